@@ -1,0 +1,56 @@
+# Every target that needs Python sets up .venv by itself; PYTHON chooses the interpreter (3.11 or newer).
+PYTHON  ?= python3
+VENV    ?= .venv
+BIN     := $(VENV)/bin
+RESULTS ?= results
+BUDGET  ?=
+JOBS    ?=
+ONLY    ?=
+STAMP   := $(VENV)/.installed
+# The CPU build: a tagged wheel where one is at hand, else from PyTorch's own index. Never the CUDA packages.
+TORCH   := torch==2.13.0
+
+.DEFAULT_GOAL := help
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench precompute clean
+
+help: ## list the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-14s %s\n", $$1, $$2}'
+	@echo "  variables: BUDGET=10m (time for a sweep; none: until done)  JOBS=2  RESULTS=results  ONLY=name (one figure)"
+
+setup: $(STAMP) ## virtual environment in .venv with everything but CUDA (does nothing when it is up to date)
+
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "bns needs Python 3.11 or newer; this is %d.%d. Try: make PYTHON=python3.12" % sys.version_info[:2])'
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -c 'import torch' 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check "$(TORCH)+cpu" 2>/dev/null \
+		|| $(BIN)/pip install --disable-pip-version-check --index-url https://download.pytorch.org/whl/cpu "$(TORCH)"
+	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,lint,bench]'
+	@touch $@
+
+test: setup ## all tests
+	$(BIN)/python -m pytest -n 2 --dist worksteal -q
+
+lint: setup ## style and types
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+clean: ## remove the virtual environment and caches (never the results)
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build *.egg-info
+	find . -name __pycache__ -prune -exec rm -rf {} +
+
+SWEEP = $(BIN)/bns sweep $(if $(BUDGET),--budget $(BUDGET)) $(if $(JOBS),--jobs $(JOBS)) --results $(RESULTS)
+
+sweep-khepera: setup ## the Khepera study: prototype trials, small slice, all 45,000 runs; BUDGET=10m stops in time
+	$(SWEEP) sweeps/prototype.yaml sweeps/khepera-small.yaml sweeps/khepera.yaml
+
+sweep-budget: setup ## how much evolution and training an evaluation should get
+	$(SWEEP) sweeps/budget.yaml
+
+figures: setup ## figures from whatever results there are, into results/figures; ONLY=success-by-mutation for one
+	$(BIN)/python -m analysis --results $(RESULTS) $(if $(ONLY),--only $(ONLY))
+
+bench: setup ## speed, as ratios against named peers measured in the same run
+	$(BIN)/python -m tests.bench --json $(RESULTS)/bench.json
+
+precompute: setup ## rebuild the static simulator that ships in the package
+	$(BIN)/bns precompute --robot khepera

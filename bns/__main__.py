@@ -1,0 +1,7 @@
+"""`python -m bns`."""
+
+import sys
+
+from bns.cli import main
+
+sys.exit(main())

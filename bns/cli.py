@@ -1,0 +1,221 @@
+"""The command line: one short function a command, which parses, calls and prints."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from bns import __version__
+from bns.errors import BnsError, SpecError
+from bns.spec import FIELDS, RunSpec, checked, field_type
+
+SWEEP_OF_SINGLE_RUNS = "by-hand"
+_INTERRUPTED, _TERMINATED = 130, 143
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of ``bns``. Exit codes: 0 done, 2 bad input, 130 interrupted, 143 terminated."""
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.command(options))
+    except BnsError as error:
+        print(f"bns: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("bns: interrupted", file=sys.stderr)
+        return _INTERRUPTED
+    except BrokenPipeError:  # the reader of our output, `head` say, has what it wants
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="bns", description="Bootstrapped Neuro-Simulation: runs, sweeps and their results."
+    )
+    parser.add_argument("--version", action="version", version=f"bns {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    def command(name: str, function: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        added = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+        added.set_defaults(command=function)
+        return added
+
+    one = command("run", run, "carry out one run and draw its path")
+    _add_spec_options(one)
+    one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
+    many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
+    many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
+    many.add_argument(
+        "--jobs",
+        type=_positive,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="worker processes (default: one a core)",
+    )
+    many.add_argument(
+        "--budget", type=_duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
+    )
+    many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
+    many.add_argument(
+        "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
+    )
+    status_ = command("status", status, "how far the sweeps in a store are")
+    ask = command("query", query, "answer an SQL query over evals, runs, specs, paths, generations, probes (DuckDB)")
+    ask.add_argument("sql", metavar="SELECT ...")
+    ask.add_argument("--csv", action="store_true", help="bare rows, no header")
+    small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
+    ready = command("precompute", precompute, "train the static simulator of a robot and write it")
+    ready.add_argument("--robot", default="khepera")
+    ready.add_argument("-o", "--output", type=Path, metavar="FILE", help="where (default: into the package)")
+    for with_results in (one, many, status_, ask, small):
+        with_results.add_argument(
+            "--results",
+            type=Path,
+            default=Path("results"),
+            metavar="DIR",
+            help="folder of all results (default: results)",
+        )
+    return parser
+
+
+def _add_spec_options(parser: argparse.ArgumentParser) -> None:
+    """One option a parameter, named and explained as in `RunSpec`."""
+    for name, field in FIELDS.items():
+        allowed = field.metadata["choices"]
+        text = field.metadata["help"] + (f": {', '.join(allowed)}" if allowed else "")
+        parser.add_argument(
+            "--" + name.replace("_", "-"),
+            type=_of_parameter(name),
+            default=field.default,
+            metavar={int: "N", float: "SHARE", str: "NAME"}[field_type(name)],
+            help=f"{text} (default: {field.default})",
+        )
+
+
+def _of_parameter(name: str) -> Callable[[str], object]:
+    def convert(text: str) -> object:
+        kind = field_type(name)
+        try:
+            value = text if kind is str else float(text)
+        except ValueError:
+            value = text
+        try:
+            return checked(name, value)
+        except SpecError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return convert
+
+
+def _positive(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
+    return int(text)
+
+
+def _duration(text: str) -> float:
+    """Seconds of ``90``, ``90s``, ``10m``, ``1h30m``."""
+    match = re.fullmatch(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?", text)
+    if not text or match is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time; write 90s, 10m or 1h30m")
+    hours, minutes, seconds = (float(part or 0) for part in match.groups())
+    return 3600 * hours + 60 * minutes + seconds
+
+
+def run(options: argparse.Namespace) -> int:
+    """One run by hand: live view, rows in the store, figure of the path."""
+    from bns.single import run_by_hand
+
+    spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
+    print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn))
+    return 0
+
+
+def sweep(options: argparse.Namespace) -> int:
+    """Runs of sweep files, one file after the other, on one budget."""
+    from bns.sweep.budget import Budget
+    from bns.sweep.grid import load_sweep
+    from bns.sweep.plan import plan
+    from bns.sweep.progress import SweepProgress
+    from bns.sweep.report import planned, summed_up
+    from bns.sweep.runner import run_sweep
+
+    sweeps = [load_sweep(file) for file in options.files]
+    if options.dry_run:
+        for one in sweeps:
+            print(planned(plan(one, options.results, options.jobs, retry_failed=options.retry_failed), options.jobs))
+        return 0
+    budget = Budget(options.budget)
+    with SweepProgress() as bar:
+        for one in sweeps:
+            summary = run_sweep(
+                one,
+                options.results,
+                jobs=options.jobs,
+                budget=budget,
+                retry_failed=options.retry_failed,
+                on_progress=bar,
+            )
+            print(summed_up(summary, options.results), file=sys.stderr)
+            if summary.stopped_by in {"interrupt", "terminated"}:
+                return _INTERRUPTED if summary.stopped_by == "interrupt" else _TERMINATED
+    return 0
+
+
+def status(options: argparse.Namespace) -> int:
+    """A table of the sweeps."""
+    from bns.sweep.report import status_table
+    from bns.sweep.status import sweep_status
+
+    print(status_table(sweep_status(options.results)))
+    return 0
+
+
+def query(options: argparse.Namespace) -> int:
+    """Rows of a query, as a table or as CSV."""
+    from bns.store import query as answer
+
+    rows = answer(options.results, options.sql)
+    if options.csv:
+        sys.stdout.write(rows.to_csv(index=False, header=False))
+    else:
+        print(rows.to_string(index=False, max_rows=100) if len(rows) else "no rows")
+    sys.stdout.flush()
+    return 0
+
+
+def compact(options: argparse.Namespace) -> int:
+    """Merge small files."""
+    from bns.store import compact as merge
+
+    print(merge(options.results))
+    return 0
+
+
+def precompute(options: argparse.Namespace) -> int:
+    """The static simulator, from random commands in the physics world."""
+    from bns.precompute import describe
+    from bns.precompute import precompute as train
+    from bns.robots import load_robot
+    from bns.robots.simulator import save_simulator, static_path
+    from bns.single import counting
+    from bns.worlds import build_world
+
+    robot = load_robot(options.robot)
+    began, path = time.perf_counter(), options.output or static_path(robot.name)
+    with counting(f"training the static simulator of {robot.name}") as progress:
+        simulator = train(robot, build_world("physics", robot), progress=progress)
+    save_simulator(simulator, path)
+    print(describe(simulator))
+    print(f"written to {path} in {time.perf_counter() - began:.0f} s")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Numbers only: compiled kernels over arrays. `reference` holds their slow twins."""

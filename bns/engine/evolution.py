@@ -1,0 +1,234 @@
+"""The genetic algorithm over command lists of varying length: ranking, tournaments, crossover, mutation, diversity.
+
+A population is `commands` (n, longest, 3) float32 in device units and `lengths` (n,) int32. Fitness is larger for better,
+and 0 where the arithmetic failed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bns.engine.jit import exact, fast, inline
+from bns.engine.philox import Key, Purpose, philox, uniforms, words
+
+IDENTICAL_CUT = 0.8
+"""Probability that both parents are cut at the same place (section 4.3)."""
+_UNIT = 2.0**-32
+
+
+@dataclass
+class Population:
+    """Controllers side by side: commands (n, longest, components) float32, lengths (n,) int32."""
+
+    commands: np.ndarray
+    lengths: np.ndarray
+
+    def controller(self, index: int) -> np.ndarray:
+        """The commands of one controller, (length, components), a copy."""
+        return self.commands[index, : self.lengths[index]].copy()
+
+    def __len__(self) -> int:
+        return len(self.lengths)
+
+
+@dataclass(frozen=True)
+class CommandBounds:
+    """What a command's components may be and how far a mutation moves them, each (components,) float32."""
+
+    low: np.ndarray
+    high: np.ndarray
+    mutation_span: np.ndarray
+
+
+def random_population(
+    key: Key, n: int, shortest: int, longest: int, capacity: int, bounds: CommandBounds
+) -> Population:
+    """Uniform lengths shortest..longest and uniform commands; lists are cut at capacity."""
+    draws = words(key, Purpose.INITIAL_LENGTH, 0, n, 1)[:, 0, 0].astype(np.uint64)
+    lengths = shortest + (draws * np.uint64(longest - shortest + 1) >> np.uint64(32)).astype(np.int32)
+    width = len(bounds.low)
+    u = uniforms(key, Purpose.INITIAL_COMMAND, 0, n, min(longest, capacity))[..., :width]
+    commands = np.zeros((n, capacity, width), np.float32)
+    commands[:, : u.shape[1]] = bounds.low + u * (bounds.high - bounds.low)
+    return Population(commands, np.minimum(lengths, capacity).astype(np.int32))
+
+
+def tournament_cdf(n: int, share: float) -> np.ndarray:
+    """P(rank of the winner <= r), r = 0..n-1, for a tournament among distinct members of a ranked population.
+
+    One draw through this table is one tournament, whatever its size. The size is share * n, rounded, at least 1.
+    """
+    k = min(n, max(1, int(share * n + 0.5)))
+    r = np.arange(n)
+    left = np.maximum(n - 1.0 - r[:, None] - np.arange(k)[None, :], 0.0)  # members ranked behind r, as k are drawn
+    return 1.0 - np.prod(left / (n - np.arange(k))[None, :], axis=1)
+
+
+def rank(fitness: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Indices from best to worst; among equals the shorter list first; NaN and 0 come last. int64 (n,).
+
+    The tie-break keeps commands behind the last goal, which cannot change the fitness, from piling up.
+    """
+    return np.lexsort((lengths, -np.nan_to_num(fitness, nan=0.0, neginf=0.0)))
+
+
+def pick(key: Key, purpose: Purpose, step: int, order: np.ndarray, cdf: np.ndarray) -> int:
+    """The winner of one tournament."""
+    u = words(key, purpose, step, 1, 1)[0, 0, 0] * _UNIT
+    return int(order[np.searchsorted(cdf, u, side="right")])
+
+
+@inline
+def _winner(order: Any, cdf: Any, word: Any) -> Any:
+    return order[min(np.searchsorted(cdf, word * _UNIT, side="right"), order.size - 1)]
+
+
+@inline
+def _below(word: Any, n: Any) -> Any:
+    """Uniform whole number 0..n-1."""
+    return np.int64(np.uint64(word) * np.uint64(n) >> np.uint64(32))
+
+
+@exact
+def _cross(child, child_length, commands, lengths, front, back, cut_front, cut_back, shortest):  # type: ignore[no-untyped-def]  # compiled
+    """First cut_front commands of one parent, then the other parent's from cut_back on; 1 if it had to be cut short."""
+    length = cut_front + lengths[back] - cut_back
+    if length < shortest:  # too short a list is not made: the parent passes unchanged
+        cut_front, cut_back, length = 0, 0, lengths[back]
+    kept = min(length, commands.shape[1])
+    for j in range(min(cut_front, kept)):
+        for c in range(3):
+            child[j, c] = commands[front, j, c]
+    for j in range(cut_front, kept):
+        for c in range(3):
+            child[j, c] = commands[back, j - cut_front + cut_back, c]
+    child_length[0] = kept
+    return 1 if kept < length else 0
+
+
+@fast
+def _mutation_words(slot, individual, count, step, k0, k1, out):  # type: ignore[no-untyped-def]  # compiled
+    """One block of draws a command, for all commands of all children at once, so that the generator vectorises."""
+    first, second, third = out[0], out[1], out[2]
+    for m in range(count):
+        draws = philox(slot[m], individual[m], step, np.uint32(Purpose.MUTATION), k0, k1)
+        first[m] = draws[0]
+        second[m] = draws[1]
+        third[m] = draws[2]
+
+
+@exact
+def _mutate(children, lengths, rate, low, high, span, step, k0, k1):  # type: ignore[no-untyped-def]  # compiled
+    """Mutate all controllers but the first, which is the elite."""
+    total = 0
+    for i in range(1, lengths.size):
+        total += lengths[i]
+    slot, individual = np.empty(total, np.uint32), np.empty(total, np.uint32)
+    m = 0
+    for i in range(1, lengths.size):
+        for j in range(lengths[i]):
+            slot[m], individual[m] = j, i
+            m += 1
+    draws = np.empty((3, total), np.uint32)
+    _mutation_words(slot, individual, total, step, k0, k1, draws)
+    threshold = rate / _UNIT
+    for c in range(3):
+        for m in range(total):
+            word = np.float64(draws[c, m])
+            if word < threshold:
+                # Given that it fell below the threshold, the draw is uniform there: it serves twice.
+                i, j = individual[m], slot[m]
+                value = children[i, j, c] + np.float32((2.0 * word / threshold - 1.0) * span[c])
+                children[i, j, c] = min(max(value, low[c]), high[c])
+
+
+@exact
+def breed_into(commands, lengths, order, cdf, rate, low, high, span, shortest, step, k0, k1, children, child_lengths):  # type: ignore[no-untyped-def]  # compiled
+    """Fill children with the best controller and the offspring of tournament winners; count those cut at the bound."""
+    hits = 0
+    n = commands.shape[0]
+    best = order[0]
+    children[0, : lengths[best]] = commands[best, : lengths[best]]
+    child_lengths[0] = lengths[best]
+    for pair in range(n // 2):
+        first = 1 + 2 * pair
+        parents = philox(np.uint32(0), np.uint32(pair), step, np.uint32(Purpose.PARENTS), k0, k1)
+        cuts = philox(np.uint32(0), np.uint32(pair), step, np.uint32(Purpose.CUTS), k0, k1)
+        a, b = _winner(order, cdf, parents[0]), _winner(order, cdf, parents[1])
+        cut_a = _below(cuts[1], min(lengths[a], lengths[b]) + 1)
+        cut_b = cut_a
+        if cuts[0] * _UNIT >= IDENTICAL_CUT:
+            cut_a = _below(cuts[1], lengths[a] + 1)
+            cut_b = _below(cuts[2], lengths[b] + 1)
+        hits += _cross(children[first], child_lengths[first:], commands, lengths, a, b, cut_a, cut_b, shortest)
+        if first + 1 < n:
+            hits += _cross(
+                children[first + 1], child_lengths[first + 1 :], commands, lengths, b, a, cut_b, cut_a, shortest
+            )
+    _mutate(children, child_lengths, rate, low, high, span, step, k0, k1)
+    return hits
+
+
+def breed(
+    key: Key,
+    parents: Population,
+    order: np.ndarray,
+    cdf: np.ndarray,
+    rate: float,
+    bounds: CommandBounds,
+    shortest: int,
+    generation: int,
+    children: Population,
+) -> int:
+    """One generation into `children` (same shapes as parents); how many children were cut at the longest list allowed.
+
+    Elitism: the best controller goes on unchanged. Two-parent crossover swaps the first segments; the cut is the same in
+    80 % and independent in 20 % of the pairs. Every component mutates with probability `rate`, uniformly within its
+    span, and stays within its bounds (section 4.3).
+    """
+    return int(
+        breed_into(
+            parents.commands,
+            parents.lengths,
+            order,
+            cdf,
+            rate,
+            bounds.low,
+            bounds.high,
+            bounds.mutation_span,
+            shortest,
+            np.uint32(generation),
+            *key.words,
+            children.commands,
+            children.lengths,
+        )
+    )
+
+
+@exact
+def _diversity(commands, lengths, low, high):  # type: ignore[no-untyped-def]  # compiled
+    n, longest, width = commands.shape
+    total = 0.0
+    for c in range(width):
+        scale = 1.0 / (high[c] - low[c])
+        for j in range(longest):
+            members, mean = 0, 0.0
+            for i in range(n):
+                if lengths[i] > j:
+                    members += 1
+                    mean += commands[i, j, c]
+            if members == 0:
+                break
+            mean /= members
+            for i in range(n):
+                if lengths[i] > j:
+                    total += abs(commands[i, j, c] - mean) * scale
+    return total / n
+
+
+def diversity(population: Population, bounds: CommandBounds) -> float:
+    """Equation 4.1, commands normalised to their range: mean over controllers of the summed distances from the mean command."""
+    return float(_diversity(population.commands, population.lengths, bounds.low, bounds.high))

@@ -1,0 +1,185 @@
+"""Resilient backpropagation over all patterns at once (Riedmiller and Braun 1993), compiled.
+
+Two variants: ``rprop+`` takes the last change back when a gradient changes sign (what the original's library does by
+default), ``irprop-`` forgets the gradient instead (what torch.optim.Rprop does).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bns.engine.jit import exact, fast, inline
+from bns.engine.snn import BLOCK, GROUP, PER_NEURON, forward4, hidden_count
+
+INITIAL_STEP, LARGEST_STEP, SMALLEST_STEP = 0.1, 50.0, 1e-6
+GROW, SHRINK = 1.2, 0.5
+_F = np.float32
+_GROW, _SHRINK, _LARGEST, _SMALLEST, _ZERO = _F(GROW), _F(SHRINK), _F(LARGEST_STEP), _F(SMALLEST_STEP), _F(0)
+
+
+@dataclass
+class Rprop:
+    """Weights under training and what the rule remembers, each (networks, W) float32."""
+
+    weights: np.ndarray
+    step: np.ndarray
+    last_gradient: np.ndarray
+    last_change: np.ndarray
+    backtrack: bool
+
+    @classmethod
+    def start(cls, weights: np.ndarray, algorithm: str) -> Rprop:
+        """Begin with these networks; algorithm is ``rprop+`` or ``irprop-``."""
+        weights = weights.astype(np.float32)
+        return cls(
+            weights,
+            np.full_like(weights, INITIAL_STEP),
+            np.zeros_like(weights),
+            np.zeros_like(weights),
+            algorithm == "rprop+",
+        )
+
+    def train(self, X: np.ndarray, targets: np.ndarray, count: int, iterations: int) -> None:
+        """Train every network on its row of targets (networks, >= count) for inputs X (5, >= count)."""
+        if count == 0:
+            return
+        for net in range(len(self.weights)):
+            train_network(
+                self.weights[net],
+                self.step[net],
+                self.last_gradient[net],
+                self.last_change[net],
+                X,
+                targets[net],
+                count,
+                iterations,
+                self.backtrack,
+            )
+
+    def restart(self, net: int, weights: np.ndarray) -> None:
+        """Begin one network anew, after its arithmetic has failed."""
+        self.weights[net] = weights
+        self.step[net] = INITIAL_STEP
+        self.last_gradient[net] = 0
+        self.last_change[net] = 0
+
+
+@inline
+def _share(g: Any, d: Any, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any) -> Any:
+    return g[0] + d * x0, g[1] + d * x1, g[2] + d * x2, g[3] + d * x3, g[4] + d * x4, g[5] + d
+
+
+@inline
+def _write(gradient: Any, w: Any, k: Any, g: Any, to_output: Any) -> None:
+    v = w[k + 6]
+    gradient[k] += v * g[0]
+    gradient[k + 1] += v * g[1]
+    gradient[k + 2] += v * g[2]
+    gradient[k + 3] += v * g[3]
+    gradient[k + 4] += v * g[4]
+    gradient[k + 5] += v * g[5]
+    gradient[k + 6] += to_output
+
+
+@fast
+def _backward4(X, w, first, hidden_out, error, gradient, a, b):  # type: ignore[no-untyped-def]  # compiled
+    x0, x1, x2, x3, x4 = X[0, a:b], X[1, a:b], X[2, a:b], X[3, a:b], X[4, a:b]
+    h0, h1 = hidden_out[first, : b - a], hidden_out[first + 1, : b - a]
+    h2, h3 = hidden_out[first + 2, : b - a], hidden_out[first + 3, : b - a]
+    zero = _ZERO
+    g0 = g1 = g2 = g3 = (zero, zero, zero, zero, zero, zero)
+    o0 = o1 = o2 = o3 = zero
+    for p in range(error.size):
+        e, v0, v1, v2, v3, v4 = error[p], x0[p], x1[p], x2[p], x3[p], x4[p]
+        e0, e1, e2, e3 = e * h0[p], e * h1[p], e * h2[p], e * h3[p]
+        o0 += e0
+        o1 += e1
+        o2 += e2
+        o3 += e3
+        g0 = _share(g0, e0 - e0 * h0[p], v0, v1, v2, v3, v4)
+        g1 = _share(g1, e1 - e1 * h1[p], v0, v1, v2, v3, v4)
+        g2 = _share(g2, e2 - e2 * h2[p], v0, v1, v2, v3, v4)
+        g3 = _share(g3, e3 - e3 * h3[p], v0, v1, v2, v3, v4)
+    k = first * PER_NEURON
+    _write(gradient, w, k, g0, o0)
+    _write(gradient, w, k + PER_NEURON, g1, o1)
+    _write(gradient, w, k + 2 * PER_NEURON, g2, o2)
+    _write(gradient, w, k + 3 * PER_NEURON, g3, o3)
+
+
+@fast
+def _residuals(out, target, bias, error):  # type: ignore[no-untyped-def]  # compiled
+    total = _ZERO
+    for p in range(out.size):
+        e = out[p] + bias - target[p]
+        error[p] = e
+        total += e
+    return total
+
+
+@fast
+def gradient_into(w, X, target, n, gradient, hidden_out, out, error):  # type: ignore[no-untyped-def]  # compiled
+    """Gradient of half the summed squared error over patterns 0..n, into gradient (W,)."""
+    hidden = (w.size - 1) // PER_NEURON
+    gradient[:] = _ZERO
+    block = -(-n // -(-n // BLOCK))
+    for a in range(0, n, block):
+        b = min(a + block, n)
+        o, e = out[: b - a], error[: b - a]
+        o[:] = _ZERO
+        for first in range(0, hidden, GROUP):
+            forward4(X, w, first, hidden_out, o, a, b)
+        gradient[w.size - 1] += _residuals(o, target[a:b], w[w.size - 1], e)
+        for first in range(0, hidden, GROUP):
+            _backward4(X, w, first, hidden_out, e, gradient, a, b)
+
+
+@exact
+def _update(w, step, last_gradient, last_change, gradient, backtrack):  # type: ignore[no-untyped-def]  # compiled
+    for i in range(w.size):
+        g = gradient[i]
+        agreement = g * last_gradient[i]
+        if agreement < _ZERO:
+            step[i] = max(step[i] * _SHRINK, _SMALLEST)
+            if backtrack:
+                last_change[i] = -last_change[i]
+                w[i] += last_change[i]
+            last_gradient[i] = _ZERO
+            continue
+        if agreement > _ZERO:
+            step[i] = min(step[i] * _GROW, _LARGEST)
+        last_change[i] = -np.sign(g) * step[i]
+        w[i] += last_change[i]
+        last_gradient[i] = g
+
+
+@exact
+def train_network(w, step, last_gradient, last_change, X, target, n, iterations, backtrack):  # type: ignore[no-untyped-def]  # compiled
+    """Iterate one network in place; all arrays float32, the first four (W,), X (5, >= n), target (>= n,)."""
+    hidden_out = np.empty(((w.size - 1) // PER_NEURON, BLOCK), np.float32)
+    out = np.empty(BLOCK, np.float32)
+    error = np.empty(BLOCK, np.float32)
+    gradient = np.empty(w.size, np.float32)
+    for _ in range(iterations):
+        gradient_into(w, X, target, n, gradient, hidden_out, out, error)
+        _update(w, step, last_gradient, last_change, gradient, backtrack)
+
+
+def gradient(weights: np.ndarray, X: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Gradient (W,) of one network: half the summed squared error over X (5, n) and target (n,)."""
+    hidden = hidden_count(weights.size)
+    result = np.empty(weights.size, np.float32)
+    gradient_into(
+        weights,
+        X,
+        target,
+        X.shape[1],
+        result,
+        np.empty((hidden, BLOCK), np.float32),
+        np.empty(BLOCK, np.float32),
+        np.empty(BLOCK, np.float32),
+    )
+    return result

@@ -1,0 +1,122 @@
+"""Simulator neural networks as flat arrays of weights, and the kernel that reads them.
+
+A network has 5 inputs, H sigmoid hidden neurons and one linear output (figure 4.3). Its weights are one float32 row:
+for each hidden neuron the five input weights, its bias and its weight to the output, and at the end the output's bias.
+H is a multiple of four, because the kernels take four hidden neurons at a time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bns.engine.jit import fast, inline
+from bns.engine.philox import Key, Purpose, uniforms
+
+INPUTS = 5
+PER_NEURON = INPUTS + 2
+GROUP = 4
+BLOCK = 512
+"""Patterns handled at once, so that the hidden activations stay in the first-level cache."""
+
+_F = np.float32
+
+
+def weight_count(hidden: int) -> int:
+    """Length of a network's row of weights."""
+    return hidden * PER_NEURON + 1
+
+
+def hidden_count(weights: int) -> int:
+    """Hidden neurons of a network with so many weights."""
+    return (weights - 1) // PER_NEURON
+
+
+def initial_weights(key: Key, networks: int, hidden: int) -> np.ndarray:
+    """Untrained networks: uniform in [-1, 1], shape (networks, weights), float32."""
+    count = weight_count(hidden)
+    draws = uniforms(key, Purpose.WEIGHTS, 0, networks, -(-count // 4)).reshape(networks, -1)
+    return (2.0 * draws[:, :count] - 1.0).astype(np.float32)
+
+
+@inline
+def sigmoid(x: Any) -> Any:
+    """Logistic function to 2e-7, without a branch and without exp, so that it vectorises.
+
+    1/2 + tanh(x/2)/2 with the rational approximation of tanh that Eigen uses (degree 13 over 6, saturated at 7.9).
+    """
+    h = _F(0.5) * x
+    h = _F(7.9) if h > _F(7.9) else h
+    h = _F(-7.9) if h < _F(-7.9) else h
+    s = h * h
+    p = _F(-2.76076847742355e-16) * s + _F(2.00018790482477e-13)
+    p = p * s + _F(-8.60467152213735e-11)
+    p = p * s + _F(5.12229709037114e-08)
+    p = p * s + _F(1.48572235717979e-05)
+    p = p * s + _F(6.37261928875436e-04)
+    p = p * s + _F(4.89352455891786e-03)
+    q = _F(1.19825839466702e-06) * s + _F(1.18534705686654e-04)
+    q = q * s + _F(2.26843463243900e-03)
+    q = q * s + _F(4.89352518554385e-03)
+    return _F(0.5) + _F(0.5) * (h * p / q)
+
+
+@inline
+def neuron(w: Any, k: Any) -> Any:
+    """Weights of the hidden neuron that begins at k, as a tuple: they stay in registers."""
+    return w[k], w[k + 1], w[k + 2], w[k + 3], w[k + 4], w[k + 5], w[k + 6]
+
+
+@inline
+def activation(n: Any, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any) -> Any:
+    """Output of a hidden neuron."""
+    return sigmoid(n[5] + n[0] * x0 + n[1] * x1 + n[2] * x2 + n[3] * x3 + n[4] * x4)
+
+
+@fast
+def forward4(X, w, first, hidden_out, out, a, b):  # type: ignore[no-untyped-def]  # compiled
+    """Add four hidden neurons' share to the output of patterns a..b; keep their activations."""
+    x0, x1, x2, x3, x4 = X[0, a:b], X[1, a:b], X[2, a:b], X[3, a:b], X[4, a:b]
+    h0, h1 = hidden_out[first, : b - a], hidden_out[first + 1, : b - a]
+    h2, h3 = hidden_out[first + 2, : b - a], hidden_out[first + 3, : b - a]
+    k = first * PER_NEURON
+    n0, n1 = neuron(w, k), neuron(w, k + PER_NEURON)
+    n2, n3 = neuron(w, k + 2 * PER_NEURON), neuron(w, k + 3 * PER_NEURON)
+    for p in range(out.size):
+        v0, v1, v2, v3, v4 = x0[p], x1[p], x2[p], x3[p], x4[p]
+        s0 = activation(n0, v0, v1, v2, v3, v4)
+        s1 = activation(n1, v0, v1, v2, v3, v4)
+        s2 = activation(n2, v0, v1, v2, v3, v4)
+        s3 = activation(n3, v0, v1, v2, v3, v4)
+        h0[p] = s0
+        h1[p] = s1
+        h2[p] = s2
+        h3[p] = s3
+        out[p] += n0[6] * s0 + n1[6] * s1 + n2[6] * s2 + n3[6] * s3
+
+
+@fast
+def predict_into(weights, X, n, out, scratch):  # type: ignore[no-untyped-def]  # compiled
+    """Outputs of several networks for the first n columns of X.
+
+    weights (networks, W), X (5, >= n), out (networks, >= n), scratch (H, BLOCK): float32.
+    """
+    hidden = (weights.shape[1] - 1) // PER_NEURON
+    for net in range(weights.shape[0]):
+        w = weights[net]
+        for a in range(0, n, BLOCK):
+            b = min(a + BLOCK, n)
+            o = out[net, a:b]
+            o[:] = w[w.size - 1]
+            for first in range(0, hidden, GROUP):
+                forward4(X, w, first, scratch, o, a, b)
+
+
+def predict(weights: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """Outputs (networks, n) of networks (networks, W) for inputs X (5, n); all float32."""
+    n = X.shape[1]
+    out = np.empty((weights.shape[0], n), np.float32)
+    scratch = np.empty((hidden_count(weights.shape[1]), BLOCK), np.float32)
+    predict_into(weights, np.ascontiguousarray(X, np.float32), n, out, scratch)
+    return out

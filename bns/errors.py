@@ -1,0 +1,32 @@
+"""The errors a user can cause or meet. Every message names what was given, what is allowed, what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class BnsError(Exception):
+    """A fault that has an explanation: the command line prints it without a traceback and exits with 2."""
+
+    exit_code = 2
+
+
+class SpecError(BnsError):
+    """A run or sweep that cannot be carried out as written."""
+
+
+class StoreError(BnsError):
+    """Results that cannot be read, written or understood."""
+
+
+class ModelError(BnsError):
+    """A robot model, network file or table of measurements that cannot be used."""
+
+
+def unknown_name(kind: str, given: object, valid: Iterable[str]) -> str:
+    """Say that ``given`` is no ``kind``, which one was probably meant, and list the valid names."""
+    names = sorted(valid)
+    near = get_close_matches(str(given), names, n=1, cutoff=0.5)
+    hint = f" Did you mean {near[0]!r}?" if near else ""
+    return f"unknown {kind} {given!r}.{hint} Valid: {', '.join(names)}."

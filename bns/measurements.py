@@ -1,0 +1,62 @@
+"""The table of what was commanded and where the robot was; simulated or real, never told apart.
+
+One row a tracked pose. The command columns hold what is in force from this row's time on, and are empty where
+no command is. Further columns are kept.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from bns.errors import ModelError
+
+COMMANDS = ("left_m_s", "right_m_s")
+POSE = ("x_m", "y_m", "heading_rad")
+COLUMNS = ("trial", "t_s", *COMMANDS, *POSE)
+"""trial: number; t_s: since the trial began; wheel-surface speeds; heading counter-clockwise from x."""
+
+
+def trial_table(trial: int, commands: ArrayLike, poses: ArrayLike) -> pd.DataFrame:
+    """Rows of one trial with the columns `COLUMNS`.
+
+    ``commands`` (n, 3): left_m_s, right_m_s, duration_s, back to back. ``poses`` (n + 1, 3): x_m, y_m,
+    heading_rad at the start and at the end of every command. ModelError if the shapes do not fit.
+    """
+    given, tracked = np.asarray(commands, dtype=np.float64), np.asarray(poses, dtype=np.float64)
+    if given.ndim != 2 or given.shape[1] != 3 or tracked.shape != (len(given) + 1, 3):
+        raise ModelError(
+            f"trial {trial}: commands have the shape {given.shape} and poses {tracked.shape}; "
+            "give (n, 3) commands and (n + 1, 3) poses, the first at the start."
+        )
+    speeds = np.vstack([given[:, :2], [[np.nan, np.nan]]])
+    times = np.concatenate([[0.0], np.cumsum(given[:, 2])])
+    numbers = np.column_stack([times, speeds, tracked])
+    table = pd.DataFrame(numbers, columns=list(COLUMNS[1:]))
+    table.insert(0, "trial", trial)
+    return table
+
+
+def write_measurements(table: pd.DataFrame, path: str | Path) -> None:
+    """Write a table as .csv or .parquet; a reader never meets half a file.
+
+    ModelError if a column is missing or the name ends otherwise.
+    """
+    path = Path(path)
+    missing = [name for name in COLUMNS if name not in table.columns]
+    if missing:
+        raise ModelError(
+            f"A table of measurements for {path} lacks {', '.join(missing)}; it needs {', '.join(COLUMNS)}."
+        )
+    if path.suffix not in {".csv", ".parquet"}:
+        raise ModelError(f"Measurements cannot be written to {path}; let the name end in .csv or .parquet.")
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    if path.suffix == ".csv":
+        table.to_csv(unfinished, index=False)
+    else:
+        table.to_parquet(unfinished, index=False)
+    unfinished.replace(path)

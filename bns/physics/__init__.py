@@ -1,0 +1,1 @@
+"""Differential drive with named physical effects, one file each in `effects`."""

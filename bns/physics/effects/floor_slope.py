@@ -1,0 +1,24 @@
+"""A sloping floor draws the driving robot downhill."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Flow
+
+
+def apply(flow: Flow, x_m_s: float, y_m_s: float) -> Flow:
+    """A constant velocity in the world's frame while the wheels turn."""
+    return replace(flow, x_m_s=flow.x_m_s + x_m_s, y_m_s=flow.y_m_s + y_m_s)
+
+
+EFFECT = Effect(
+    name="floor-slope", stage="world",
+    parameters=(Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.02, 0.02), 0.0, "drift to the east"),
+                Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.02, 0.02), 0.0, "drift to the north")),
+    equation="dx/dt += sx, dy/dt += sy while moving",
+    residuals="Positions are off in one direction of the room, whatever the heading, in proportion "
+              "to the time driven.",
+    lookalikes=("tether-pull",),
+    apply=apply)

@@ -1,0 +1,29 @@
+"""The tracked point is not above the middle of the axle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import View
+
+
+def apply(view: View, forward_m: float, left_m: float) -> View:
+    """Positions moved by the offset, turned with the robot; headings as they are."""
+    cos, sin = np.cos(view.poses[..., 2]), np.sin(view.poses[..., 2])
+    poses = view.poses.copy()
+    poses[..., 0] += cos * forward_m - sin * left_m
+    poses[..., 1] += sin * forward_m + cos * left_m
+    return View(poses)
+
+
+EFFECT = Effect(
+    name="marker-offset", stage="measure",
+    parameters=(Parameter("forward_m", "m", -1.0, 1.0, (-0.05, 0.05), 0.0,
+                          "marker ahead of the axle's middle"),
+                Parameter("left_m", "m", -1.0, 1.0, (-0.05, 0.05), 0.0,
+                          "marker to the left of the axle's middle")),
+    equation="x' = x + f·cos(theta) - s·sin(theta), y' = y + f·sin(theta) + s·cos(theta)",
+    residuals="Turns on the spot move the robot on a circle; straight commands fit.",
+    lookalikes=("side-slip", "turn-slip"),
+    apply=apply)

@@ -1,0 +1,24 @@
+"""The robot is carried outwards in a curve."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Body
+
+
+def apply(body: Body, slip_s: float) -> Body:
+    """Sideways velocity slip·v·omega: to the right in a left turn, and outwards always."""
+    return replace(body, sideways_m_s=body.sideways_m_s + slip_s * body.forward_m_s * body.yaw_rad_s)
+
+
+EFFECT = Effect(
+    name="side-slip", stage="body",
+    parameters=(Parameter("slip_s", "s", 0.0, 1.0, (0.0, 0.05), 0.0,
+                          "sideways velocity per centripetal acceleration v·omega"),),
+    equation="s' = s + k·v·omega, s the velocity to the right",
+    residuals="The path lies outside the commanded arc, more so the faster and sharper it is; "
+              "headings fit.",
+    lookalikes=("turn-slip", "marker-offset"),
+    apply=apply)

@@ -1,0 +1,27 @@
+"""A turning robot drives slower than its wheels say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Body
+
+
+def apply(body: Body, slip_s: float) -> Body:
+    """Forward speed times 1 - slip·|omega|, never turned round."""
+    kept = np.maximum(1.0 - slip_s * np.abs(body.yaw_rad_s), 0.0)
+    return replace(body, forward_m_s=body.forward_m_s * kept)
+
+
+EFFECT = Effect(
+    name="turn-slip", stage="body",
+    parameters=(Parameter("slip_s", "s/rad", 0.0, 1.0, (0.0, 0.05), 0.0,
+                          "share of speed lost per rad/s of turning"),),
+    equation="v' = v·max(1 - k·|omega|, 0)",
+    residuals="Arcs are too short the sharper they are, left and right alike; straight commands and "
+              "headings fit.",
+    lookalikes=("speed-gain", "wheelbase", "side-slip"),
+    apply=apply)

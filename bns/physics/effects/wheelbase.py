@@ -1,0 +1,24 @@
+"""The wheels touch the floor nearer together or farther apart than the drawing says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Wheels
+
+
+def apply(wheels: Wheels, factor: float) -> Wheels:
+    """Wheelbase times ``factor``."""
+    return replace(wheels, wheelbase_m=wheels.wheelbase_m * factor)
+
+
+EFFECT = Effect(
+    name="wheelbase", stage="wheel",
+    parameters=(Parameter("factor", "1", 0.2, 5.0, (0.95, 1.2), 1.0,
+                          "effective over nominal distance of the wheels; soft tyres lie above 1"),),
+    equation="b' = e·b, so that omega = (r - l)/(e·b)",
+    residuals="Every turn is too small or too large by the same share, left and right alike; "
+              "straight commands fit.",
+    lookalikes=("turn-slip", "wheel-mismatch"),
+    apply=apply)

@@ -1,0 +1,202 @@
+"""A robot as physics sees it: a differential drive, the effects switched on, how much it jitters.
+
+Models are YAML files in which every value of an effect stands beside its reason.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from bns.errors import ModelError, unknown_name
+from bns.physics.effect import Effect, number
+from bns.physics.effects import effect_named
+
+BASES = ("differential-drive",)
+BASIS = ("measured", "published", "guess")
+"""How a value came to be known."""
+
+_TOP = ("base", "wheelbase_m", "dt_s", "jitter", "noise", "effects")
+_GROUPS: Mapping[str, tuple[str, ...]] = {
+    "jitter": ("wheel_speed_relative",), "noise": ("position_m", "heading_rad")}
+_WHY = ("basis", "reason")
+_EFFECT_KEYS = ("name", "values", *_WHY)
+
+LIMITS: Mapping[str, tuple[float, float]] = {
+    "wheelbase_m": (1e-3, 10.0),
+    "dt_s": (1e-5, 0.1),
+    "jitter_relative": (0.0, 0.5),
+    "noise_position_m": (0.0, 1.0),
+    "noise_heading_rad": (0.0, 1.0),
+}
+"""Lowest and highest allowed value of the model's own numbers."""
+
+
+@dataclass(frozen=True)
+class ActiveEffect:
+    """An effect that is switched on, its values in the order of its parameters, and where they come from."""
+
+    effect: Effect
+    values: tuple[float, ...]
+    basis: str = "guess"
+    reason: str = ""
+
+    @property
+    def by_name(self) -> dict[str, float]:
+        """Parameter name -> value."""
+        return {p.name: v for p, v in zip(self.effect.parameters, self.values, strict=True)}
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything that decides how a differential drive moves and how it is seen.
+
+    ``effects`` act stage by stage (wheel, body, world, measure), in one stage in the order of the tuple.
+    ``dt_s`` is the longest integration step. ``jitter_relative`` is the standard deviation of each wheel's
+    speed as a share of the commanded speed, drawn once a command; the noise is that of one observed pose.
+    """
+
+    wheelbase_m: float
+    effects: tuple[ActiveEffect, ...] = ()
+    dt_s: float = 0.005
+    jitter_relative: float = 0.0
+    noise_position_m: float = 0.0
+    noise_heading_rad: float = 0.0
+    base: str = "differential-drive"
+    name: str = "unnamed"
+
+    def __post_init__(self) -> None:
+        if self.base not in BASES:
+            raise ModelError(unknown_name("base", self.base, BASES))
+        for field, (low, high) in LIMITS.items():
+            value = number(f"model {self.name}: {field}", getattr(self, field), low, high)
+            object.__setattr__(self, field, value)
+        names = [active.effect.name for active in self.effects]
+        for name in names:
+            if names.count(name) > 1:
+                raise ModelError(f"model {self.name} has the effect {name!r} twice; keep one of them.")
+        for active in self.effects:
+            active.effect.checked(active.by_name)
+
+    def at(self, stage: str) -> Iterator[ActiveEffect]:
+        """The effects of one stage, in order."""
+        return (active for active in self.effects if active.effect.stage == stage)
+
+    def values_of(self, name: str) -> dict[str, float]:
+        """The values of an effect; the neutral ones if it is switched off."""
+        found = [active.by_name for active in self.effects if active.effect.name == name]
+        return found[0] if found else effect_named(name).neutral
+
+    def with_effect(self, name: str, basis: str = "guess", reason: str = "", **values: float) -> Model:
+        """The model with that effect switched on at these values; in its old place, else last."""
+        effect = effect_named(name)
+        active = ActiveEffect(effect, effect.checked(values), basis, reason)
+        if all(a.effect.name != name for a in self.effects):
+            return replace(self, effects=(*self.effects, active))
+        return replace(self, effects=tuple(active if a.effect.name == name else a for a in self.effects))
+
+    def without(self, name: str) -> Model:
+        """The model with that effect switched off."""
+        effect_named(name)
+        return replace(self, effects=tuple(a for a in self.effects if a.effect.name != name))
+
+    def canonical_json(self) -> str:
+        """All that changes numbers, as JSON with sorted keys; neither the model's name nor the reasons."""
+        numbers: dict[str, Any] = {field: getattr(self, field) for field in LIMITS}
+        numbers |= {"base": self.base, "effects": [[a.effect.name, a.by_name] for a in self.effects]}
+        return json.dumps(numbers, sort_keys=True, separators=(",", ":"))
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of `canonical_json`, 20 hexadecimal digits."""
+        return hashlib.sha256(self.canonical_json().encode()).hexdigest()[:20]
+
+
+def model_names() -> list[str]:
+    """The models that come with the package."""
+    folder = resources.files("bns.physics")
+    return sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".yaml"))
+
+
+def load_model(name_or_path: str | Path) -> Model:
+    """A model of the package by its name, or any YAML file by its path (with .yaml or .yml at the end).
+
+    ModelError if there is none, or if it has an unknown key, effect or parameter or a value out of bounds.
+    """
+    path = Path(name_or_path)
+    if path.suffix in {".yaml", ".yml"}:
+        if not path.is_file():
+            raise ModelError(f"There is no model file {path}. Give the path of a YAML file or one of: "
+                             f"{', '.join(model_names())}.")
+        return parse_model(path.read_text(encoding="utf-8"), path.stem)
+    if str(name_or_path) not in model_names():
+        known = unknown_name("robot model", str(name_or_path), model_names())
+        raise ModelError(f"{known} Or give the path of a YAML file, with .yaml at its end.")
+    text = (resources.files("bns.physics") / f"{name_or_path}.yaml").read_text(encoding="utf-8")
+    return parse_model(text, str(name_or_path))
+
+
+def parse_model(text: str, name: str) -> Model:
+    """The model in a YAML text; ``name`` is for messages."""
+    try:
+        tree = yaml.safe_load(text)
+    except yaml.YAMLError as fault:
+        raise ModelError(f"model {name} is no valid YAML: {fault}. Correct the place it names.") from fault
+    top = _keys(f"model {name}", tree, _TOP, required=("base", "wheelbase_m"))
+    jitter, noise = (_group(name, top, key) for key in _GROUPS)
+    listed = top.get("effects") or []
+    if not isinstance(listed, list):
+        raise ModelError(f"model {name}: effects is {listed!r}; it must be a list of {_join(_EFFECT_KEYS)}.")
+    return Model(
+        name=name, base=top["base"], wheelbase_m=top["wheelbase_m"], dt_s=top.get("dt_s", Model.dt_s),
+        jitter_relative=jitter["wheel_speed_relative"], noise_position_m=noise["position_m"],
+        noise_heading_rad=noise["heading_rad"], effects=tuple(_effect(name, entry) for entry in listed))
+
+
+def _effect(model: str, entry: Any) -> ActiveEffect:
+    keys = _keys(f"an effect of model {model}", entry, _EFFECT_KEYS, required=_EFFECT_KEYS)
+    effect = effect_named(str(keys["name"]))
+    names = tuple(p.name for p in effect.parameters)
+    values = _keys(f"values of {effect.name} in model {model}", keys["values"], names)
+    return ActiveEffect(effect, effect.checked(values), *_why(f"{effect.name} in model {model}", keys))
+
+
+def _group(model: str, top: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """The numbers of jitter or noise; all 0 where the file says nothing."""
+    if key not in top:
+        return dict.fromkeys(_GROUPS[key], 0.0)
+    where = f"{key} of model {model}"
+    group = _keys(where, top[key], (*_GROUPS[key], *_WHY), required=(*_GROUPS[key], *_WHY))
+    _why(where, group)
+    return group
+
+
+def _why(where: str, keys: Mapping[str, Any]) -> tuple[str, str]:
+    if keys["basis"] not in BASIS:
+        raise ModelError(f"{where}: " + unknown_name("basis", keys["basis"], BASIS))
+    if not isinstance(keys["reason"], str) or not keys["reason"].strip():
+        raise ModelError(f"{where}: reason is {keys['reason']!r}; write down why the value is what it is.")
+    return keys["basis"], keys["reason"].strip()
+
+
+def _keys(where: str, tree: Any, allowed: tuple[str, ...], required: tuple[str, ...] = ()) -> dict[str, Any]:
+    if not isinstance(tree, dict):
+        raise ModelError(f"{where} is {tree!r}; it must be a mapping with the keys {_join(allowed)}.")
+    for key in tree:
+        if key not in allowed:
+            raise ModelError(f"{where}: " + unknown_name("key", key, allowed))
+    missing = [key for key in required if key not in tree]
+    if missing:
+        raise ModelError(f"{where} lacks {_join(missing)}; write each of {_join(required)}.")
+    return tree
+
+
+def _join(names: tuple[str, ...] | list[str]) -> str:
+    return ", ".join(names)

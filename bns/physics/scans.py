@@ -1,0 +1,65 @@
+"""Recurrences along a trial, compiled: each value needs the one before it. Arrays are (batch, steps)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.engine.jit import exact
+from bns.physics.signals import Array
+
+
+@exact
+def first_order(target: Array, step_s: Array, tau_s: float) -> Array:
+    """Mean over each step of w, where dw/dt = (target - w)/tau and w = 0 at the start; exact."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        w = 0.0
+        for k in range(target.shape[1]):
+            h = step_s[row, k]
+            if h == 0.0:
+                continue
+            settled = -np.expm1(-h / tau_s)
+            mean[row, k] = target[row, k] + (w - target[row, k]) * settled * tau_s / h
+            w += (target[row, k] - w) * settled
+    return mean
+
+
+@exact
+def rate_limited(target: Array, step_s: Array, limit: float) -> Array:
+    """Mean over each step of w, which follows the target with |dw/dt| <= limit, from 0; exact."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        w = 0.0
+        for k in range(target.shape[1]):
+            h, gap = step_s[row, k], target[row, k] - w
+            if h == 0.0:
+                continue
+            ramp_s = abs(gap) / limit
+            if ramp_s <= h:
+                mean[row, k] = target[row, k] - gap * ramp_s / (2.0 * h)
+                w = target[row, k]
+            else:
+                mean[row, k] = w + np.sign(gap) * limit * h / 2.0
+                w += np.sign(gap) * limit * h
+    return mean
+
+
+@exact
+def flow_along(start: Array, moved: Array, moving_s: Array, flow: float, return_per_s: float) -> Array:
+    """Positions (batch, steps + 1) of one axis: ``moved`` metres a step, and flow - return·position.
+
+    ``moving_s`` is the time of each step during which the flow acts. Exact for constant velocity in a step.
+    """
+    nodes = np.empty((moved.shape[0], moved.shape[1] + 1))
+    for row in range(moved.shape[0]):
+        position = start[row]
+        nodes[row, 0] = position
+        for k in range(moved.shape[1]):
+            time = moving_s[row, k]
+            change = moved[row, k] + (flow - return_per_s * position) * time
+            decay = return_per_s * time
+            if decay > 0.0:
+                change *= -np.expm1(-decay) / decay
+            position += change
+            nodes[row, k + 1] = position
+    return nodes

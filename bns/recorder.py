@@ -1,0 +1,184 @@
+"""What is kept of a run: one row an evaluation, and with ``record: full`` paths, generations and probes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bns.engine.evolution import Population
+from bns.engine.philox import Key, Purpose
+from bns.engine.snn import predict
+from bns.evolver import Evolver
+from bns.robots.base import Robot
+from bns.spec import RunSpec
+from bns.tasks import Task
+from bns.trainer import Trainer
+from bns.worlds.base import World
+
+RADII_CM = (7, 10, 14, 20)
+PROBES, PROBE_COMMANDS = 10, 5
+"""Figure 4.17b: ten random controllers of five commands."""
+
+
+class _Columns:
+    """Rows gathered one at a time (or several), given back as columns."""
+
+    def __init__(self) -> None:
+        self._columns: dict[str, list[Any]] = {}
+
+    def add(self, **values: Any) -> dict[str, Any]:
+        for name, value in values.items():
+            self._columns.setdefault(name, []).append(value)
+        return values
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        return {name: np.array(values) for name, values in self._columns.items()}
+
+
+class Recorder:
+    """Drives controllers for measurement and gathers the tables of one run.
+
+    `last_poses` and `last_simulated` (n, 3) are the latest path of the fittest controller, in the world and in simulation.
+    """
+
+    def __init__(self, robot: Robot, task: Task, world: World, key: Key, spec: RunSpec) -> None:
+        self._robot, self._task, self._world, self._key = robot, task, world, key
+        self._full = spec.record == "full"
+        self._evals, self._paths, self._generations, self._probe_rows = (_Columns() for _ in range(4))
+        self.last_poses = self.last_simulated = np.empty((0, 3))
+        self._ever: dict[str, bool] = {}
+        self._evaluated: dict[str, Any] = {}
+        if self._full:
+            self._probes = robot.random_controllers(key, PROBES, PROBE_COMMANDS)
+            self._probe_world = [
+                self._final(self._drive(self._probes.controller(i), Purpose.PROBE, 1 + i)) for i in range(PROBES)
+            ]
+            self._probe_before: list[np.ndarray] | None = None
+
+    def drive_evaluated(self, evaluation: int, controller: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Drive the controller picked for this evaluation; its measured poses (n, 3) are what the networks learn from."""
+        poses = self._drive(controller, Purpose.WORLD_EVALUATED, evaluation)
+        in_world, goals = self._robot.judge(poses, self._task)
+        simulated = self._simulated(controller, weights)
+        in_simulation, _ = self._robot.judge(simulated, self._task)
+        self._evaluated = {
+            "evaluated_fitness_simulation": in_simulation,
+            "evaluated_fitness_world": in_world,
+            "evaluated_fitness_error": abs(in_simulation - in_world),
+            "evaluated_goals_reached": goals,
+            "commands": len(controller),
+            "driven_ms": self._robot.driven_ms(controller),
+        } | self._successes("evaluated_success", poses)
+        if self._full:
+            self._add_path(evaluation, "evaluated", controller, poses, simulated)
+        return poses
+
+    def record(
+        self,
+        evaluation: int,
+        trainer: Trainer,
+        evolver: Evolver,
+        weights: np.ndarray,
+        training_cpu_s: float,
+        evolution_cpu_s: float,
+    ) -> dict[str, Any]:
+        """Measure the fittest controller in the world and add this evaluation's row."""
+        fittest = evolver.fittest()
+        poses = self._drive(fittest, Purpose.WORLD_FITTEST, evaluation)
+        in_world, goals = self._robot.judge(poses, self._task)
+        self.last_poses, self.last_simulated = poses, self._simulated(fittest, weights)
+        successes = self._successes("success", poses)
+        for name, value in successes.items():
+            self._ever["ever_" + name] = self._ever.get("ever_" + name, False) or value
+        training_error, validation_error = trainer.errors()
+        if self._full:
+            self._record_full(evaluation, fittest, poses, evolver, weights)
+        return self._evals.add(
+            evaluation=evaluation,
+            diversity=evolver.diversity(),
+            fitness_error=abs(evolver.best_fitness - in_world),
+            fitness_simulation=evolver.best_fitness,
+            fitness_world=in_world,
+            best_fitness=evolver.best_fitness,
+            mean_fitness=evolver.mean_fitness,
+            goals_reached=goals,
+            training_error=training_error,
+            validation_error=validation_error,
+            training_patterns=trainer.data.training.count,
+            validation_patterns=trainer.data.validation.count,
+            fittest_commands=len(fittest),
+            mean_commands=float(evolver.population.lengths.mean()),
+            generations=evolver.generations,
+            bound_hits=evolver.bound_hits,
+            arithmetic_failures=evolver.failures + trainer.failures,
+            training_cpu_s=training_cpu_s,
+            evolution_cpu_s=evolution_cpu_s,
+            **successes,
+            **self._ever,
+            **self._evaluated,
+        )
+
+    def tables(self) -> dict[str, dict[str, np.ndarray]]:
+        """Everything kept, table by table."""
+        found = {"evals": self._evals.arrays()}
+        if self._full:
+            found |= {
+                "paths": self._paths.arrays(),
+                "generations": self._generations.arrays(),
+                "probes": self._probe_rows.arrays(),
+            }
+        return {name: columns for name, columns in found.items() if columns}
+
+    def _drive(self, controller: np.ndarray, purpose: Purpose, step: int) -> np.ndarray:
+        return self._world.drive(controller, self._key, purpose, step)
+
+    def _simulated(self, controller: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        outputs = predict(weights, self._robot.inputs(controller))
+        return self._robot.poses(self._robot.displacements(outputs))
+
+    def _successes(self, prefix: str, poses: np.ndarray) -> dict[str, bool]:
+        within = self._robot.successes(poses, self._task)
+        by_radius = {f"{prefix}_{cm}cm": ok for cm, ok in zip(RADII_CM, within, strict=True)}
+        return {prefix: within[0]} | by_radius
+
+    def _record_full(
+        self, evaluation: int, fittest: np.ndarray, poses: np.ndarray, evolver: Evolver, weights: np.ndarray
+    ) -> None:
+        self._add_path(evaluation, "fittest", fittest, poses, self.last_simulated)
+        for generation in evolver.history:
+            driven = self._drive(generation.best, Purpose.WORLD_GENERATION, generation.number)
+            self._generations.add(
+                evaluation=evaluation,
+                generation=generation.number,
+                best_fitness=generation.best_fitness,
+                best_fitness_world=self._robot.judge(driven, self._task)[0],
+                mean_fitness=generation.mean_fitness,
+            )
+        self._add_probes(evaluation, self._probes, weights)
+
+    def _add_path(
+        self, evaluation: int, who: str, controller: np.ndarray, poses: np.ndarray, simulated: np.ndarray
+    ) -> None:
+        start = self._robot.poses(np.zeros((1, len(self._robot.networks))))
+        nothing = np.full((1, controller.shape[1]), np.nan)
+        rows = np.hstack([np.vstack([nothing, controller]), np.vstack([start, poses]), np.vstack([start, simulated])])
+        names = (*self._robot.command_columns, "x_m", "y_m", "heading_rad", "snn_x_m", "snn_y_m", "snn_heading_rad")
+        for step, row in enumerate(rows):
+            self._paths.add(evaluation=evaluation, who=who, step=step, **dict(zip(names, row.tolist(), strict=True)))
+
+    def _add_probes(self, evaluation: int, probes: Population, weights: np.ndarray) -> None:
+        now = [self._final(self._simulated(probes.controller(i), weights)) for i in range(len(probes))]
+        before = self._probe_before or [np.full(2, np.nan)] * len(now)
+        for i, position in enumerate(now):
+            self._probe_rows.add(
+                evaluation=evaluation,
+                probe=i,
+                distance_m=float(np.linalg.norm(position - self._probe_world[i])),
+                change_m=float(np.linalg.norm(position - before[i])),
+            )
+        self._probe_before = now
+
+    @staticmethod
+    def _final(poses: np.ndarray) -> np.ndarray:
+        return poses[-1, :2]

@@ -1,0 +1,217 @@
+"""Khepera III: two wheels, commands of left speed, right speed and duration, driven open loop (section 4.2).
+
+Device units: wheel speeds in the firmware's units (144.01 units per mm/s before firmware 3.0), durations in ms.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bns.engine.evolution import CommandBounds, Population, random_population
+from bns.engine.jit import exact, fast, inline
+from bns.engine.philox import Key, Purpose, uniforms
+from bns.engine.snn import BLOCK, hidden_count, predict_into
+from bns.robots.base import Scores
+from bns.tasks import Task
+
+UNITS_PER_M_S = 144_010.0
+GOAL_RADIUS_M = 0.07
+MISSED_GOAL_M = 10.0
+"""Penalty for a goal not reached, in metres of distance: more than any path on the surface adds up to, so that one goal
+more always outweighs a shorter path. The source says "a large constant"."""
+SMALLEST_SUM_M = 0.01
+"""The distance sum that fitness is the inverse of is kept above this, so that fitness never exceeds 100 per metre."""
+LARGEST_HEADING_RAD = 1e5
+"""A controller whose heading in simulation runs beyond this counts as failed arithmetic: its networks have diverged."""
+START = (0.0, 0.0, math.pi / 2)
+"""Start of every task: between the goals, facing north."""
+
+_LOW = np.array([3000.0, 3000.0, 400.0], np.float32)
+_HIGH = np.array([30000.0, 30000.0, 3000.0], np.float32)
+_CENTRE, _HALF = (_LOW + _HIGH) / 2, (_HIGH - _LOW) / 2
+_SCALE = np.array([0.2, 0.3, 3.0], np.float32)
+"""Metres, metres and radians that an output of 1 stands for: the order of what random commands do."""
+
+
+@fast
+def _gather(commands, lengths, centre, half, X, starts):  # type: ignore[no-untyped-def]  # compiled
+    """Inputs of all commands of all controllers, side by side: previous left and right (0 at first), left, right, duration."""
+    n = 0
+    for i in range(lengths.size):
+        starts[i] = n
+        left, right = -centre[0] / half[0], -centre[1] / half[1]
+        for j in range(lengths[i]):
+            X[0, n], X[1, n] = left, right
+            left = (commands[i, j, 0] - centre[0]) / half[0]
+            right = (commands[i, j, 1] - centre[1]) / half[1]
+            X[2, n], X[3, n] = left, right
+            X[4, n] = (commands[i, j, 2] - centre[2]) / half[2]
+            n += 1
+    return n
+
+
+@inline
+def _sine(x):  # type: ignore[no-untyped-def]  # compiled
+    """Sine to 1e-11 for |x| below LARGEST_HEADING_RAD, without a branch, so that it vectorises."""
+    half_turns = np.int32(x / math.pi + 1048576.5) - 1048576
+    r = x - half_turns * math.pi
+    s = r * r
+    p = -1 / 1307674368000 * s + 1 / 6227020800
+    p = p * s - 1 / 39916800
+    p = p * s + 1 / 362880
+    p = p * s - 1 / 5040
+    p = p * s + 1 / 120
+    p = p * s - 1 / 6
+    return (r + r * s * p) * (1.0 - 2.0 * (half_turns & 1))
+
+
+@fast
+def _directions(heading, sine, cosine):  # type: ignore[no-untyped-def]  # compiled
+    for c in range(heading.size):
+        sine[c] = _sine(heading[c])
+        cosine[c] = _sine(heading[c] + math.pi / 2)
+
+
+@exact
+def _headings(turns, starts, lengths, scale, heading):  # type: ignore[no-untyped-def]  # compiled
+    """Heading at the start of every command."""
+    for i in range(lengths.size):
+        angle = START[2]
+        for c in range(starts[i], starts[i] + lengths[i]):
+            heading[c] = angle
+            angle += turns[c] * scale
+
+
+@exact
+def _walk(outputs, starts, lengths, scale, goals, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+    """Algorithm 2 for every controller; how many could not be computed."""
+    count = outputs.shape[1]
+    heading, sine, cosine = np.empty(count), np.empty(count), np.empty(count)
+    _headings(outputs[2], starts, lengths, scale[2], heading)
+    _directions(heading, sine, cosine)
+    failures, last = 0, goals.shape[0] - 1
+    for i in range(lengths.size):
+        x, y, total, goal = START[0], START[1], 0.0, 0
+        for c in range(starts[i], starts[i] + lengths[i]):
+            right, ahead = outputs[0, c] * scale[0], outputs[1, c] * scale[1]
+            x += ahead * cosine[c] + right * sine[c]
+            y += ahead * sine[c] - right * cosine[c]
+            if abs(heading[c]) > LARGEST_HEADING_RAD:
+                total = np.inf
+            aim = min(goal, last)
+            distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
+            if goal <= last and distance <= GOAL_RADIUS_M:
+                goal += 1
+                aim = min(goal, last)
+                distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
+            total += distance
+        total += MISSED_GOAL_M * (goals.shape[0] - goal)
+        reached[i] = goal
+        fitness[i] = 1.0 / max(total, SMALLEST_SUM_M)
+        if not np.isfinite(total):
+            fitness[i] = 0.0
+            failures += 1
+    return failures
+
+
+class Khepera:
+    """Implements `bns.robots.base.Robot`."""
+
+    name = "khepera"
+    networks = ("dx", "dy", "dtheta")
+    hidden = 20
+    radii_m = (0.07, 0.10, 0.14, 0.20)
+    bounds = CommandBounds(_LOW, _HIGH, np.array([2000.0, 2000.0, 400.0], np.float32))
+    command_columns = ("left_units", "right_units", "duration_ms")
+
+    def initial_population(self, key: Key, size: int, capacity: int) -> Population:
+        """4 to 13 random commands a controller."""
+        return random_population(key, size, 4, 13, capacity, self.bounds)
+
+    def random_controllers(self, key: Key, count: int, length: int) -> Population:
+        """Controllers of `length` random commands, apart from every population's draws."""
+        u = uniforms(key, Purpose.PROBE, 0, count, length)[..., :3]
+        commands = (_LOW + u * (_HIGH - _LOW)).astype(np.float32)
+        return Population(commands, np.full(count, length, np.int32))
+
+    def inputs(self, commands: np.ndarray) -> np.ndarray:
+        """Inputs (5, n): previous left, previous right, left, right, duration, normalised; at rest before the first."""
+        X, starts = np.empty((5, len(commands)), np.float32), np.empty(1, np.int64)
+        _gather(commands[None].astype(np.float32), np.array([len(commands)], np.int32), _CENTRE, _HALF, X, starts)
+        return X
+
+    def displacements(self, outputs: np.ndarray) -> np.ndarray:
+        """(n, 3): to the right m, ahead m, counter-clockwise rad, in the frame the command began in."""
+        return (outputs * _SCALE[:, None]).T.astype(np.float64)
+
+    def targets(self, displacements: np.ndarray) -> np.ndarray:
+        """Network targets (3, n)."""
+        return np.ascontiguousarray((displacements / _SCALE).T, np.float32)
+
+    def poses(self, displacements: np.ndarray) -> np.ndarray:
+        """Poses x_m, y_m, heading_rad (not wrapped) after each displacement."""
+        heading = START[2] + np.concatenate([[0.0], np.cumsum(displacements[:, 2])])
+        before = heading[:-1]
+        right, ahead = displacements[:, 0], displacements[:, 1]
+        x = START[0] + np.cumsum(ahead * np.cos(before) + right * np.sin(before))
+        y = START[1] + np.cumsum(ahead * np.sin(before) - right * np.cos(before))
+        return np.column_stack([x, y, heading[1:]])
+
+    def measured_displacements(self, poses: np.ndarray) -> np.ndarray:
+        """Displacements in the frame at the start of each command; headings must not be wrapped."""
+        before = np.vstack([START, poses[:-1]])
+        step = poses - before
+        cos, sin = np.cos(before[:, 2]), np.sin(before[:, 2])
+        return np.column_stack([step[:, 0] * sin - step[:, 1] * cos, step[:, 0] * cos + step[:, 1] * sin, step[:, 2]])
+
+    def score(self, population: Population, weights: np.ndarray, task: Task) -> Scores:
+        """Fitness on simulator networks (algorithm 2)."""
+        n, total = len(population), int(population.lengths.sum())
+        X = np.empty((5, total), np.float32)
+        outputs = np.empty((3, total), np.float32)
+        starts = np.empty(n, np.int64)
+        _gather(population.commands, population.lengths, _CENTRE, _HALF, X, starts)
+        predict_into(weights, X, total, outputs, np.empty((hidden_count(weights.shape[1]), BLOCK), np.float32))
+        fitness, reached = np.empty(n), np.empty(n, np.int32)
+        failures = _walk(outputs, starts, population.lengths, _SCALE, task.goals_m, fitness, reached)
+        return Scores(fitness, reached, int(failures))
+
+    def judge(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
+        """Fitness per metre, and goals reached, of one path; fitness 0 if a pose is not finite."""
+        total, goal = 0.0, 0
+        last = len(task.goals_m) - 1
+        for x, y, _ in poses:
+            distance = math.hypot(*(task.goals_m[min(goal, last)] - (x, y)))
+            if goal <= last and distance <= GOAL_RADIUS_M:
+                goal += 1
+                distance = math.hypot(*(task.goals_m[min(goal, last)] - (x, y)))
+            total += distance
+        total += MISSED_GOAL_M * (len(task.goals_m) - goal)
+        return (1.0 / max(total, SMALLEST_SUM_M) if math.isfinite(total) else 0.0), goal
+
+    def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
+        """Whether all goals are visited in order, within each radius."""
+        return tuple(_visited(poses, task.goals_m, radius) == len(task.goals_m) for radius in self.radii_m)
+
+    def driven_ms(self, commands: np.ndarray) -> float:
+        """Sum of the durations."""
+        return float(commands[:, 2].sum())
+
+    def wheel_speeds_m_s(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Left and right wheel-surface speeds m/s and durations s, each (n,), of commands in device units."""
+        return commands[:, 0] / UNITS_PER_M_S, commands[:, 1] / UNITS_PER_M_S, commands[:, 2] / 1000.0
+
+
+def _visited(poses: np.ndarray, goals_m: np.ndarray, radius_m: float) -> int:
+    goal = 0
+    for x, y, _ in poses:
+        if math.hypot(x - goals_m[goal, 0], y - goals_m[goal, 1]) <= radius_m:
+            goal += 1
+            if goal == len(goals_m):
+                break
+    return goal
+
+
+ROBOT = Khepera()

@@ -1,0 +1,158 @@
+"""One run by hand: what the terminal shows while it goes on, and what is kept at its end."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from bns.loop import RunResult, run
+from bns.plotting import path_figure
+from bns.recorder import RADII_CM
+from bns.robots import load_robot
+from bns.robots.simulator import StaticSimulator, save_simulator
+from bns.spec import RunSpec
+from bns.store.lock import SweepLockedError
+from bns.store.record import RunRecord
+from bns.store.writer import Writer
+from bns.sweep import memory
+from bns.tasks import load_task
+
+_PATIENCE_S = 60.0
+
+
+def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None = None) -> str:
+    """Carry out a run with a live view, store it, draw the path of its fittest controller; the report in words."""
+    load_task(spec.robot, spec.task)
+    with _patient_writer(results, sweep):
+        pass  # a folder that cannot be written is better found before the run than after it
+    started, wall, cpu = datetime.now(UTC), time.perf_counter(), time.process_time()
+    memory.reset_peak()
+    with live_view(spec) as show:
+        result = run(spec, show)
+    row = {
+        "status": "ok",
+        "error": None,
+        "world_digest": result.world_digest,
+        "started_at": started,
+        "wall_s": time.perf_counter() - wall,
+        "cpu_s": time.process_time() - cpu,
+        "peak_memory_mib": memory.peak_mib(),
+        "attempts": 1,
+    }
+    with _patient_writer(results, sweep) as writer:
+        writer.append(RunRecord(spec, row, result.tables))
+    if save_snn is not None:
+        save_simulator(
+            StaticSimulator(
+                result.networks, result.weights, np.empty(0), {"run_id": spec.run_id, "spec": spec.canonical_json()}
+            ),
+            save_snn,
+        )
+    figure = path_figure(
+        spec,
+        load_task(spec.robot, spec.task),
+        load_robot(spec.robot),
+        result,
+        results / "figures" / f"run-{spec.task}-{spec.seed}-{spec.run_id}",
+    )
+    return _report(spec, result, row["wall_s"], figure)
+
+
+@contextmanager
+def _patient_writer(results: Path, sweep: str) -> Iterator[Writer]:
+    """Runs by hand share one sweep's name; each holds its lock for an instant only."""
+    deadline = time.monotonic() + _PATIENCE_S
+    while True:
+        writer = Writer(results, sweep)
+        try:
+            writer.__enter__()
+            break
+        except SweepLockedError:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(0.1)
+    try:
+        yield writer
+    finally:
+        writer.__exit__(*sys.exc_info())
+
+
+def _report(spec: RunSpec, result: RunResult, wall_s: float, figure: Path) -> str:
+    evals = result.tables["evals"]
+    reached = [f"{cm} cm " + _first(evals[f"success_{cm}cm"], evals["evaluation"]) for cm in RADII_CM]
+    return "\n".join(
+        [
+            f"run {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {spec.evaluations} evaluations in {wall_s:.1f} s",
+            "all goals reached by the fittest controller, within " + "; ".join(reached),
+            f"fitness of the fittest at the end: {evals['fitness_simulation'][-1]:.3f} in simulation, "
+            f"{evals['fitness_world'][-1]:.3f} in the world ({spec.world})",
+            f"path: {figure}",
+        ]
+    )
+
+
+def _first(success: Any, evaluation: Any) -> str:
+    return f"first at evaluation {evaluation[success][0]}, {success.mean():.0%} of them" if success.any() else "never"
+
+
+@contextmanager
+def live_view(spec: RunSpec) -> Iterator[Callable[[Mapping[str, Any]], None]]:
+    """A table on stderr that follows the evaluations; nothing where stderr is no terminal."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda row: None
+        return
+    with Live(console=console, refresh_per_second=4) as live:
+        yield lambda row: live.update(_view(spec, row))
+
+
+def _view(spec: RunSpec, row: Mapping[str, Any]) -> Table:
+    table = Table(title=f"{spec.robot}, {spec.task}, seed {spec.seed}, world {spec.world}", min_width=64)
+    for heading in (
+        "evaluation",
+        "fitness: simulation",
+        "world",
+        "goals",
+        *(f"{cm} cm" for cm in RADII_CM),
+        "diversity",
+        "training error",
+    ):
+        table.add_column(heading, justify="right")
+    marks = [("yes" if row[f"success_{cm}cm"] else "ever" if row[f"ever_success_{cm}cm"] else "no") for cm in RADII_CM]
+    table.add_row(
+        f"{row['evaluation']}/{spec.evaluations}",
+        f"{row['fitness_simulation']:.3f}",
+        f"{row['fitness_world']:.3f}",
+        str(row["goals_reached"]),
+        *marks,
+        f"{row['diversity']:.2f}",
+        f"{row['training_error']:.5f}",
+    )
+    return table
+
+
+@contextmanager
+def counting(text: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar on stderr to be told (done, of); nothing where stderr is no terminal."""
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task(text, total=None)
+        yield lambda done, of: bar.update(task, completed=done, total=of)

@@ -1,0 +1,120 @@
+"""The whole description of one run. Its hash is the run's name.
+
+Every parameter is declared once, here: the command line, the sweep files and the result tables take
+names, bounds and help texts from the fields of `RunSpec`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bns.errors import SpecError, unknown_name
+
+ENGINE_VERSION = 1
+"""Raised whenever the same spec would give other numbers; part of every run's name."""
+
+
+def _field(
+    default: Any,
+    text: str,
+    *,
+    low: float | None = None,
+    high: float | None = None,
+    choices: tuple[str, ...] | None = None,
+) -> Any:
+    return dataclasses.field(default=default, metadata={"help": text, "low": low, "high": high, "choices": choices})
+
+
+@dataclass(frozen=True)
+class RunSpec:
+    """One run: robot, task, world, parameters and seed.
+
+    The defaults are the prototype settings of the source (table 4.1, section 4.3) with 100 evaluations
+    (section 4.5). Shares are fractions of the population, 0..1.
+    """
+
+    robot: str = _field("khepera", "robot")
+    task: str = _field("circle", "goal task of that robot")
+    world: str = _field("substitute", "what answers a controller", choices=("substitute", "physics"))
+    seed: int = _field(0, "seed of this run", low=0, high=2**32 - 1)
+    root_seed: int = _field(0, "seed of the whole study", low=0, high=2**32 - 1)
+    population_size: int = _field(400, "controllers in the population", low=1, high=1_000_000)
+    tournament_size: float = _field(0.5, "tournament for parents, share of the population", low=0.0, high=1.0)
+    mutation_rate: float = _field(0.1, "probability that a component of a command mutates", low=0.0, high=1.0)
+    real_world_selection_size: float = _field(
+        0.7, "tournament for the controller that drives in the world, share of the population", low=0.0, high=1.0
+    )
+    evaluations: int = _field(100, "controllers driven in the world", low=1, high=65_535)
+    generations_per_evaluation: int = _field(20, "generations evolved after each evaluation", low=0, high=100_000)
+    training_iterations_per_evaluation: int = _field(
+        1000, "Rprop iterations after each evaluation", low=0, high=10_000_000
+    )
+    training_algorithm: str = _field("rprop+", "weight update", choices=("rprop+", "irprop-"))
+    min_commands: int = _field(4, "shortest command list that crossover may make", low=1, high=10_000)
+    max_commands: int = _field(100, "longest command list that crossover may make", low=1, high=10_000)
+    record: str = _field(
+        "evals", "what is kept: one row an evaluation, or paths and generations too", choices=("evals", "full")
+    )
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            object.__setattr__(self, field.name, checked(field.name, getattr(self, field.name)))
+
+    def canonical_json(self) -> str:
+        """The spec and the engine's version as JSON with sorted keys: what the run's name is the hash of."""
+        return json.dumps(
+            dataclasses.asdict(self) | {"engine_version": ENGINE_VERSION}, sort_keys=True, separators=(",", ":")
+        )
+
+    @property
+    def run_id(self) -> str:
+        """Name of the run: ``r`` and 20 hexadecimal digits (a letter first, so that no reader takes it for a number)."""
+        return "r" + hashlib.sha256(self.canonical_json().encode()).hexdigest()[:20]
+
+
+FIELDS: Mapping[str, dataclasses.Field[Any]] = {f.name: f for f in dataclasses.fields(RunSpec)}
+
+
+def field_type(name: str) -> type:
+    """int, float or str: the type that a parameter's values have."""
+    return type(FIELDS[name].default)
+
+
+def checked(name: str, value: Any) -> Any:
+    """``value`` in the parameter's own type; SpecError if there is no such parameter or the value is not allowed."""
+    if name not in FIELDS:
+        raise SpecError(unknown_name("parameter", name, FIELDS))
+    wanted, meta = field_type(name), FIELDS[name].metadata
+    fits = isinstance(value, wanted) and not isinstance(value, bool)
+    if wanted is float and isinstance(value, int) and not isinstance(value, bool):
+        value, fits = float(value), True
+    elif wanted is int and isinstance(value, float) and value.is_integer():
+        value, fits = int(value), True
+    if not fits:
+        raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.")
+    if wanted is str:
+        if meta["choices"] and value not in meta["choices"]:
+            raise SpecError(unknown_name(name, value, meta["choices"]))
+        return value
+    low, high = meta["low"], meta["high"]
+    if not math.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):
+        raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.{_percent_hint(name, value)}")
+    return value
+
+
+def _allowed(name: str) -> str:
+    meta, kind = FIELDS[name].metadata, {int: "a whole number", float: "a number", str: "a text"}[field_type(name)]
+    if meta["choices"]:
+        return "one of " + ", ".join(meta["choices"])
+    return kind if meta["low"] is None else f"{kind} from {meta['low']:g} to {meta['high']:g}"
+
+
+def _percent_hint(name: str, value: float) -> str:
+    share = field_type(name) is float and FIELDS[name].metadata["high"] == 1.0
+    return f" For {value:g} percent write {value / 100:g}." if share and 1 < value <= 100 else ""

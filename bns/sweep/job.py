@@ -1,0 +1,65 @@
+"""One run, measured, and with whatever goes wrong in it turned into a row."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from bns.spec import RunSpec
+from bns.store.record import RunRecord
+from bns.sweep import memory
+
+_FRAMES = 3
+
+
+def run_job(spec: RunSpec) -> RunRecord:
+    """Carry out one run: status ``ok`` with its tables, or ``failed`` with what went wrong and no tables.
+
+    wall_s and cpu_s cover the run alone, without the start of the process; peak_memory_mib is the process's
+    resident memory, interpreter and libraries included.
+    """
+    meter, tables, row = _Meter(), {}, {}
+    try:
+        # Imported here: the parent of a sweep has no need of the kernels and their libraries.
+        from bns.loop import run  # noqa: PLC0415
+
+        warm()
+        meter = _Meter()
+        result = run(spec)
+        tables, row = result.tables, {"status": "ok", "error": None, "world_digest": result.world_digest}
+    except Exception as fault:  # one run must not end a sweep; its row keeps the fault
+        tables, row = {}, {"status": "failed", "error": describe(fault)}
+    return RunRecord(spec, row | meter.columns(), tables)
+
+
+@cache
+def warm() -> None:
+    """Compile the kernels or load them from disk, once a process, so that no run is charged with it."""
+    from bns.loop import run  # noqa: PLC0415
+
+    run(RunSpec(population_size=4, evaluations=2, generations_per_evaluation=1,
+                training_iterations_per_evaluation=1))
+
+
+class _Meter:
+    """Time and memory from its making on."""
+
+    def __init__(self) -> None:
+        self._started_at, self._wall, self._cpu = datetime.now(UTC), time.perf_counter(), time.process_time()
+        memory.reset_peak()
+
+    def columns(self) -> dict[str, Any]:
+        return {"started_at": self._started_at, "wall_s": time.perf_counter() - self._wall,
+                "cpu_s": time.process_time() - self._cpu, "peak_memory_mib": memory.peak_mib(), "attempts": 1}
+
+
+def describe(fault: BaseException) -> str:
+    """A fault in one line and, below it, the innermost places it came through."""
+    text = " ".join(str(fault).split())
+    frames = traceback.extract_tb(fault.__traceback__)[-_FRAMES:]
+    places = [f"  at {Path(f.filename).name}:{f.lineno} in {f.name}: {f.line}" for f in reversed(frames)]
+    return "\n".join([f"{type(fault).__name__}: {text}" if text else type(fault).__name__, *places])

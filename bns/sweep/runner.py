@@ -1,0 +1,157 @@
+"""A sweep from its runs to its results: what is done is skipped, what finishes is stored, then counted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from bns.spec import RunSpec
+from bns.store.reader import finished
+from bns.store.record import RunRecord
+from bns.store.writer import Writer
+from bns.sweep.budget import Budget
+from bns.sweep.digests import WorldDigests
+from bns.sweep.executor import Executor, Job
+from bns.sweep.grid import Sweep
+from bns.sweep.interrupt import GRACE_S, Interrupts
+from bns.sweep.job import run_job, warm
+from bns.sweep.order import ordered_specs
+from bns.sweep.workers import LokyExecutor
+
+_POLL_S = 0.2
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Where a sweep stands. ``done``, ``failed``, ``quarantined`` include earlier calls, ``new`` does not.
+
+    ``stopped_by`` is None (nothing left to do), "budget", "limit", "interrupt" (Ctrl-C) or "terminated"
+    (SIGTERM).
+    """
+
+    sweep: str
+    total: int
+    done: int = 0
+    failed: int = 0
+    quarantined: int = 0
+    new: int = 0
+    stopped_by: str | None = None
+
+    @property
+    def remaining(self) -> int:
+        """Runs that have no result of any kind."""
+        return self.total - self.done - self.failed - self.quarantined
+
+
+def _silent(_summary: Summary) -> None:
+    """Progress that nobody wants to see."""
+
+
+def run_sweep(sweep: Sweep, results: Path, *, jobs: int = 1, budget: Budget | None = None,
+              retry_failed: bool = False, limit: int | None = None, job: Job = run_job,
+              executor: Executor | None = None, warm_up: Callable[[], object] | None = None,
+              on_progress: Callable[[Summary], None] = _silent, grace_s: float = GRACE_S) -> Summary:
+    """Carry out the runs of a sweep that have no result yet, at most ``limit``.
+
+    With ``retry_failed`` failed and quarantined runs are done again. ``jobs`` is the number of workers
+    unless an ``executor`` is given; ``warm_up`` is called once before the first (by default it compiles the
+    kernels). ``budget`` can be shared by several calls. After the first SIGINT or SIGTERM, runs in flight may
+    finish for ``grace_s`` seconds; the second gives them up.
+
+    Raises:
+        StoreError: another process writes this sweep, the disk is full, or the store's runs of this sweep
+            come from other world files. What was finished before is kept.
+    """
+    course = _Course(sweep, Path(results), budget or Budget(), on_progress)
+    with Interrupts(grace_s) as course.interrupts:
+        try:
+            with Writer(course.results, sweep.name, sweep_text=sweep.text, sweep_runs=sweep.total) as writer:
+                todo = course.plan(retry_failed, limit)
+                if todo and course.budget.allows_another():
+                    (warm_up or (warm if job is run_job else lambda: None))()
+                    with executor or LokyExecutor(jobs, job) as ready:
+                        course.interrupts.arm(ready.cancel)
+                        course.carry_out(iter(todo), ready, writer)
+        except KeyboardInterrupt:
+            if course.interrupts.stopped_by is None:
+                raise
+    return course.summary()
+
+
+class _Course:
+    """One call of ``run_sweep``: counts and the loop."""
+
+    def __init__(self, sweep: Sweep, results: Path, budget: Budget,
+                 on_progress: Callable[[Summary], None]) -> None:
+        self.results, self.budget, self.interrupts = results, budget, Interrupts()
+        self._sweep, self._on_progress = sweep, on_progress
+        self._digests = WorldDigests(results, sweep.name)
+        self._statuses: dict[str, str] = {}
+        self._counts: Counter[str] = Counter()
+        self._new = self._submitted = self._todo = self._wanted = 0
+
+    def plan(self, retry_failed: bool, limit: int | None) -> list[RunSpec]:
+        """The runs to do, in order; whatever has a result is counted as such."""
+        known = finished(self.results, self._sweep.name)
+        if "ok" in known.values():
+            self._digests.read()
+        skipped = {"ok"} if retry_failed else {"ok", "failed", "quarantined"}
+        todo = []
+        for spec in ordered_specs(self._sweep):
+            status = known.get(spec.run_id) if known else None
+            if status is not None:
+                self._count(spec.run_id, status)
+            if status not in skipped:
+                todo.append(spec)
+        self._wanted = len(todo)
+        todo = todo if limit is None else todo[:limit]
+        self._todo = len(todo)
+        return todo
+
+    def carry_out(self, specs: Iterator[RunSpec], executor: Executor, writer: Writer) -> None:
+        """Until all runs are stored, the budget is used up or a signal says to stop."""
+        self._on_progress(self.summary())
+        self._fill(specs, executor)
+        while executor.in_flight:
+            if self.interrupts.grace_is_over:
+                executor.cancel()
+            record = executor.next(_POLL_S)
+            if record is None:
+                continue
+            if record.run["status"] == "ok":
+                self.budget.add(record.run["wall_s"])
+            self._fill(specs, executor)  # first of all: the worker need not wait for the disk
+            self._store(record, writer)
+
+    def _fill(self, specs: Iterator[RunSpec], executor: Executor) -> None:
+        while executor.free and self.interrupts.stopped_by is None and self._submitted < self._todo:
+            if not self.budget.allows_another():
+                return
+            executor.submit(next(specs))
+            self._submitted += 1
+
+    def _store(self, record: RunRecord, writer: Writer) -> None:
+        self._digests.check(record)
+        writer.append(record)
+        self._count(record.spec.run_id, record.run["status"])
+        self._new += 1
+        self._on_progress(self.summary())
+
+    def _count(self, run_id: str, status: str) -> None:
+        self._counts.subtract([self._statuses.get(run_id, "none")])
+        self._statuses[run_id] = status
+        self._counts.update([status])
+
+    def summary(self) -> Summary:
+        """The counts now."""
+        return Summary(self._sweep.name, self._sweep.total, self._counts["ok"], self._counts["failed"],
+                       self._counts["quarantined"], self._new, self._stopped_by())
+
+    def _stopped_by(self) -> str | None:
+        if self.interrupts.stopped_by is not None:
+            return self.interrupts.stopped_by
+        if self._new < self._todo:
+            return "budget"
+        return "limit" if self._todo < self._wanted else None

@@ -1,0 +1,65 @@
+"""The training networks of one run: what they learn from, and what happens when their arithmetic fails."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.engine.patterns import PatternSet, TrainingData
+from bns.engine.philox import Key
+from bns.engine.rprop import Rprop
+from bns.engine.snn import INPUTS, initial_weights, predict
+from bns.robots.base import Robot
+from bns.spec import RunSpec
+
+
+@dataclass
+class Trainer:
+    """Networks under training and the patterns gathered so far."""
+
+    robot: Robot
+    key: Key
+    iterations: int
+    rule: Rprop
+    data: TrainingData
+    failures: int = 0
+
+    @classmethod
+    def start(cls, robot: Robot, key: Key, spec: RunSpec) -> Trainer:
+        """Untrained networks and no patterns."""
+        weights = initial_weights(key, len(robot.networks), robot.hidden)
+        return cls(
+            robot,
+            key,
+            spec.training_iterations_per_evaluation,
+            Rprop.start(weights, spec.training_algorithm),
+            TrainingData.empty(INPUTS, len(robot.networks)),
+        )
+
+    def add(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
+        """Take in what the robot did: measured poses (n, 3) at the end of each command."""
+        targets = self.robot.targets(self.robot.measured_displacements(poses))
+        self.failures += self.data.add(self.robot.inputs(commands), targets, self.key, evaluation)
+
+    def train(self) -> None:
+        """Iterate on all training patterns. A network that is no longer finite begins anew, and is counted."""
+        patterns = self.data.training
+        self.rule.train(patterns.inputs, patterns.targets, patterns.count, self.iterations)
+        for net in np.flatnonzero(~np.isfinite(self.rule.weights).all(axis=1)):
+            self.failures += 1
+            self.rule.restart(int(net), initial_weights(self.key, len(self.rule.weights), self.robot.hidden)[net])
+
+    def evolution_weights(self) -> np.ndarray:
+        """A copy of the networks for evolution to work on."""
+        return self.rule.weights.copy()
+
+    def errors(self) -> tuple[float, float]:
+        """Mean squared error of the normalised outputs on training and on validation patterns; NaN while there are none."""
+        return self._error(self.data.training), self._error(self.data.validation)
+
+    def _error(self, patterns: PatternSet) -> float:
+        if patterns.count == 0:
+            return float("nan")
+        outputs = predict(self.rule.weights, patterns.inputs[:, : patterns.count])
+        return float(np.mean((outputs.astype(np.float64) - patterns.targets[:, : patterns.count]) ** 2))

@@ -1,0 +1,119 @@
+"""What must hold of every effect in the folder, also of one that is added later."""
+
+import inspect
+import pkgutil
+
+import numpy as np
+import pytest
+
+from bns.errors import ModelError
+from bns.physics import effects
+from bns.physics.differential_drive import observe, simulate
+from bns.physics.effect import STAGES, number
+from bns.physics.effects import all_effects, effect_named
+from bns.physics.model import Model
+from bns.physics.signals import Body, Flow, View, Wheels
+
+SIGNALS = dict(zip(STAGES, (Wheels, Body, Flow, View), strict=True))
+IDEAL = Model(wheelbase_m=0.0884)
+LEFT = np.array([[0.10, 0.20, -0.05, 0.02], [0.15, 0.0, 0.07, 0.0], [0.2, 0.2, 0.1, 0.15]])
+RIGHT = np.array([[0.20, 0.05, 0.10, 0.02], [0.15, 0.1, -0.07, 0.0], [0.2, 0.1, 0.2, 0.15]])
+DURATION = np.array([[1.0031, 0.5, 0.7507, 0.301], [0.31, 0.9, 0.42, 0.0], [0.5, 0.25, 0.333, 0.444]])
+
+every_effect = pytest.mark.parametrize("effect", all_effects().values(), ids=all_effects())
+
+
+def plausible_model(effect):
+    """The effect at the plausible end that is farther from neutral."""
+    ends = {p.name: max(p.plausible, key=lambda v, p=p: abs(v - p.neutral)) for p in effect.parameters}
+    limits = [p for p in effect.parameters if np.isinf(p.neutral)]
+    ends |= {p.name: min(p.plausible) for p in limits}
+    return IDEAL.with_effect(effect.name, **ends)
+
+
+def seen(model, rows=slice(None)):
+    poses = simulate(model, LEFT[rows], RIGHT[rows], DURATION[rows], start=(0.3, 0.1, 0.4))
+    return observe(poses, None, model)
+
+
+def test_one_effect_a_file_under_its_own_name():
+    files = {m.name.replace("_", "-") for m in pkgutil.iter_modules(effects.__path__)}
+    assert files == set(all_effects())
+    assert len(files) >= 13
+
+
+@every_effect
+def test_declared_completely(effect):
+    assert effect.stage in STAGES
+    assert effect.parameters
+    assert all(text.strip() for text in (effect.equation, effect.residuals))
+    assert effect.lookalikes
+    assert set(effect.lookalikes) <= set(all_effects()) - {effect.name}
+    assert list(inspect.signature(effect.apply).parameters)[1:] == [p.name for p in effect.parameters]
+
+
+@every_effect
+def test_plausible_and_neutral_lie_inside_the_bounds(effect):
+    for p in effect.parameters:
+        assert p.low <= p.plausible[0] < p.plausible[1] <= p.high
+        assert np.isfinite(p.plausible).all()
+        assert p.low <= p.neutral <= p.high
+        assert p.unit
+        assert p.text
+
+
+@every_effect
+def test_neutral_changes_nothing(effect):
+    neutral = IDEAL.with_effect(effect.name, **effect.neutral)
+    np.testing.assert_allclose(seen(neutral), seen(IDEAL), rtol=0, atol=1e-12)
+
+
+@every_effect
+def test_plausible_value_shows(effect):
+    change = np.abs(seen(plausible_model(effect)) - seen(IDEAL))
+    assert change.max() > 1e-3
+    assert np.isfinite(change).all()
+
+
+@every_effect
+def test_batch_equals_single_trials(effect):
+    model = plausible_model(effect)
+    together = seen(model)
+    for row in range(len(LEFT)):
+        np.testing.assert_allclose(together[[row]], seen(model, [row]), rtol=0, atol=1e-13)
+
+
+@every_effect
+def test_apply_returns_the_signal_of_its_stage_and_leaves_its_input(effect):
+    arrays = np.full((1, 3), 0.1)
+    given = {"wheel": Wheels(arrays, arrays, arrays, 0.1), "body": Body(arrays, arrays, arrays, arrays),
+             "world": Flow(), "measure": View(np.full((1, 3), 0.1))}[effect.stage]
+    values = plausible_model(effect).values_of(effect.name)
+    assert type(effect.apply(given, **values)) is SIGNALS[effect.stage]
+    assert (arrays == 0.1).all()
+
+
+@every_effect
+def test_values_beyond_the_bounds_are_refused(effect):
+    for p in effect.parameters:
+        beyond = effect.neutral | {p.name: p.low - 1e-6}
+        with pytest.raises(ModelError, match=f"{effect.name}: {p.name} is .* must be a number from"):
+            effect.checked(beyond)
+        with pytest.raises(ModelError, match=p.name):
+            effect.checked(effect.neutral | {p.name: float("nan")})
+
+
+def test_unknown_missing_and_misspelt_names():
+    with pytest.raises(ModelError, match=r"unknown effect 'motor-lug'\. Did you mean 'motor-lag'\?"):
+        effect_named("motor-lug")
+    with pytest.raises(ModelError, match=r"unknown parameter of motor-lag 'tau'\. Did you mean 'tau_s'"):
+        effect_named("motor-lag").checked({"tau": 0.1})
+    with pytest.raises(ModelError, match="floor-slope lacks y_m_s"):
+        effect_named("floor-slope").checked({"x_m_s": 0.0})
+
+
+@pytest.mark.parametrize(("value", "hint"), [("1e-3", "exponent with a point"), (True, "must be a number"),
+                                             (None, "must be a number"), ("fast", "must be a number")])
+def test_what_is_no_number_is_refused(value, hint):
+    with pytest.raises(ModelError, match=hint):
+        number("tau_s", value, 0.0, 1.0)

@@ -1,0 +1,216 @@
+"""Files that are truncated, foreign, missing, doubled or of another version."""
+
+import os
+import shutil
+import time
+import warnings
+
+import pandas.testing as pdt
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from bns.errors import StoreError
+from bns.store import StoreWarning, Writer, compact, connect, finished, load, query
+
+from .synthetic import failed, record, records
+
+
+@pytest.fixture
+def store(tmp_path):
+    """Two folds of three runs each."""
+    runs = records(6)
+    with Writer(tmp_path, "s", fold_at=3) as writer:
+        for run in runs:
+            writer.append(run)
+    assert len(files(tmp_path, "evals")) == len(files(tmp_path, "runs")) == 2
+    return tmp_path
+
+
+def files(results, table):
+    return sorted((results / table).rglob("*.parquet"))
+
+
+def ids_in(path):
+    return set(pq.read_table(path, columns=["run_id"], partitioning=None)["run_id"].to_pylist())
+
+
+@pytest.mark.parametrize("content", [
+    lambda data: data[:len(data) // 2],
+    lambda data: b"",
+    lambda data: b"PAR1" + bytes(50) + b"PAR1",
+    lambda data: data[:-100] + bytes(100),
+])
+def test_truncated_file_is_skipped_with_one_warning_and_set_aside(store, content):
+    first, second = files(store, "evals")
+    lost, data = ids_in(first), content(first.read_bytes())
+    first.write_bytes(data)
+    with pytest.warns(StoreWarning, match=first.name) as caught:
+        assert set(load(store)["run_id"]) == ids_in(second)
+    assert len(caught) == 1
+    with pytest.warns(StoreWarning, match="is skipped: it is truncated"):
+        assert set(finished(store, "s")) == ids_in(second)
+    summary = compact(store)
+    assert [path.read_bytes() for path in summary.set_aside] == [data]
+    assert str(summary.set_aside[0]).startswith(str(store / "set-aside" / "evals"))
+    assert set(finished(store, "s")).isdisjoint(lost)
+    assert set(load(store)["run_id"]) == ids_in(second)
+
+
+def test_foreign_files_are_skipped_and_set_aside(store):
+    before = load(store)
+    folder = files(store, "evals")[0].parent
+    pq.write_table(pa.table({"x": [1]}), folder / "a.parquet")
+    pq.write_table(pa.table({"x": [1]}), store / "evals" / "stray.parquet")
+    shutil.copy(files(store, "runs")[0], folder / "part-jwrong-0.parquet")
+    (store / "evals" / "notes.txt").write_text("not ours, not parquet, left alone")
+    with pytest.warns(StoreWarning) as caught:
+        pdt.assert_frame_equal(load(store), before)
+    assert sorted(str(one.message).split(" is skipped")[0].split("/")[-1] for one in caught) == [
+        "a.parquet", "part-jwrong-0.parquet", "stray.parquet"]
+    assert len(compact(store).set_aside) == 3
+    pdt.assert_frame_equal(load(store), before)
+
+
+def test_run_without_its_evaluations_does_not_count_and_can_be_repeated(store):
+    lost = files(store, "evals")[0]
+    gone = ids_in(lost)
+    lost.unlink()
+    assert gone.isdisjoint(finished(store, "s"))
+    assert len(finished(store, "s")) == 3
+    with Writer(store, "s") as writer:
+        for run in (run for run in records(6) if run.spec.run_id in gone):
+            writer.append(run)
+    assert len(finished(store, "s")) == 6
+    compact(store)
+    assert len(finished(store, "s")) == len(load(store, "runs")) == 6
+
+
+def test_evaluations_without_their_runs_are_reported_and_kept(store):
+    lost = files(store, "runs")[0]
+    gone = ids_in(lost)
+    lost.unlink()
+    with pytest.warns(StoreWarning, match=f"{lost.name} is skipped: there is no readable runs/.* belongs to"):
+        assert gone.isdisjoint(load(store)["run_id"])
+    assert [path.name for path in compact(store).set_aside] == [lost.name]
+
+
+def test_run_in_two_files_is_taken_once(store):
+    before = {table: load(store, table) for table in ("evals", "runs")}
+    for table in ("evals", "runs"):
+        path = files(store, table)[0]
+        shutil.copy(path, path.with_name("part-jcopy-0.parquet"))
+    for table, frame in before.items():
+        pdt.assert_frame_equal(load(store, table), frame)
+    assert compact(store).dropped_copies == 3
+    for table, frame in before.items():
+        pdt.assert_frame_equal(load(store, table), frame)
+
+
+def test_copy_of_the_runs_alone_hides_nothing(store):
+    before = load(store)
+    for path in files(store, "runs"):
+        shutil.copy(path, path.with_name(f"part-a{path.name}"))
+    pdt.assert_frame_equal(load(store), before)
+    assert len(finished(store, "s")) == 6
+
+
+def test_same_run_in_two_sweeps_belongs_to_both(store):
+    with Writer(store, "t") as writer:
+        writer.append(records(1)[0])
+    assert len(load(store, "runs")) == 7
+    assert len(finished(store, "t")) == 1
+
+
+def test_later_success_hides_a_folded_failure(tmp_path):
+    run = records(1)[0]
+    for one in (failed(run.spec), record(run.spec), failed(run.spec, "quarantined")):
+        with Writer(tmp_path, "s") as writer:
+            writer.append(one)
+    assert finished(tmp_path, "s") == {run.spec.run_id: "ok"}
+    assert load(tmp_path, "runs")["status"].tolist() == ["ok"]
+    assert len(load(tmp_path)) == 3
+
+
+def with_version(path, version):
+    table = pq.read_table(path, partitioning=None)
+    text = table.schema.metadata[b"bns"].replace(b'"schema_version": 1', b'"schema_version": %d' % version)
+    if version == 0 and "arithmetic_failures" in table.column_names:
+        table = table.drop_columns(["arithmetic_failures"])
+    pq.write_table(table.replace_schema_metadata({b"bns": text}), path)
+
+
+def test_older_files_name_the_command_that_rewrites_them(store):
+    before = load(store).assign(arithmetic_failures=0)
+    for table in ("evals", "runs"):
+        with_version(files(store, table)[0], 0)
+    for read in (load, connect, lambda results: finished(results, "s")):
+        with pytest.raises(StoreError, match=rf"version 0, older than 1.* bns compact --results {store}"):
+            read(store)
+    assert compact(store).upgraded_files == 2
+    after = load(store)
+    old = after["arithmetic_failures"] == 0
+    assert old.sum() >= 9
+    pdt.assert_frame_equal(after.assign(arithmetic_failures=0), before, check_dtype=False)
+
+
+def test_newer_files_name_the_update(store):
+    with_version(files(store, "evals")[1], 2)
+    for read in (load, compact):
+        with pytest.raises(StoreError, match=r"schema version 2, newer than 1.* pip install -U bns"):
+            read(store)
+
+
+def test_empty_and_missing_results_name_the_commands_to_begin_with(tmp_path):
+    for results in (tmp_path, tmp_path / "none"):
+        with pytest.raises(StoreError, match=r"no results in .* bns sweep sweeps/khepera-small.yaml, or"):
+            load(results)
+    assert not (tmp_path / "none").exists()
+    with pytest.raises(StoreError, match="the folder does not exist"):
+        compact(tmp_path / "none")
+
+
+@pytest.mark.parametrize(("call", "message"), [
+    (lambda r: load(r, "eval"), "unknown table 'eval'. Did you mean 'evals'"),
+    (lambda r: load(r, columns=["succes_7cm"]), "column of evals 'succes_7cm'. Did you mean 'success_7cm'"),
+    (lambda r: load(r, where={"mutation": 1}), "unknown column of evals 'mutation'"),
+    (lambda r: load(r, where="mutation > 1"), "DuckDB cannot answer .*mutation"),
+    (lambda r: load(r, where={"seed": object()}), "a condition cannot compare with"),
+    (lambda r: query(r, "SELECT nonsense FROM evals"), "DuckDB cannot answer .*nonsense"),
+    (lambda r: query(r, "SELEC 1"), "DuckDB cannot answer .*SELEC"),
+])
+def test_questions_that_cannot_be_answered(store, call, message):
+    with pytest.raises(StoreError, match=message):
+        call(store)
+
+
+def test_clock_that_goes_back_and_odd_file_times_change_nothing(store, monkeypatch):
+    before = load(store)
+    for path in (*files(store, "evals"), *files(store, "runs")):
+        os.utime(path, (0, 0))
+    monkeypatch.setattr(time, "time", lambda: 1.0)
+    with Writer(store, "s") as writer:
+        for run in records(8)[6:]:
+            writer.append(run)
+    assert len(finished(store, "s")) == 8
+    known = load(store)
+    pdt.assert_frame_equal(known[known["run_id"].isin(before["run_id"])].reset_index(drop=True), before)
+
+
+def test_results_in_a_folder_with_odd_letters(tmp_path):
+    odd = tmp_path / "it's [a] *str?nge* folder"
+    with warnings.catch_warnings(), Writer(odd, "s") as writer:
+        for run in records(2):
+            writer.append(run)
+    assert len(load(odd)) == 6
+
+
+def test_unreadable_runs_are_warned_of_once(store):
+    path = files(store, "runs")[0]
+    gone = ids_in(path)
+    path.write_bytes(path.read_bytes()[:-9])
+    with pytest.warns(StoreWarning, match="is truncated") as caught:
+        assert gone.isdisjoint(finished(store, "s"))
+    assert len(caught) == 1
+    assert [moved.name for moved in compact(store).set_aside] == [path.name, path.name]
+    assert len(finished(store, "s")) == 3

@@ -1,0 +1,135 @@
+"""Journals that are torn or damaged give every whole run they hold."""
+
+import shutil
+import warnings
+
+import pandas.testing as pdt
+import pytest
+
+from bns.errors import StoreError
+from bns.store import StoreWarning, Writer, compact, finished, load
+from bns.store import journal as journal_module
+from bns.store.journal import MAGIC, journals
+
+from .synthetic import failed, record, records, specs
+
+
+class StopError(Exception):
+    """Leaves a journal behind, as a crash does."""
+
+
+@pytest.fixture
+def left(tmp_path):
+    """Results with a journal of three runs that was not folded, and the three frames' offsets."""
+    runs = records(3)
+    with pytest.raises(StopError), Writer(tmp_path, "s") as writer:  # noqa: PT012
+        for run in runs:
+            writer.append(run)
+        raise StopError
+    path = journals(tmp_path)[0].path
+    data = path.read_bytes()
+    starts = [at for at in range(len(data)) if data.startswith(MAGIC, at)]
+    assert len(starts) == 3
+    return tmp_path, path, runs, starts
+
+
+def ids(runs):
+    return sorted(run.spec.run_id for run in runs)
+
+
+def test_readers_see_the_journal_and_the_fold_changes_nothing(left):
+    results, path, runs, _ = left
+    before, status = load(results), finished(results, "s")
+    assert list(status) == ids(runs)
+    with Writer(results, "s"):
+        assert not path.exists()
+    pdt.assert_frame_equal(load(results), before)
+
+
+@pytest.mark.parametrize("cut", [1, 10, 23, 24, 30, 200])
+def test_torn_last_frame_is_cut_without_a_word(left, cut):
+    results, path, runs, starts = left
+    data = path.read_bytes()
+    path.write_bytes(data[:starts[2] + cut])
+    assert list(finished(results, "s")) == ids(runs[:2])
+    with Writer(results, "s") as writer:
+        assert writer.recovered == 2
+        writer.append(runs[2])
+    assert list(finished(results, "s")) == ids(runs)
+    assert not (results / "set-aside").exists()
+
+
+def test_zeros_at_the_end_are_a_torn_frame(left):
+    results, path, runs, _ = left
+    path.write_bytes(path.read_bytes() + bytes(4096))
+    assert list(finished(results, "s")) == ids(runs)
+
+
+@pytest.mark.parametrize("where", ["magic", "length", "payload"])
+@pytest.mark.parametrize("frame", [0, 1, 2])
+def test_damaged_frame_is_reported_and_the_others_kept(left, where, frame):
+    results, path, runs, starts = left
+    data = bytearray(path.read_bytes())
+    data[starts[frame] + {"magic": 2, "length": 9, "payload": 500}[where]] ^= 0x40
+    path.write_bytes(data)
+    good = [run for number, run in enumerate(runs) if number != frame]
+    with pytest.warns(StoreWarning, match=f"{path.name} is damaged .* 2 whole runs"):
+        assert list(finished(results, "s")) == ids(good)
+    with pytest.warns(StoreWarning, match=r"2 whole runs of it are kept, a\s+copy is in .*set-aside"), \
+            Writer(results, "s"):
+        pass
+    assert list(finished(results, "s")) == ids(good)
+    assert (results / "set-aside" / "journal" / path.name).read_bytes() == data
+
+
+def test_run_in_a_journal_and_in_a_file_is_taken_once(left, tmp_path_factory):
+    results, path, runs, _ = left
+    kept = tmp_path_factory.mktemp("kept") / path.name
+    shutil.copy(path, kept)
+    with Writer(results, "s"):
+        pass
+    folded = load(results)
+    shutil.copy(kept, path)
+    pdt.assert_frame_equal(load(results), folded)
+    other = path.with_name("s--j" + "0" * 32 + ".journal")
+    shutil.move(path, other)
+    pdt.assert_frame_equal(load(results), folded)
+    assert compact(results).recovered_runs == 3
+    pdt.assert_frame_equal(load(results), folded)
+    assert len(load(results, "runs")) == len(runs)
+
+
+def test_retry_that_goes_well_hides_the_failure(tmp_path):
+    spec = next(specs(1, 3))
+    for order in ([failed(spec), record(spec)], [record(spec), failed(spec)]):
+        sweep = f"s{len(list(tmp_path.iterdir()))}"
+        with Writer(tmp_path, sweep) as writer:
+            writer.append(order[0])
+            assert list(finished(tmp_path, sweep).values()) == [order[0].run["status"]]
+            writer.append(order[1])
+            assert finished(tmp_path, sweep) == {spec.run_id: "ok"}
+        assert len(load(tmp_path, "runs", where={"sweep": sweep})) == 1
+        assert len(load(tmp_path, where={"sweep": sweep})) == 3
+
+
+def test_journal_of_another_sweep_is_left_alone(left):
+    results, path, runs, _ = left
+    with Writer(results, "s--j"), Writer(results, "t"):
+        assert path.exists()
+    assert list(finished(results, "s")) == ids(runs)
+
+
+def test_journal_of_a_newer_version_is_refused(left, monkeypatch):
+    results, _, _, _ = left
+    monkeypatch.setattr(journal_module, "SCHEMA_VERSION", 0)
+    with pytest.raises(StoreError, match=r"schema version 1; this bns knows 0.*pip install -U bns"):
+        finished(results, "s")
+
+
+def test_empty_journal_is_removed(tmp_path):
+    path = tmp_path / "journal" / f"s--j{'1' * 32}.journal"
+    path.parent.mkdir(parents=True)
+    path.touch()
+    with warnings.catch_warnings(), Writer(tmp_path, "s") as writer:
+        assert writer.recovered == 0
+    assert not path.exists()

@@ -1,0 +1,149 @@
+"""What status, plan and progress bar say."""
+
+import io
+import math
+
+import pytest
+import sweep_jobs
+from sweep_jobs import make_sweep
+
+from bns.errors import StoreError
+from bns.store.record import RunRecord
+from bns.sweep.executor import SerialExecutor
+from bns.sweep.grid import parse_sweep
+from bns.sweep.plan import plan, work
+from bns.sweep.progress import SweepProgress, describe_rate
+from bns.sweep.runner import Summary, run_sweep
+from bns.sweep.status import sweep_status
+
+TEXT = """
+name: {name}
+robot: khepera
+seeds: 2
+fixed: {{evaluations: 3}}
+grid: {{task: [circle, letter-s], population_size: [10, 11, 12]}}
+"""
+
+
+def sweep_of(tmp_path, name: str = "demo"):
+    return parse_sweep(TEXT.format(name=name), tmp_path / "x.yaml")
+
+
+def job(spec) -> RunRecord:
+    record = sweep_jobs.ok(spec, wall_s=spec.population_size / 10)
+    if spec.population_size == 12:
+        return RunRecord(spec, {**record.run, "status": "failed", "error": "ValueError: twelve"})
+    return record
+
+
+def serial(sweep, results, **options) -> Summary:
+    return run_sweep(sweep, results, job=job, executor=SerialExecutor(job), **options)
+
+
+@pytest.fixture(autouse=True)
+def tasks(monkeypatch):
+    monkeypatch.setattr("bns.sweep.grid.task_names", lambda _robot: ("circle", "letter-s"))
+
+
+def test_status_counts_by_sweep_and_task_against_the_sweep_file(tmp_path):
+    serial(sweep_of(tmp_path), tmp_path)
+    serial(make_sweep("no-file", seeds=1), tmp_path)
+    rows = sweep_status(tmp_path)
+    assert [(r.sweep, r.task, r.done, r.failed, r.quarantined, r.total, r.remaining) for r in rows] == [
+        ("demo", "circle", 4, 2, 0, 6, 0), ("demo", "letter-s", 4, 2, 0, 6, 0),
+        ("no-file", "circle", 3, 1, 0, None, None)]
+    assert rows[0].mean_wall_s == pytest.approx(1.05)
+    assert rows[0].last.tzinfo is not None
+
+
+def test_status_of_a_sweep_half_done(tmp_path):
+    serial(sweep_of(tmp_path), tmp_path, limit=5)
+    assert sum(row.remaining for row in sweep_status(tmp_path)) == 7
+
+
+def test_status_of_nothing_is_explained(tmp_path):
+    with pytest.raises(StoreError, match="bns"):
+        sweep_status(tmp_path)
+
+
+def test_plan_from_stored_runs_is_their_mean(tmp_path):
+    sweep = make_sweep(combos=2, seeds=4)
+    serial(sweep, tmp_path, limit=4)  # both population sizes, seeds 0 and 1
+    found = plan(sweep, tmp_path, 2, job=pytest.fail)
+    assert (found.total, found.done, found.remaining) == (8, 4, 4)
+    assert found.seconds_estimate == pytest.approx((2 * 1.0 + 2 * 1.1) / 2)
+    assert found.basis == "the mean of 4 stored runs of this sweep"
+    assert 100 < found.bytes_estimate < 1e6
+    serial(sweep, tmp_path)
+    done = plan(sweep, tmp_path, 2, job=pytest.fail)
+    assert (done.remaining, done.seconds_estimate, done.bytes_estimate) == (0, 0.0, 0.0)
+
+
+def test_plan_scales_population_sizes_that_were_never_run(tmp_path):
+    serial(make_sweep(combos=1, seeds=1), tmp_path)
+    sweep = make_sweep(combos=2, seeds=1)
+    found = plan(sweep, tmp_path, 1, job=pytest.fail)
+    assert "population sizes 11 have none and are scaled by work" in found.basis
+    assert 0.9 < found.seconds_estimate < 1.2
+
+
+def test_plan_without_results_times_one_short_run(tmp_path):
+    calls = []
+
+    def trial(spec):
+        calls.append(spec)
+        return sweep_jobs.ok(spec, wall_s=0.5)
+
+    sweep = make_sweep(combos=1, seeds=4, evaluations=100)
+    found = plan(sweep, tmp_path / "none", 2, job=trial, warm_up=lambda: calls.append("warm"))
+    assert [calls[0], calls[1].evaluations, len(calls)] == ["warm", 20, 2]
+    assert found.basis.startswith("one trial run of 20 evaluations (0.50 s)")
+    # Five times the evaluations, and more than that in training; four runs by two workers.
+    assert 5 * 0.5 * 2 < found.seconds_estimate < 25 * 0.5 * 2
+    assert found.bytes_estimate == 4 * 100 * 100
+    assert not (tmp_path / "none").exists()
+
+
+def test_plan_says_that_the_trial_failed(tmp_path):
+    sweep = parse_sweep("name: demo\nrobot: khepera\nfixed: {population_size: 12}", tmp_path / "x.yaml")
+    found = plan(sweep, tmp_path, 1, job=job, warm_up=lambda: None)
+    assert math.isnan(found.seconds_estimate)
+    assert found.basis.endswith("failed with ValueError: twelve")
+
+
+def test_failed_runs_are_planned_only_on_request(tmp_path):
+    sweep = make_sweep()
+    serial(sweep, tmp_path)
+    assert plan(sweep, tmp_path, 1).remaining == 0
+    assert plan(sweep, tmp_path, 1, retry_failed=True).remaining == 2
+
+
+def test_work_grows_with_everything_that_costs():
+    base = make_sweep(combos=1, seeds=1)
+    first = work(sweep_spec(base))
+    for name in "evaluations", "population_size", "generations_per_evaluation":
+        assert work(sweep_spec(base, **{name: 5000})) > first
+    assert work(sweep_spec(base, training_iterations_per_evaluation=5000)) > first
+
+
+def sweep_spec(sweep, **changes):
+    from bns.spec import RunSpec
+    return RunSpec(**{**sweep.combos[0], **changes})
+
+
+def test_progress_bar_is_silent_in_a_file_and_speaks_to_a_terminal():
+    quiet, loud = io.StringIO(), io.StringIO()
+    loud.isatty = lambda: True
+    for stream in (quiet, loud):
+        with SweepProgress(stream) as bar:
+            bar(Summary("demo", 8))
+            bar(Summary("demo", 8, done=3, failed=1, new=4))
+    assert quiet.getvalue() == ""
+    assert "demo" in loud.getvalue()
+    assert "4/8" in loud.getvalue()
+
+
+def test_rate_and_time_to_go():
+    summary = Summary("demo", 100, done=40, failed=2, quarantined=1, new=10)
+    assert describe_rate(summary, 60.0) == "10.0/min, 0:05:42 to go, 3 failed"
+    assert describe_rate(Summary("demo", 100), 0.0) == ""
