@@ -45,7 +45,7 @@ class Evolver:
         return cls(robot, task, key, spec, population, robot.score(population, weights, task))
 
     def __post_init__(self) -> None:
-        self.order = rank(self.scores.fitness, self.population.lengths)
+        self.order = rank(self.scores.fitness)
         self._spare = Population(np.zeros_like(self.population.commands), np.zeros_like(self.population.lengths))
         self._parents = tournament_cdf(len(self.population), self.spec.tournament_size)
         self._real_world = tournament_cdf(len(self.population), self.spec.real_world_selection_size)
@@ -82,7 +82,7 @@ class Evolver:
 
     def _score(self, weights: np.ndarray) -> None:
         self.scores = self.robot.score(self.population, weights, self.task)
-        self.order = rank(self.scores.fitness, self.population.lengths)
+        self.order = rank(self.scores.fitness)
         self.failures += self.scores.failures
 
     @property

@@ -67,12 +67,9 @@ def tournament_cdf(n: int, share: float) -> np.ndarray:
     return 1.0 - np.prod(left / (n - np.arange(k))[None, :], axis=1)
 
 
-def rank(fitness: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Indices from best to worst; among equals the shorter list first; NaN and 0 come last. int64 (n,).
-
-    The tie-break keeps commands behind the last goal, which cannot change the fitness, from piling up.
-    """
-    return np.lexsort((lengths, -np.nan_to_num(fitness, nan=0.0, neginf=0.0)))
+def rank(fitness: np.ndarray) -> np.ndarray:
+    """Indices from best to worst; equals keep their order; NaN and 0 come last. int64 (n,)."""
+    return np.argsort(-np.nan_to_num(fitness, nan=0.0, neginf=0.0), kind="stable")
 
 
 def pick(key: Key, purpose: Purpose, step: int, order: np.ndarray, cdf: np.ndarray) -> int:

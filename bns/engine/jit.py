@@ -2,21 +2,49 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
 
-# LLVM uses half of a 512-bit register unless told otherwise; training is a quarter faster with all of it.
-# Left alone where the user has chosen processor features.
-_features = llvm.get_host_cpu_features()
-if "NUMBA_CPU_FEATURES" not in os.environ and _features.get("avx512f"):
-    numba.config.CPU_FEATURES = _features.flatten() + ",-prefer-256-bit"  # type: ignore[attr-defined]  # set from the environment otherwise
-
+_PACKAGE = Path(__file__).resolve().parent.parent
+_WITH_KERNELS = ("engine", "physics", "robots")
 # No "nnan" and "ninf": failed arithmetic must stay visible as NaN.
 _FAST_FLAGS = {"reassoc", "contract", "arcp", "nsz", "afn"}
+
+
+def cache_folder() -> Path:
+    """Where compiled kernels lie: in the package, or in the user's cache if the package cannot be written.
+
+    Numba looks only at the date of the file a kernel stands in, not at the helpers it inlines from others; so the
+    folder is named after the text of all of them, and a change anywhere begins a new one.
+    """
+    digest = hashlib.sha256()
+    for folder in _WITH_KERNELS:
+        for file in sorted((_PACKAGE / folder).rglob("*.py")):
+            digest.update(file.read_bytes())
+    name = f"kernels-{digest.hexdigest()[:12]}"
+    if os.access(_PACKAGE, os.W_OK):
+        return _PACKAGE / "__pycache__" / name
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "bns" / name
+
+
+def _configure() -> None:
+    """Left alone where the user has chosen otherwise through numba's environment variables."""
+    config: Any = numba.config
+    if not config.CACHE_DIR:
+        config.CACHE_DIR = str(cache_folder())
+    features = llvm.get_host_cpu_features()
+    if config.CPU_FEATURES is None and features.get("avx512f"):
+        # LLVM uses half of a 512-bit register unless told otherwise; training is a quarter faster with all of it.
+        config.CPU_FEATURES = features.flatten() + ",-prefer-256-bit"
+
+
+_configure()
 
 
 def fast(function: Callable[..., Any]) -> Any:

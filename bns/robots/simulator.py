@@ -83,12 +83,13 @@ def _part(named: dict[str, np.ndarray], name: str) -> np.ndarray:
 
 def save_simulator(simulator: StaticSimulator, path: Path) -> None:
     """Write a safetensors file with the provenance in its header."""
-    header = {
+    about = {
         "format": "bns-snn-1",
-        "networks": json.dumps(list(simulator.networks)),
-        "noise_sd": json.dumps([float(v) for v in simulator.noise_sd]),
-        "provenance": json.dumps(simulator.provenance, sort_keys=True),
+        "networks": list(simulator.networks),
+        "noise_sd": [float(sd) for sd in simulator.noise_sd],
+        "provenance": simulator.provenance,
     }
+    header = {"bns": json.dumps(about, sort_keys=True)}  # one entry: safetensors writes several in any order
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(save(tensors(simulator.networks, simulator.weights), metadata=header))
 
@@ -103,17 +104,12 @@ def load_simulator(path: Path) -> StaticSimulator:
             named = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # not a dict
     except SafetensorError as error:
         raise ModelError(f"{path} is no safetensors file: {error}.") from error
-    if "networks" not in header:
-        raise ModelError(
-            f"{path} holds tensors but not which networks they are; write it with bns (`bns run --save-snn FILE`)."
-        )
-    networks = tuple(json.loads(header["networks"]))
-    return StaticSimulator(
-        networks,
-        from_tensors(networks, named),
-        np.asarray(json.loads(header.get("noise_sd", "[]")), np.float64),
-        json.loads(header.get("provenance", "{}")),
-    )
+    if "bns" not in header:
+        raise ModelError(f"{path} does not say which networks it holds; write it with bns (`bns run --save-snn FILE`).")
+    about = json.loads(header["bns"])
+    networks = tuple(about["networks"])
+    noise_sd = np.asarray(about["noise_sd"], np.float64)
+    return StaticSimulator(networks, from_tensors(networks, named), noise_sd, about["provenance"])
 
 
 def static_path(robot: str) -> Path:

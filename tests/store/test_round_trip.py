@@ -99,7 +99,7 @@ def test_views_are_there_and_empty_before_anything_is_recorded_in_them(tmp_path)
             names = [row[0] for row in connection.execute(f"DESCRIBE {table}").fetchall()]
             assert names == read_columns(table)
     assert load(tmp_path, "paths").empty
-    assert list(load(tmp_path, "paths", columns=["left", "right"]).columns) == ["left", "right"]
+    assert list(load(tmp_path, "paths", columns=["left_units", "right_units"]).columns) == ["left_units", "right_units"]
 
 
 def test_names_that_look_like_numbers_stay_text(tmp_path):

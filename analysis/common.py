@@ -1,0 +1,221 @@
+"""What the figures share: questions to the store, which runs may stand in one curve, intervals, captions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from statsmodels.stats.proportion import proportion_confint
+
+from bns import store as results_store
+from bns.errors import BnsError, SpecError, StoreError
+from bns.plotting import save
+from bns.spec import FIELDS
+from bns.store.files import publish
+from bns.sweep.grid import parse_sweep
+from bns.tasks import load_task
+
+BEGIN = "make sweep-khepera BUDGET=10m"
+SETTING = ("robot", "world", "world_digest", "training_algorithm", "evaluations", "generations_per_evaluation",
+           "training_iterations_per_evaluation", "min_commands", "max_commands")
+"""Columns of runs that must agree before runs are counted together."""
+CELL = ("population_size", "tournament_size", "mutation_rate", "real_world_selection_size")
+"""The parameters whose combinations the source compares (table 4.3)."""
+
+
+class NoDataError(BnsError):
+    """The store has nothing for a figure; the message says what would feed it."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure and what its caption says: ``n`` runs stand in it, ``missing`` names what does not."""
+
+    name: str
+    figure: Figure
+    shows: str
+    n: int
+    sweeps: tuple[str, ...]
+    missing: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the newest file of a sweep asks for; ``cells`` and ``mutation_rates`` are empty if it cannot be read."""
+
+    runs: int
+    cells: int
+    mutation_rates: frozenset[float]
+
+
+class Store:
+    """The results in one folder, as the figures ask for them.
+
+    Raises:
+        StoreError: there is no run at all; the message says what to run.
+    """
+
+    def __init__(self, results: Path | str) -> None:
+        self.results = Path(results)
+        written = any((self.results / name).is_dir() for name in ("runs", "journal"))
+        if not written or not self.query("SELECT count(*) AS n FROM runs").n[0]:
+            raise StoreError(f"there are no runs in {self.results} to draw. Make some with: {BEGIN}; or name "
+                             "another folder with --results DIR.")
+
+    def query(self, sql: str) -> pd.DataFrame:
+        """Rows of a SELECT over the tables of the store."""
+        return results_store.query(self.results, sql)
+
+    @cached_property
+    def plans(self) -> dict[str, Plan]:
+        """By sweep, what its newest file asks for; sweeps that were written without one are absent."""
+        newest = self.query("SELECT sweep, arg_max(text, written_at) AS text, arg_max(runs, written_at) AS runs "
+                            "FROM specs GROUP BY sweep ORDER BY sweep")
+        return {row.sweep: _plan(row.text, row.runs) for row in newest.itertuples()}
+
+    def origins(self, sweeps: Sequence[str]) -> dict[str, Any]:
+        """Spec hashes, commits and versions that the results of ``sweeps`` come from."""
+        hashes = self.query(f"SELECT DISTINCT spec_hash FROM specs WHERE {among('sweep', sweeps)} ORDER BY 1")
+        made = self.query("SELECT DISTINCT git_sha, git_clean, bns_version FROM runs "
+                          f"WHERE {among('sweep', sweeps)} ORDER BY ALL")
+        return {"spec_hashes": hashes.spec_hash.tolist(), "bns_versions": sorted(set(made.bns_version)),
+                "git": [{"sha": one.git_sha, "clean": None if pd.isna(one.git_clean) else bool(one.git_clean)}
+                        for one in made.itertuples()]}
+
+
+def _plan(text: str, runs: float) -> Plan:
+    try:
+        sweep = parse_sweep(text, Path("the stored sweep file"))
+    except SpecError:  # written for another version of bns: its size is known all the same
+        return Plan(0 if pd.isna(runs) else int(runs), 0, frozenset())
+    default = FIELDS["mutation_rate"].default
+    rates = frozenset(float(combo.get("mutation_rate", default)) for combo in sweep.combos)
+    return Plan(sweep.total, len(sweep.combos), rates)
+
+
+def among(column: str, values: Iterable[str]) -> str:
+    """SQL: ``column`` is one of ``values``; of none, if there are none."""
+    listed = ", ".join("'" + value.replace("'", "''") + "'" for value in values)
+    return f"{column} IN ({listed})" if listed else "false"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Runs that may be counted together: all finished ones of ``sweeps`` at one setting a task."""
+
+    sweeps: tuple[str, ...]
+    condition: str
+    n: int
+    tasks: tuple[tuple[str, str], ...]
+    left_out: tuple[str, ...]
+
+    @property
+    def sql(self) -> str:
+        """SELECT of run_id, sweep and number of evaluations. The same run in two sweeps counts once."""
+        return (f"SELECT run_id, min(sweep) AS sweep, any_value(evaluations) AS evaluations FROM runs "
+                f"WHERE status = 'ok' AND {self.condition} GROUP BY run_id")
+
+
+def mutation_sweeps(store: Store) -> list[str]:
+    """Sweeps that compare mutation rates, by their plan or by their runs."""
+    rates = store.query("SELECT sweep, count(DISTINCT mutation_rate) AS rates FROM runs GROUP BY sweep ORDER BY sweep")
+    return [row.sweep for row in rates.itertuples()
+            if row.rates > 1 or (row.sweep in store.plans and len(store.plans[row.sweep].mutation_rates) > 1)]
+
+
+def comparable(store: Store, sweeps: Sequence[str]) -> Selection:
+    """The finished runs of ``sweeps`` at the setting that most of them have, task by task.
+
+    Only tasks with goal points, which a success within 7 cm is known of.
+
+    Raises:
+        NoDataError: there is none; failed ones are counted in the message.
+    """
+    groups = store.query(f"""
+        SELECT task, {', '.join(SETTING)}, count(DISTINCT run_id) AS n FROM runs
+        WHERE status = 'ok' AND {among('sweep', sweeps)} AND robot = 'khepera' GROUP BY ALL
+        ORDER BY n DESC, task, {', '.join(SETTING)}""")
+    if groups.empty:
+        failed = failures(store, sweeps)
+        why = f"none of its runs finished ({failed} failed)" if failed else "no sweep compares mutation rates"
+        raise NoDataError(f"{why}; run {BEGIN}")
+    chosen = groups.drop_duplicates("task")
+    condition = " OR ".join(f"({_equals(row)})" for row in chosen[["task", *SETTING]].to_dict("records"))
+    others = groups.drop(chosen.index)
+    left_out = tuple(f"{row.n:,} runs of {row.task} with {row.evaluations} evaluations, "
+                     f"{row.generations_per_evaluation} generations and {row.training_iterations_per_evaluation} "
+                     "iterations each, or of another world, are left out" for row in others.itertuples())
+    tasks = sorted(zip(chosen.robot, chosen.task, strict=True), key=lambda pair: _task_order(*pair))
+    return Selection(tuple(sweeps), f"{among('sweep', sweeps)} AND ({condition})", int(chosen.n.sum()),
+                     tuple(tasks), left_out)
+
+
+def _equals(values: dict[str, Any]) -> str:
+    return " AND ".join(among(name, [value]) if isinstance(value, str) else f"{name} = {value}"
+                        for name, value in values.items())
+
+
+def failures(store: Store, sweeps: Sequence[str]) -> int:
+    """How many runs of ``sweeps`` broke and were not carried out again with success."""
+    return int(store.query(f"""SELECT count(*) AS n FROM (SELECT run_id FROM runs WHERE {among('sweep', sweeps)}
+        GROUP BY run_id HAVING count(*) FILTER (status = 'ok') = 0)""").n[0])
+
+
+def coverage(store: Store, sweeps: Sequence[str], n: int) -> tuple[str, ...]:
+    """How much of what was planned is there: first the runs, then what is missing of them, one sentence each."""
+    plans = [store.plans[sweep] for sweep in sweeps if sweep in store.plans]
+    planned = sum(plan.runs for plan in plans)
+    said = [f"{n:,} of {planned:,} runs so far" if planned > n else f"{n:,} runs"]
+    cells = sum(plan.cells for plan in plans)
+    known = [sweep for sweep in sweeps if sweep in store.plans and store.plans[sweep].cells]
+    there = store.query(f"""SELECT count(*) AS n FROM (SELECT DISTINCT sweep, task, world, training_algorithm, {', '.join(CELL)},
+        generations_per_evaluation, training_iterations_per_evaluation FROM runs
+        WHERE status = 'ok' AND {among('sweep', known)})""").n[0]
+    if there < cells:
+        said.append(f"{cells - there:,} of {cells:,} combinations have no finished run")
+    if failed := failures(store, sweeps):
+        said.append(f"{failed:,} run{'s' if failed > 1 else ''} failed and {'are' if failed > 1 else 'is'} not shown")
+    return tuple(said)
+
+
+def wilson(successes: Any, runs: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the Wilson 95 % interval of a share, each as the arguments, in 0..1."""
+    low, high = proportion_confint(np.asarray(successes), np.asarray(runs), alpha=0.05, method="wilson")
+    return np.asarray(low), np.asarray(high)
+
+
+def percent(share: float) -> str:
+    """0.1 as ``10 %``."""
+    return f"{100 * share:g} %"
+
+
+def task_title(robot: str, task: str) -> str:
+    """Title of a task; its name, if this version has no such task."""
+    try:
+        return load_task(robot, task).title
+    except SpecError:
+        return task
+
+
+def _task_order(robot: str, task: str) -> tuple[str, str]:
+    try:
+        return load_task(robot, task).source, task
+    except SpecError:
+        return "unknown", task
+
+
+def publish_drawn(drawn: Drawn, paper: str, store: Store, out: Path) -> Path:
+    """Write NAME.png, NAME.svg and, beside them, the caption as NAME.json; the path of the PNG."""
+    png, svg = save(drawn.figure, out / drawn.name)
+    caption = {"name": drawn.name, "paper": paper, "shows": drawn.shows, "n": drawn.n, "missing": list(drawn.missing),
+               "sweeps": list(drawn.sweeps), "files": [png.name, svg.name], **store.origins(drawn.sweeps)}
+    data = (json.dumps(caption, indent=2, ensure_ascii=False) + "\n").encode()
+    publish(data, out / f".{drawn.name}.json.part", out / f"{drawn.name}.json")
+    return png

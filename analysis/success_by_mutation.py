@@ -1,0 +1,53 @@
+"""Figure 4.7: how many runs succeed after each evaluation, by mutation rate."""
+
+from __future__ import annotations
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from analysis.common import Drawn, Selection, Store, comparable, coverage, mutation_sweeps, percent, task_title, wilson
+from bns.plotting import note, ordered_styles, panels, style
+
+NAME = "success-by-mutation"
+PAPER = "figure 4.7"
+
+
+def counts(store: Store, chosen: Selection) -> pd.DataFrame:
+    """Runs and successes of each task, mutation rate and evaluation."""
+    return store.query(f"""
+        SELECT task, mutation_rate, evaluation, count(success_7cm) AS runs,
+               count(*) FILTER (success_7cm) AS successes
+        FROM evals SEMI JOIN ({chosen.sql}) USING (run_id, sweep)
+        WHERE success_7cm IS NOT NULL GROUP BY ALL ORDER BY ALL""")
+
+
+@style()
+def draw(store: Store) -> list[Drawn]:
+    chosen = comparable(store, mutation_sweeps(store))
+    rows = counts(store, chosen)
+    looks = dict(zip(sorted(rows.mutation_rate.unique()), ordered_styles(rows.mutation_rate.nunique()), strict=True))
+    figure, axes = panels(len(chosen.tasks), 3.6, rows_each=2, ratios=(3, 1))
+    for (robot, task), letter, (ax, below) in zip(chosen.tasks, "abcdefgh", axes, strict=False):
+        _panel(ax, rows[rows.task == task], looks)
+        ax.set_title(f"({letter}) {task_title(robot, task)}")
+        below.set_axis_off()
+        below.legend(*ax.get_legend_handles_labels(), loc="upper center", title="mutation rate")
+    said = coverage(store, chosen.sweeps, chosen.n)
+    note(figure, "; ".join((*said, "bands: 95 % Wilson intervals")) + ".")
+    shows = (f"Share of runs whose fittest controller, driven in the world after each evaluation, visits all goals "
+             f"within 7 cm, by mutation rate; all other parameters pooled. n = {chosen.n:,} runs of "
+             f"{', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals.")
+    return [Drawn(NAME, figure, shows, chosen.n, chosen.sweeps, (*said, *chosen.left_out))]
+
+
+def _panel(ax: Axes, rows: pd.DataFrame, looks: dict[float, dict[str, str]]) -> None:
+    for rate, curve in rows.groupby("mutation_rate"):
+        low, high = wilson(curve.successes, curve.runs)
+        every = max(1, len(curve) // 6)
+        ax.fill_between(curve.evaluation, 100 * low, 100 * high, color=looks[rate]["color"], alpha=0.18, linewidth=0)
+        ax.plot(curve.evaluation, 100 * curve.successes / curve.runs, **looks[rate],
+                markevery=(every // 2, every), label=f"{percent(rate)} (n = {curve.runs.max():,})")
+    ax.set(ylim=(-2, 102), xlabel="evaluation in the world", ylabel="successful runs, 7 cm (%)",
+           xlim=(0, rows.evaluation.max() + 1))
+    ax.xaxis.set_major_locator(MaxNLocator(5, integer=True))

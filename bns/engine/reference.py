@@ -1,0 +1,208 @@
+"""The slow twins of the compiled kernels, in plain Python and numpy, as the equations read.
+
+Nothing here is used by a run: tests hold the kernels against it. Floating point is double precision unless said otherwise,
+so a kernel agrees to single precision; whatever is a choice among whole numbers (draws, parents, cuts) agrees exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.engine.evolution import IDENTICAL_CUT, CommandBounds, Population
+from bns.engine.philox import Key, Purpose
+from bns.engine.rprop import GROW, INITIAL_STEP, LARGEST_STEP, SHRINK, SMALLEST_STEP
+from bns.engine.snn import INPUTS, PER_NEURON
+
+_WORD = 2**32
+Words = tuple[int, int, int, int]
+
+
+def philox4x32_10(counter: Words, key: tuple[int, int]) -> Words:
+    """Ten rounds of Philox4x32 over Python's whole numbers (Salmon et al., SC 2011, section 3.3)."""
+    c0, c1, c2, c3 = counter
+    k0, k1 = key
+    for _ in range(10):
+        high0, low0 = divmod(0xD2511F53 * c0, _WORD)
+        high1, low1 = divmod(0xCD9E8D57 * c2, _WORD)
+        c0, c1, c2, c3 = high1 ^ c1 ^ k0, low1, high0 ^ c3 ^ k1, low0
+        k0, k1 = (k0 + 0x9E3779B9) % _WORD, (k1 + 0xBB67AE85) % _WORD
+    return c0, c1, c2, c3
+
+
+def draw(key: Key, purpose: Purpose, step: int, individual: int, slot: int) -> Words:
+    """The four words of one block of a run."""
+    return philox4x32_10((slot, individual, step, int(purpose)), (key.seed, key.study))
+
+
+def split_weights(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """One network (W,) as input weights (H, 5), hidden biases (H,), output weights (H,) and output bias, float64."""
+    row = np.asarray(weights, np.float64)
+    neurons = row[:-1].reshape(-1, PER_NEURON)
+    return neurons[:, :INPUTS], neurons[:, INPUTS], neurons[:, INPUTS + 1], float(row[-1])
+
+
+def hidden_activations(weights: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """Logistic sigmoids (H, n) of one network for inputs X (5, n)."""
+    into, bias, _, _ = split_weights(weights)
+    return np.asarray(1.0 / (1.0 + np.exp(-(into @ np.asarray(X, np.float64) + bias[:, None]))))
+
+
+def predict(weights: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """Outputs (networks, n) of networks (networks, W) for inputs X (5, n) (figure 4.3)."""
+    outputs = []
+    for row in weights:
+        _, _, to_output, bias = split_weights(row)
+        outputs.append(to_output @ hidden_activations(row, X) + bias)
+    return np.array(outputs)
+
+
+def gradient(weights: np.ndarray, X: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Backpropagation: gradient (W,) of half the summed squared error over X (5, n) and target (n,)."""
+    hidden = hidden_activations(weights, X)
+    _, _, to_output, bias = split_weights(weights)
+    error = to_output @ hidden + bias - np.asarray(target, np.float64)
+    at_hidden = to_output[:, None] * error * hidden * (1.0 - hidden)
+    neurons = np.column_stack([at_hidden @ np.asarray(X, np.float64).T, at_hidden.sum(axis=1), hidden @ error])
+    return np.concatenate([neurons.ravel(), [error.sum()]])
+
+
+@dataclass
+class RpropState:
+    """One network under training, all (W,), in the precision that it was started with."""
+
+    weights: np.ndarray
+    step: np.ndarray
+    last_gradient: np.ndarray
+    last_change: np.ndarray
+
+    @classmethod
+    def start(cls, weights: np.ndarray) -> RpropState:
+        """No gradient seen yet."""
+        nothing = np.zeros_like(weights)
+        return cls(weights.copy(), np.full_like(weights, INITIAL_STEP), nothing.copy(), nothing.copy())
+
+
+def update_rprop_plus(state: RpropState, slope: np.ndarray) -> None:
+    """One step of Rprop with weight backtracking (Riedmiller and Braun 1993), weight by weight."""
+    one = state.weights.dtype.type
+    for i, g in enumerate(slope):
+        agreement = g * state.last_gradient[i]
+        if agreement < 0:
+            state.step[i] = max(state.step[i] * one(SHRINK), one(SMALLEST_STEP))
+            state.last_change[i] = -state.last_change[i]
+            state.last_gradient[i] = 0
+        else:
+            if agreement > 0:
+                state.step[i] = min(state.step[i] * one(GROW), one(LARGEST_STEP))
+            state.last_change[i] = -np.sign(g) * state.step[i]
+            state.last_gradient[i] = g
+        state.weights[i] += state.last_change[i]
+
+
+def update_irprop_minus(state: RpropState, slope: np.ndarray) -> None:
+    """One step of iRprop- (Igel and Hüsken 2000), whole arrays at once: a changed sign is forgotten, not taken back."""
+    one = state.weights.dtype.type
+    agreement = slope * state.last_gradient
+    state.step[agreement > 0] *= one(GROW)
+    state.step[agreement < 0] *= one(SHRINK)
+    state.step[:] = np.clip(state.step, one(SMALLEST_STEP), one(LARGEST_STEP))
+    state.last_gradient[:] = np.where(agreement < 0, one(0), slope)
+    state.weights -= np.sign(state.last_gradient) * state.step
+
+
+UPDATES: dict[str, Callable[[RpropState, np.ndarray], None]] = {
+    "rprop+": update_rprop_plus,
+    "irprop-": update_irprop_minus,
+}
+
+
+def train(state: RpropState, X: np.ndarray, target: np.ndarray, iterations: int, algorithm: str) -> None:
+    """Iterate one network in place on X (5, n) and target (n,)."""
+    for _ in range(iterations):
+        UPDATES[algorithm](state, gradient(state.weights, X, target).astype(state.weights.dtype))
+
+
+def rank(fitness: np.ndarray) -> list[int]:
+    """Best first; equals in the order they come in; what is no number counts as 0."""
+    value = [0.0 if np.isnan(f) or f == -np.inf else float(f) for f in fitness]
+    return sorted(range(len(value)), key=lambda i: -value[i])
+
+
+def tournament(random: np.random.Generator, size: int, share: float) -> int:
+    """Rank of the winner of one tournament among distinct members, drawn one by one."""
+    entrants = min(size, max(1, int(share * size + 0.5)))
+    return int(random.permutation(size)[:entrants].min())
+
+
+def breed(
+    key: Key,
+    parents: Population,
+    order: list[int],
+    cdf: np.ndarray,
+    rate: float,
+    bounds: CommandBounds,
+    shortest: int,
+    generation: int,
+) -> tuple[list[np.ndarray], int]:
+    """The children as lists of commands, (length, 3) float32 each, and how many were cut at the longest list allowed."""
+    capacity = parents.commands.shape[1]
+    old = [parents.controller(i) for i in range(len(parents))]
+    children = [old[order[0]]]
+    for pair in range(len(parents) // 2):
+        a, b = _parents(key, old, order, cdf, generation, pair)
+        cut_a, cut_b = _cuts(key, len(a), len(b), generation, pair)
+        children += [_crossed(a, b, cut_a, cut_b, shortest), _crossed(b, a, cut_b, cut_a, shortest)]
+    children = children[: len(parents)]
+    hits = sum(len(child) > capacity for child in children)
+    children = [child[:capacity].copy() for child in children]
+    for i, child in enumerate(children[1:], start=1):
+        _mutate(key, child, i, rate, bounds, generation)
+    return children, hits
+
+
+def _parents(
+    key: Key, old: list[np.ndarray], order: list[int], cdf: np.ndarray, generation: int, pair: int
+) -> tuple[np.ndarray, np.ndarray]:
+    words = draw(key, Purpose.PARENTS, generation, pair, 0)
+    first, second = (next((r for r, p in enumerate(cdf) if word / _WORD < p), len(cdf) - 1) for word in words[:2])
+    return old[order[first]], old[order[second]]
+
+
+def _cuts(key: Key, length_a: int, length_b: int, generation: int, pair: int) -> tuple[int, int]:
+    which, first, second, _ = draw(key, Purpose.CUTS, generation, pair, 0)
+    if which / _WORD < IDENTICAL_CUT:
+        cut = first * (min(length_a, length_b) + 1) // _WORD
+        return cut, cut
+    return first * (length_a + 1) // _WORD, second * (length_b + 1) // _WORD
+
+
+def _crossed(front: np.ndarray, back: np.ndarray, cut_front: int, cut_back: int, shortest: int) -> np.ndarray:
+    child = np.concatenate([front[:cut_front], back[cut_back:]])
+    return child if len(child) >= shortest else back
+
+
+def _mutate(key: Key, child: np.ndarray, index: int, rate: float, bounds: CommandBounds, generation: int) -> None:
+    threshold = rate * _WORD
+    for j in range(len(child)):
+        words = draw(key, Purpose.MUTATION, generation, index, j)
+        for c in range(child.shape[1]):
+            if words[c] < threshold:
+                move = np.float32((2.0 * words[c] / threshold - 1.0) * float(bounds.mutation_span[c]))
+                child[j, c] = min(max(child[j, c] + move, bounds.low[c]), bounds.high[c])
+
+
+def diversity(population: Population, bounds: CommandBounds) -> float:
+    """Equation 4.1: the mean over controllers of the summed normalised distances of their commands from the mean command.
+
+    The mean command at a place is taken over the controllers that are long enough to have one there.
+    """
+    spread = bounds.high.astype(np.float64) - bounds.low
+    controllers = [population.controller(i).astype(np.float64) / spread for i in range(len(population))]
+    mean = [
+        np.mean([one[j] for one in controllers if len(one) > j], axis=0) for j in range(max(map(len, controllers)))
+    ]
+    return float(np.mean([sum(np.abs(c - m).sum() for c, m in zip(one, mean, strict=False)) for one in controllers]))
+

@@ -1,0 +1,207 @@
+"""The one style of every figure, how figures are saved, and paths on the floor.
+
+A figure is drawn and saved inside `style`; nothing here keeps global state or opens a window.
+"""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from cycler import cycler
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+
+from bns.engine.philox import Key, Purpose
+from bns.engine.snn import predict
+from bns.loop import RunResult
+from bns.robots.base import Robot
+from bns.spec import RunSpec
+from bns.store.files import publish
+from bns.tasks import Task
+from bns.worlds import build_world
+
+COLUMN_IN, PAGE_IN = 3.5, 7.2
+"""Widths of one column and of a page."""
+TEXT_PT = 8
+"""No text is smaller than this at those widths."""
+OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+GREY = "#555555"
+
+_STYLE: Mapping[Any, Any] = {
+    "font.size": TEXT_PT, "axes.titlesize": TEXT_PT + 1, "axes.labelsize": TEXT_PT, "xtick.labelsize": TEXT_PT,
+    "ytick.labelsize": TEXT_PT, "legend.fontsize": TEXT_PT, "legend.title_fontsize": TEXT_PT,
+    "figure.titlesize": TEXT_PT + 1, "figure.labelsize": TEXT_PT, "axes.formatter.use_mathtext": False,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "axes.axisbelow": True,
+    "grid.color": "#dddddd", "grid.linewidth": 0.6, "axes.linewidth": 0.8, "lines.linewidth": 1.4,
+    "lines.markersize": 4, "legend.frameon": False, "legend.handlelength": 2.8, "savefig.dpi": 200,
+    "figure.constrained_layout.use": True, "svg.hashsalt": "bns", "svg.fonttype": "path",
+    "axes.prop_cycle": cycler(color=OKABE_ITO),
+}
+_LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
+_MARKERS = ("o", "s", "^", "D", "v", "P")
+_SMALLEST_TURN_RAD, _LARGEST_TURN_RAD = 1e-3, 0.95 * 2 * np.pi
+_MARGIN_M, _REACH_M = 0.12, 0.6
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """The settings that all figures are drawn and saved under, whatever the user's matplotlibrc says.
+
+    A context manager, and so a decorator too: ``@style()``.
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def ordered_styles(count: int) -> list[dict[str, Any]]:
+    """Colour, line style and marker for each of ``count`` ordered values: told apart without colour, too."""
+    shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.85, max(count, 1)))
+    return [{"color": mpl.colors.to_hex(shades[i]), "linestyle": _LINES[i % len(_LINES)],
+             "marker": _MARKERS[i % len(_MARKERS)]} for i in range(count)]
+
+
+def note(figure: Figure, text: str) -> None:
+    """A line or more in grey below everything else, wrapped to the figure's width."""
+    letters = int((figure.get_figwidth() - 0.2) * 72 / (0.52 * TEXT_PT))
+    figure.supxlabel(textwrap.fill(text, letters), x=0.01, ha="left", color=GREY, fontsize=TEXT_PT)
+
+
+def save(figure: Figure, stem: Path | str) -> tuple[Path, Path]:
+    """Write ``stem``.png (200 dpi) and ``stem``.svg, each all at once; the same figure gives the same bytes.
+
+    Raises:
+        StoreError: the disk does not take a file.
+    """
+    stem = Path(stem)
+    made = []
+    for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
+        buffer, place = io.BytesIO(), stem.with_name(f"{stem.name}.{kind}")
+        with style():
+            figure.savefig(buffer, format=kind, metadata=metadata)
+        publish(buffer.getvalue(), place.with_name(f".{place.name}.part"), place)
+        made.append(place)
+    return made[0], made[1]
+
+
+def arcs(poses: np.ndarray, step_rad: float = 0.05) -> np.ndarray:
+    """Points (m, 2) on the path through ``poses`` (n, 3: x_m, y_m, heading_rad, not wrapped).
+
+    A command holds both wheel speeds, so the robot drives an arc that turns by the change of heading. A turn of
+    about a full circle or more leaves the arc undetermined by its chord, and the chord is drawn.
+    """
+    points = [poses[:1, :2]]
+    for before, after in pairwise(poses):
+        turn = after[2] - before[2]
+        if not _SMALLEST_TURN_RAD < abs(turn) < _LARGEST_TURN_RAD:
+            points.append(after[None, :2])
+            continue
+        turned = np.linspace(0, turn, int(abs(turn) / step_rad) + 2)[1:]
+        # Chord from the start to where the robot has turned so far, relative to the whole chord.
+        part = np.sin(turned / 2) / np.sin(turn / 2) * np.exp(0.5j * (turned - turn))
+        ahead = part * complex(*(after[:2] - before[:2]))
+        points.append(before[:2] + np.column_stack([ahead.real, ahead.imag]))
+    return np.vstack(points)
+
+
+def draw_paths(ax: Axes, goals_m: np.ndarray, radius_m: float, world_poses: np.ndarray,
+               snn_poses: np.ndarray) -> None:
+    """Robot's path (solid) and the simulator's idea of it (dashed) among the goals, in cm.
+
+    Poses are (n, 3), x_m, y_m, heading_rad, first the start, then the end of each command (dots). A simulator that is
+    far off runs out of the picture rather than shrink it.
+    """
+    _draw_goals(ax, goals_m, radius_m)
+    for poses, label, color, line in ((world_poses, "robot", OKABE_ITO[0], "-"),
+                                      (snn_poses, "simulator", OKABE_ITO[1], "--")):
+        path = 100 * arcs(poses)
+        ax.plot(path[:, 0], path[:, 1], label=label, color=color, linestyle=line)
+        ax.plot(100 * poses[1:, 0], 100 * poses[1:, 1], "o", color=color, markersize=2.2)
+    x, y, heading = world_poses[0]
+    ax.plot(100 * x, 100 * y, marker=(3, 0, np.degrees(heading) - 90), color="black", markersize=8, linestyle="none",
+            label="start")
+    _frame(ax, goals_m, radius_m, arcs(world_poses))
+
+
+def _draw_goals(ax: Axes, goals_m: np.ndarray, radius_m: float) -> None:
+    places, first = np.unique(goals_m, axis=0, return_index=True)
+    centre = places.mean(axis=0)
+    for place in goals_m[np.sort(first)]:
+        numbers = ", ".join(str(i + 1) for i in np.flatnonzero((goals_m == place).all(axis=1)))
+        ax.add_patch(Circle(tuple(100 * place), 100 * radius_m, facecolor="#c8c8c8", edgecolor="#777777", zorder=1))
+        # Outside the disc, where a path that reaches the goal does not end: away from the middle, or to the right.
+        outward = place - centre
+        length = np.linalg.norm(outward)
+        outward = outward / length if length > radius_m else np.array([1.0, 0.0])
+        x, y = 100 * (place + outward * (radius_m + 0.045))
+        ax.text(x, y, numbers, ha="center", va="center", zorder=5, fontweight="bold",
+                path_effects=[withStroke(linewidth=2, foreground="white")])
+
+
+def _frame(ax: Axes, goals_m: np.ndarray, radius_m: float, path: np.ndarray) -> None:
+    low, high = goals_m.min(axis=0) - radius_m, goals_m.max(axis=0) + radius_m
+    seen = np.clip(path[np.isfinite(path).all(axis=1)], low - _REACH_M, high + _REACH_M)
+    low = 100 * (np.vstack([seen, low[None]]).min(axis=0) - _MARGIN_M)
+    high = 100 * (np.vstack([seen, high[None]]).max(axis=0) + _MARGIN_M)
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, east (cm)",
+           ylabel="y, north (cm)")
+
+
+@style()
+def path_figure(spec: RunSpec, task: Task, robot: Robot, result: RunResult, stem: Path) -> Path:
+    """Draw and save the path of a run's fittest controller at its end, a column wide; the path of the PNG."""
+    driven, simulated = fittest_poses(spec, robot, result)
+    figure = Figure(figsize=(COLUMN_IN, COLUMN_IN + 0.4))
+    ax = figure.subplots()
+    draw_paths(ax, task.goals_m, robot.radii_m[0], driven, simulated)
+    success = bool(result.tables["evals"]["success"][-1])
+    ax.set_title(f"{task.title}, seed {spec.seed}, evaluation {spec.evaluations}: {outcome(success)}")
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return save(figure, stem)[0]
+
+
+def fittest_poses(spec: RunSpec, robot: Robot, result: RunResult) -> tuple[np.ndarray, np.ndarray]:
+    """Poses (n, 3) of the fittest controller at a run's end, start included: driven, and as its networks see it.
+
+    It is driven with the noise of the run's last evaluation again, and so ends where the results say it did.
+    """
+    key = Key.of_run(spec.seed, spec.root_seed, spec.robot, spec.task)
+    start = robot.poses(np.zeros((1, len(robot.networks))))
+    driven = build_world(spec.world, robot).drive(result.fittest, key, Purpose.WORLD_FITTEST, spec.evaluations)
+    simulated = robot.poses(robot.displacements(predict(result.weights, robot.inputs(result.fittest))))
+    return np.vstack([start, driven]), np.vstack([start, simulated])
+
+
+def outcome(success: bool) -> str:
+    """What a path came to, in words for a title."""
+    return "all goals" if success else "not all goals"
+
+
+def panels(count: int, height_in: float, columns: int = 3, rows_each: int = 1,
+           ratios: Sequence[float] | None = None) -> tuple[Figure, np.ndarray]:
+    """Figure with ``count`` panels (count, rows_each): a column wide if there is one, else a page wide.
+
+    ``rows_each`` axes stand above each other in a panel, of relative heights ``ratios``; ``height_in`` is the
+    height of one row of panels. Rows are filled from the left; places that stay empty are blank.
+    """
+    across = min(count, 2 if count == 4 else columns)
+    down = -(-count // across)
+    figure = Figure(figsize=(COLUMN_IN if count == 1 else PAGE_IN, height_in * down))
+    heights = list(ratios or [1] * rows_each) * down
+    grid = figure.subplots(down * rows_each, across, squeeze=False, gridspec_kw={"height_ratios": heights})
+    axes = np.array([[grid[(i // across) * rows_each + row, i % across] for row in range(rows_each)]
+                     for i in range(down * across)])
+    for blank in axes[count:].ravel():
+        blank.set_axis_off()
+    return figure, axes[:count]
