@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import pkgutil
 import sys
 from collections.abc import Sequence
@@ -11,8 +12,10 @@ from pathlib import Path
 from types import ModuleType
 
 import analysis
-from analysis.common import NoDataError, Store, publish_drawn
+from analysis.common import Drawn, NoDataError, Store
 from bns.errors import BnsError, SpecError, unknown_name
+from bns.plotting import save
+from bns.store.files import publish
 
 
 def figures() -> dict[str, ModuleType]:
@@ -56,10 +59,28 @@ def _draw_all(modules: dict[str, ModuleType], results: Path, out: Path) -> None:
         _progress(f"[{number}/{len(modules)}] {name}")
         try:
             for drawn in module.draw(store):
-                png = publish_drawn(drawn, module.PAPER, store, out)
+                png = _publish(drawn, module.PAPER, store, out)
                 print(f"{png}  ({module.PAPER}, n = {drawn.n:,} runs)")
         except NoDataError as reason:
             print(f"{name} ({module.PAPER}) skipped: {reason}")
+
+
+def _publish(drawn: Drawn, paper: str, store: Store, out: Path) -> Path:
+    """Write NAME.png, NAME.svg and, beside them, the caption as NAME.json; the path of the PNG."""
+    png, svg = save(drawn.figure, out / drawn.name)
+    caption = {
+        "name": drawn.name,
+        "paper": paper,
+        "shows": drawn.shows,
+        "n": drawn.n,
+        "missing": list(drawn.missing),
+        "sweeps": list(drawn.sweeps),
+        "files": [png.name, svg.name],
+        **store.origins(drawn.sweeps),
+    }
+    data = (json.dumps(caption, indent=2, ensure_ascii=False) + "\n").encode()
+    publish(data, out / f".{drawn.name}.json.part", out / f"{drawn.name}.json")
+    return png
 
 
 def _progress(text: str) -> None:

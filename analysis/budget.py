@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
-from analysis.common import Drawn, NoDataError, Store, coverage, task_title, wilson
+from analysis.common import Drawn, NoDataError, Store, coverage, task_order, task_title, wilson
 from bns.plotting import note, ordered_styles, panels, style
 
 NAME = "budget"
 PAPER = "choice of defaults, not in the source"
 SWEEP = "budget"
-HOURS_OF_RUNS = 1000
+RUNS = 1000
+"""The core-hours are those of this many runs."""
 
 
 def cells(store: Store) -> pd.DataFrame:
@@ -32,7 +37,7 @@ def draw(store: Store) -> list[Drawn]:
     rows = cells(store)
     if rows.empty:
         raise NoDataError(f"no finished run of the sweep {SWEEP!r}; run make sweep-budget")
-    tasks = list(rows[["robot", "task"]].drop_duplicates().itertuples(index=False, name=None))
+    tasks = sorted(set(zip(rows.robot, rows.task, strict=True)), key=lambda pair: task_order(*pair))
     looks = dict(zip(sorted(rows.iterations.unique()), ordered_styles(rows.iterations.nunique()), strict=True))
     columns = sorted(rows.generations.unique())
     figure, axes = panels(len(tasks), 5.0, rows_each=2, ratios=(1, 1))
@@ -41,16 +46,23 @@ def draw(store: Store) -> list[Drawn]:
         _success(above, here, looks, columns)
         _cost(below, here, looks, columns)
         above.set_title(task_title(robot, task))
+    _share_costs(axes[:, 1])
+    axes[0, 0].set_ylabel("successful runs, 7 cm (%)")
     handles, labels = max((ax.get_legend_handles_labels() for ax in axes[:, 0]), key=lambda pair: len(pair[1]))
     figure.legend(handles, labels, loc="outside upper center", ncols=4, title="training iterations an evaluation")
     n = int(rows.runs.sum())
     said = coverage(store, (SWEEP,), n)
-    note(figure, "; ".join((*said, f"{_runs_each(rows)} a point")) + ". Bars above: 95 % Wilson intervals; below: "
-         "median, 10 to 90 % of the runs.")
-    shows = (f"Above: share of runs whose fittest controller visits all goals within 7 cm at the last evaluation "
-             f"(95 % Wilson intervals). Below: CPU time of a run (median, 10 to 90 %). By generations and training "
-             f"iterations after each evaluation; {_runs_each(rows)} a point, n = {n:,} runs of {SWEEP}.")
-    return [Drawn(NAME, figure, shows, n, (SWEEP,), said)]
+    note(
+        figure,
+        "; ".join((*said.sentences, f"{_runs_each(rows)} a point")) + ". Bars above: 95 % Wilson intervals; below: "
+        "median, 10 to 90 % of the runs.",
+    )
+    shows = (
+        f"Above: share of runs whose fittest controller visits all goals within 7 cm at the last evaluation "
+        f"(95 % Wilson intervals). Below: CPU time of a run (median, 10 to 90 %). By generations and training "
+        f"iterations after each evaluation; {_runs_each(rows)} a point, n = {n:,} runs of {SWEEP}."
+    )
+    return [Drawn(NAME, figure, shows, n, (SWEEP,), said.missing)]
 
 
 def _runs_each(rows: pd.DataFrame) -> str:
@@ -73,11 +85,27 @@ def _success(ax: Axes, rows: pd.DataFrame, looks: dict, columns: list[int]) -> N
     low, high = wilson(rows.successes, rows.runs)
     shares = rows.assign(share=100 * rows.successes / rows.runs, low=100 * low, high=100 * high)
     _lines(ax, shares, looks, columns, "share", "low", "high")
-    ax.set(ylim=(-2, 102), ylabel="successful runs, 7 cm (%)")
+    ax.set_ylim(-2, 102)
 
 
 def _cost(ax: Axes, rows: pd.DataFrame, looks: dict, columns: list[int]) -> None:
+    ax.set_yscale("log")
     _lines(ax, rows, looks, columns, "cpu_s", "cpu_low_s", "cpu_high_s")
-    ax.set(yscale="log", ylabel="CPU time a run (s)")
-    hours = ax.secondary_yaxis("right", functions=(lambda s: s * HOURS_OF_RUNS / 3600, lambda h: h * 3600 / HOURS_OF_RUNS))
-    hours.set_ylabel(f"core-hours for {HOURS_OF_RUNS:,} runs")
+
+
+def _share_costs(axes: Sequence[Axes]) -> None:
+    """One scale for all tasks: seconds on the left, core-hours of many runs on the right."""
+    ends = [ax.get_ylim() for ax in axes]
+    for ax in axes:
+        ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
+        _plain(ax.yaxis)
+    axes[0].set_ylabel("CPU time a run (s)")
+    hours = axes[-1].secondary_yaxis("right", functions=(lambda s: s * RUNS / 3600, lambda h: h * 3600 / RUNS))
+    _plain(hours.yaxis)
+    hours.set_ylabel(f"core-hours for {RUNS:,} runs")
+
+
+def _plain(axis: Axis) -> None:
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_locator(NullLocator())

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import duckdb
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -16,15 +16,23 @@ from statsmodels.stats.proportion import proportion_confint
 
 from bns import store as results_store
 from bns.errors import BnsError, SpecError, StoreError
-from bns.plotting import save
 from bns.spec import FIELDS
-from bns.store.files import publish
+from bns.store.schema import PARAMETERS
 from bns.sweep.grid import parse_sweep
 from bns.tasks import load_task
 
 BEGIN = "make sweep-khepera BUDGET=10m"
-SETTING = ("robot", "world", "world_digest", "training_algorithm", "evaluations", "generations_per_evaluation",
-           "training_iterations_per_evaluation", "min_commands", "max_commands")
+SETTING = [
+    "robot",
+    "world",
+    "world_digest",
+    "training_algorithm",
+    "evaluations",
+    "generations_per_evaluation",
+    "training_iterations_per_evaluation",
+    "min_commands",
+    "max_commands",
+]
 """Columns of runs that must agree before runs are counted together."""
 CELL = ("population_size", "tournament_size", "mutation_rate", "real_world_selection_size")
 """The parameters whose combinations the source compares (table 4.3)."""
@@ -56,7 +64,7 @@ class Plan:
 
 
 class Store:
-    """The results in one folder, as the figures ask for them.
+    """The results in one folder as they are now: all figures of one call show the same runs.
 
     Raises:
         StoreError: there is no run at all; the message says what to run.
@@ -66,28 +74,45 @@ class Store:
         self.results = Path(results)
         written = any((self.results / name).is_dir() for name in ("runs", "journal"))
         if not written or not self.query("SELECT count(*) AS n FROM runs").n[0]:
-            raise StoreError(f"there are no runs in {self.results} to draw. Make some with: {BEGIN}; or name "
-                             "another folder with --results DIR.")
+            raise StoreError(
+                f"there are no runs in {self.results} to draw. Make some with: {BEGIN}; or name "
+                "another folder with --results DIR."
+            )
 
     def query(self, sql: str) -> pd.DataFrame:
         """Rows of a SELECT over the tables of the store."""
-        return results_store.query(self.results, sql)
+        try:
+            return self._connection.execute(sql).df()
+        except duckdb.IOException:  # a compaction has replaced files meanwhile: the rows are the same in the new ones
+            return results_store.query(self.results, sql)
+
+    @cached_property
+    def _connection(self) -> duckdb.DuckDBPyConnection:
+        return results_store.connect(self.results)
 
     @cached_property
     def plans(self) -> dict[str, Plan]:
         """By sweep, what its newest file asks for; sweeps that were written without one are absent."""
-        newest = self.query("SELECT sweep, arg_max(text, written_at) AS text, arg_max(runs, written_at) AS runs "
-                            "FROM specs GROUP BY sweep ORDER BY sweep")
+        newest = self.query(
+            "SELECT sweep, arg_max(text, written_at) AS text, arg_max(runs, written_at) AS runs "
+            "FROM specs GROUP BY sweep ORDER BY sweep"
+        )
         return {row.sweep: _plan(row.text, row.runs) for row in newest.itertuples()}
 
     def origins(self, sweeps: Sequence[str]) -> dict[str, Any]:
         """Spec hashes, commits and versions that the results of ``sweeps`` come from."""
         hashes = self.query(f"SELECT DISTINCT spec_hash FROM specs WHERE {among('sweep', sweeps)} ORDER BY 1")
-        made = self.query("SELECT DISTINCT git_sha, git_clean, bns_version FROM runs "
-                          f"WHERE {among('sweep', sweeps)} ORDER BY ALL")
-        return {"spec_hashes": hashes.spec_hash.tolist(), "bns_versions": sorted(set(made.bns_version)),
-                "git": [{"sha": one.git_sha, "clean": None if pd.isna(one.git_clean) else bool(one.git_clean)}
-                        for one in made.itertuples()]}
+        made = self.query(
+            f"SELECT DISTINCT git_sha, git_clean, bns_version FROM runs WHERE {among('sweep', sweeps)} ORDER BY ALL"
+        )
+        return {
+            "spec_hashes": hashes.spec_hash.tolist(),
+            "bns_versions": sorted(set(made.bns_version)),
+            "git": [
+                {"sha": one.git_sha, "clean": None if pd.isna(one.git_clean) else bool(one.git_clean)}
+                for one in made.itertuples()
+            ],
+        }
 
 
 def _plan(text: str, runs: float) -> Plan:
@@ -119,15 +144,20 @@ class Selection:
     @property
     def sql(self) -> str:
         """SELECT of run_id, sweep and number of evaluations. The same run in two sweeps counts once."""
-        return (f"SELECT run_id, min(sweep) AS sweep, any_value(evaluations) AS evaluations FROM runs "
-                f"WHERE status = 'ok' AND {self.condition} GROUP BY run_id")
+        return (
+            f"SELECT run_id, min(sweep) AS sweep, any_value(evaluations) AS evaluations FROM runs "
+            f"WHERE status = 'ok' AND {self.condition} GROUP BY run_id"
+        )
 
 
 def mutation_sweeps(store: Store) -> list[str]:
     """Sweeps that compare mutation rates, by their plan or by their runs."""
     rates = store.query("SELECT sweep, count(DISTINCT mutation_rate) AS rates FROM runs GROUP BY sweep ORDER BY sweep")
-    return [row.sweep for row in rates.itertuples()
-            if row.rates > 1 or (row.sweep in store.plans and len(store.plans[row.sweep].mutation_rates) > 1)]
+    return [
+        row.sweep
+        for row in rates.itertuples()
+        if row.rates > 1 or (row.sweep in store.plans and len(store.plans[row.sweep].mutation_rates) > 1)
+    ]
 
 
 def comparable(store: Store, sweeps: Sequence[str]) -> Selection:
@@ -139,56 +169,100 @@ def comparable(store: Store, sweeps: Sequence[str]) -> Selection:
         NoDataError: there is none; failed ones are counted in the message.
     """
     groups = store.query(f"""
-        SELECT task, {', '.join(SETTING)}, count(DISTINCT run_id) AS n FROM runs
-        WHERE status = 'ok' AND {among('sweep', sweeps)} AND robot = 'khepera' GROUP BY ALL
-        ORDER BY n DESC, task, {', '.join(SETTING)}""")
+        SELECT task, {", ".join(SETTING)}, count(DISTINCT run_id) AS n FROM runs
+        WHERE status = 'ok' AND {among("sweep", sweeps)} AND robot = 'khepera' GROUP BY ALL
+        ORDER BY n DESC, task, {", ".join(SETTING)}""")
     if groups.empty:
         failed = failures(store, sweeps)
-        why = f"none of its runs finished ({failed} failed)" if failed else "no sweep compares mutation rates"
+        why = f"no run has finished ({failed:,} failed)" if failed else "no sweep compares mutation rates"
         raise NoDataError(f"{why}; run {BEGIN}")
     chosen = groups.drop_duplicates("task")
     condition = " OR ".join(f"({_equals(row)})" for row in chosen[["task", *SETTING]].to_dict("records"))
     others = groups.drop(chosen.index)
-    left_out = tuple(f"{row.n:,} runs of {row.task} with {row.evaluations} evaluations, "
-                     f"{row.generations_per_evaluation} generations and {row.training_iterations_per_evaluation} "
-                     "iterations each, or of another world, are left out" for row in others.itertuples())
-    tasks = sorted(zip(chosen.robot, chosen.task, strict=True), key=lambda pair: _task_order(*pair))
-    return Selection(tuple(sweeps), f"{among('sweep', sweeps)} AND ({condition})", int(chosen.n.sum()),
-                     tuple(tasks), left_out)
+    left_out = tuple(
+        f"{counted(row.n, 'run')} of {row.task} with {row.evaluations} evaluations, "
+        f"{row.generations_per_evaluation} generations and {row.training_iterations_per_evaluation} "
+        "iterations each, or of another world or other bounds, left out"
+        for row in others.itertuples()
+    )
+    tasks = sorted(zip(chosen.robot, chosen.task, strict=True), key=lambda pair: task_order(*pair))
+    return Selection(
+        tuple(sweeps), f"{among('sweep', sweeps)} AND ({condition})", int(chosen.n.sum()), tuple(tasks), left_out
+    )
 
 
 def _equals(values: dict[str, Any]) -> str:
-    return " AND ".join(among(name, [value]) if isinstance(value, str) else f"{name} = {value}"
-                        for name, value in values.items())
+    return " AND ".join(
+        among(name, [value]) if isinstance(value, str) else f"{name} = {value}" for name, value in values.items()
+    )
 
 
 def failures(store: Store, sweeps: Sequence[str]) -> int:
     """How many runs of ``sweeps`` broke and were not carried out again with success."""
-    return int(store.query(f"""SELECT count(*) AS n FROM (SELECT run_id FROM runs WHERE {among('sweep', sweeps)}
-        GROUP BY run_id HAVING count(*) FILTER (status = 'ok') = 0)""").n[0])
+    return int(
+        store.query(f"""SELECT count(*) AS n FROM (SELECT run_id FROM runs WHERE {among("sweep", sweeps)}
+        GROUP BY run_id HAVING count(*) FILTER (status = 'ok') = 0)""").n[0]
+    )
 
 
-def coverage(store: Store, sweeps: Sequence[str], n: int) -> tuple[str, ...]:
-    """How much of what was planned is there: first the runs, then what is missing of them, one sentence each."""
-    plans = [store.plans[sweep] for sweep in sweeps if sweep in store.plans]
-    planned = sum(plan.runs for plan in plans)
-    said = [f"{n:,} of {planned:,} runs so far" if planned > n else f"{n:,} runs"]
-    cells = sum(plan.cells for plan in plans)
-    known = [sweep for sweep in sweeps if sweep in store.plans and store.plans[sweep].cells]
-    there = store.query(f"""SELECT count(*) AS n FROM (SELECT DISTINCT sweep, task, world, training_algorithm, {', '.join(CELL)},
-        generations_per_evaluation, training_iterations_per_evaluation FROM runs
-        WHERE status = 'ok' AND {among('sweep', known)})""").n[0]
+@dataclass(frozen=True)
+class Coverage:
+    """How much of what was planned is there, in words; ``missing`` says the same of what is not."""
+
+    amount: str
+    missing: tuple[str, ...]
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """All of it, the amount first."""
+        return self.amount, *(text for text in self.missing if text != self.amount)
+
+
+def coverage(store: Store, sweeps: Sequence[str], n: int | None = None) -> Coverage:
+    """What there is of ``sweeps``: ``n`` runs, by default all finished ones, of those that their files ask for."""
+    plans = {sweep: store.plans[sweep] for sweep in sweeps if sweep in store.plans}
+    whole, there = (
+        _finished(store, sweeps),
+        _finished_cells(store, [name for name, plan in plans.items() if plan.cells]),
+    )
+    n = whole if n is None else n
+    planned, cells = (sum(getattr(plan, what) for plan in plans.values()) for what in ("runs", "cells"))
+    amount, missing = counted(n, "run"), []
+    if n < planned:
+        amount = f"{n:,} of {planned:,} runs so far"
+        missing.append(amount)
     if there < cells:
-        said.append(f"{cells - there:,} of {cells:,} combinations have no finished run")
+        missing.append(f"{cells - there:,} of {counted(cells, 'combination')} without a finished run")
     if failed := failures(store, sweeps):
-        said.append(f"{failed:,} run{'s' if failed > 1 else ''} failed and {'are' if failed > 1 else 'is'} not shown")
-    return tuple(said)
+        missing.append(f"{counted(failed, 'failed run')} not shown")
+    return Coverage(amount, tuple(missing))
+
+
+def _finished(store: Store, sweeps: Sequence[str]) -> int:
+    return int(
+        store.query(f"SELECT count(DISTINCT run_id) AS n FROM runs WHERE status = 'ok' AND {among('sweep', sweeps)}").n[
+            0
+        ]
+    )
+
+
+def _finished_cells(store: Store, sweeps: Sequence[str]) -> int:
+    return int(
+        store.query(f"""SELECT count(*) AS n FROM (SELECT DISTINCT sweep, task, evaluations,
+        {", ".join(name for name in PARAMETERS if name != "seed")}
+        FROM runs WHERE status = 'ok' AND {among("sweep", sweeps)})""").n[0]
+    )
 
 
 def wilson(successes: Any, runs: Any) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the Wilson 95 % interval of a share, each as the arguments, in 0..1."""
     low, high = proportion_confint(np.asarray(successes), np.asarray(runs), alpha=0.05, method="wilson")
     return np.asarray(low), np.asarray(high)
+
+
+def counted(n: int, noun: str) -> str:
+    """``1 run``, ``1,200 runs``."""
+    return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
 
 
 def percent(share: float) -> str:
@@ -204,18 +278,9 @@ def task_title(robot: str, task: str) -> str:
         return task
 
 
-def _task_order(robot: str, task: str) -> tuple[str, str]:
+def task_order(robot: str, task: str) -> tuple[str, str]:
+    """Sort key: the source's order of tasks."""
     try:
         return load_task(robot, task).source, task
     except SpecError:
         return "unknown", task
-
-
-def publish_drawn(drawn: Drawn, paper: str, store: Store, out: Path) -> Path:
-    """Write NAME.png, NAME.svg and, beside them, the caption as NAME.json; the path of the PNG."""
-    png, svg = save(drawn.figure, out / drawn.name)
-    caption = {"name": drawn.name, "paper": paper, "shows": drawn.shows, "n": drawn.n, "missing": list(drawn.missing),
-               "sweeps": list(drawn.sweeps), "files": [png.name, svg.name], **store.origins(drawn.sweeps)}
-    data = (json.dumps(caption, indent=2, ensure_ascii=False) + "\n").encode()
-    publish(data, out / f".{drawn.name}.json.part", out / f"{drawn.name}.json")
-    return png

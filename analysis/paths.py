@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.common import Drawn, NoDataError, Store, coverage, task_title
-from bns.plotting import draw_paths, note, outcome, panels, style
+from analysis.common import Drawn, NoDataError, Store, counted, coverage, task_title
+from bns.plotting import draw_paths, frame_alike, note, outcome, panels, style
 from bns.robots import load_robot
 from bns.tasks import load_task
 
@@ -28,7 +28,7 @@ def last_successes(store: Store) -> pd.DataFrame:
 def poses(store: Store, shown: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Poses of the fittest controller at those evaluations, by run."""
     which = " OR ".join(f"(run_id = '{row.run_id}' AND evaluation = {row.evaluation})" for row in shown.itertuples())
-    rows = store.query(f"""SELECT run_id, {', '.join(WORLD + SNN)} FROM paths
+    rows = store.query(f"""SELECT run_id, {", ".join(WORLD + SNN)} FROM paths
         WHERE sweep = '{SWEEP}' AND who = 'fittest' AND ({which}) ORDER BY run_id, step""")
     return dict(iter(rows.groupby("run_id")))
 
@@ -36,8 +36,9 @@ def poses(store: Store, shown: pd.DataFrame) -> dict[str, pd.DataFrame]:
 def draw(store: Store) -> list[Drawn]:
     runs = last_successes(store)
     if runs.empty:
-        raise NoDataError(f"no finished run of the sweep {SWEEP!r} with paths; run bns sweep sweeps/{SWEEP}.yaml "
-                          "(record: full)")
+        raise NoDataError(
+            f"no finished run of the sweep {SWEEP!r} with paths; run bns sweep sweeps/{SWEEP}.yaml (record: full)"
+        )
     return [_draw_task(store, robot, task, found) for (robot, task), found in runs.groupby(["robot", "task"])]
 
 
@@ -45,19 +46,22 @@ def draw(store: Store) -> list[Drawn]:
 def _draw_task(store: Store, robot: str, task: str, runs: pd.DataFrame) -> Drawn:
     shown = runs.head(MOST_PANELS)
     walked, goals_m, radius_m = poses(store, shown), load_task(robot, task).goals_m, load_robot(robot).radii_m[0]
-    figure, axes = panels(len(shown), 3.1)
+    figure, axes = panels(len(shown), 3.0)
     for run, ax in zip(shown.itertuples(), axes[:, 0], strict=True):
         path = walked[run.run_id]
         draw_paths(ax, goals_m, radius_m, path[WORLD].to_numpy(), path[SNN].to_numpy())
         ax.set_title(f"seed {run.seed}, evaluation {run.evaluation}:\n{outcome(run.success)}")
+    frame_alike(axes[:, 0])
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     succeeded, n = int(runs.success.sum()), len(runs)
-    said = coverage(store, (SWEEP,), n)[1:]
+    said = coverage(store, (SWEEP,)).missing
     if n > len(shown):
-        said = (*said, f"{n - len(shown)} more runs of this task are not shown")
+        said = (*said, f"{counted(n - len(shown), 'more run')} of this task not shown")
     note(figure, "; ".join((f"Task {task_title(robot, task)}: {succeeded} of {n} runs visited all goals", *said)) + ".")
-    shows = (f"Paths of the fittest controller of each run at its last success, or at its last evaluation if it had "
-             f"none ({succeeded} of n = {n} runs of {SWEEP} had one), on task {task_title(robot, task)}. Solid: "
-             f"driven; dashed: as its simulator networks saw it; dots: ends of commands; grey: goals of "
-             f"{100 * radius_m:g} cm in order.")
+    shows = (
+        f"Paths of the fittest controller of each run at its last success, or at its last evaluation if it had "
+        f"none ({succeeded} of n = {n} runs of {SWEEP} had one), on task {task_title(robot, task)}. Solid: "
+        f"driven; dashed: as its simulator networks saw it; dots: ends of commands; grey: goals of "
+        f"{100 * radius_m:g} cm in order."
+    )
     return Drawn(f"{NAME}-{task}", figure, shows, n, (SWEEP,), said)

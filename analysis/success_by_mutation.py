@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from analysis.common import Drawn, Selection, Store, comparable, coverage, mutation_sweeps, percent, task_title, wilson
-from bns.plotting import note, ordered_styles, panels, style
+from bns.plotting import lettered, note, ordered_styles, panels, style
 
 NAME = "success-by-mutation"
 PAPER = "figure 4.7"
@@ -28,17 +28,20 @@ def draw(store: Store) -> list[Drawn]:
     rows = counts(store, chosen)
     looks = dict(zip(sorted(rows.mutation_rate.unique()), ordered_styles(rows.mutation_rate.nunique()), strict=True))
     figure, axes = panels(len(chosen.tasks), 3.6, rows_each=2, ratios=(3, 1))
-    for (robot, task), letter, (ax, below) in zip(chosen.tasks, "abcdefgh", axes, strict=False):
+    for number, ((robot, task), (ax, below)) in enumerate(zip(chosen.tasks, axes, strict=True)):
         _panel(ax, rows[rows.task == task], looks)
-        ax.set_title(f"({letter}) {task_title(robot, task)}")
+        ax.set_title(lettered(number, len(axes), task_title(robot, task)))
         below.set_axis_off()
         below.legend(*ax.get_legend_handles_labels(), loc="upper center", title="mutation rate")
+    axes[0, 0].set_ylabel("successful runs, 7 cm (%)")
     said = coverage(store, chosen.sweeps, chosen.n)
-    note(figure, "; ".join((*said, "bands: 95 % Wilson intervals")) + ".")
-    shows = (f"Share of runs whose fittest controller, driven in the world after each evaluation, visits all goals "
-             f"within 7 cm, by mutation rate; all other parameters pooled. n = {chosen.n:,} runs of "
-             f"{', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals.")
-    return [Drawn(NAME, figure, shows, chosen.n, chosen.sweeps, (*said, *chosen.left_out))]
+    note(figure, "; ".join((*said.sentences, "bands: 95 % Wilson intervals")) + ".")
+    shows = (
+        f"Share of runs whose fittest controller, driven in the world after each evaluation, visits all goals "
+        f"within 7 cm, by mutation rate; all other parameters pooled. n = {chosen.n:,} runs of "
+        f"{', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals."
+    )
+    return [Drawn(NAME, figure, shows, chosen.n, chosen.sweeps, (*said.missing, *chosen.left_out))]
 
 
 def _panel(ax: Axes, rows: pd.DataFrame, looks: dict[float, dict[str, str]]) -> None:
@@ -46,8 +49,12 @@ def _panel(ax: Axes, rows: pd.DataFrame, looks: dict[float, dict[str, str]]) -> 
         low, high = wilson(curve.successes, curve.runs)
         every = max(1, len(curve) // 6)
         ax.fill_between(curve.evaluation, 100 * low, 100 * high, color=looks[rate]["color"], alpha=0.18, linewidth=0)
-        ax.plot(curve.evaluation, 100 * curve.successes / curve.runs, **looks[rate],
-                markevery=(every // 2, every), label=f"{percent(rate)} (n = {curve.runs.max():,})")
-    ax.set(ylim=(-2, 102), xlabel="evaluation in the world", ylabel="successful runs, 7 cm (%)",
-           xlim=(0, rows.evaluation.max() + 1))
-    ax.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+        ax.plot(
+            curve.evaluation,
+            100 * curve.successes / curve.runs,
+            **looks[rate],
+            markevery=(every // 2, every),
+            label=f"{percent(rate)} (n = {curve.runs.max():,})",
+        )
+    ax.set(ylim=(-2, 102), xlabel="evaluation in the world", xlim=(0, rows.evaluation.max() + 1))
+    ax.xaxis.set_major_locator(MaxNLocator(6, integer=True, steps=[1, 2, 5, 10]))

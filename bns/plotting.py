@@ -20,6 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MultipleLocator
 
 from bns.engine.philox import Key, Purpose
 from bns.engine.snn import predict
@@ -37,15 +38,17 @@ TEXT_PT = 8
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 GREY = "#555555"
 
+_SIZES = (
+    "font.size axes.labelsize xtick.labelsize ytick.labelsize legend.fontsize legend.title_fontsize figure.labelsize"
+)
 _STYLE: Mapping[Any, Any] = {
-    "font.size": TEXT_PT, "axes.titlesize": TEXT_PT + 1, "axes.labelsize": TEXT_PT, "xtick.labelsize": TEXT_PT,
-    "ytick.labelsize": TEXT_PT, "legend.fontsize": TEXT_PT, "legend.title_fontsize": TEXT_PT,
-    "figure.titlesize": TEXT_PT + 1, "figure.labelsize": TEXT_PT, "axes.formatter.use_mathtext": False,
-    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "axes.axisbelow": True,
-    "grid.color": "#dddddd", "grid.linewidth": 0.6, "axes.linewidth": 0.8, "lines.linewidth": 1.4,
-    "lines.markersize": 4, "legend.frameon": False, "legend.handlelength": 2.8, "savefig.dpi": 200,
-    "figure.constrained_layout.use": True, "svg.hashsalt": "bns", "svg.fonttype": "path",
-    "axes.prop_cycle": cycler(color=OKABE_ITO),
+    **dict.fromkeys(_SIZES.split(), TEXT_PT),
+    **dict.fromkeys(("axes.titlesize", "figure.titlesize"), TEXT_PT + 1),
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right", "legend.frameon"), False),
+    **dict.fromkeys(("axes.grid", "axes.axisbelow", "figure.constrained_layout.use"), True),
+    **{"grid.color": "#dddddd", "grid.linewidth": 0.6, "axes.linewidth": 0.8, "lines.linewidth": 1.4},
+    **{"lines.markersize": 4, "legend.handlelength": 3.2, "axes.prop_cycle": cycler(color=OKABE_ITO)},
+    **{"savefig.dpi": 200, "svg.hashsalt": "bns", "svg.fonttype": "path"},
 }
 _LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
 _MARKERS = ("o", "s", "^", "D", "v", "P")
@@ -68,8 +71,14 @@ def style() -> Iterator[None]:
 def ordered_styles(count: int) -> list[dict[str, Any]]:
     """Colour, line style and marker for each of ``count`` ordered values: told apart without colour, too."""
     shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.85, max(count, 1)))
-    return [{"color": mpl.colors.to_hex(shades[i]), "linestyle": _LINES[i % len(_LINES)],
-             "marker": _MARKERS[i % len(_MARKERS)]} for i in range(count)]
+    return [
+        {
+            "color": mpl.colors.to_hex(shades[i]),
+            "linestyle": _LINES[i % len(_LINES)],
+            "marker": _MARKERS[i % len(_MARKERS)],
+        }
+        for i in range(count)
+    ]
 
 
 def note(figure: Figure, text: str) -> None:
@@ -109,28 +118,36 @@ def arcs(poses: np.ndarray, step_rad: float = 0.05) -> np.ndarray:
             continue
         turned = np.linspace(0, turn, int(abs(turn) / step_rad) + 2)[1:]
         # Chord from the start to where the robot has turned so far, relative to the whole chord.
-        part = np.sin(turned / 2) / np.sin(turn / 2) * np.exp(0.5j * (turned - turn))
+        part = np.sin(turned / 2) / np.sin(turn / 2) * np.exp(0.5j * (turn - turned))
         ahead = part * complex(*(after[:2] - before[:2]))
         points.append(before[:2] + np.column_stack([ahead.real, ahead.imag]))
     return np.vstack(points)
 
 
-def draw_paths(ax: Axes, goals_m: np.ndarray, radius_m: float, world_poses: np.ndarray,
-               snn_poses: np.ndarray) -> None:
+def draw_paths(ax: Axes, goals_m: np.ndarray, radius_m: float, world_poses: np.ndarray, snn_poses: np.ndarray) -> None:
     """Robot's path (solid) and the simulator's idea of it (dashed) among the goals, in cm.
 
     Poses are (n, 3), x_m, y_m, heading_rad, first the start, then the end of each command (dots). A simulator that is
     far off runs out of the picture rather than shrink it.
     """
     _draw_goals(ax, goals_m, radius_m)
-    for poses, label, color, line in ((world_poses, "robot", OKABE_ITO[0], "-"),
-                                      (snn_poses, "simulator", OKABE_ITO[1], "--")):
+    for poses, label, color, line in (
+        (world_poses, "robot", OKABE_ITO[0], "-"),
+        (snn_poses, "simulator", OKABE_ITO[1], "--"),
+    ):
         path = 100 * arcs(poses)
         ax.plot(path[:, 0], path[:, 1], label=label, color=color, linestyle=line)
         ax.plot(100 * poses[1:, 0], 100 * poses[1:, 1], "o", color=color, markersize=2.2)
     x, y, heading = world_poses[0]
-    ax.plot(100 * x, 100 * y, marker=(3, 0, np.degrees(heading) - 90), color="black", markersize=8, linestyle="none",
-            label="start")
+    ax.plot(
+        100 * x,
+        100 * y,
+        marker=(3, 0, np.degrees(heading) - 90),
+        color="black",
+        markersize=8,
+        linestyle="none",
+        label="start",
+    )
     _frame(ax, goals_m, radius_m, arcs(world_poses))
 
 
@@ -143,10 +160,19 @@ def _draw_goals(ax: Axes, goals_m: np.ndarray, radius_m: float) -> None:
         # Outside the disc, where a path that reaches the goal does not end: away from the middle, or to the right.
         outward = place - centre
         length = np.linalg.norm(outward)
-        outward = outward / length if length > radius_m else np.array([1.0, 0.0])
-        x, y = 100 * (place + outward * (radius_m + 0.045))
-        ax.text(x, y, numbers, ha="center", va="center", zorder=5, fontweight="bold",
-                path_effects=[withStroke(linewidth=2, foreground="white")])
+        central = length <= radius_m
+        outward = np.array([1.0, 0.0]) if central else outward / length
+        x, y = 100 * (place + outward * (radius_m + (0.01 if central else 0.045)))
+        ax.text(
+            x,
+            y,
+            numbers,
+            ha="left" if central else "center",
+            va="center",
+            zorder=5,
+            fontweight="bold",
+            path_effects=[withStroke(linewidth=2, foreground="white")],
+        )
 
 
 def _frame(ax: Axes, goals_m: np.ndarray, radius_m: float, path: np.ndarray) -> None:
@@ -154,8 +180,26 @@ def _frame(ax: Axes, goals_m: np.ndarray, radius_m: float, path: np.ndarray) -> 
     seen = np.clip(path[np.isfinite(path).all(axis=1)], low - _REACH_M, high + _REACH_M)
     low = 100 * (np.vstack([seen, low[None]]).min(axis=0) - _MARGIN_M)
     high = 100 * (np.vstack([seen, high[None]]).max(axis=0) + _MARGIN_M)
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, east (cm)",
-           ylabel="y, north (cm)")
+    ax.set(
+        xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, east (cm)", ylabel="y, north (cm)"
+    )
+    _tick_alike(ax)
+
+
+def frame_alike(axes: Sequence[Axes]) -> None:
+    """Show the same floor in all panels of paths: as much as the largest of them."""
+    for name in ("xlim", "ylim"):
+        ends = np.array([getattr(ax, f"get_{name}")() for ax in axes])
+        for ax in axes:
+            ax.set(**{name: (ends[:, 0].min(), ends[:, 1].max())})
+    for ax in axes:
+        _tick_alike(ax)
+
+
+def _tick_alike(ax: Axes) -> None:
+    step = next((step for step in (20, 50, 100) if np.ptp(ax.get_xlim()) <= 5 * step), 200)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(MultipleLocator(step))
 
 
 @style()
@@ -166,7 +210,7 @@ def path_figure(spec: RunSpec, task: Task, robot: Robot, result: RunResult, stem
     ax = figure.subplots()
     draw_paths(ax, task.goals_m, robot.radii_m[0], driven, simulated)
     success = bool(result.tables["evals"]["success"][-1])
-    ax.set_title(f"{task.title}, seed {spec.seed}, evaluation {spec.evaluations}: {outcome(success)}")
+    ax.set_title(f"{task.title}, seed {spec.seed}\nevaluation {spec.evaluations}: {outcome(success)}")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return save(figure, stem)[0]
 
@@ -188,8 +232,14 @@ def outcome(success: bool) -> str:
     return "all goals" if success else "not all goals"
 
 
-def panels(count: int, height_in: float, columns: int = 3, rows_each: int = 1,
-           ratios: Sequence[float] | None = None) -> tuple[Figure, np.ndarray]:
+def lettered(number: int, count: int, title: str) -> str:
+    """Title of panel ``number`` (from 0) of ``count``: with its letter, unless it is the only one."""
+    return f"({chr(ord('a') + number)}) {title}" if count > 1 else title
+
+
+def panels(
+    count: int, height_in: float, columns: int = 3, rows_each: int = 1, ratios: Sequence[float] | None = None
+) -> tuple[Figure, np.ndarray]:
     """Figure with ``count`` panels (count, rows_each): a column wide if there is one, else a page wide.
 
     ``rows_each`` axes stand above each other in a panel, of relative heights ``ratios``; ``height_in`` is the
@@ -200,8 +250,9 @@ def panels(count: int, height_in: float, columns: int = 3, rows_each: int = 1,
     figure = Figure(figsize=(COLUMN_IN if count == 1 else PAGE_IN, height_in * down))
     heights = list(ratios or [1] * rows_each) * down
     grid = figure.subplots(down * rows_each, across, squeeze=False, gridspec_kw={"height_ratios": heights})
-    axes = np.array([[grid[(i // across) * rows_each + row, i % across] for row in range(rows_each)]
-                     for i in range(down * across)])
+    axes = np.array(
+        [[grid[(i // across) * rows_each + row, i % across] for row in range(rows_each)] for i in range(down * across)]
+    )
     for blank in axes[count:].ravel():
         blank.set_axis_off()
     return figure, axes[:count]

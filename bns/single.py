@@ -33,19 +33,20 @@ _PATIENCE_S = 60.0
 
 def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None = None) -> str:
     """Carry out a run with a live view, store it, draw the path of its fittest controller; the report in words."""
-    load_task(spec.robot, spec.task)
+    robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
     with _patient_writer(results, sweep):
         pass  # a folder that cannot be written is better found before the run than after it
     started, wall, cpu = datetime.now(UTC), time.perf_counter(), time.process_time()
     memory.reset_peak()
     with live_view(spec) as show:
         result = run(spec, show)
+    wall_s = time.perf_counter() - wall
     row = {
         "status": "ok",
         "error": None,
         "world_digest": result.world_digest,
         "started_at": started,
-        "wall_s": time.perf_counter() - wall,
+        "wall_s": wall_s,
         "cpu_s": time.process_time() - cpu,
         "peak_memory_mib": memory.peak_mib(),
         "attempts": 1,
@@ -61,12 +62,12 @@ def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None 
         )
     figure = path_figure(
         spec,
-        load_task(spec.robot, spec.task),
-        load_robot(spec.robot),
+        task,
+        robot,
         result,
         results / "figures" / f"run-{spec.task}-{spec.seed}-{spec.run_id}",
     )
-    return _report(spec, result, row["wall_s"], figure)
+    return _report(spec, result, wall_s, figure)
 
 
 @contextmanager

@@ -65,6 +65,11 @@ class RunSpec:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             object.__setattr__(self, field.name, checked(field.name, getattr(self, field.name)))
+        if self.min_commands > self.max_commands:
+            raise SpecError(
+                f"min_commands is {self.min_commands} and max_commands {self.max_commands}; "
+                "the shortest list must not be longer than the longest: set both."
+            )
 
     def canonical_json(self) -> str:
         """The spec and the engine's version as JSON with sorted keys: what the run's name is the hash of."""

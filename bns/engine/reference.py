@@ -201,8 +201,5 @@ def diversity(population: Population, bounds: CommandBounds) -> float:
     """
     spread = bounds.high.astype(np.float64) - bounds.low
     controllers = [population.controller(i).astype(np.float64) / spread for i in range(len(population))]
-    mean = [
-        np.mean([one[j] for one in controllers if len(one) > j], axis=0) for j in range(max(map(len, controllers)))
-    ]
+    mean = [np.mean([one[j] for one in controllers if len(one) > j], axis=0) for j in range(max(map(len, controllers)))]
     return float(np.mean([sum(np.abs(c - m).sum() for c, m in zip(one, mean, strict=False)) for one in controllers]))
-

@@ -1,0 +1,75 @@
+"""Small stores, made up and real, and a walk over everything that is written on a figure."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from matplotlib.text import Text
+
+TESTS = Path(__file__).parents[1]
+sys.path[:0] = [str(path) for path in (TESTS.parent, TESTS) if str(path) not in sys.path]
+
+MUTATION = """
+name: mutation
+robot: khepera
+seeds: 5
+fixed: {evaluations: 4, population_size: 8, generations_per_evaluation: 2, training_iterations_per_evaluation: 20}
+grid: {task: [circle, complex], mutation_rate: [0.1, 0.5]}
+"""
+PROTOTYPE = """
+name: prototype
+robot: khepera
+seeds: 2
+fixed: {evaluations: 3, population_size: 8, generations_per_evaluation: 2, training_iterations_per_evaluation: 20,
+        record: full}
+grid: {task: [infinity]}
+"""
+BUDGET = """
+name: budget
+robot: khepera
+seeds: 2
+fixed: {evaluations: 3, population_size: 8}
+grid: {generations_per_evaluation: [1, 3], training_iterations_per_evaluation: [10, 20]}
+"""
+
+
+def carry_out(results: Path, text: str, keep: slice = slice(None)) -> None:
+    """Do a sweep (a part of its runs) in this process."""
+    from bns.store import Writer
+    from bns.sweep.grid import parse_sweep
+    from bns.sweep.job import run_job
+    from bns.sweep.order import ordered_specs
+
+    sweep = parse_sweep(text, Path("test.yaml"))
+    with Writer(results, sweep.name, sweep_text=text, sweep_runs=sweep.total) as writer:
+        for spec in list(ordered_specs(sweep))[keep]:
+            writer.append(run_job(spec))
+
+
+@pytest.fixture(scope="session")
+def real_results(tmp_path_factory) -> Path:
+    """A finished mutation sweep of 20 runs, one of 2 with paths, and 7 of 8 runs of a budget sweep."""
+    results = tmp_path_factory.mktemp("results")
+    carry_out(results, MUTATION)
+    carry_out(results, PROTOTYPE)
+    carry_out(results, BUDGET, slice(7))
+    return results
+
+
+@pytest.fixture
+def texts():
+    """Function: figure -> (text, size in points) of all that is visibly written on it."""
+    from bns.plotting import style
+
+    def walk(figure) -> list[tuple[str, float]]:
+        with style():
+            figure.draw_without_rendering()
+        return [
+            (one.get_text(), one.get_fontsize())
+            for one in figure.findobj(Text)
+            if one.get_visible() and one.get_text().strip()
+        ]
+
+    return walk

@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from store.synthetic import failed, record
+
+from analysis.__main__ import figures, main
+from analysis.common import Store, wilson
+from bns.errors import StoreError
+from bns.spec import RunSpec
+from bns.store import Writer, query
+
+
+def test_wilson_agrees_with_the_formula_by_hand():
+    # k = 3, n = 10, z = 1.959964: centre (k + z²/2) / (n + z²), half width z √(k (n - k) / n + z²/4) / (n + z²)
+    low, high = wilson([3, 0, 10], [10, 10, 10])
+    assert low == pytest.approx([0.10779, 0.0, 0.72247], abs=5e-6)
+    assert high == pytest.approx([0.60322, 0.27753, 1.0], abs=5e-6)
+    z2 = 1.959963984540054**2
+    assert low[0] == pytest.approx((3 + z2 / 2 - np.sqrt(z2 * (2.1 + z2 / 4))) / (10 + z2))
+
+
+def test_all_figures_come_with_their_captions(real_results, tmp_path, capsys):
+    assert main(["--results", str(real_results), "--out", str(tmp_path)]) == 0
+    shown = capsys.readouterr()
+    assert shown.err == ""  # no progress off a terminal
+    assert "success-by-mutation.png  (figure 4.7, n = 20 runs)" in shown.out
+    names = {"budget", "paths-infinity", "success-by-diversity", "success-by-mutation"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"{n}.{kind}" for n in names for kind in ("png", "svg", "json")
+    }
+    caption = json.loads((tmp_path / "success-by-mutation.json").read_text())
+    assert (caption["n"], caption["sweeps"], caption["missing"]) == (20, ["mutation"], [])
+    hashes = query(real_results, "SELECT spec_hash FROM specs WHERE sweep = 'mutation'").spec_hash.tolist()
+    assert caption["spec_hashes"] == hashes
+    assert [one["sha"] for one in caption["git"]] == query(
+        real_results, "SELECT DISTINCT git_sha FROM runs"
+    ).git_sha.tolist()
+
+
+def test_a_figure_drawn_again_has_the_same_bytes(real_results, tmp_path):
+    for out in ("one", "two"):
+        main(["--results", str(real_results), "--only", "success-by-diversity", "--out", str(tmp_path / out)])
+    made = sorted((tmp_path / "one").iterdir())
+    assert len(made) == 3
+    assert [path.read_bytes() for path in made] == [(tmp_path / "two" / path.name).read_bytes() for path in made]
+
+
+def test_figures_stand_below_the_results_unless_told(tmp_path):
+    with Writer(tmp_path, "grid") as writer:
+        for rate in (0.1, 0.5):
+            writer.append(record(RunSpec(evaluations=3, mutation_rate=rate)))
+    assert main(["--results", str(tmp_path), "--only", "success-by-mutation"]) == 0
+    assert (tmp_path / "figures" / "success-by-mutation.svg").is_file()
+    assert (
+        Store(tmp_path).query("SELECT count(*) AS n FROM runs").n[0] == 2
+    )  # the store takes them for nothing of its own
+
+
+def test_an_unknown_figure_lists_those_there_are(tmp_path, capsys):
+    assert main(["--results", str(tmp_path), "--only", "success-by-mutaton"]) == 2
+    said = capsys.readouterr().err
+    assert "unknown figure 'success-by-mutaton'. Did you mean 'success-by-mutation'?" in said
+    assert all(name in said for name in figures())
+
+
+def no_runs_yet(results):
+    Writer(results, "none", sweep_text="name: none").__enter__().close()
+
+
+@pytest.mark.parametrize("make", [lambda path: None, lambda path: path.mkdir(), no_runs_yet])
+def test_an_empty_store_says_what_to_run(tmp_path, capsys, make):
+    make(tmp_path / "results")
+    assert main(["--results", str(tmp_path / "results")]) == 2
+    assert "make sweep-khepera BUDGET=10m" in capsys.readouterr().err
+    with pytest.raises(StoreError, match="no runs in"):
+        Store(tmp_path / "results")
+
+
+def test_a_figure_without_data_is_skipped_with_one_line(tmp_path, capsys):
+    with Writer(tmp_path, "grid") as writer:
+        writer.append(failed(RunSpec(mutation_rate=0.1)))
+        writer.append(failed(RunSpec(mutation_rate=0.5)))
+    assert main(["--results", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == len(figures())
+    assert (
+        "success-by-mutation (figure 4.7) skipped: no run has finished (2 failed); run make sweep-khepera" in lines[-1]
+    )
+    assert not (tmp_path / "figures").exists()
+
+
+def test_a_compaction_under_way_does_not_disturb_a_figure(tmp_path):
+    from bns.store import compact
+
+    for half in range(2):
+        with Writer(tmp_path, "grid") as writer:
+            for rate in (0.1, 0.5):
+                writer.append(record(RunSpec(seed=half, evaluations=3, mutation_rate=rate)))
+    store = Store(tmp_path)
+    before = store.query("SELECT count(*) AS n FROM evals").n[0]
+    assert compact(tmp_path).files_after < 4
+    assert store.query("SELECT count(*) AS n FROM evals").n[0] == before == 12

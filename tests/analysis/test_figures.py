@@ -1,0 +1,159 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from store.synthetic import failed, make_store, record
+
+from analysis import budget, paths, success_by_diversity, success_by_mutation
+from analysis.__main__ import figures
+from analysis.common import NoDataError, Store, wilson
+from bns.plotting import COLUMN_IN, PAGE_IN, TEXT_PT
+from bns.spec import RunSpec
+from bns.store import Writer, load
+
+
+def written(results, sweep, records, **more):
+    with Writer(results, sweep, **more) as writer:
+        for one in records:
+            writer.append(one)
+
+
+def specs(seeds, **values):
+    return [
+        RunSpec(seed=seed, evaluations=4, mutation_rate=rate, **values) for seed in range(seeds) for rate in (0.1, 0.5)
+    ]
+
+
+def curves(figure):
+    """Label -> (x, y) of the labelled lines of the first axes."""
+    lines = figure.axes[0].get_lines()
+    return {line.get_label(): line.get_data() for line in lines if not line.get_label().startswith("_")}
+
+
+def test_every_figure_is_drawn_from_a_real_store_legibly_and_says_how_many_runs(real_results, texts):
+    store = Store(real_results)
+    drawn = [one for module in figures().values() for one in module.draw(store)]
+    assert {one.name: one.n for one in drawn} == {
+        "budget": 7,
+        "paths-infinity": 2,
+        "success-by-diversity": 20,
+        "success-by-mutation": 20,
+    }
+    for one in drawn:
+        assert one.figure.get_figwidth() in (COLUMN_IN, PAGE_IN)
+        assert min(size for _, size in texts(one.figure)) >= TEXT_PT, one.name
+        assert f"n = {one.n}" in one.shows
+
+
+def test_success_by_mutation_shows_what_pandas_counts(real_results):
+    drawn = success_by_mutation.draw(Store(real_results))[0].figure
+    rows = load(real_results, "evals", where={"sweep": "mutation", "task": "circle"})
+    shares = rows.groupby(["mutation_rate", "evaluation"]).success_7cm.mean() * 100
+    for rate, label in ((0.1, "10 % (n = 5)"), (0.5, "50 % (n = 5)")):
+        x, y = curves(drawn)[label]
+        assert list(x) == [1, 2, 3, 4]
+        assert y == pytest.approx(shares[rate].to_numpy(float))
+    assert [ax.get_title() for ax in drawn.axes if ax.get_title()] == ["(a) circle", "(b) complex"]
+
+
+def test_the_bands_are_wilson_intervals_of_those_counts(tmp_path):
+    make_store(tmp_path, 60, evaluations=3)
+    figure = success_by_mutation.draw(Store(tmp_path))[0].figure
+    rows = load(tmp_path, "evals").query("mutation_rate == 0.02")
+    low, high = wilson(rows.groupby("evaluation").success_7cm.sum().to_numpy(int), [12] * 3)
+    corners = figure.axes[0].collections[0].get_paths()[0].vertices[:, 1]
+    assert {round(v, 6) for v in corners} == {round(v, 6) for v in [*(100 * low), *(100 * high)]}
+    assert rows.success_7cm.sum() > 0
+
+
+def test_success_by_diversity_shows_what_pandas_counts(real_results):
+    figure = success_by_diversity.draw(Store(real_results))[0].figure
+    rows = load(real_results, "evals", where={"sweep": "mutation", "task": "circle", "evaluation": 4})
+    means = rows.groupby("mutation_rate").agg(x=("diversity", "mean"), y=("success_7cm", "mean"))
+    for rate, label in ((0.1, "10 %"), (0.5, "50 %")):
+        x, y = curves(figure)[label]
+        assert (x[0], y[0]) == (pytest.approx(means.x[rate]), pytest.approx(100 * float(means.y[rate])))
+    titles = [ax.get_title() for ax in figure.axes]
+    assert titles == ["(a) circle, within 7 cm", "(b) complex, within 7 cm", "(c) complex, within 10 cm"]
+
+
+def test_budget_shows_success_and_median_cost_of_each_cell_and_what_is_missing(real_results):
+    drawn = budget.draw(Store(real_results))[0]
+    runs = load(real_results, "runs", where={"sweep": "budget"})
+    cost = runs.groupby(["training_iterations_per_evaluation", "generations_per_evaluation"]).cpu_s.median()
+    lines = {line.get_label(): line.get_ydata() for line in drawn.figure.axes[1].get_lines()}
+    for iterations in (10, 20):
+        assert lines[str(iterations)] == pytest.approx(cost[iterations].to_numpy())
+    assert drawn.missing == ("7 of 8 runs so far",)
+
+
+def test_paths_show_the_last_fittest_controller_of_each_run(real_results):
+    figure = paths.draw(Store(real_results))[0].figure
+    evals = load(real_results, "evals", where={"sweep": "prototype", "seed": 0})
+    shown = evals[evals.success].evaluation.max() if evals.success.any() else 3
+    rows = load(real_results, "paths", where={"run_id": evals.run_id[0], "evaluation": int(shown), "who": "fittest"})
+    assert figure.axes[0].get_title().startswith(f"seed 0, evaluation {shown}:")
+    x, y = curves(figure)["robot"]
+    assert (x[-1], y[-1]) == (pytest.approx(100 * rows.x_m.iloc[-1]), pytest.approx(100 * rows.y_m.iloc[-1]))
+
+
+def test_sweeps_with_a_grid_of_mutation_rates_are_pooled_and_the_same_run_counts_once(tmp_path):
+    written(tmp_path, "one", [record(spec) for spec in specs(3)])
+    written(tmp_path, "two", [record(spec) for spec in specs(5)])  # the first three seeds again
+    written(tmp_path, "single", [record(RunSpec(seed=9, evaluations=4, mutation_rate=0.1, population_size=50))])
+    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    assert set(curves(drawn.figure)) == {"10 % (n = 5)", "50 % (n = 5)"}
+    assert (drawn.n, drawn.sweeps) == (10, ("one", "two"))
+    assert "n = 10 runs of one, two" in drawn.shows
+
+
+def test_runs_of_another_length_are_left_out_and_named(tmp_path):
+    written(tmp_path, "one", [record(spec) for spec in specs(3)])
+    written(tmp_path, "two", [record(spec) for spec in specs(2, generations_per_evaluation=7)])
+    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    assert drawn.n == 6
+    assert any("4 runs of circle with 4 evaluations, 7 generations" in text for text in drawn.missing)
+
+
+def test_failed_and_planned_runs_are_stated_on_the_figure(tmp_path, texts):
+    text = (
+        "name: grid\nrobot: khepera\nseeds: 3\nfixed: {evaluations: 4, task: circle}\n"
+        "grid: {mutation_rate: [0.1, 0.5, 0.9]}"
+    )
+    written(
+        tmp_path, "grid", [*(record(spec) for spec in specs(1)), failed(specs(2)[2])], sweep_text=text, sweep_runs=9
+    )
+    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    said = " ".join(text.replace("\n", " ") for text, _ in texts(drawn.figure))
+    for part in ("2 of 9 runs so far", "1 of 3 combinations without a finished run", "1 failed run not shown"):
+        assert part in said
+        assert part in drawn.missing
+
+
+def test_one_run_of_a_planned_grid_is_drawn_with_its_wide_interval(tmp_path):
+    text = "name: grid\nrobot: khepera\nfixed: {evaluations: 4, task: circle}\ngrid: {mutation_rate: [0.1, 0.5]}"
+    written(tmp_path, "grid", [record(specs(1)[0])], sweep_text=text, sweep_runs=2)
+    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    assert set(curves(drawn.figure)) == {"10 % (n = 1)"}
+    heights = np.ptp(drawn.figure.axes[0].collections[0].get_paths()[0].vertices[:, 1])
+    assert heights > 75  # one run says next to nothing
+    with pytest.raises(NoDataError, match=r"no combination has 5 finished runs yet \(the most is 1\)"):
+        success_by_diversity.draw(Store(tmp_path))
+
+
+def test_only_combinations_with_enough_runs_are_dots_and_the_others_are_counted(tmp_path):
+    few = [RunSpec(seed=seed, evaluations=4, mutation_rate=0.9) for seed in range(2)]
+    written(tmp_path, "grid", [record(spec) for spec in [*specs(6), *few]])
+    drawn = success_by_diversity.draw(Store(tmp_path))[0]
+    assert set(curves(drawn.figure)) == {"10 %", "50 %"}
+    assert drawn.n == 12
+    assert "1 combination with fewer than 5 runs left out" in drawn.missing
+
+
+@pytest.mark.parametrize(("name", "module"), figures().items())
+def test_a_store_of_one_combination_or_of_failures_alone_says_what_would_feed_a_figure(tmp_path, name, module):
+    written(tmp_path / "same", "same", [record(RunSpec(seed=seed, evaluations=4)) for seed in range(6)])
+    written(tmp_path / "bad", "bad", [failed(spec) for spec in specs(2)])
+    for folder in ("same", "bad"):
+        with pytest.raises(NoDataError, match=r"run (make sweep|bns sweep)"):
+            module.draw(Store(tmp_path / folder))

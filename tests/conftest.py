@@ -1,0 +1,23 @@
+"""What several tests share."""
+
+import os
+import subprocess
+import sys
+
+import matplotlib as mpl
+import pytest
+
+mpl.use("Agg")
+
+
+@pytest.fixture
+def bns():
+    """Run the command line in a process of its own: bns("run", "--seed", "3") -> completed process."""
+
+    def call(*arguments, cwd=None, timeout=240, **environment):
+        return subprocess.run(
+            [sys.executable, "-m", "bns", *map(str, arguments)],
+            cwd=cwd, env=os.environ | environment, capture_output=True, text=True, timeout=timeout, check=False,
+        )  # fmt: skip
+
+    return call

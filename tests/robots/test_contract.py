@@ -1,0 +1,180 @@
+"""What every robot promises, on every one of its tasks. A new robot or task is found by itself."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from bns.engine.evolution import Population
+from bns.engine.philox import Key
+from bns.engine.snn import initial_weights, predict
+from bns.errors import SpecError
+from bns.robots import load_robot, robot_names
+from bns.spec import FIELDS
+from bns.tasks import load_task, task_names
+
+ROBOTS = robot_names()
+GOALS = [(robot, task) for robot in ROBOTS for task in task_names(robot)]
+KEY = Key(3, 1)
+some_displacements = st.integers(1, 12).flatmap(
+    lambda n: arrays(np.float64, (n, 3), elements=st.floats(-3, 3, allow_subnormal=False))
+)
+
+
+@pytest.fixture(params=ROBOTS)
+def robot(request):
+    return load_robot(request.param)
+
+
+@pytest.fixture(params=GOALS, ids="-".join)
+def goal(request):
+    """A robot and one of its tasks."""
+    return load_robot(request.param[0]), load_task(*request.param)
+
+
+def weights_of(robot, seed=0, scale=0.5):
+    return initial_weights(Key(seed, 1), len(robot.networks), robot.hidden) * np.float32(scale)
+
+
+def test_defaults_name_a_robot_and_its_task():
+    assert FIELDS["robot"].default in ROBOTS
+    assert FIELDS["task"].default in task_names(FIELDS["robot"].default)
+
+
+def test_unknown_names_list_the_known_ones():
+    with pytest.raises(SpecError, match=r"unknown robot 'kheperra'.*Did you mean 'khepera'.*Valid: .*khepera"):
+        load_robot("kheperra")
+    with pytest.raises(SpecError, match=r"unknown task of robot khepera 'cirle'.*'circle'.*Valid: "):
+        load_task("khepera", "cirle")
+
+
+def test_names_and_shapes_fit_together(robot):
+    assert load_robot(robot.name) is robot
+    components = len(robot.bounds.low)
+    assert len(robot.command_columns) == len(set(robot.command_columns)) == components
+    assert len(set(robot.networks)) == len(robot.networks)
+    assert list(robot.radii_m) == sorted(robot.radii_m)
+    assert robot.bounds.high.shape == robot.bounds.mutation_span.shape == (components,)
+    assert (robot.bounds.low < robot.bounds.high).all()
+    assert (robot.bounds.mutation_span > 0).all()
+
+
+def test_populations_are_of_their_key_and_within_bounds(robot):
+    one, same, other = (robot.initial_population(Key(seed, 1), 30, 50) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one.commands, same.commands)
+    np.testing.assert_array_equal(one.lengths, same.lengths)
+    assert not np.array_equal(one.controller(0), other.controller(0))
+    for i in range(30):
+        assert (one.controller(i) >= robot.bounds.low).all()
+        assert (one.controller(i) <= robot.bounds.high).all()
+
+
+def test_random_controllers_are_apart_from_the_population(robot):
+    probes = robot.random_controllers(KEY, 10, 5)
+    assert probes.lengths.tolist() == [5] * 10
+    assert (probes.commands >= robot.bounds.low).all()
+    assert (probes.commands <= robot.bounds.high).all()
+    assert not np.array_equal(probes.controller(0)[:4], robot.initial_population(KEY, 10, 50).controller(0)[:4])
+
+
+def test_inputs_stay_near_one_and_notice_every_component(robot):
+    commands = robot.random_controllers(KEY, 1, 30).controller(0)
+    X = robot.inputs(commands)
+    assert X.dtype == np.float32
+    assert X.shape[1] == 30
+    assert np.abs(X).max() < 2
+    for c in range(commands.shape[1]):
+        changed = commands.copy()
+        changed[7, c] = robot.bounds.low[c] + robot.bounds.high[c] - changed[7, c]
+        different = (robot.inputs(changed) != X).any(axis=0)
+        assert different[7]
+        assert not different[:7].any()  # a command cannot change what came before it
+
+
+def test_displacements_and_targets_are_inverse(robot):
+    outputs = predict(weights_of(robot), robot.inputs(robot.random_controllers(KEY, 1, 25).controller(0)))
+    np.testing.assert_allclose(robot.targets(robot.displacements(outputs)), outputs, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@settings(max_examples=100, deadline=None)
+@given(displacements=some_displacements)
+def test_poses_and_measured_displacements_are_inverse(name, displacements):
+    robot = load_robot(name)
+    poses = robot.poses(displacements)
+    assert poses.shape == displacements.shape
+    np.testing.assert_allclose(robot.measured_displacements(poses), displacements, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(robot.poses(robot.measured_displacements(poses)), poses, rtol=0, atol=1e-10)
+
+
+def test_score_is_what_judge_says_of_the_simulated_path(goal):
+    robot, task = goal
+    weights, population = weights_of(robot), robot.initial_population(KEY, 100, 60)
+    scores = robot.score(population, weights, task)
+    assert scores.fitness.shape == scores.goals_reached.shape == (100,)
+    judged = []
+    for i in range(100):
+        outputs = predict(weights, robot.inputs(population.controller(i)))
+        judged.append(robot.judge(robot.poses(robot.displacements(outputs)), task))
+    # The same float32 outputs but for the order of sums at the end of a vector loop.
+    np.testing.assert_allclose(scores.fitness, [fitness for fitness, _ in judged], rtol=1e-5)
+    assert scores.goals_reached.tolist() == [reached for _, reached in judged]
+    assert len(np.unique(scores.fitness)) > 90
+
+
+def test_a_score_does_not_depend_on_the_neighbours(goal):
+    robot, task = goal
+    weights, population = weights_of(robot), robot.initial_population(KEY, 40, 60)
+    together = robot.score(population, weights, task)
+    back = Population(population.commands[::-1].copy(), population.lengths[::-1].copy())
+    np.testing.assert_allclose(robot.score(back, weights, task).fitness[::-1], together.fitness, rtol=1e-5)
+    noisy = Population(population.commands.copy(), population.lengths)
+    for i, length in enumerate(noisy.lengths):
+        noisy.commands[i, length:] = np.nan
+    np.testing.assert_array_equal(robot.score(noisy, weights, task).fitness, together.fitness)
+
+
+def test_fitness_is_positive_finite_and_better_for_a_drive_through_the_goals(goal):
+    robot, task = goal
+    through = np.column_stack([task.goals_m, np.zeros(len(task.goals_m))])
+    fitness, reached = robot.judge(through, task)
+    assert reached == len(task.goals_m)
+    assert robot.successes(through, task) == (True,) * len(robot.radii_m)
+    backwards, fewer = robot.judge(through[::-1], task)
+    assert 0 < backwards < fitness < np.inf
+    assert fewer < reached
+
+
+def test_a_path_that_is_not_finite_is_worth_nothing(goal):
+    robot, task = goal
+    for bad in (np.nan, np.inf):
+        path = np.zeros((4, 3))
+        path[2, 0] = bad
+        assert robot.judge(path, task)[0] == 0
+        assert not any(robot.successes(path, task))
+
+
+def test_success_is_monotone_in_the_radius(goal):
+    robot, task = goal
+    random, seen = np.random.default_rng(0), set()
+    spread = np.abs(task.goals_m).max()
+    for _ in range(200):
+        noise = random.normal(0, 0.4 * spread * random.random(), task.goals_m.shape)
+        within = robot.successes(np.column_stack([task.goals_m + noise, np.zeros(len(noise))]), task)
+        assert list(within) == sorted(within)
+        seen.add(within)
+    assert len(seen) >= 4  # from none to all
+
+
+def test_networks_that_failed_are_counted_controller_by_controller(goal):
+    robot, task = goal
+    weights = np.full_like(weights_of(robot), np.nan)
+    scores = robot.score(robot.initial_population(KEY, 10, 50), weights, task)
+    assert scores.failures == 10
+    assert scores.fitness.tolist() == [0] * 10
+
+
+def test_driving_takes_time(robot):
+    commands = robot.random_controllers(KEY, 1, 6).controller(0)
+    assert 0 < robot.driven_ms(commands[:3]) < robot.driven_ms(commands)

@@ -1,0 +1,149 @@
+"""The command line as a user meets it: what it prints, where it writes, how it ends."""
+
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import bns as package
+from bns.cli import _duration, main
+from bns.errors import BnsError
+
+QUICK = ["--evaluations", "2", "--population-size", "20", "--generations-per-evaluation", "2",
+         "--training-iterations-per-evaluation", "20"]  # fmt: skip
+SWEEP = """
+name: little
+robot: khepera
+seeds: 2
+fixed: {evaluations: 2, population_size: 20, generations_per_evaluation: 1, training_iterations_per_evaluation: 10}
+grid: {mutation_rate: [0.1, 0.9], task: [circle, complex]}
+"""
+
+
+@pytest.fixture
+def sweep_file(tmp_path):
+    file = tmp_path / "little.yaml"
+    file.write_text(SWEEP)
+    return file
+
+
+def test_run_stores_rows_draws_a_path_and_saves_its_networks(tmp_path, bns):
+    done = bns("run", "--task", "infinity", "--seed", 3, *QUICK, "--results", tmp_path, "--save-snn", tmp_path / "n.safetensors")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    evals = package.load(tmp_path)
+    assert list(evals["evaluation"]) == [1, 2]
+    assert {"run_id", "diversity", "fitness_error", "success_7cm", "success_10cm", "success_14cm", "success_20cm"} <= set(evals)
+    assert set(evals["task"]) == {"infinity"}
+    figure = re.search(r"path: (\S+\.png)", done.stdout).group(1)
+    assert Path(figure).read_bytes()[:4] == b"\x89PNG"
+    assert (tmp_path / "n.safetensors").is_file()
+
+
+def test_two_runs_by_hand_of_one_spec_count_once(tmp_path, capsys):
+    for _ in range(2):
+        assert main(["run", *QUICK, "--results", str(tmp_path)]) == 0
+    assert len(package.load(tmp_path)) == 2
+    assert len(package.load(tmp_path, "runs")) == 1
+
+
+def test_physics_world_answers_otherwise_than_the_substitute(tmp_path):
+    for world in ("substitute", "physics"):
+        assert main(["run", *QUICK, "--world", world, "--results", str(tmp_path)]) == 0
+    fitness = package.load(tmp_path).pivot_table(index="evaluation", columns="world", values="evaluated_fitness_world")
+    assert (fitness["physics"] != fitness["substitute"]).all()
+
+
+def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
+    results = tmp_path / "results"
+    plan = bns("sweep", sweep_file, "--dry-run", "--results", results)
+    assert "little: 8 runs, 0 done, 8 to do" in plan.stdout
+    assert not results.exists(), "a dry run writes nothing"
+    done = bns("sweep", sweep_file, "--jobs", 2, "--results", results)
+    assert done.returncode == 0, done.stderr
+    assert "8 runs now, 8 of 8 done" in done.stderr
+    again = bns("sweep", sweep_file, "--jobs", 1, "--results", results)
+    assert "0 runs now, 8 of 8 done" in again.stderr
+    assert main(["status", "--results", str(results)]) == 0
+    assert re.search(r"little\s+circle\s+4\s+4\s+0\s+0", capsys.readouterr().out)
+    assert main(["query", "--csv", "SELECT count(*), count(DISTINCT run_id) FROM evals", "--results", str(results)]) == 0
+    assert capsys.readouterr().out == "16,8\n"
+    before = package.load(results)
+    assert main(["compact", "--results", str(results)]) == 0
+    pd.testing.assert_frame_equal(package.load(results), before)
+
+
+def test_one_and_two_jobs_and_a_resumed_sweep_give_the_same_rows(tmp_path, sweep_file):
+    frames = []
+    for name, calls in {"one": [["--jobs", "1"]], "two": [["--jobs", "2"]], "resumed": [["--budget", "0s"], []]}.items():
+        for options in calls:
+            assert main(["sweep", str(sweep_file), *options, "--results", str(tmp_path / name)]) == 0
+        evals = package.load(tmp_path / name)
+        frames.append(evals[[c for c in evals if not c.endswith("_s")]])
+    pd.testing.assert_frame_equal(frames[0], frames[1])
+    pd.testing.assert_frame_equal(frames[0], frames[2])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "--task", "cirle"], r"unknown task of robot khepera 'cirle'\. Did you mean 'circle'\?"),
+        (["run", "--robot", "kepera"], r"unknown robot 'kepera'\. Did you mean 'khepera'\?"),
+        (["sweep", "nowhere.yaml"], r"nowhere\.yaml"),
+        (["status", "--results", "nowhere"], r"bns sweep sweeps/khepera-small\.yaml"),
+        (["query", "SELECT 1", "--results", "nowhere"], r"bns sweep"),
+        (["precompute", "--robot", "kepera"], r"unknown robot"),
+    ],
+)
+def test_bad_input_is_named_and_ends_with_2(arguments, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert re.search(message, captured.err), captured.err
+    assert captured.out == ""
+    assert list(tmp_path.iterdir()) == [], "nothing is half-written"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "--mutation-rate", "30"], r"For 30 percent write 0\.3"),
+        (["run", "--mutation-rte", "0.3"], r"unrecognized arguments"),
+        (["run", "--population-size", "many"], r"population_size is 'many'; it must be a whole number"),
+        (["sweep", "x.yaml", "--budget", "soon"], r"'soon' is not a time; write 90s, 10m or 1h30m"),
+        (["sweep", "x.yaml", "--jobs", "0"], r"whole number of 1 or more"),
+        ([], r"COMMAND"),
+    ],
+)
+def test_bad_options_end_with_2(arguments, message, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    assert re.search(message, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("90", 90), ("90s", 90), ("10m", 600), ("1h30m", 5400), ("0.5h", 1800)])
+def test_times(text, seconds):
+    assert _duration(text) == seconds
+
+
+def test_query_says_what_duckdb_says(tmp_path, capsys):
+    assert main(["run", *QUICK, "--results", str(tmp_path)]) == 0
+    assert main(["query", "SELECT sucess_7cm FROM evals", "--results", str(tmp_path)]) == 2
+    assert "success_7cm" in capsys.readouterr().err
+
+
+def test_output_into_a_closed_pipe_is_no_fault(tmp_path, bns):
+    assert main(["run", *QUICK, "--results", str(tmp_path)]) == 0
+    import subprocess
+    import sys
+
+    shell = f"{sys.executable} -m bns query --csv 'SELECT i FROM range(200000) t(i)' --results {tmp_path} | head -1"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=60, check=False)
+    assert done.stdout == "0\n"
+    assert done.stderr == ""
+
+
+def test_every_error_ends_with_2():
+    assert BnsError.exit_code == 2

@@ -1,0 +1,60 @@
+"""A spec is checked, named by its hash, and says what is wrong with it."""
+
+import dataclasses
+import json
+
+import pytest
+
+from bns.errors import SpecError
+from bns.spec import FIELDS, RunSpec, checked
+
+
+def test_equal_specs_have_equal_names_and_every_field_changes_the_name():
+    base = RunSpec()
+    assert base.run_id == RunSpec(mutation_rate=0.10).run_id
+    others = {
+        "robot": "snake", "task": "infinity", "world": "physics", "training_algorithm": "irprop-", "record": "full",
+    }  # fmt: skip
+    names = {base.run_id}
+    for name, field in FIELDS.items():
+        value = others.get(name) or (field.default / 2 if isinstance(field.default, float) else field.default + 1)
+        names.add(dataclasses.replace(base, **{name: value}).run_id)
+    assert len(names) == len(FIELDS) + 1
+
+
+def test_name_begins_with_a_letter_and_the_engine_is_part_of_it():
+    assert RunSpec().run_id[0] == "r"
+    assert "engine_version" in json.loads(RunSpec().canonical_json())
+
+
+def test_whole_numbers_and_shares_are_taken_as_their_own_type():
+    assert RunSpec(population_size=50.0).run_id == RunSpec(population_size=50).run_id
+    assert isinstance(RunSpec(mutation_rate=1).mutation_rate, float)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("population_size", 0, r"population_size is 0; it must be a whole number from 1 to"),
+        ("population_size", 1.5, r"population_size is 1.5; it must be a whole number"),
+        ("population_size", True, r"population_size is True"),
+        ("mutation_rate", 30, r"from 0 to 1\. For 30 percent write 0\.3"),
+        ("mutation_rate", float("nan"), r"mutation_rate is nan"),
+        ("mutation_rate", "high", r"mutation_rate is 'high'; it must be a number from 0 to 1"),
+        ("world", "physic", r"unknown world 'physic'\. Did you mean 'physics'\? Valid: physics, substitute"),
+        ("mutation_rte", 0.1, r"unknown parameter 'mutation_rte'\. Did you mean 'mutation_rate'\?"),
+        ("evaluations", -1, r"evaluations is -1"),
+    ],
+)
+def test_bad_values_are_named_with_what_is_allowed(name, value, message):
+    with pytest.raises(SpecError, match=message):
+        checked(name, value)
+    if name in FIELDS:
+        with pytest.raises(SpecError, match=message):
+            RunSpec(**{name: value})
+
+
+def test_shortest_list_must_not_exceed_the_longest():
+    with pytest.raises(SpecError, match=r"min_commands is 4 and max_commands 1"):
+        RunSpec(max_commands=1)
+    assert RunSpec(min_commands=1, max_commands=1).max_commands == 1
