@@ -10,9 +10,12 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
+
+import pandas as pd
 
 import analysis
-from analysis.common import Drawn, NoDataError, Store
+from analysis.common import Drawn, NoDataError, Store, among
 from bns.errors import BnsError, SpecError, unknown_name
 from bns.plotting import save
 from bns.store.files import publish
@@ -76,11 +79,27 @@ def _publish(drawn: Drawn, paper: str, store: Store, out: Path) -> Path:
         "missing": list(drawn.missing),
         "sweeps": list(drawn.sweeps),
         "files": [png.name, svg.name],
-        **store.origins(drawn.sweeps),
+        **_origins(store, drawn.sweeps),
     }
     data = (json.dumps(caption, indent=2, ensure_ascii=False) + "\n").encode()
     publish(data, out / f".{drawn.name}.json.part", out / f"{drawn.name}.json")
     return png
+
+
+def _origins(store: Store, sweeps: Sequence[str]) -> dict[str, Any]:
+    """Spec hashes, commits and versions that the results of ``sweeps`` come from."""
+    hashes = store.query(f"SELECT DISTINCT spec_hash FROM specs WHERE {among('sweep', sweeps)} ORDER BY 1")
+    made = store.query(
+        f"SELECT DISTINCT git_sha, git_clean, bns_version FROM runs WHERE {among('sweep', sweeps)} ORDER BY ALL"
+    )
+    return {
+        "spec_hashes": hashes.spec_hash.tolist(),
+        "bns_versions": sorted(set(made.bns_version)),
+        "git": [
+            {"sha": one.git_sha, "clean": None if pd.isna(one.git_clean) else bool(one.git_clean)}
+            for one in made.itertuples()
+        ],
+    }
 
 
 def _progress(text: str) -> None:

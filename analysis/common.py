@@ -22,20 +22,11 @@ from bns.sweep.grid import parse_sweep
 from bns.tasks import load_task
 
 BEGIN = "make sweep-khepera BUDGET=10m"
-SETTING = [
-    "robot",
-    "world",
-    "world_digest",
-    "training_algorithm",
-    "evaluations",
-    "generations_per_evaluation",
-    "training_iterations_per_evaluation",
-    "min_commands",
-    "max_commands",
-]
+SETTING = (
+    *("robot", "world", "world_digest", "training_algorithm", "evaluations", "min_commands", "max_commands"),
+    *("generations_per_evaluation", "training_iterations_per_evaluation"),
+)
 """Columns of runs that must agree before runs are counted together."""
-CELL = ("population_size", "tournament_size", "mutation_rate", "real_world_selection_size")
-"""The parameters whose combinations the source compares (table 4.3)."""
 
 
 class NoDataError(BnsError):
@@ -98,21 +89,6 @@ class Store:
             "FROM specs GROUP BY sweep ORDER BY sweep"
         )
         return {row.sweep: _plan(row.text, row.runs) for row in newest.itertuples()}
-
-    def origins(self, sweeps: Sequence[str]) -> dict[str, Any]:
-        """Spec hashes, commits and versions that the results of ``sweeps`` come from."""
-        hashes = self.query(f"SELECT DISTINCT spec_hash FROM specs WHERE {among('sweep', sweeps)} ORDER BY 1")
-        made = self.query(
-            f"SELECT DISTINCT git_sha, git_clean, bns_version FROM runs WHERE {among('sweep', sweeps)} ORDER BY ALL"
-        )
-        return {
-            "spec_hashes": hashes.spec_hash.tolist(),
-            "bns_versions": sorted(set(made.bns_version)),
-            "git": [
-                {"sha": one.git_sha, "clean": None if pd.isna(one.git_clean) else bool(one.git_clean)}
-                for one in made.itertuples()
-            ],
-        }
 
 
 def _plan(text: str, runs: float) -> Plan:

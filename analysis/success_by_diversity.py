@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 
 from analysis.common import (
     BEGIN,
-    CELL,
     Drawn,
     NoDataError,
     Selection,
@@ -24,6 +23,8 @@ from bns.plotting import lettered, note, ordered_styles, panels, style
 
 NAME = "success-by-diversity"
 PAPER = "figure 4.12"
+CELL = ("population_size", "tournament_size", "mutation_rate", "real_world_selection_size")
+"""The parameters whose combinations the source compares (table 4.3)."""
 FEWEST_RUNS = 5
 CROWD = 60
 """From this many dots a panel on, their intervals are drawn faintly."""

@@ -128,11 +128,19 @@ def _duration(text: str) -> float:
     return 3600 * hours + 60 * minutes + seconds
 
 
+def _say_if_compiling() -> None:
+    from bns.engine.jit import cache_folder
+
+    if sys.stderr.isatty() and not cache_folder().exists():
+        print("bns: compiling the kernels, once on this machine (about 20 s)", file=sys.stderr)
+
+
 def run(options: argparse.Namespace) -> int:
     """One run by hand: live view, rows in the store, figure of the path."""
     from bns.single import run_by_hand
 
     spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
+    _say_if_compiling()
     print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn))
     return 0
 
@@ -151,6 +159,7 @@ def sweep(options: argparse.Namespace) -> int:
         for one in sweeps:
             print(planned(plan(one, options.results, options.jobs, retry_failed=options.retry_failed), options.jobs))
         return 0
+    _say_if_compiling()
     budget = Budget(options.budget)
     with SweepProgress() as bar:
         for one in sweeps:

@@ -118,7 +118,7 @@ def arcs(poses: np.ndarray, step_rad: float = 0.05) -> np.ndarray:
             continue
         turned = np.linspace(0, turn, int(abs(turn) / step_rad) + 2)[1:]
         # Chord from the start to where the robot has turned so far, relative to the whole chord.
-        part = np.sin(turned / 2) / np.sin(turn / 2) * np.exp(0.5j * (turn - turned))
+        part = np.sin(turned / 2) / np.sin(turn / 2) * np.exp(0.5j * (turned - turn))
         ahead = part * complex(*(after[:2] - before[:2]))
         points.append(before[:2] + np.column_stack([ahead.real, ahead.imag]))
     return np.vstack(points)

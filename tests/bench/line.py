@@ -1,0 +1,62 @@
+"""One line of the table: what was measured, what was wanted, and how far the floor is."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Line:
+    """`measured` and `target` share a unit; at_most says on which side of the target it should be.
+
+    `floor` is the least (or, for a ratio that should be large, the most) that the machine allows, in the same unit.
+    """
+
+    name: str
+    measured: float | None
+    target: float
+    unit: str
+    at_most: bool
+    floor: float | None = None
+    note: str = ""
+
+    @property
+    def met(self) -> bool | None:
+        """None where nothing was measured."""
+        if self.measured is None:
+            return None
+        return self.measured <= self.target if self.at_most else self.measured >= self.target
+
+    @property
+    def distance(self) -> float | None:
+        """How many times the floor, or which share of the ceiling, this is."""
+        return self.measured / self.floor if self.measured is not None and self.floor else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self) | {"met": self.met, "distance": self.distance}
+
+    def in_words(self) -> str:
+        """One row of the table."""
+        sign = "<=" if self.at_most else ">="
+        verdict = {True: "met", False: "NOT met", None: "not measured"}[self.met]
+        measured = "-" if self.measured is None else f"{self.measured:.3g}"
+        floor = (
+            f"floor {self.floor:.3g}, {self.distance:.2g} times" if self.at_most else f"ceiling {self.floor or 0:.3g}"
+        )
+        return f"{self.name:58s} {measured:>8s} {self.unit:3s} {sign} {self.target:<5g} {verdict:12s} " + "; ".join(
+            part for part in (floor if self.floor and self.measured is not None else "", self.note) if part
+        )
+
+
+def at_most(
+    name: str, measured: float | None, target: float, unit: str, floor: float | None = None, note: str = ""
+) -> Line:
+    """A duration or a share: less is better."""
+    return Line(name, measured, target, unit, True, floor, note)
+
+
+def at_least(name: str, measured: float | None, target: float, floor: float | None = None, note: str = "") -> Line:
+    """A ratio: more is better."""
+    return Line(name, measured, target, "x", False, floor, note)

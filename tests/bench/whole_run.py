@@ -1,0 +1,59 @@
+"""A whole run with the prototype's settings on one core, and how far it is from what the core could do."""
+
+from __future__ import annotations
+
+import time
+from statistics import median
+
+import numpy as np
+
+from bns.loop import run
+from bns.robots.khepera import ROBOT
+from bns.spec import RunSpec
+from bns.sweep.job import warm
+from tests.bench.clock import one_core, seconds
+from tests.bench.line import Line, at_most
+
+# Operations of our formulas: a multiplication and an addition count as two, a comparison as one.
+INPUT_OPS = 10  # five products and sums
+SIGMOID_OPS = 26  # two polynomials, two bounds, a quotient
+OUTPUT_OPS = 2
+BACKWARD_OPS = 15  # error at the neuron, its slope, six sums for the inputs and the bias, one for the output
+FORWARD = INPUT_OPS + SIGMOID_OPS + OUTPUT_OPS
+
+
+def peak_flops() -> float:
+    """Operations a second of this core in single precision: the best of several large matrix products."""
+    n = 1024
+    a, b = np.ones((n, n), np.float32), np.ones((n, n), np.float32)
+    return 2 * n**3 / min(seconds(lambda: a @ b) for _ in range(20))
+
+
+def operations(spec: RunSpec, evals: dict[str, np.ndarray]) -> tuple[float, float]:
+    """Of training and of evolution, for a run that left these rows."""
+    neurons = len(ROBOT.networks) * ROBOT.hidden
+    patterns = float(evals["training_patterns"].sum()) * spec.training_iterations_per_evaluation
+    commands = float(evals["mean_commands"].sum()) * spec.population_size * (spec.generations_per_evaluation + 1)
+    return patterns * neurons * (FORWARD + BACKWARD_OPS), commands * neurons * FORWARD
+
+
+def measure(quick: bool) -> list[Line]:
+    """Processor seconds of the median seed: a machine that others use as well does not lengthen them by waiting."""
+    warm()
+    taken, floors, notes = [], [], []
+    with one_core():
+        for seed in range(1 if quick else 3):
+            spec = RunSpec(seed=seed)
+            began, wall = time.process_time(), time.perf_counter()
+            evals = run(spec).tables["evals"]
+            taken.append(time.process_time() - began)
+            training, evolution = operations(spec, evals)
+            floors.append((training + evolution) / peak_flops())
+            notes.append(
+                f"seed {seed}: {taken[-1]:.1f} s processor, {time.perf_counter() - wall:.1f} s wall, "
+                f"{evals['training_patterns'][-1]} patterns, {training / (training + evolution):.0%} of it training"
+            )
+    middle = int(np.argsort(taken)[len(taken) // 2])
+    name = "a run: circle, population 400, 100 evaluations, one core"
+    floor_note = "floor: operations at this core's peak in matrix products"
+    return [at_most(name, median(taken), 5, "s", floors[middle], "; ".join([floor_note, *notes]))]
