@@ -130,7 +130,7 @@ def draw_paths(ax: Axes, goals_m: np.ndarray, radius_m: float, world_poses: np.n
     Poses are (n, 3), x_m, y_m, heading_rad, first the start, then the end of each command (dots). A simulator that is
     far off runs out of the picture rather than shrink it.
     """
-    _draw_goals(ax, goals_m, radius_m)
+    draw_goals(ax, goals_m, radius_m)
     for poses, label, color, line in (
         (world_poses, "robot", OKABE_ITO[0], "-"),
         (snn_poses, "simulator", OKABE_ITO[1], "--"),
@@ -151,7 +151,8 @@ def draw_paths(ax: Axes, goals_m: np.ndarray, radius_m: float, world_poses: np.n
     _frame(ax, goals_m, radius_m, arcs(world_poses))
 
 
-def _draw_goals(ax: Axes, goals_m: np.ndarray, radius_m: float) -> None:
+def draw_goals(ax: Axes, goals_m: np.ndarray, radius_m: float) -> None:
+    """Goals (n, 2) as discs of the radius that counts, numbered in order; one visited twice carries both numbers."""
     places, first = np.unique(goals_m, axis=0, return_index=True)
     centre = places.mean(axis=0)
     for place in goals_m[np.sort(first)]:

@@ -56,6 +56,17 @@ def check_peer(fitness: Fitness, commands: np.ndarray, expected: np.ndarray) -> 
         raise AssertionError(f"the peer agrees on {close.mean():.0%} of the controllers only")
 
 
+def rollouts(fitness: Fitness, population: np.ndarray, count: int) -> Callable[[], object]:
+    """`count` times the fitness of the same controllers, one call each."""
+    commands, compiled = jnp.asarray(population, jnp.float32), jax.jit(fitness)
+
+    def all_of_them() -> None:
+        for _ in range(count):
+            jax.block_until_ready(compiled(commands))
+
+    return all_of_them
+
+
 def generations(fitness: Fitness, population: np.ndarray, count: int) -> Callable[[], object]:
     """`count` generations of ask, fitness and tell in one compiled call, each call going on from the one before."""
     first = jnp.asarray(population, jnp.float32)

@@ -42,12 +42,15 @@ class Line:
         sign = "<=" if self.at_most else ">="
         verdict = {True: "met", False: "NOT met", None: "not measured"}[self.met]
         measured = "-" if self.measured is None else f"{self.measured:.3g}"
-        floor = (
-            f"floor {self.floor:.3g}, {self.distance:.2g} times" if self.at_most else f"ceiling {self.floor or 0:.3g}"
-        )
-        return f"{self.name:58s} {measured:>8s} {self.unit:3s} {sign} {self.target:<5g} {verdict:12s} " + "; ".join(
-            part for part in (floor if self.floor and self.measured is not None else "", self.note) if part
-        )
+        told = "; ".join(part for part in (self._floor_in_words(), self.note) if part)
+        return f"{self.name:58s} {measured:>8s} {self.unit:3s} {sign} {self.target:<5g} {verdict:12s} {told}".rstrip()
+
+    def _floor_in_words(self) -> str:
+        if self.floor is None or self.distance is None:
+            return ""
+        if self.at_most:
+            return f"floor {self.floor:.3g} {self.unit}, this is {self.distance:.2g} times that"
+        return f"ceiling {self.floor:.3g}, this is {self.distance:.0%} of it"
 
 
 def at_most(

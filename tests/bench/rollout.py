@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.util import find_spec
 
 import numpy as np
@@ -50,33 +51,35 @@ def normalised(commands: np.ndarray) -> np.ndarray:
 
 
 def measure(quick: bool) -> list[Line]:
-    """Milliseconds a rollout, and evosax's generation in ours."""
+    """Milliseconds a rollout, the same rollout in JAX, and evosax's generation in ours."""
     ours = Ours(initial_weights(KEY, 3, ROBOT.hidden))
     subjects = {"rollout": ours.rollouts, "generation": ours.generations}
-    title = f"  a whole generation against evosax {'' if find_spec('evosax') else '(not installed)'}".rstrip()
-    if not find_spec("evosax"):
-        with one_core():
-            taken = alternating(subjects, 11)
-        peer = at_least(title, None, 5, note="not installed; pip install -e '.[bench]'")
-    else:
-        with one_core():
-            taken = alternating(subjects | {"evosax": _peer(ours)}, 7 if quick else 21)
-        note = f"ours {_ms(taken['generation']):.2f} ms, peer {_ms(taken['evosax']):.2f} ms"
-        peer = at_least(title, taken["evosax"] / taken["generation"], 5, note=note)
+    with one_core():
+        taken = alternating(subjects | _peers(ours), 7 if quick else 21)
+    ms = {name: call_s / GENERATIONS * 1e3 for name, call_s in taken.items()}
     return [
-        at_most(f"rollout of {POPULATION} x {COMMANDS} commands x 3 networks", _ms(taken["rollout"]), 0.5, "ms"),
-        peer,
+        at_most(f"rollout of {POPULATION} x {COMMANDS} commands x 3 networks", ms["rollout"], 0.5, "ms"),
+        _against("  against the same rollout in JAX", ms, "rollout", "jax"),
+        _against("  a whole generation against evosax", ms, "generation", "evosax"),
     ]
 
 
-def _peer(ours: Ours):
-    from tests.bench.evosax_peer import check_peer, fitness_of, generations
+def _against(name: str, ms: dict[str, float], subject: str, peer: str) -> Line:
+    if peer not in ms:
+        return at_least(name, None, 5, note="evosax is not installed; pip install -e '.[bench]'")
+    return at_least(name, ms[peer] / ms[subject], 5, note=f"ours {ms[subject]:.2f} ms, peer {ms[peer]:.2f} ms")
+
+
+def _peers(ours: Ours) -> dict[str, Callable[[], object]]:
+    """Nothing where evosax is not installed."""
+    if not find_spec("evosax"):
+        return {}
+    from tests.bench.evosax_peer import check_peer, fitness_of, generations, rollouts
 
     commands = normalised(ours.population.commands)
     fitness = fitness_of(ours.weights, ours.task.goals_m)
     check_peer(fitness, commands, ours.rollout())
-    return generations(fitness, commands, GENERATIONS)
-
-
-def _ms(call_s: float) -> float:
-    return call_s / GENERATIONS * 1e3
+    return {
+        "jax": rollouts(fitness, commands, GENERATIONS),
+        "evosax": generations(fitness, commands, GENERATIONS),
+    }

@@ -50,8 +50,8 @@ class Course:
 
     @property
     def throughput(self) -> float:
-        """Runs a second while all workers are at work."""
-        return self._in_window().sum() / (self.window[1] - self.window[0]) / median(self.runs["wall_s"])
+        """Runs a second, parts of runs included, while all workers are at work."""
+        return float((self._in_window() / self.runs["wall_s"]).sum()) / (self.window[1] - self.window[0])
 
     @property
     def overhead(self) -> float:
