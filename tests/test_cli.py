@@ -29,12 +29,31 @@ def sweep_file(tmp_path):
 
 
 def test_run_stores_rows_draws_a_path_and_saves_its_networks(tmp_path, bns):
-    done = bns("run", "--task", "infinity", "--seed", 3, *QUICK, "--results", tmp_path, "--save-snn", tmp_path / "n.safetensors")
+    done = bns(
+        "run",
+        "--task",
+        "infinity",
+        "--seed",
+        3,
+        *QUICK,
+        "--results",
+        tmp_path,
+        "--save-snn",
+        tmp_path / "n.safetensors",
+    )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     evals = package.load(tmp_path)
     assert list(evals["evaluation"]) == [1, 2]
-    assert {"run_id", "diversity", "fitness_error", "success_7cm", "success_10cm", "success_14cm", "success_20cm"} <= set(evals)
+    assert {
+        "run_id",
+        "diversity",
+        "fitness_error",
+        "success_7cm",
+        "success_10cm",
+        "success_14cm",
+        "success_20cm",
+    } <= set(evals)
     assert set(evals["task"]) == {"infinity"}
     figure = re.search(r"path: (\S+\.png)", done.stdout).group(1)
     assert Path(figure).read_bytes()[:4] == b"\x89PNG"
@@ -67,7 +86,9 @@ def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
     assert "0 runs now, 8 of 8 done" in again.stderr
     assert main(["status", "--results", str(results)]) == 0
     assert re.search(r"little\s+circle\s+4\s+4\s+0\s+0", capsys.readouterr().out)
-    assert main(["query", "--csv", "SELECT count(*), count(DISTINCT run_id) FROM evals", "--results", str(results)]) == 0
+    assert (
+        main(["query", "--csv", "SELECT count(*), count(DISTINCT run_id) FROM evals", "--results", str(results)]) == 0
+    )
     assert capsys.readouterr().out == "16,8\n"
     before = package.load(results)
     assert main(["compact", "--results", str(results)]) == 0
@@ -76,7 +97,11 @@ def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
 
 def test_one_and_two_jobs_and_a_resumed_sweep_give_the_same_rows(tmp_path, sweep_file):
     frames = []
-    for name, calls in {"one": [["--jobs", "1"]], "two": [["--jobs", "2"]], "resumed": [["--budget", "0s"], []]}.items():
+    for name, calls in {
+        "one": [["--jobs", "1"]],
+        "two": [["--jobs", "2"]],
+        "resumed": [["--budget", "0s"], []],
+    }.items():
         for options in calls:
             assert main(["sweep", str(sweep_file), *options, "--results", str(tmp_path / name)]) == 0
         evals = package.load(tmp_path / name)

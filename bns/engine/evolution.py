@@ -16,6 +16,8 @@ from bns.engine.philox import Key, Purpose, philox, uniforms, words
 
 IDENTICAL_CUT = 0.8
 """Probability that both parents are cut at the same place (section 4.3)."""
+COMPONENTS = 3
+"""Numbers a command has: left, right, duration."""
 _UNIT = 2.0**-32
 
 
@@ -69,7 +71,7 @@ def tournament_cdf(n: int, share: float) -> np.ndarray:
 
 def rank(fitness: np.ndarray) -> np.ndarray:
     """Indices from best to worst; equals keep their order; NaN and 0 come last. int64 (n,)."""
-    return np.argsort(-np.nan_to_num(fitness, nan=0.0, neginf=0.0), kind="stable")
+    return np.argsort(np.where(fitness > 0, -fitness, 0.0), kind="stable")
 
 
 def pick(key: Key, purpose: Purpose, step: int, order: np.ndarray, cdf: np.ndarray) -> int:
@@ -89,21 +91,26 @@ def _below(word: Any, n: Any) -> Any:
     return np.int64(np.uint64(word) * np.uint64(n) >> np.uint64(32))
 
 
+@inline
+def _copy(source, row, start, target, child, at, count):  # type: ignore[no-untyped-def]  # compiled
+    for e in range(count):
+        target[child, at + e] = source[row, start + e]
+
+
 @exact
-def _cross(child, child_length, commands, lengths, front, back, cut_front, cut_back, shortest):  # type: ignore[no-untyped-def]  # compiled
-    """First cut_front commands of one parent, then the other parent's from cut_back on; 1 if it had to be cut short."""
+def _cross(children, child, lists, lengths, front, back, cut_front, cut_back, shortest):  # type: ignore[no-untyped-def]  # compiled
+    """First cut_front commands of one parent, then the other parent's from cut_back on; the length before and after the bound.
+
+    children and lists are (n, capacity * components): lists of commands laid end to end.
+    """
     length = cut_front + lengths[back] - cut_back
     if length < shortest:  # too short a list is not made: the parent passes unchanged
         cut_front, cut_back, length = 0, 0, lengths[back]
-    kept = min(length, commands.shape[1])
-    for j in range(min(cut_front, kept)):
-        for c in range(3):
-            child[j, c] = commands[front, j, c]
-    for j in range(cut_front, kept):
-        for c in range(3):
-            child[j, c] = commands[back, j - cut_front + cut_back, c]
-    child_length[0] = kept
-    return 1 if kept < length else 0
+    kept = min(length, lists.shape[1] // COMPONENTS)
+    first = min(cut_front, kept)
+    _copy(lists, front, 0, children, child, 0, first * COMPONENTS)
+    _copy(lists, back, cut_back * COMPONENTS, children, child, first * COMPONENTS, (kept - first) * COMPONENTS)
+    return length, kept
 
 
 @fast
@@ -131,14 +138,14 @@ def _mutate(children, lengths, rate, low, high, span, step, k0, k1):  # type: ig
             m += 1
     draws = np.empty((3, total), np.uint32)
     _mutation_words(slot, individual, total, step, k0, k1, draws)
-    threshold = rate / _UNIT
-    for c in range(3):
+    threshold = np.uint64(rate / _UNIT)
+    for c in range(COMPONENTS):
         for m in range(total):
-            word = np.float64(draws[c, m])
+            word = np.uint64(draws[c, m])
             if word < threshold:
                 # Given that it fell below the threshold, the draw is uniform there: it serves twice.
                 i, j = individual[m], slot[m]
-                value = children[i, j, c] + np.float32((2.0 * word / threshold - 1.0) * span[c])
+                value = children[i, j, c] + np.float32((2.0 * np.float64(word) / np.float64(threshold) - 1.0) * span[c])
                 children[i, j, c] = min(max(value, low[c]), high[c])
 
 
@@ -147,8 +154,9 @@ def breed_into(commands, lengths, order, cdf, rate, low, high, span, shortest, s
     """Fill children with the best controller and the offspring of tournament winners; count those cut at the bound."""
     hits = 0
     n = commands.shape[0]
+    lists, child_lists = commands.reshape(n, -1), children.reshape(n, -1)
     best = order[0]
-    children[0, : lengths[best]] = commands[best, : lengths[best]]
+    _copy(lists, best, 0, child_lists, 0, 0, lengths[best] * COMPONENTS)
     child_lengths[0] = lengths[best]
     for pair in range(n // 2):
         first = 1 + 2 * pair
@@ -160,11 +168,13 @@ def breed_into(commands, lengths, order, cdf, rate, low, high, span, shortest, s
         if cuts[0] * _UNIT >= IDENTICAL_CUT:
             cut_a = _below(cuts[1], lengths[a] + 1)
             cut_b = _below(cuts[2], lengths[b] + 1)
-        hits += _cross(children[first], child_lengths[first:], commands, lengths, a, b, cut_a, cut_b, shortest)
+        length, kept = _cross(child_lists, first, lists, lengths, a, b, cut_a, cut_b, shortest)
+        child_lengths[first] = kept
+        hits += length > kept
         if first + 1 < n:
-            hits += _cross(
-                children[first + 1], child_lengths[first + 1 :], commands, lengths, b, a, cut_b, cut_a, shortest
-            )
+            length, kept = _cross(child_lists, first + 1, lists, lengths, b, a, cut_b, cut_a, shortest)
+            child_lengths[first + 1] = kept
+            hits += length > kept
     _mutate(children, child_lengths, rate, low, high, span, step, k0, k1)
     return hits
 

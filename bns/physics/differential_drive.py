@@ -30,8 +30,15 @@ class Track:
     poses: Array
 
 
-def simulate(model: Model, left_m_s: ArrayLike, right_m_s: ArrayLike, duration_s: ArrayLike, *,
-             start: ArrayLike = (0.0, 0.0, 0.0), normals: ArrayLike | None = None) -> Array:
+def simulate(
+    model: Model,
+    left_m_s: ArrayLike,
+    right_m_s: ArrayLike,
+    duration_s: ArrayLike,
+    *,
+    start: ArrayLike = (0.0, 0.0, 0.0),
+    normals: ArrayLike | None = None,
+) -> Array:
     """True poses at the end of every command, (batch, commands, 3): x_m, y_m, heading_rad (unwrapped).
 
     Each trial's commands are driven back to back, from rest. Speeds and durations are (batch, commands);
@@ -50,8 +57,16 @@ def simulate(model: Model, left_m_s: ArrayLike, right_m_s: ArrayLike, duration_s
     return poses
 
 
-def track(model: Model, left_m_s: ArrayLike, right_m_s: ArrayLike, duration_s: ArrayLike, *,
-          dense_dt_s: float, start: ArrayLike = (0.0, 0.0, 0.0), normals: ArrayLike | None = None) -> Track:
+def track(
+    model: Model,
+    left_m_s: ArrayLike,
+    right_m_s: ArrayLike,
+    duration_s: ArrayLike,
+    *,
+    dense_dt_s: float,
+    start: ArrayLike = (0.0, 0.0, 0.0),
+    normals: ArrayLike | None = None,
+) -> Track:
     """The same drive as `simulate`, seen every ``dense_dt_s`` from the start to the end of each trial."""
     left, right, duration = _jittered(model, _commands(left_m_s, right_m_s, duration_s), normals)
     poses0 = _start(start, len(left))
@@ -96,18 +111,24 @@ def _integrate(model: Model, grid: Grid, start: Array) -> Array:
     chord = np.sinc(turned / (2.0 * np.pi)) * grid.step_s  # an arc's chord: sin(a/2)/(a/2) of its length
     cos, sin = np.cos(middle) * chord, np.sin(middle) * chord
     moving_s = body.moving * grid.step_s
-    x = flow_along(start[:, 0], body.forward_m_s * cos + body.sideways_m_s * sin, moving_s,
-                   flow.x_m_s, flow.return_per_s)
-    y = flow_along(start[:, 1], body.forward_m_s * sin - body.sideways_m_s * cos, moving_s,
-                   flow.y_m_s, flow.return_per_s)
+    x = flow_along(
+        start[:, 0], body.forward_m_s * cos + body.sideways_m_s * sin, moving_s, flow.x_m_s, flow.return_per_s
+    )
+    y = flow_along(
+        start[:, 1], body.forward_m_s * sin - body.sideways_m_s * cos, moving_s, flow.y_m_s, flow.return_per_s
+    )
     return np.stack([x, y, heading], axis=2)
 
 
 def _body(wheels: Wheels) -> Body:
     left, right = wheels.left_m_s, wheels.right_m_s
     moving = np.minimum(np.maximum(np.abs(left), np.abs(right)) / CREEP_M_S, 1.0)
-    return Body(forward_m_s=(left + right) / 2.0, sideways_m_s=np.zeros_like(left),
-                yaw_rad_s=(right - left) / wheels.wheelbase_m, moving=moving)
+    return Body(
+        forward_m_s=(left + right) / 2.0,
+        sideways_m_s=np.zeros_like(left),
+        yaw_rad_s=(right - left) / wheels.wheelbase_m,
+        moving=moving,
+    )
 
 
 def _chunks(trials: int) -> list[slice]:
@@ -117,8 +138,10 @@ def _chunks(trials: int) -> list[slice]:
 def _commands(left_m_s: ArrayLike, right_m_s: ArrayLike, duration_s: ArrayLike) -> tuple[Array, Array, Array]:
     left, right, duration = (np.asarray(a, dtype=np.float64) for a in (left_m_s, right_m_s, duration_s))
     if left.ndim != 2 or left.shape != right.shape or left.shape != duration.shape:
-        raise ModelError(f"left_m_s, right_m_s and duration_s have the shapes {left.shape}, {right.shape} "
-                         f"and {duration.shape}; give all three as (trials, commands).")
+        raise ModelError(
+            f"left_m_s, right_m_s and duration_s have the shapes {left.shape}, {right.shape} "
+            f"and {duration.shape}; give all three as (trials, commands)."
+        )
     for name, values in (("left_m_s", left), ("right_m_s", right), ("duration_s", duration)):
         if not np.isfinite(values).all():
             raise ModelError(f"{name} holds {values[~np.isfinite(values)][0]}; pad short trials with 0.")
@@ -127,8 +150,9 @@ def _commands(left_m_s: ArrayLike, right_m_s: ArrayLike, duration_s: ArrayLike) 
     return left, right, duration
 
 
-def _jittered(model: Model, commands: tuple[Array, Array, Array],
-              normals: ArrayLike | None) -> tuple[Array, Array, Array]:
+def _jittered(
+    model: Model, commands: tuple[Array, Array, Array], normals: ArrayLike | None
+) -> tuple[Array, Array, Array]:
     left, right, duration = commands
     if normals is None:
         return commands

@@ -58,8 +58,9 @@ class Effect:
                 raise ModelError(unknown_name(f"parameter of {self.name}", name, names))
         missing = [name for name in names if name not in values]
         if missing:
-            raise ModelError(f"{self.name} lacks {', '.join(missing)}; it needs a value for each of "
-                             f"{', '.join(names)}.")
+            raise ModelError(
+                f"{self.name} lacks {', '.join(missing)}; it needs a value for each of {', '.join(names)}."
+            )
         return tuple(number(f"{self.name}: {p.name}", values[p.name], p.low, p.high) for p in self.parameters)
 
 

@@ -24,8 +24,7 @@ BASIS = ("measured", "published", "guess")
 """How a value came to be known."""
 
 _TOP = ("base", "wheelbase_m", "dt_s", "jitter", "noise", "effects")
-_GROUPS: Mapping[str, tuple[str, ...]] = {
-    "jitter": ("wheel_speed_relative",), "noise": ("position_m", "heading_rad")}
+_GROUPS: Mapping[str, tuple[str, ...]] = {"jitter": ("wheel_speed_relative",), "noise": ("position_m", "heading_rad")}
 _WHY = ("basis", "reason")
 _EFFECT_KEYS = ("name", "values", *_WHY)
 
@@ -133,8 +132,9 @@ def load_model(name_or_path: str | Path) -> Model:
     path = Path(name_or_path)
     if path.suffix in {".yaml", ".yml"}:
         if not path.is_file():
-            raise ModelError(f"There is no model file {path}. Give the path of a YAML file or one of: "
-                             f"{', '.join(model_names())}.")
+            raise ModelError(
+                f"There is no model file {path}. Give the path of a YAML file or one of: {', '.join(model_names())}."
+            )
         return parse_model(path.read_text(encoding="utf-8"), path.stem)
     if str(name_or_path) not in model_names():
         known = unknown_name("robot model", str(name_or_path), model_names())
@@ -155,9 +155,15 @@ def parse_model(text: str, name: str) -> Model:
     if not isinstance(listed, list):
         raise ModelError(f"model {name}: effects is {listed!r}; it must be a list of {_join(_EFFECT_KEYS)}.")
     return Model(
-        name=name, base=top["base"], wheelbase_m=top["wheelbase_m"], dt_s=top.get("dt_s", Model.dt_s),
-        jitter_relative=jitter["wheel_speed_relative"], noise_position_m=noise["position_m"],
-        noise_heading_rad=noise["heading_rad"], effects=tuple(_effect(name, entry) for entry in listed))
+        name=name,
+        base=top["base"],
+        wheelbase_m=top["wheelbase_m"],
+        dt_s=top.get("dt_s", Model.dt_s),
+        jitter_relative=jitter["wheel_speed_relative"],
+        noise_position_m=noise["position_m"],
+        noise_heading_rad=noise["heading_rad"],
+        effects=tuple(_effect(name, entry) for entry in listed),
+    )
 
 
 def _effect(model: str, entry: Any) -> ActiveEffect:

@@ -18,9 +18,21 @@ from bns.errors import ModelError
 from bns.physics.model import Model
 from bns.physics.signals import CREEP_M_S, Array
 
-ORDER = ("speed-gain", "wheel-mismatch", "dead-zone", "speed-limit", "acceleration-limit",
-         "command-delay", "motor-lag", "wheelbase", "turn-slip", "side-slip", "yaw-bias", "floor-slope",
-         "tether-pull")
+ORDER = (
+    "speed-gain",
+    "wheel-mismatch",
+    "dead-zone",
+    "speed-limit",
+    "acceleration-limit",
+    "command-delay",
+    "motor-lag",
+    "wheelbase",
+    "turn-slip",
+    "side-slip",
+    "yaw-bias",
+    "floor-slope",
+    "tether-pull",
+)
 """The one order of effects for which these equations are written."""
 
 _CATCH_UP_S = 1e-5  # a rate limit has a corner where it catches up; the solver gets this short lag instead
@@ -28,8 +40,13 @@ _STIFF = {"method": "LSODA", "rtol": 1e-8, "atol": 1e-10, "max_step": 0.01}
 _SMOOTH = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-11, "max_step": 0.02}
 
 
-def simulate_slowly(model: Model, left_m_s: Sequence[float], right_m_s: Sequence[float],
-                    duration_s: Sequence[float], start: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
+def simulate_slowly(
+    model: Model,
+    left_m_s: Sequence[float],
+    right_m_s: Sequence[float],
+    duration_s: Sequence[float],
+    start: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Array:
     """Pose at the end of each command of one trial, (commands, 3), without jitter.
 
     ModelError if the model has effects that are not in `ORDER`, or has them in another order.
@@ -51,12 +68,13 @@ def simulate_slowly(model: Model, left_m_s: Sequence[float], right_m_s: Sequence
 def _check_order(model: Model) -> None:
     names = [a.effect.name for a in model.effects if a.effect.stage != "measure"]
     if names != [name for name in ORDER if name in names]:
-        raise ModelError(f"The slow twin cannot solve the effects {', '.join(names)} in this order; "
-                         f"it knows {', '.join(ORDER)}, in this order.")
+        raise ModelError(
+            f"The slow twin cannot solve the effects {', '.join(names)} in this order; "
+            f"it knows {', '.join(ORDER)}, in this order."
+        )
 
 
-def _piece(model: Model, state: Array, left: float, right: float,
-           duration: float) -> Array:
+def _piece(model: Model, state: Array, left: float, right: float, duration: float) -> Array:
     """Integrate over a time in which the delayed command does not change."""
     target, lagged = _told(model, left, right), model.values_of("motor-lag")["tau_s"] > 0
     limited = math.isfinite(model.values_of("acceleration-limit")["max_m_s2"])
@@ -82,8 +100,7 @@ def _told(model: Model, left: float, right: float) -> tuple[float, float]:
 def _rates(model: Model, state: Array, target: tuple[float, float], wheels: Array) -> list[float]:
     """Time derivative of x, y, heading, what a rate limit lets through (2), lagging wheels (2)."""
     tau, limit = model.values_of("motor-lag")["tau_s"], model.values_of("acceleration-limit")["max_m_s2"]
-    limited = [max(-limit, min(limit, (u - w) / _CATCH_UP_S))
-               for u, w in zip(target, state[3:5], strict=True)]
+    limited = [max(-limit, min(limit, (u - w) / _CATCH_UP_S)) for u, w in zip(target, state[3:5], strict=True)]
     lagging = [(u - w) / tau if tau > 0 else 0.0 for u, w in zip(state[3:5], state[5:7], strict=True)]
     return [*_velocity(model, state, wheels[0], wheels[1]), *limited, *lagging]
 
@@ -98,6 +115,8 @@ def _velocity(model: Model, state: Array, left: float, right: float) -> tuple[fl
     pull = tether["pull_per_s"]
     drift_x = slope["x_m_s"] + pull * (tether["anchor_x_m"] - x)
     drift_y = slope["y_m_s"] + pull * (tether["anchor_y_m"] - y)
-    return (v * math.cos(heading) + rightwards * math.sin(heading) + moving * drift_x,
-            v * math.sin(heading) - rightwards * math.cos(heading) + moving * drift_y,
-            omega + moving * model.values_of("yaw-bias")["rate_rad_s"])
+    return (
+        v * math.cos(heading) + rightwards * math.sin(heading) + moving * drift_x,
+        v * math.sin(heading) - rightwards * math.cos(heading) + moving * drift_y,
+        omega + moving * model.values_of("yaw-bias")["rate_rad_s"],
+    )

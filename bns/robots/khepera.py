@@ -12,7 +12,7 @@ import numpy as np
 from bns.engine.evolution import CommandBounds, Population, random_population
 from bns.engine.jit import exact, fast, inline
 from bns.engine.philox import Key, Purpose, uniforms
-from bns.engine.snn import BLOCK, hidden_count, predict_into
+from bns.engine.snn import predict_into
 from bns.robots.base import Scores
 from bns.tasks import Task
 
@@ -173,7 +173,7 @@ class Khepera:
         outputs = np.empty((3, total), np.float32)
         starts = np.empty(n, np.int64)
         _gather(population.commands, population.lengths, _CENTRE, _HALF, X, starts)
-        predict_into(weights, X, total, outputs, np.empty((hidden_count(weights.shape[1]), BLOCK), np.float32))
+        predict_into(weights, X, total, outputs)
         fitness, reached = np.empty(n), np.empty(n, np.int32)
         failures = _walk(outputs, starts, population.lengths, _SCALE, task.goals_m, fitness, reached)
         return Scores(fitness, reached, int(failures))

@@ -27,9 +27,11 @@ class CompactSummary:
     skipped_sweeps: tuple[str, ...]
 
     def __str__(self) -> str:
-        lines = [f"{self.files_before} files before, {self.files_after} after; {self.recovered_runs} runs "
-                 f"recovered from journals, {self.dropped_copies} copies dropped, "
-                 f"{self.upgraded_files} files upgraded"]
+        lines = [
+            f"{self.files_before} files before, {self.files_after} after; {self.recovered_runs} runs "
+            f"recovered from journals, {self.dropped_copies} copies dropped, "
+            f"{self.upgraded_files} files upgraded"
+        ]
         lines += [f"could not be read, set aside: {path}" for path in self.set_aside]
         lines += [f"skipped, being written: sweep {sweep}" for sweep in self.skipped_sweeps]
         return "\n".join(lines)
@@ -45,8 +47,7 @@ def compact(results: Path | str) -> CompactSummary:
     """
     root = Path(results)
     if not root.is_dir():
-        raise StoreError(f"there are no results in {root}: the folder does not exist. "
-                         "Name another with --results DIR.")
+        raise StoreError(f"there are no results in {root}: the folder does not exist. Name another with --results DIR.")
     before, sweeps = _count(root), _sweeps(root)
     work, skipped = Tally(set_aside=_set_aside_strays(root)), []
     for sweep in sweeps:
@@ -55,8 +56,9 @@ def compact(results: Path | str) -> CompactSummary:
                 compact_sweep(root, sweep, work)
         except SweepLockedError:
             skipped.append(sweep)
-    return CompactSummary(before, _count(root), work.recovered, work.dropped, work.upgraded,
-                          tuple(work.set_aside), tuple(skipped))
+    return CompactSummary(
+        before, _count(root), work.recovered, work.dropped, work.upgraded, tuple(work.set_aside), tuple(skipped)
+    )
 
 
 def bytes_per_run(results: Path | str, sweep: str) -> float:
@@ -78,6 +80,10 @@ def _sweeps(root: Path) -> list[str]:
 
 def _set_aside_strays(root: Path) -> list[Path]:
     """Move away the files that stand in no sweep's folder; those in one are for the holder of its lock."""
-    strays = [file.path for table in SCHEMAS for file in find_parts(root, table)[1]
-              if not is_name(file.path.relative_to(root / table).parts[0].removeprefix("sweep="))]
+    strays = [
+        file.path
+        for table in SCHEMAS
+        for file in find_parts(root, table)[1]
+        if not is_name(file.path.relative_to(root / table).parts[0].removeprefix("sweep="))
+    ]
     return [set_aside(root, path) for path in strays]

@@ -33,8 +33,10 @@ def is_name(text: str) -> bool:
 def checked_name(kind: str, name: str) -> str:
     """``name`` if it can stand in a folder name; StoreError otherwise."""
     if not is_name(name):
-        raise StoreError(f"{kind} {name!r} cannot be a folder name: it must begin with a letter and hold "
-                         "only letters, digits, - and _. Rename it.")
+        raise StoreError(
+            f"{kind} {name!r} cannot be a folder name: it must begin with a letter and hold "
+            "only letters, digits, - and _. Rename it."
+        )
     return name
 
 
@@ -50,15 +52,20 @@ def explained(action: str, path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         if error.errno in _FULL:
-            reason, remedy = ("The disk, quota or file size limit is full.",
-                              "free some space and repeat the command, which goes on where it stopped.")
+            reason, remedy = (
+                "The disk, quota or file size limit is full.",
+                "free some space and repeat the command, which goes on where it stopped.",
+            )
         elif error.errno in _LOCKED_OUT:
-            reason, remedy = ("The folder is read-only for this user.",
-                              "make it writable, or choose another folder with --results DIR.")
+            reason, remedy = (
+                "The folder is read-only for this user.",
+                "make it writable, or choose another folder with --results DIR.",
+            )
         else:
             reason, remedy = "", "look after the disk and repeat the command."
-        raise StoreError(f"cannot {action} {path}: {error.strerror or error}. {reason} "
-                         f"Nothing that was finished is lost: {remedy}") from error
+        raise StoreError(
+            f"cannot {action} {path}: {error.strerror or error}. {reason} Nothing that was finished is lost: {remedy}"
+        ) from error
 
 
 def make_folder(folder: Path) -> None:
@@ -74,7 +81,7 @@ def write_all(descriptor: int, data: bytes) -> None:
     """Write every byte of ``data``: one os.write may stop short."""
     rest = memoryview(data)
     while rest:
-        rest = rest[os.write(descriptor, rest):]
+        rest = rest[os.write(descriptor, rest) :]
 
 
 def publish(data: bytes, staged: Path, place: Path) -> None:

@@ -31,8 +31,7 @@ def fold_journal(results: Path, file: JournalFile) -> int:
 
 def publish_part(results: Path, sweep: str, task: str, part: str, frames: list[Frame]) -> None:
     """Publish one part a table. "runs" comes last: a run is there when its rows are."""
-    tables = {name: [frame.tables[name] for frame in frames if name in frame.tables]
-              for name in (*RECORDED, "runs")}
+    tables = {name: [frame.tables[name] for frame in frames if name in frame.tables] for name in (*RECORDED, "runs")}
     runs = pa.concat_tables(tables["runs"])
     hashes = {frame.spec_hash for frame in frames}
     for name, parts in tables.items():
@@ -55,6 +54,9 @@ def clear_staging(results: Path, sweep: str) -> None:
 
 def _report_damage(results: Path, file: JournalFile, found: Scan) -> None:
     copy = set_aside(results, file.path, found.data)
-    warnings.warn(f"{file.path} is damaged ({found.damaged} bytes); {len(found.frames)} whole runs of it are "
-                  f"kept, a copy is in {copy}. Run the sweep again: it makes up for what is missing.",
-                  StoreWarning, stacklevel=3)
+    warnings.warn(
+        f"{file.path} is damaged ({found.damaged} bytes); {len(found.frames)} whole runs of it are "
+        f"kept, a copy is in {copy}. Run the sweep again: it makes up for what is missing.",
+        StoreWarning,
+        stacklevel=3,
+    )

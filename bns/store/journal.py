@@ -161,9 +161,16 @@ class Journal:
 def encoded(frame: Frame) -> bytes:
     """The bytes of one frame."""
     streams = {name: _stream(table) for name, table in frame.tables.items()}
-    index = json.dumps({"schema_version": SCHEMA_VERSION, "run_id": frame.run_id, "task": frame.task,
-                        "status": frame.status, "spec_hash": frame.spec_hash,
-                        "tables": {name: len(stream) for name, stream in streams.items()}}).encode()
+    index = json.dumps(
+        {
+            "schema_version": SCHEMA_VERSION,
+            "run_id": frame.run_id,
+            "task": frame.task,
+            "status": frame.status,
+            "spec_hash": frame.spec_hash,
+            "tables": {name: len(stream) for name, stream in streams.items()},
+        }
+    ).encode()
     payload = b"".join([_CHECK.pack(len(index)), index, *streams.values()])
     head = _HEAD.pack(MAGIC, len(payload), zlib.crc32(payload))
     return head + _CHECK.pack(zlib.crc32(head)) + payload
@@ -177,8 +184,8 @@ def _stream(table: pa.Table) -> bytes:
 
 
 def _length_at(data: bytes, at: int) -> int | None:
-    head = data[at:at + _HEAD.size]
-    check = data[at + _HEAD.size:at + _HEAD_SIZE]
+    head = data[at : at + _HEAD.size]
+    check = data[at + _HEAD.size : at + _HEAD_SIZE]
     if len(check) < _CHECK.size or not head.startswith(MAGIC) or _CHECK.unpack(check)[0] != zlib.crc32(head):
         return None
     return int(_HEAD.unpack(head)[1])
@@ -188,8 +195,8 @@ def _payload_at(data: bytes, at: int) -> bytes | None:
     length = _length_at(data, at)
     if length is None:
         return None
-    payload = data[at + _HEAD_SIZE:at + _HEAD_SIZE + length]
-    wanted = _HEAD.unpack(data[at:at + _HEAD.size])[2]
+    payload = data[at + _HEAD_SIZE : at + _HEAD_SIZE + length]
+    wanted = _HEAD.unpack(data[at : at + _HEAD.size])[2]
     return payload if len(payload) == length and zlib.crc32(payload) == wanted else None
 
 
@@ -206,19 +213,21 @@ def _is_torn(data: bytes, at: int) -> bool:
     rest, length = data[at:], _length_at(data, at)
     if length is not None:
         return len(rest) < _HEAD_SIZE + length
-    return (len(rest) < _HEAD_SIZE and MAGIC[:len(rest)] == rest[:len(MAGIC)]) or not any(rest)
+    return (len(rest) < _HEAD_SIZE and MAGIC[: len(rest)] == rest[: len(MAGIC)]) or not any(rest)
 
 
 def _decoded(payload: bytes, path: Path) -> Frame:
-    start = _CHECK.size + _CHECK.unpack(payload[:_CHECK.size])[0]
-    index: dict[str, Any] = json.loads(payload[_CHECK.size:start])
+    start = _CHECK.size + _CHECK.unpack(payload[: _CHECK.size])[0]
+    index: dict[str, Any] = json.loads(payload[_CHECK.size : start])
     version = index["schema_version"]
     if version > SCHEMA_VERSION:
-        raise StoreError(f"{path} was written with schema version {version}; this bns knows "
-                         f"{SCHEMA_VERSION}. Update it: pip install -U bns")
+        raise StoreError(
+            f"{path} was written with schema version {version}; this bns knows "
+            f"{SCHEMA_VERSION}. Update it: pip install -U bns"
+        )
     tables = {}
     for name, length in index["tables"].items():
-        table = pa.ipc.open_stream(pa.py_buffer(payload[start:start + length])).read_all()
+        table = pa.ipc.open_stream(pa.py_buffer(payload[start : start + length])).read_all()
         tables[name] = table if version == SCHEMA_VERSION else upgraded(name, table, version)
         start += length
     return Frame(index["run_id"], index["task"], index["status"], index["spec_hash"], tables)

@@ -41,8 +41,10 @@ class SweepLock:
             except filelock.Timeout as error:
                 raise SweepLockedError(self._taken()) from error
             except NotImplementedError as error:
-                raise StoreError(f"cannot lock {self._path}: this file system has no file locks. "
-                                 "Choose a folder on a local disk with --results DIR.") from error
+                raise StoreError(
+                    f"cannot lock {self._path}: this file system has no file locks. "
+                    "Choose a folder on a local disk with --results DIR."
+                ) from error
         try:
             with explained("write", self._holder):
                 self._holder.write_text(json.dumps(_myself()))
@@ -58,8 +60,9 @@ class SweepLock:
         self.acquire()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.release()
 
     def _taken(self) -> str:
@@ -68,10 +71,11 @@ class SweepLock:
             who = f"process {holder['pid']} on {holder['host']} since {holder['since']}"
         except (OSError, ValueError, KeyError, TypeError):
             who = "a process that has not said yet which it is"
-        return (f"sweep {self._sweep!r} is being written by {who} (lock {self._path}). Wait until it is "
-                "done or stop it; other sweeps can be written at the same time.")
+        return (
+            f"sweep {self._sweep!r} is being written by {who} (lock {self._path}). Wait until it is "
+            "done or stop it; other sweeps can be written at the same time."
+        )
 
 
 def _myself() -> dict[str, str | int]:
-    return {"pid": os.getpid(), "host": platform.node(),
-            "since": datetime.now(UTC).isoformat(timespec="seconds")}
+    return {"pid": os.getpid(), "host": platform.node(), "since": datetime.now(UTC).isoformat(timespec="seconds")}

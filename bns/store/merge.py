@@ -111,8 +111,15 @@ def _folds(tables: dict[str, list[Part]]) -> list[_Fold]:
     for run, (_, place) in best.items():
         kept[place].add(run)
     names = ("runs", *RECORDED)
-    return [_Fold(place, {name: by_place[name][place] for name in names if place in by_place[name]},
-                  frozenset(kept[place]), place not in lacking) for place in sorted(kept)]
+    return [
+        _Fold(
+            place,
+            {name: by_place[name][place] for name in names if place in by_place[name]},
+            frozenset(kept[place]),
+            place not in lacking,
+        )
+        for place in sorted(kept)
+    ]
 
 
 def _clear_orphans(root: Path, tables: dict[str, list[Part]], folds: list[_Fold], tally: Tally) -> None:
@@ -137,8 +144,9 @@ def _groups(folds: list[_Fold]) -> list[list[_Fold]]:
             merged[-1].append(fold)
     if len(merged) > 1 and _size(merged[-2] + merged[-1]) <= MOST_RUNS:
         merged[-2:] = [merged[-2] + merged[-1]]
-    return [group for group in alone + merged
-            if len(group) > 1 or any(fold.has_copies or fold.old_files for fold in group)]
+    return [
+        group for group in alone + merged if len(group) > 1 or any(fold.has_copies or fold.old_files for fold in group)
+    ]
 
 
 def _size(group: Iterable[_Fold]) -> int:

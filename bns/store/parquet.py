@@ -23,9 +23,13 @@ def part_bytes(name: str, table: pa.Table, sweep: str, spec_hashes: Iterable[str
     """
     clean = set(runs["git_clean"].to_pylist())
     metadata = file_metadata(
-        name, sweep, spec_hash=_joined(spec_hashes), git_sha=_joined(runs["git_sha"].to_pylist()),
+        name,
+        sweep,
+        spec_hash=_joined(spec_hashes),
+        git_sha=_joined(runs["git_sha"].to_pylist()),
         git_clean=None if None in clean or not clean else all(clean),
-        bns_version=_joined(runs["bns_version"].to_pylist()))
+        bns_version=_joined(runs["bns_version"].to_pylist()),
+    )
     ordered = table.sort_by([(key, "ascending") for key in SORT_KEYS[name]])
     return file_bytes(name, ordered, metadata)
 
@@ -34,9 +38,14 @@ def file_bytes(name: str, table: pa.Table, metadata: bytes) -> bytes:
     """``table`` as a parquet file of this schema version with the given JSON under the key "bns"."""
     measures = _measures(name)
     sink = pa.BufferOutputStream()
-    pq.write_table(table.replace_schema_metadata({METADATA_KEY: metadata}), sink, compression="zstd",
-                   use_dictionary=[column for column in SCHEMAS[name].names if column not in measures],
-                   column_encoding=dict.fromkeys(measures, "BYTE_STREAM_SPLIT"), write_page_checksum=True)
+    pq.write_table(
+        table.replace_schema_metadata({METADATA_KEY: metadata}),
+        sink,
+        compression="zstd",
+        use_dictionary=[column for column in SCHEMAS[name].names if column not in measures],
+        column_encoding=dict.fromkeys(measures, "BYTE_STREAM_SPLIT"),
+        write_page_checksum=True,
+    )
     return bytes(sink.getvalue())
 
 
@@ -63,5 +72,6 @@ def _joined(texts: Iterable[str]) -> str:
 @cache
 def _measures(name: str) -> tuple[str, ...]:
     # Measured numbers hardly repeat: split by bytes they are a quarter smaller, and quicker to write.
-    return tuple(field.name for field in SCHEMAS[name]
-                 if pa.types.is_float64(field.type) and field.name not in PARAMETERS)
+    return tuple(
+        field.name for field in SCHEMAS[name] if pa.types.is_float64(field.type) and field.name not in PARAMETERS
+    )

@@ -69,11 +69,15 @@ def find_parts(results: Path, table: str, sweep: str | None = None) -> tuple[lis
 def check_version(part: Part, results: Path) -> None:
     """StoreError naming the remedy if ``part`` has another schema version than this bns."""
     if part.version < SCHEMA_VERSION:
-        raise StoreError(f"{part.path} has schema version {part.version}, older than {SCHEMA_VERSION}, which "
-                         f"this bns reads. Rewrite it with: bns compact --results {results}")
+        raise StoreError(
+            f"{part.path} has schema version {part.version}, older than {SCHEMA_VERSION}, which "
+            f"this bns reads. Rewrite it with: bns compact --results {results}"
+        )
     if part.version > SCHEMA_VERSION:
-        raise StoreError(f"{part.path} has schema version {part.version}, newer than {SCHEMA_VERSION}, which "
-                         "this bns reads. Update bns: pip install -U bns")
+        raise StoreError(
+            f"{part.path} has schema version {part.version}, newer than {SCHEMA_VERSION}, which "
+            "this bns reads. Update bns: pip install -U bns"
+        )
 
 
 def _part(results: Path, table: str, path: Path) -> Part | Unreadable:

@@ -29,8 +29,13 @@ class Provenance:
 
     def columns(self) -> dict[str, Any]:
         """The provenance columns of the runs table."""
-        return {"git_sha": self.git_sha, "git_clean": self.git_clean, "bns_version": self.bns_version,
-                "host": self.host, "versions": self.versions}
+        return {
+            "git_sha": self.git_sha,
+            "git_clean": self.git_clean,
+            "bns_version": self.bns_version,
+            "host": self.host,
+            "versions": self.versions,
+        }
 
 
 @cache
@@ -53,8 +58,9 @@ def git_state(package: Path) -> tuple[str, bool | None]:
 
 def _git(folder: Path, *arguments: str) -> str | None:
     try:
-        done = subprocess.run(["git", "-C", str(folder), *arguments], capture_output=True, text=True,
-                              timeout=_GIT_TIMEOUT_S, check=False)
+        done = subprocess.run(
+            ["git", "-C", str(folder), *arguments], capture_output=True, text=True, timeout=_GIT_TIMEOUT_S, check=False
+        )
     except (OSError, subprocess.SubprocessError, UnicodeDecodeError):
         return None
     return done.stdout.strip() if done.returncode == 0 else None

@@ -43,8 +43,9 @@ def query(results: Path | str, sql: str) -> pd.DataFrame:
     return _frame(_answer(Path(results), sql))
 
 
-def load(results: Path | str, table: str = "evals", columns: Sequence[str] | None = None,
-         where: Where = None) -> pd.DataFrame:
+def load(
+    results: Path | str, table: str = "evals", columns: Sequence[str] | None = None, where: Where = None
+) -> pd.DataFrame:
     """Rows of one table, in an order that does not depend on when the runs finished.
 
     Args:
@@ -111,8 +112,9 @@ def _settled(results: Path, work: Callable[[], _T]) -> _T:
             return work()
         except duckdb.IOException as error:
             fault = error
-    raise StoreError(f"cannot read {results}: {fault}. If a file is damaged, bns compact --results {results} "
-                     "moves it to set-aside/.") from fault
+    raise StoreError(
+        f"cannot read {results}: {fault}. If a file is damaged, bns compact --results {results} moves it to set-aside/."
+    ) from fault
 
 
 def _condition(where: Where) -> str:
@@ -141,13 +143,18 @@ def _literal(value: Any) -> str:
         return repr(plain)
     if isinstance(plain, str):
         return "'" + plain.replace("'", "''") + "'"
-    raise StoreError(f"a condition cannot compare with {value!r}; give a text, a number or a truth value, "
-                     "or write the condition as SQL.")
+    raise StoreError(
+        f"a condition cannot compare with {value!r}; give a text, a number or a truth value, "
+        "or write the condition as SQL."
+    )
 
 
 def _frame(table: pa.Table) -> pd.DataFrame:
     # Arrow gives truth values with gaps as objects, which neither average nor fit in memory.
     frame: pd.DataFrame = table.to_pandas(types_mapper={pa.bool_(): pd.BooleanDtype()}.get)
-    certain = [field.name for field in table.schema if pa.types.is_boolean(field.type)
-               and field.name not in _NULLABLE and not table[field.name].null_count]
+    certain = [
+        field.name
+        for field in table.schema
+        if pa.types.is_boolean(field.type) and field.name not in _NULLABLE and not table[field.name].null_count
+    ]
     return frame.astype(dict.fromkeys(certain, bool))

@@ -61,8 +61,11 @@ def table_of(name: str, spec: RunSpec, columns: Mapping[str, Any]) -> pa.Table:
     _check_names(where, columns, [field.name for field in own])
     rows = _common_length(where, columns)
     identity = {"run_id": spec.run_id, "robot": spec.robot, **{key: getattr(spec, key) for key in PARAMETERS}}
-    repeated = [pa.repeat(pa.scalar(identity[field.name], field.type), rows)
-                for field in schema if field.name in _identity(schema)]
+    repeated = [
+        pa.repeat(pa.scalar(identity[field.name], field.type), rows)
+        for field in schema
+        if field.name in _identity(schema)
+    ]
     return pa.table([*repeated, *(_array(where, field, columns[field.name]) for field in own)], schema=schema)
 
 
@@ -84,8 +87,10 @@ def _checked_run(record: RunRecord) -> dict[str, Any]:
         raise StoreError(f"{where}: {unknown_name('status', status, STATUSES)}")
     if (status == "ok") != ("evals" in record.tables) or (status != "ok" and record.tables):
         given = ", ".join(record.tables) or "none"
-        raise StoreError(f"{where} has status {status!r} and the tables: {given}. "
-                         "A run that is ok needs evals; any other has no tables.")
+        raise StoreError(
+            f"{where} has status {status!r} and the tables: {given}. "
+            "A run that is ok needs evals; any other has no tables."
+        )
     return {**_RUN_DEFAULTS, **record.run}
 
 
@@ -104,8 +109,10 @@ def _common_length(where: str, columns: Mapping[str, Any]) -> int:
     first, rows = next(iter(lengths.items()))
     ragged = [name for name, length in lengths.items() if length != rows]
     if ragged:
-        raise StoreError(f"{where}: column {ragged[0]!r} has {lengths[ragged[0]]} values and {first!r} has "
-                         f"{rows}; all columns need the same length.")
+        raise StoreError(
+            f"{where}: column {ragged[0]!r} has {lengths[ragged[0]]} values and {first!r} has "
+            f"{rows}; all columns need the same length."
+        )
     return rows
 
 
@@ -113,8 +120,10 @@ def _array(where: str, field: pa.Field, values: Any) -> pa.Array:
     kind = values.dtype.kind if isinstance(values, np.ndarray) else "O"
     # Arrow takes NaN for True: a truth value that is not known must be None or masked.
     if pa.types.is_boolean(field.type) and kind not in "bO":
-        raise StoreError(f"{where}: column {field.name!r} is {values.dtype}; it must be bool "
-                         "(an object array with None, or a masked one, where a value is not known).")
+        raise StoreError(
+            f"{where}: column {field.name!r} is {values.dtype}; it must be bool "
+            "(an object array with None, or a masked one, where a value is not known)."
+        )
     try:
         array = pa.array(values, type=field.type)
     except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError) as error:

@@ -131,12 +131,21 @@ def empty(table: str) -> pa.Table:
     return pa.schema([*schema, *folders]).empty_table()
 
 
-def file_metadata(table: str, sweep: str, *, spec_hash: str, git_sha: str, git_clean: bool | None,
-                  bns_version: str) -> bytes:
+def file_metadata(
+    table: str, sweep: str, *, spec_hash: str, git_sha: str, git_clean: bool | None, bns_version: str
+) -> bytes:
     """The JSON that stands in every file's key-value metadata under ``METADATA_KEY``."""
-    return json.dumps({"schema_version": SCHEMA_VERSION, "table": table, "sweep": sweep,
-                       "spec_hash": spec_hash, "git_sha": git_sha, "git_clean": git_clean,
-                       "bns_version": bns_version}).encode()
+    return json.dumps(
+        {
+            "schema_version": SCHEMA_VERSION,
+            "table": table,
+            "sweep": sweep,
+            "spec_hash": spec_hash,
+            "git_sha": git_sha,
+            "git_clean": git_clean,
+            "bns_version": bns_version,
+        }
+    ).encode()
 
 
 def _from_version_0(name: str, table: pa.Table) -> pa.Table:
@@ -158,8 +167,10 @@ def upgraded(name: str, table: pa.Table, version: int) -> pa.Table:
     """
     for step in range(version, SCHEMA_VERSION):
         if step not in UPGRADES:
-            raise StoreError(f"table {name} has schema version {version}; this bns upgrades from "
-                             f"{min(UPGRADES)} to {SCHEMA_VERSION}. Install a bns that reads it.")
+            raise StoreError(
+                f"table {name} has schema version {version}; this bns upgrades from "
+                f"{min(UPGRADES)} to {SCHEMA_VERSION}. Install a bns that reads it."
+            )
         table = UPGRADES[step](name, table)
     columns = [_column_or_nulls(name, table, field) for field in SCHEMAS[name]]
     return pa.table(columns, schema=SCHEMAS[name])
@@ -169,6 +180,8 @@ def _column_or_nulls(name: str, table: pa.Table, field: pa.Field) -> Any:
     if field.name in table.column_names:
         return table.column(field.name).cast(field.type)
     if not field.nullable:
-        raise StoreError(f"table {name} has no column {field.name!r}, which may not be empty. "
-                         "The file was not written by bns, or by a version without an upgrade.")
+        raise StoreError(
+            f"table {name} has no column {field.name!r}, which may not be empty. "
+            "The file was not written by bns, or by a version without an upgrade."
+        )
     return pa.nulls(table.num_rows, field.type)

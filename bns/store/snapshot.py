@@ -54,9 +54,11 @@ def full_snapshot(results: Path) -> Snapshot:
     found = snapshot(results) if results.is_dir() else None
     if found is None or found.is_empty:
         state = "is empty" if results.is_dir() else "does not exist"
-        raise StoreError(f"there are no results in {results}: the folder {state}. Make some with: "
-                         "bns sweep sweeps/khepera-small.yaml, or: bns run; or name another folder with "
-                         "--results DIR.")
+        raise StoreError(
+            f"there are no results in {results}: the folder {state}. Make some with: "
+            "bns sweep sweeps/khepera-small.yaml, or: bns run; or name another folder with "
+            "--results DIR."
+        )
     return found
 
 
@@ -67,16 +69,21 @@ def _settled_parts(results: Path, sweep: str | None) -> tuple[dict[str, list[Par
         runs = list_files(results, "runs", sweep)
         listed = {table: find_parts(results, table, sweep) for table in SCHEMAS}
         if list_files(results, "runs", sweep) == runs:
-            return ({table: found for table, (found, _) in listed.items()},
-                    [one for _, unreadable in listed.values() for one in unreadable])
+            return (
+                {table: found for table, (found, _) in listed.items()},
+                [one for _, unreadable in listed.values() for one in unreadable],
+            )
     raise StoreError(f"{results} changes faster than it can be read. Repeat the command in a moment.")
 
 
 def _frames(file: JournalFile) -> list[Frame]:
     found = read_journal(file)
     if found.damaged:
-        warnings.warn(f"{file.path} is damaged ({found.damaged} bytes); its {len(found.frames)} whole runs "
-                      "are read.", StoreWarning, stacklevel=4)
+        warnings.warn(
+            f"{file.path} is damaged ({found.damaged} bytes); its {len(found.frames)} whole runs are read.",
+            StoreWarning,
+            stacklevel=4,
+        )
     return best_frames(found.frames)
 
 
@@ -84,8 +91,13 @@ def _counted(results: Path, parts: list[Part], runs: list[Part]) -> list[Part]:
     # A fold publishes "runs" last and a compaction removes it first: rows without it are half a step, and are
     # elsewhere as well. Where nothing explains it the file with the runs was lost, and somebody should know.
     places = {part.place for part in runs}
-    _warn([Unreadable(part.path, f"there is no readable runs/{part.place}, which it belongs to")
-           for part in parts if part.place not in places and _is_lost(results, part, runs)])
+    _warn(
+        [
+            Unreadable(part.path, f"there is no readable runs/{part.place}, which it belongs to")
+            for part in parts
+            if part.place not in places and _is_lost(results, part, runs)
+        ]
+    )
     return [part for part in parts if part.place in places]
 
 
@@ -107,5 +119,6 @@ def _run_ids(parts: list[Part]) -> set[str]:
 
 def _warn(bad: list[Unreadable]) -> None:
     for file in bad:
-        warnings.warn(f"{file.path} is skipped: {file.reason}. bns compact moves it to set-aside/.",
-                      StoreWarning, stacklevel=4)
+        warnings.warn(
+            f"{file.path} is skipped: {file.reason}. bns compact moves it to set-aside/.", StoreWarning, stacklevel=4
+        )

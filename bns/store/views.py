@@ -33,8 +33,9 @@ def connect_views(found: Snapshot) -> duckdb.DuckDBPyConnection:
 
 def _journal_rows(table: str, found: Snapshot) -> pa.Table:
     nothing = empty(table).append_column("place", pa.array([], pa.string()))
-    rows = [_with_place(frame, table, file) for file, frames in found.journals for frame in frames
-            if table in frame.tables]
+    rows = [
+        _with_place(frame, table, file) for file, frames in found.journals for frame in frames if table in frame.tables
+    ]
     alike = [one.select(nothing.column_names).cast(nothing.schema) for one in rows]
     return pa.concat_tables([nothing, *alike])
 
@@ -82,8 +83,10 @@ def _view(table: str, found: Snapshot, touched: set[str]) -> str:
     columns = ", ".join(f'"{name}"' for name in read_columns(table))
     if table == "specs":
         read = f" UNION ALL SELECT {columns} FROM {_read(found.parts[table])}" if found.parts[table] else ""
-        return (f"SELECT * FROM (SELECT {columns} FROM store.specs{read}) "
-                "QUALIFY row_number() OVER (PARTITION BY sweep, spec_hash ORDER BY written_at) = 1")
+        return (
+            f"SELECT * FROM (SELECT {columns} FROM store.specs{read}) "
+            "QUALIFY row_number() OVER (PARTITION BY sweep, spec_hash ORDER BY written_at) = 1"
+        )
     clean = [part for part in found.parts[table] if part.place not in touched]
     mixed = [part for part in found.parts[table] if part.place in touched]
     pieces = [f"SELECT {columns} FROM {_without_losers(f'SELECT * FROM store.{table}')}"]

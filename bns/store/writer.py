@@ -38,8 +38,9 @@ class Writer:
     Entering takes the sweep's lock and folds what a killed writer left; ``recovered`` counts those runs.
     """
 
-    def __init__(self, results: Path, sweep: str, *, sweep_text: str = "", sweep_runs: int | None = None,
-                 fold_at: int = 128) -> None:
+    def __init__(
+        self, results: Path, sweep: str, *, sweep_text: str = "", sweep_runs: int | None = None, fold_at: int = 128
+    ) -> None:
         if fold_at < 1:
             raise StoreError(f"fold_at is {fold_at}; it must be 1 or more runs.")
         self.results = Path(results)
@@ -75,8 +76,7 @@ class Writer:
         tables = record_tables(record, provenance())
         if self._journal is None:
             self._journal = Journal(JournalFile.new(self.results, self.sweep))
-        self._journal.append(
-            Frame(record.spec.run_id, task, record.run["status"], spec_hash(self._text), tables))
+        self._journal.append(Frame(record.spec.run_id, task, record.run["status"], spec_hash(self._text), tables))
         if self._journal.runs >= self._fold_at:
             self.fold()
 
@@ -97,8 +97,9 @@ class Writer:
             finally:
                 self._lock.release()
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if error is None:
             self.close()
             return
@@ -115,9 +116,14 @@ class Writer:
         if not name or place.exists():
             return
         made = provenance()
-        row = {"spec_hash": [name], "written_at": [datetime.now(UTC)], "text": [self._text],
-               "runs": [self._planned]}
-        metadata = file_metadata("specs", self.sweep, spec_hash=name, git_sha=made.git_sha,
-                                 git_clean=made.git_clean, bns_version=made.bns_version)
+        row = {"spec_hash": [name], "written_at": [datetime.now(UTC)], "text": [self._text], "runs": [self._planned]}
+        metadata = file_metadata(
+            "specs",
+            self.sweep,
+            spec_hash=name,
+            git_sha=made.git_sha,
+            git_clean=made.git_clean,
+            bns_version=made.bns_version,
+        )
         data = file_bytes("specs", pa.table(row, schema=SCHEMAS["specs"]), metadata)
         publish(data, staged(self.results, self.sweep, f"spec-{name}"), place)

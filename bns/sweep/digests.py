@@ -19,8 +19,12 @@ class WorldDigests:
 
     def read(self) -> None:
         """Take note of the runs in the store, of which there must be some."""
-        runs = load(self._results, "runs", columns=["task", "world", "world_digest"],
-                    where={"sweep": self._sweep, "status": "ok"})
+        runs = load(
+            self._results,
+            "runs",
+            columns=["task", "world", "world_digest"],
+            where={"sweep": self._sweep, "status": "ok"},
+        )
         for task, world, digest in runs.drop_duplicates().itertuples(index=False):
             self._compare(task, world, digest)
 
@@ -37,4 +41,5 @@ class WorldDigests:
                 f"the results of sweep {self._sweep!r} in {self._results} were made with world {former} "
                 f"(task {task}, world {world}), but there is now one with world {digest}: a network or model "
                 "file has changed. They must not be mixed: give another folder with --results, the sweep "
-                "another name, or bring the former files back.")
+                "another name, or bring the former files back."
+            )

@@ -24,8 +24,10 @@ from bns.tasks import task_names
 
 KEYS = ("name", "robot", "seeds", "fixed", "grid", "zip", "include", "exclude")
 PARAMETERS = tuple(name for name in FIELDS if name not in ("robot", "seed"))
-_ELSEWHERE = {"robot": "'robot' is a key of the file itself: one robot a sweep.",
-              "seed": "'seed' is not a parameter of a sweep; write 'seeds: 30' for the seeds 0..29."}
+_ELSEWHERE = {
+    "robot": "'robot' is a key of the file itself: one robot a sweep.",
+    "seed": "'seed' is not a parameter of a sweep; write 'seeds: 30' for the seeds 0..29.",
+}
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
@@ -101,8 +103,10 @@ def _places(root: Located) -> dict[str, tuple[Located, Located]]:
 def _read_name(parts: _Parts, value: Located) -> None:
     name = value.value()
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        value.fail(f"name is {name!r}; it must begin with a letter and have only letters, digits, '-' and "
-                   "'_', because it becomes the name of a folder.")
+        value.fail(
+            f"name is {name!r}; it must begin with a letter and have only letters, digits, '-' and "
+            "'_', because it becomes the name of a folder."
+        )
     parts.name = name
 
 
@@ -148,8 +152,15 @@ def _read_exclude(parts: _Parts, value: Located) -> None:
 
 
 _READERS: Mapping[str, Callable[[_Parts, Located], None]] = {
-    "name": _read_name, "robot": _read_robot, "seeds": _read_seeds, "fixed": _read_fixed, "grid": _read_grid,
-    "zip": _read_zip, "include": _read_include, "exclude": _read_exclude}
+    "name": _read_name,
+    "robot": _read_robot,
+    "seeds": _read_seeds,
+    "fixed": _read_fixed,
+    "grid": _read_grid,
+    "zip": _read_zip,
+    "include": _read_include,
+    "exclude": _read_exclude,
+}
 
 
 def _mapping(parts: _Parts, value: Located, what: str) -> dict[str, Any]:
@@ -218,8 +229,10 @@ def _combinations(root: Located, parts: _Parts) -> tuple[dict[str, Any], ...]:
     valid = task_names(parts.robot)
     for spec in combos:  # only a task that was not given can be wrong here: the default of another robot
         if spec.task not in valid:
-            root.fail(f"no task is given, and robot {parts.robot!r} has no task {spec.task!r}. "
-                      f"Give 'task' under fixed or grid. Valid: {', '.join(valid)}.")
+            root.fail(
+                f"no task is given, and robot {parts.robot!r} has no task {spec.task!r}. "
+                f"Give 'task' under fixed or grid. Valid: {', '.join(valid)}."
+            )
     return tuple(combos.values())
 
 

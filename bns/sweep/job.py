@@ -41,8 +41,7 @@ def warm() -> None:
     """Compile the kernels or load them from disk, once a process, so that no run is charged with it."""
     from bns.loop import run  # noqa: PLC0415
 
-    run(RunSpec(population_size=4, evaluations=2, generations_per_evaluation=1,
-                training_iterations_per_evaluation=1))
+    run(RunSpec(population_size=4, evaluations=2, generations_per_evaluation=1, training_iterations_per_evaluation=1))
 
 
 class _Meter:
@@ -53,8 +52,13 @@ class _Meter:
         memory.reset_peak()
 
     def columns(self) -> dict[str, Any]:
-        return {"started_at": self._started_at, "wall_s": time.perf_counter() - self._wall,
-                "cpu_s": time.process_time() - self._cpu, "peak_memory_mib": memory.peak_mib(), "attempts": 1}
+        return {
+            "started_at": self._started_at,
+            "wall_s": time.perf_counter() - self._wall,
+            "cpu_s": time.process_time() - self._cpu,
+            "peak_memory_mib": memory.peak_mib(),
+            "attempts": 1,
+        }
 
 
 def describe(fault: BaseException) -> str:

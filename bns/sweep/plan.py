@@ -48,8 +48,15 @@ def work(run: RunSpec) -> float:
     return run.evaluations * (evolution + training + 1e-4)
 
 
-def plan(sweep: Sweep, results: Path, jobs: int, *, retry_failed: bool = False, job: Job = run_job,
-         warm_up: Callable[[], object] = warm) -> Plan:
+def plan(
+    sweep: Sweep,
+    results: Path,
+    jobs: int,
+    *,
+    retry_failed: bool = False,
+    job: Job = run_job,
+    warm_up: Callable[[], object] = warm,
+) -> Plan:
     """Count and estimate. Without stored runs of this sweep, one short run is carried out and timed.
 
     Nothing is written. The seconds are wall time with ``jobs`` workers; NaN if the trial run failed.
@@ -60,15 +67,28 @@ def plan(sweep: Sweep, results: Path, jobs: int, *, retry_failed: bool = False, 
     todo = [spec for spec in specs if spec.run_id not in had] if had else specs
     if not todo:
         return Plan(sweep.name, len(specs), len(specs), 0, 0.0, 0.0, "nothing is left to do")
-    seconds, basis = (_from_store(results, sweep.name, todo) if "ok" in known.values()
-                      else _from_trial(todo, job, warm_up))
-    return Plan(sweep.name, len(specs), len(specs) - len(todo), len(todo), seconds / min(jobs, len(todo)),
-                _bytes(results, sweep.name, todo), basis)
+    seconds, basis = (
+        _from_store(results, sweep.name, todo) if "ok" in known.values() else _from_trial(todo, job, warm_up)
+    )
+    return Plan(
+        sweep.name,
+        len(specs),
+        len(specs) - len(todo),
+        len(todo),
+        seconds / min(jobs, len(todo)),
+        _bytes(results, sweep.name, todo),
+        basis,
+    )
 
 
 def _from_store(results: Path, sweep: str, todo: list[RunSpec]) -> tuple[float, str]:
-    columns = ["population_size", "generations_per_evaluation", "training_iterations_per_evaluation",
-               "evaluations", "wall_s"]
+    columns = [
+        "population_size",
+        "generations_per_evaluation",
+        "training_iterations_per_evaluation",
+        "evaluations",
+        "wall_s",
+    ]
     runs = load(results, "runs", columns=columns, where={"sweep": sweep, "status": "ok"})
     runs["work"] = [work(row) for row in runs.itertuples()]  # type: ignore[arg-type] # same names
     sums: pd.DataFrame = runs.groupby("population_size")[["wall_s", "work"]].sum()

@@ -17,9 +17,15 @@ class SweepProgress:
 
     def __init__(self, stream: TextIO | None = None) -> None:
         stream = stream or sys.stderr
-        self._bar = Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-                             TextColumn("{task.fields[rate]}"), console=Console(file=stream), transient=False,
-                             disable=not stream.isatty())
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]}"),
+            console=Console(file=stream),
+            transient=False,
+            disable=not stream.isatty(),
+        )
         self._tasks: dict[str, tuple[TaskID, float]] = {}
 
     def __enter__(self) -> Self:
@@ -35,8 +41,9 @@ class SweepProgress:
             number = self._bar.add_task(summary.sweep, total=summary.total, rate="")
             self._tasks[summary.sweep] = number, time.monotonic()
         number, begin = self._tasks[summary.sweep]
-        self._bar.update(number, completed=summary.total - summary.remaining,
-                         rate=describe_rate(summary, time.monotonic() - begin))
+        self._bar.update(
+            number, completed=summary.total - summary.remaining, rate=describe_rate(summary, time.monotonic() - begin)
+        )
 
 
 def describe_rate(summary: Summary, elapsed_s: float) -> str:
@@ -44,8 +51,11 @@ def describe_rate(summary: Summary, elapsed_s: float) -> str:
     lost = summary.failed + summary.quarantined
     parts = [f"{lost} failed"] if lost else []
     if summary.new and elapsed_s > 0:
-        parts = [f"{60 * summary.new / elapsed_s:.1f}/min",
-                 f"{in_words(summary.remaining * elapsed_s / summary.new)} to go", *parts]
+        parts = [
+            f"{60 * summary.new / elapsed_s:.1f}/min",
+            f"{in_words(summary.remaining * elapsed_s / summary.new)} to go",
+            *parts,
+        ]
     return ", ".join(parts)
 
 

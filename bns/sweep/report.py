@@ -11,22 +11,31 @@ from bns.sweep.progress import in_words
 from bns.sweep.runner import Summary
 from bns.sweep.status import SweepRow
 
-_WHY = {"budget": "the time is used up", "limit": "the limit is reached", "interrupt": "interrupted", "terminated": "terminated"}
+_WHY = {
+    "budget": "the time is used up",
+    "limit": "the limit is reached",
+    "interrupt": "interrupted",
+    "terminated": "terminated",
+}
 
 
 def planned(plan: Plan, jobs: int) -> str:
     """What a sweep would take."""
     time = "unknown" if math.isnan(plan.seconds_estimate) else in_words(plan.seconds_estimate)
-    return (f"{plan.sweep}: {plan.total} runs, {plan.done} done, {plan.remaining} to do; about {time} (h:mm:ss) with "
-            f"{jobs} jobs, {plan.bytes_estimate / 2**20:.0f} MiB more on disk (from {plan.basis})")
+    return (
+        f"{plan.sweep}: {plan.total} runs, {plan.done} done, {plan.remaining} to do; about {time} (h:mm:ss) with "
+        f"{jobs} jobs, {plan.bytes_estimate / 2**20:.0f} MiB more on disk (from {plan.basis})"
+    )
 
 
 def summed_up(summary: Summary, results: Path) -> str:
     """Where a sweep stands, and how to go on."""
     text = f"{summary.sweep}: {summary.new} runs now, {summary.done} of {summary.total} done, in {results}"
     if summary.failed or summary.quarantined:
-        text += (f"; {summary.failed} failed, {summary.quarantined} quarantined (why: bns query \"SELECT run_id, error FROM runs "
-                 f"WHERE sweep = '{summary.sweep}' AND status <> 'ok'\"; again: --retry-failed)")
+        text += (
+            f'; {summary.failed} failed, {summary.quarantined} quarantined (why: bns query "SELECT run_id, error FROM runs '
+            f"WHERE sweep = '{summary.sweep}' AND status <> 'ok'\"; again: --retry-failed)"
+        )
     if summary.stopped_by:
         text += f"; stopped: {_WHY[summary.stopped_by]}; the same command goes on from here"
     return text
@@ -36,8 +45,19 @@ def status_table(rows: Sequence[SweepRow]) -> str:
     """One line a sweep and task."""
     head = ("sweep", "task", "done", "of", "failed", "quarantined", "mean s a run", "last run began (UTC)")
     lines = [head] + [
-        (row.sweep, row.task, str(row.done), "?" if row.total is None else str(row.total), str(row.failed),
-         str(row.quarantined), "-" if math.isnan(row.mean_wall_s) else f"{row.mean_wall_s:.2f}",
-         row.last.strftime("%Y-%m-%d %H:%M:%S")) for row in rows]
+        (
+            row.sweep,
+            row.task,
+            str(row.done),
+            "?" if row.total is None else str(row.total),
+            str(row.failed),
+            str(row.quarantined),
+            "-" if math.isnan(row.mean_wall_s) else f"{row.mean_wall_s:.2f}",
+            row.last.strftime("%Y-%m-%d %H:%M:%S"),
+        )
+        for row in rows
+    ]
     widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines)
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines
+    )

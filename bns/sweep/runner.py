@@ -49,10 +49,20 @@ def _silent(_summary: Summary) -> None:
     """Progress that nobody wants to see."""
 
 
-def run_sweep(sweep: Sweep, results: Path, *, jobs: int = 1, budget: Budget | None = None,
-              retry_failed: bool = False, limit: int | None = None, job: Job = run_job,
-              executor: Executor | None = None, warm_up: Callable[[], object] | None = None,
-              on_progress: Callable[[Summary], None] = _silent, grace_s: float = GRACE_S) -> Summary:
+def run_sweep(
+    sweep: Sweep,
+    results: Path,
+    *,
+    jobs: int = 1,
+    budget: Budget | None = None,
+    retry_failed: bool = False,
+    limit: int | None = None,
+    job: Job = run_job,
+    executor: Executor | None = None,
+    warm_up: Callable[[], object] | None = None,
+    on_progress: Callable[[Summary], None] = _silent,
+    grace_s: float = GRACE_S,
+) -> Summary:
     """Carry out the runs of a sweep that have no result yet, at most ``limit``.
 
     With ``retry_failed`` failed and quarantined runs are done again. ``jobs`` is the number of workers
@@ -83,8 +93,7 @@ def run_sweep(sweep: Sweep, results: Path, *, jobs: int = 1, budget: Budget | No
 class _Course:
     """One call of ``run_sweep``: counts and the loop."""
 
-    def __init__(self, sweep: Sweep, results: Path, budget: Budget,
-                 on_progress: Callable[[Summary], None]) -> None:
+    def __init__(self, sweep: Sweep, results: Path, budget: Budget, on_progress: Callable[[Summary], None]) -> None:
         self.results, self.budget, self.interrupts = results, budget, Interrupts()
         self._sweep, self._on_progress = sweep, on_progress
         self._digests = WorldDigests(results, sweep.name)
@@ -146,8 +155,15 @@ class _Course:
 
     def summary(self) -> Summary:
         """The counts now."""
-        return Summary(self._sweep.name, self._sweep.total, self._counts["ok"], self._counts["failed"],
-                       self._counts["quarantined"], self._new, self._stopped_by())
+        return Summary(
+            self._sweep.name,
+            self._sweep.total,
+            self._counts["ok"],
+            self._counts["failed"],
+            self._counts["quarantined"],
+            self._new,
+            self._stopped_by(),
+        )
 
     def _stopped_by(self) -> str | None:
         if self.interrupts.stopped_by is not None:

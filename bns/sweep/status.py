@@ -47,8 +47,16 @@ def _row(sweep: str, task: str, runs: pd.DataFrame, totals: dict[tuple[str, str]
     counts = runs["status"].value_counts()
     done, failed, quarantined = (int(counts.get(status, 0)) for status in ("ok", "failed", "quarantined"))
     last: pd.Timestamp = runs["started_at"].max()
-    return SweepRow(sweep, task, done, failed, quarantined, totals.get((sweep, task)), last.to_pydatetime(),
-                    float(runs.loc[runs["status"] == "ok", "wall_s"].mean()))
+    return SweepRow(
+        sweep,
+        task,
+        done,
+        failed,
+        quarantined,
+        totals.get((sweep, task)),
+        last.to_pydatetime(),
+        float(runs.loc[runs["status"] == "ok", "wall_s"].mean()),
+    )
 
 
 def _totals(specs: pd.DataFrame) -> dict[tuple[str, str], int]:

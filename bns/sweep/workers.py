@@ -28,8 +28,18 @@ from bns.sweep.job import describe, run_job
 ATTEMPTS = 3
 """How often a run is tried whose worker dies, before it is quarantined."""
 
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "BLIS_NUM_THREADS",
-                             "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+_ONE_THREAD = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "BLIS_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+    ),
+    "1",
+)
 _PARENT_CHECK_S = 1.0
 _BEGIN_S = 2.0
 
@@ -111,8 +121,9 @@ class LokyExecutor:
 
     def _pool(self, slot: _Slot) -> ProcessPoolExecutor:
         if slot.pool is None:
-            slot.pool = ProcessPoolExecutor(max_workers=1, initializer=start_worker, initargs=(os.getpid(),),
-                                            env=_ONE_THREAD)
+            slot.pool = ProcessPoolExecutor(
+                max_workers=1, initializer=start_worker, initargs=(os.getpid(),), env=_ONE_THREAD
+            )
         return slot.pool
 
     def _outcome(self, slot: _Slot, future: Future[RunRecord]) -> RunRecord | None:
@@ -135,8 +146,17 @@ class LokyExecutor:
     def _lost(self, slot: _Slot, spec: RunSpec, status: str, error: str) -> RunRecord:
         # The processor time went with the worker.
         wall_s = time.perf_counter() - slot.started_s
-        return RunRecord(spec, {"status": status, "error": error, "started_at": slot.started_at,
-                                "wall_s": wall_s, "cpu_s": float("nan"), "attempts": 1})
+        return RunRecord(
+            spec,
+            {
+                "status": status,
+                "error": error,
+                "started_at": slot.started_at,
+                "wall_s": wall_s,
+                "cpu_s": float("nan"),
+                "attempts": 1,
+            },
+        )
 
 
 def _await_begin(future: Future[RunRecord] | None) -> None:

@@ -20,8 +20,9 @@ class _Loader(yaml.SafeLoader):
     """SafeLoader that takes ``1e-3`` for a number, as YAML 1.2 does (PyYAML wants ``1.0e-3``)."""
 
 
-_Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9]+[eE][-+]?[0-9]+$"),
-                              list("-+0123456789"))
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789")
+)
 
 
 class Located:
@@ -81,8 +82,10 @@ def parse_yaml(text: str, path: Path) -> Located:
     except yaml.MarkedYAMLError as fault:
         mark = fault.problem_mark or fault.context_mark
         line = mark.line + 1 if mark else 1
-        raise SpecError(f"{path}:{line}: not valid YAML: {fault.problem or fault.context}. "
-                        "Look at indentation, colons and brackets of this line and the one above.") from None
+        raise SpecError(
+            f"{path}:{line}: not valid YAML: {fault.problem or fault.context}. "
+            "Look at indentation, colons and brackets of this line and the one above."
+        ) from None
     except yaml.YAMLError as fault:
         raise SpecError(f"{path}:1: not valid YAML: {_first_line(fault)}.") from None
     if node is None:
@@ -95,8 +98,9 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise SpecError(f"there is no sweep file {path}. Give the path of a YAML file; "
-                        "the shipped ones lie in sweeps/.") from None
+        raise SpecError(
+            f"there is no sweep file {path}. Give the path of a YAML file; the shipped ones lie in sweeps/."
+        ) from None
     except OSError as fault:
         raise SpecError(f"sweep file {path} cannot be read: {fault.strerror}.") from None
     except UnicodeDecodeError:

@@ -150,11 +150,16 @@ def test_track_agrees_with_the_ends_and_is_nan_after_a_trial():
     assert np.isnan(dense.t_s[1, 6:]).all()
 
 
-@pytest.mark.parametrize(("change", "message"), [
-    ({"duration_s": [[-1.0]]}, "duration_s holds -1"), ({"left_m_s": [[np.nan]]}, "left_m_s holds nan"),
-    ({"left_m_s": [0.1]}, r"shapes \(1,\), \(1, 1\) and \(1, 1\)"),
-    ({"start": (0, 0)}, r"start has the shape \(2,\)"),
-    ({"normals": [[0.0, 0.0]]}, r"normals have the shape \(1, 2\); they must be \(1, 1, 2\)")])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"duration_s": [[-1.0]]}, "duration_s holds -1"),
+        ({"left_m_s": [[np.nan]]}, "left_m_s holds nan"),
+        ({"left_m_s": [0.1]}, r"shapes \(1,\), \(1, 1\) and \(1, 1\)"),
+        ({"start": (0, 0)}, r"start has the shape \(2,\)"),
+        ({"normals": [[0.0, 0.0]]}, r"normals have the shape \(1, 2\); they must be \(1, 1, 2\)"),
+    ],
+)
 def test_what_cannot_be_driven_is_refused(change, message):
     with pytest.raises(ModelError, match=message):
         simulate(IDEAL, **({"left_m_s": [[0.1]], "right_m_s": [[0.1]], "duration_s": [[1.0]]} | change))

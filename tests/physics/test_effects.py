@@ -86,8 +86,12 @@ def test_batch_equals_single_trials(effect):
 @every_effect
 def test_apply_returns_the_signal_of_its_stage_and_leaves_its_input(effect):
     arrays = np.full((1, 3), 0.1)
-    given = {"wheel": Wheels(arrays, arrays, arrays, 0.1), "body": Body(arrays, arrays, arrays, arrays),
-             "world": Flow(), "measure": View(np.full((1, 3), 0.1))}[effect.stage]
+    given = {
+        "wheel": Wheels(arrays, arrays, arrays, 0.1),
+        "body": Body(arrays, arrays, arrays, arrays),
+        "world": Flow(),
+        "measure": View(np.full((1, 3), 0.1)),
+    }[effect.stage]
     values = plausible_model(effect).values_of(effect.name)
     assert type(effect.apply(given, **values)) is SIGNALS[effect.stage]
     assert (arrays == 0.1).all()
@@ -112,8 +116,15 @@ def test_unknown_missing_and_misspelt_names():
         effect_named("floor-slope").checked({"x_m_s": 0.0})
 
 
-@pytest.mark.parametrize(("value", "hint"), [("1e-3", "exponent with a point"), (True, "must be a number"),
-                                             (None, "must be a number"), ("fast", "must be a number")])
+@pytest.mark.parametrize(
+    ("value", "hint"),
+    [
+        ("1e-3", "exponent with a point"),
+        (True, "must be a number"),
+        (None, "must be a number"),
+        ("fast", "must be a number"),
+    ],
+)
 def test_what_is_no_number_is_refused(value, hint):
     with pytest.raises(ModelError, match=hint):
         number("tau_s", value, 0.0, 1.0)

@@ -12,12 +12,20 @@ from bns.physics.reference import ORDER, simulate_slowly
 
 IDEAL = Model(wheelbase_m=0.0884)
 VALUES = {
-    "speed-gain": {"gain": 1.04}, "wheel-mismatch": {"ratio": 0.97}, "dead-zone": {"width_m_s": 0.015},
-    "speed-limit": {"max_m_s": 0.17}, "command-delay": {"delay_s": 0.0437}, "motor-lag": {"tau_s": 0.09},
-    "acceleration-limit": {"max_m_s2": 0.6}, "wheelbase": {"factor": 1.07}, "turn-slip": {"slip_s": 0.04},
-    "side-slip": {"slip_s": 0.03}, "yaw-bias": {"rate_rad_s": -0.08},
+    "speed-gain": {"gain": 1.04},
+    "wheel-mismatch": {"ratio": 0.97},
+    "dead-zone": {"width_m_s": 0.015},
+    "speed-limit": {"max_m_s": 0.17},
+    "command-delay": {"delay_s": 0.0437},
+    "motor-lag": {"tau_s": 0.09},
+    "acceleration-limit": {"max_m_s2": 0.6},
+    "wheelbase": {"factor": 1.07},
+    "turn-slip": {"slip_s": 0.04},
+    "side-slip": {"slip_s": 0.03},
+    "yaw-bias": {"rate_rad_s": -0.08},
     "floor-slope": {"x_m_s": 0.01, "y_m_s": -0.02},
-    "tether-pull": {"pull_per_s": 0.2, "anchor_x_m": -1.0, "anchor_y_m": 0.5}}
+    "tether-pull": {"pull_per_s": 0.2, "anchor_x_m": -1.0, "anchor_y_m": 0.5},
+}
 LEFT = [0.12, 0.20, 0.03, 0.0, -0.1]
 RIGHT = [0.20, 0.04, 0.15, 0.0, 0.05]
 DURATION = [0.6013, 0.4502, 0.7, 0.2, 0.3333]

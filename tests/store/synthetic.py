@@ -77,12 +77,13 @@ def failed(spec: RunSpec, status: str = "failed") -> RunRecord:
     return RunRecord(spec, run_row(status, error="ValueError: no"))
 
 
-def make_store(path: Path, runs: int, evaluations: int = 100, *, sweep: str = "synthetic",
-               runs_per_file: int = 200, seed: int = 0) -> list[RunSpec]:
+def make_store(
+    path: Path, runs: int, evaluations: int = 100, *, sweep: str = "synthetic", runs_per_file: int = 200, seed: int = 0
+) -> list[RunSpec]:
     """A store of ``runs`` runs in folded files, as a finished study leaves it (75,000 runs take a minute)."""
     random, made = np.random.default_rng(seed), list(specs(runs, evaluations))
     for number, start in enumerate(range(0, runs, runs_per_file)):
-        _publish(path, sweep, f"part-j{number:032x}-0", made[start:start + runs_per_file], random)
+        _publish(path, sweep, f"part-j{number:032x}-0", made[start : start + runs_per_file], random)
     return made
 
 
@@ -90,8 +91,14 @@ def _publish(path: Path, sweep: str, part: str, chunk: list[RunSpec], random: np
     evaluations = chunk[0].evaluations
     evals = columns("evals", evaluations * len(chunk), random)
     evals["evaluation"] = np.tile(np.arange(1, evaluations + 1), len(chunk))
-    rows = {"error": None, "world_digest": "w0", "peak_memory_mib": 80.0, "evaluations": evaluations,
-            **run_row(), **provenance().columns()}
+    rows = {
+        "error": None,
+        "world_digest": "w0",
+        "peak_memory_mib": 80.0,
+        "evaluations": evaluations,
+        **run_row(),
+        **provenance().columns(),
+    }
     filled = {name: [value] * len(chunk) for name, value in rows.items()}
     filled["started_at"] = [START + timedelta(seconds=number) for number in range(len(chunk))]
     filled["spec"] = [spec.canonical_json() for spec in chunk]

@@ -22,13 +22,16 @@ def rows(path):
     return pq.read_metadata(path).num_rows
 
 
-@pytest.mark.parametrize(("runs", "each", "expected"), [
-    (250, 7, [105, 145]),
-    (90, 30, [90]),
-    (300, 100, [100, 100, 100]),
-    (330, 128, [128, 128, 74]),
-    (420, 40, [120, 120, 180]),
-])
+@pytest.mark.parametrize(
+    ("runs", "each", "expected"),
+    [
+        (250, 7, [105, 145]),
+        (90, 30, [90]),
+        (300, 100, [100, 100, 100]),
+        (330, 128, [128, 128, 74]),
+        (420, 40, [120, 120, 180]),
+    ],
+)
 def test_files_hold_100_to_200_runs_and_the_rows_stay(tmp_path, runs, each, expected):
     make_store(tmp_path, runs, 2, runs_per_file=each)
     before = {table: load(tmp_path, table) for table in ("evals", "runs")}
@@ -62,9 +65,14 @@ def test_files_carry_version_spec_and_commit(tmp_path):
         with Writer(tmp_path, "s", sweep_text="a: 1\n") as writer:
             for run in runs:
                 writer.append(run)
-    expected = {"schema_version": SCHEMA_VERSION, "sweep": "s", "spec_hash": spec_hash("a: 1\n"),
-                "git_sha": provenance().git_sha, "git_clean": provenance().git_clean,
-                "bns_version": provenance().bns_version}
+    expected = {
+        "schema_version": SCHEMA_VERSION,
+        "sweep": "s",
+        "spec_hash": spec_hash("a: 1\n"),
+        "git_sha": provenance().git_sha,
+        "git_clean": provenance().git_clean,
+        "bns_version": provenance().bns_version,
+    }
     for _ in range(2):
         for table in ("evals", "runs", "specs"):
             for path in parts(tmp_path, table):

@@ -19,8 +19,13 @@ VICTIM = Path(__file__).with_name("victim.py")
 
 
 def kill(results, action, moment, number):
-    done = subprocess.run([sys.executable, str(VICTIM), str(results), action, moment, str(number)],
-                          capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run(
+        [sys.executable, str(VICTIM), str(results), action, moment, str(number)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
     assert done.returncode == -signal.SIGKILL, done.stderr
     return done.stdout
 
@@ -40,12 +45,15 @@ def check(results, reference):
     assert finished(results, "s") == statuses
 
 
-@pytest.mark.parametrize(("action", "moment", "number"), [
-    ("append", "never", 0),   # every run in the journal, nothing folded
-    ("fold", "before", 1),    # evals staged, not published
-    ("fold", "after", 1),     # evals published, runs not
-    ("fold", "after", 2),     # all published, journal still there
-])
+@pytest.mark.parametrize(
+    ("action", "moment", "number"),
+    [
+        ("append", "never", 0),  # every run in the journal, nothing folded
+        ("fold", "before", 1),  # evals staged, not published
+        ("fold", "after", 1),  # evals published, runs not
+        ("fold", "after", 2),  # all published, journal still there
+    ],
+)
 def test_killed_writer(tmp_path, reference, action, moment, number):
     assert "appended" in kill(tmp_path, action, moment, number)
     check(tmp_path, reference)
@@ -58,13 +66,16 @@ def test_killed_writer(tmp_path, reference, action, moment, number):
     assert len(list((tmp_path / "evals").rglob("*.parquet"))) == 1
 
 
-@pytest.mark.parametrize(("moment", "number"), [
-    ("before", 1),  # merged evals staged
-    ("after", 1),   # merged evals published, their runs not
-    ("after", 2),   # both published, the old files still there
-    ("unlink", 2),  # one of the old runs files removed
-    ("unlink", 4),  # one of the old evals files removed
-])
+@pytest.mark.parametrize(
+    ("moment", "number"),
+    [
+        ("before", 1),  # merged evals staged
+        ("after", 1),  # merged evals published, their runs not
+        ("after", 2),  # both published, the old files still there
+        ("unlink", 2),  # one of the old runs files removed
+        ("unlink", 4),  # one of the old evals files removed
+    ],
+)
 def test_killed_compaction(tmp_path, reference, moment, number):
     runs = sample()
     for chunk in (runs[:5], runs[5:10], runs[10:]):

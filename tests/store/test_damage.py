@@ -35,12 +35,15 @@ def ids_in(path):
     return set(pq.read_table(path, columns=["run_id"], partitioning=None)["run_id"].to_pylist())
 
 
-@pytest.mark.parametrize("content", [
-    lambda data: data[:len(data) // 2],
-    lambda data: b"",
-    lambda data: b"PAR1" + bytes(50) + b"PAR1",
-    lambda data: data[:-100] + bytes(100),
-])
+@pytest.mark.parametrize(
+    "content",
+    [
+        lambda data: data[: len(data) // 2],
+        lambda data: b"",
+        lambda data: b"PAR1" + bytes(50) + b"PAR1",
+        lambda data: data[:-100] + bytes(100),
+    ],
+)
 def test_truncated_file_is_skipped_with_one_warning_and_set_aside(store, content):
     first, second = files(store, "evals")
     lost, data = ids_in(first), content(first.read_bytes())
@@ -67,7 +70,10 @@ def test_foreign_files_are_skipped_and_set_aside(store):
     with pytest.warns(StoreWarning) as caught:
         pdt.assert_frame_equal(load(store), before)
     assert sorted(str(one.message).split(" is skipped")[0].split("/")[-1] for one in caught) == [
-        "a.parquet", "part-jwrong-0.parquet", "stray.parquet"]
+        "a.parquet",
+        "part-jwrong-0.parquet",
+        "stray.parquet",
+    ]
     assert len(compact(store).set_aside) == 3
     pdt.assert_frame_equal(load(store), before)
 
@@ -170,15 +176,18 @@ def test_empty_and_missing_results_name_the_commands_to_begin_with(tmp_path):
         compact(tmp_path / "none")
 
 
-@pytest.mark.parametrize(("call", "message"), [
-    (lambda r: load(r, "eval"), "unknown table 'eval'. Did you mean 'evals'"),
-    (lambda r: load(r, columns=["succes_7cm"]), "column of evals 'succes_7cm'. Did you mean 'success_7cm'"),
-    (lambda r: load(r, where={"mutation": 1}), "unknown column of evals 'mutation'"),
-    (lambda r: load(r, where="mutation > 1"), "DuckDB cannot answer .*mutation"),
-    (lambda r: load(r, where={"seed": object()}), "a condition cannot compare with"),
-    (lambda r: query(r, "SELECT nonsense FROM evals"), "DuckDB cannot answer .*nonsense"),
-    (lambda r: query(r, "SELEC 1"), "DuckDB cannot answer .*SELEC"),
-])
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda r: load(r, "eval"), "unknown table 'eval'. Did you mean 'evals'"),
+        (lambda r: load(r, columns=["succes_7cm"]), "column of evals 'succes_7cm'. Did you mean 'success_7cm'"),
+        (lambda r: load(r, where={"mutation": 1}), "unknown column of evals 'mutation'"),
+        (lambda r: load(r, where="mutation > 1"), "DuckDB cannot answer .*mutation"),
+        (lambda r: load(r, where={"seed": object()}), "a condition cannot compare with"),
+        (lambda r: query(r, "SELECT nonsense FROM evals"), "DuckDB cannot answer .*nonsense"),
+        (lambda r: query(r, "SELEC 1"), "DuckDB cannot answer .*SELEC"),
+    ],
+)
 def test_questions_that_cannot_be_answered(store, call, message):
     with pytest.raises(StoreError, match=message):
         call(store)

@@ -50,7 +50,7 @@ def test_readers_see_the_journal_and_the_fold_changes_nothing(left):
 def test_torn_last_frame_is_cut_without_a_word(left, cut):
     results, path, runs, starts = left
     data = path.read_bytes()
-    path.write_bytes(data[:starts[2] + cut])
+    path.write_bytes(data[: starts[2] + cut])
     assert list(finished(results, "s")) == ids(runs[:2])
     with Writer(results, "s") as writer:
         assert writer.recovered == 2
@@ -75,8 +75,10 @@ def test_damaged_frame_is_reported_and_the_others_kept(left, where, frame):
     good = [run for number, run in enumerate(runs) if number != frame]
     with pytest.warns(StoreWarning, match=f"{path.name} is damaged .* 2 whole runs"):
         assert list(finished(results, "s")) == ids(good)
-    with pytest.warns(StoreWarning, match=r"2 whole runs of it are kept, a\s+copy is in .*set-aside"), \
-            Writer(results, "s"):
+    with (
+        pytest.warns(StoreWarning, match=r"2 whole runs of it are kept, a\s+copy is in .*set-aside"),
+        Writer(results, "s"),
+    ):
         pass
     assert list(finished(results, "s")) == ids(good)
     assert (results / "set-aside" / "journal" / path.name).read_bytes() == data

@@ -30,10 +30,13 @@ def test_second_writer_is_refused_at_once_and_told_who_holds_the_sweep(tmp_path)
 
 
 def test_writer_in_another_process_is_named(tmp_path):
-    code = ("import sys; from bns.store import Writer\n"
-            "with Writer(sys.argv[1], 's'): print('in', flush=True); sys.stdin.read()")
-    with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdin=subprocess.PIPE,
-                          stdout=subprocess.PIPE, text=True) as holder:
+    code = (
+        "import sys; from bns.store import Writer\n"
+        "with Writer(sys.argv[1], 's'): print('in', flush=True); sys.stdin.read()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as holder:
         assert holder.stdout.readline() == "in\n"
         with pytest.raises(StoreError, match=f"process {holder.pid} on"), Writer(tmp_path, "s"):
             pass

@@ -140,15 +140,18 @@ def test_synthetic_store_reads_like_a_written_one(tmp_path):
     assert np.isnan(bytes_per_run(tmp_path, "other"))
 
 
-@pytest.mark.parametrize(("change", "message"), [
-    (lambda t: t["evals"].pop("diversity"), "evals of run r.* has no column diversity; it needs evaluation"),
-    (lambda t: t["evals"].update(diversty=np.zeros(3)), "column 'diversty'. Did you mean 'diversity'"),
-    (lambda t: t["evals"].update(diversity=np.zeros(2)), "'diversity' has 2 values and 'evaluation' has 3"),
-    (lambda t: t["evals"].update(commands=np.full(3, 1.5)), "column 'commands' must be int32"),
-    (lambda t: t["evals"].update(success=np.zeros(3)), "column 'success' is float64; it must be bool"),
-    (lambda t: t["evals"].update(success=np.array([True, None, True])), "'success' has an empty value"),
-    (lambda t: t.update(eval=t["evals"]), "unknown table 'eval'. Did you mean 'evals'"),
-])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t["evals"].pop("diversity"), "evals of run r.* has no column diversity; it needs evaluation"),
+        (lambda t: t["evals"].update(diversty=np.zeros(3)), "column 'diversty'. Did you mean 'diversity'"),
+        (lambda t: t["evals"].update(diversity=np.zeros(2)), "'diversity' has 2 values and 'evaluation' has 3"),
+        (lambda t: t["evals"].update(commands=np.full(3, 1.5)), "column 'commands' must be int32"),
+        (lambda t: t["evals"].update(success=np.zeros(3)), "column 'success' is float64; it must be bool"),
+        (lambda t: t["evals"].update(success=np.array([True, None, True])), "'success' has an empty value"),
+        (lambda t: t.update(eval=t["evals"]), "unknown table 'eval'. Did you mean 'evals'"),
+    ],
+)
 def test_columns_that_do_not_fit_are_refused_and_nothing_is_stored(tmp_path, change, message):
     good, bad = (record(spec) for spec in specs(2, 3))
     change(bad.tables)
@@ -159,13 +162,16 @@ def test_columns_that_do_not_fit_are_refused_and_nothing_is_stored(tmp_path, cha
     assert list(finished(tmp_path, "s")) == [good.spec.run_id]
 
 
-@pytest.mark.parametrize(("row", "tables", "message"), [
-    ({"status": "ok"}, False, "has no 'started_at'"),
-    (run_row("okay"), True, "unknown status 'okay'. Did you mean 'ok'"),
-    (run_row("ok"), False, "status 'ok' and the tables: none"),
-    (run_row("failed"), True, "status 'failed' and the tables: evals"),
-    (run_row("ok", wall=1), True, "unknown column 'wall'. Did you mean 'wall_s'"),
-])
+@pytest.mark.parametrize(
+    ("row", "tables", "message"),
+    [
+        ({"status": "ok"}, False, "has no 'started_at'"),
+        (run_row("okay"), True, "unknown status 'okay'. Did you mean 'ok'"),
+        (run_row("ok"), False, "status 'ok' and the tables: none"),
+        (run_row("failed"), True, "status 'failed' and the tables: evals"),
+        (run_row("ok", wall=1), True, "unknown column 'wall'. Did you mean 'wall_s'"),
+    ],
+)
 def test_outcomes_that_make_no_sense_are_refused(tmp_path, row, tables, message):
     made = {"evals": columns("evals", 1, np.random.default_rng(0))} if tables else {}
     with Writer(tmp_path, "s") as writer, pytest.raises(StoreError, match=message):

@@ -17,8 +17,7 @@ MARKS = "BNS_TEST_MARKS"
 """Environment variable: the folder that jobs leave marks in."""
 
 
-def make_sweep(name: str = "demo", combos: int = 4, seeds: int = 2, evaluations: int = 3,
-               text: str = "") -> Sweep:
+def make_sweep(name: str = "demo", combos: int = 4, seeds: int = 2, evaluations: int = 3, text: str = "") -> Sweep:
     each = tuple({"population_size": 10 + n, "evaluations": evaluations} for n in range(combos))
     return Sweep(name, "khepera", seeds, each, text, Path("x.yaml"))
 
@@ -32,8 +31,16 @@ def evals_of(spec: RunSpec) -> dict[str, np.ndarray]:
 
 
 def ok(spec: RunSpec, wall_s: float = 0.01, digest: str = "w1") -> RunRecord:
-    run = {"status": "ok", "error": None, "world_digest": digest, "started_at": datetime.now(UTC),
-           "wall_s": wall_s, "cpu_s": wall_s, "peak_memory_mib": 1.0, "attempts": 1}
+    run = {
+        "status": "ok",
+        "error": None,
+        "world_digest": digest,
+        "started_at": datetime.now(UTC),
+        "wall_s": wall_s,
+        "cpu_s": wall_s,
+        "peak_memory_mib": 1.0,
+        "attempts": 1,
+    }
     return RunRecord(spec, run, {"evals": evals_of(spec)})
 
 
@@ -90,4 +97,3 @@ def marks() -> Path:
 
 def mark(name: str) -> None:
     (marks() / name).touch()
-

@@ -12,8 +12,13 @@ from bns.sweep.runner import run_sweep
 
 def main(results: str, jobs: str, job: str, name: str = "demo", grace_s: str = "20") -> None:
     print("importing done", flush=True)
-    summary = run_sweep(sweep_jobs.make_sweep(name, combos=4, seeds=4), Path(results), jobs=int(jobs),
-                        job=getattr(sweep_jobs, job), grace_s=float(grace_s))
+    summary = run_sweep(
+        sweep_jobs.make_sweep(name, combos=4, seeds=4),
+        Path(results),
+        jobs=int(jobs),
+        job=getattr(sweep_jobs, job),
+        grace_s=float(grace_s),
+    )
     print(json.dumps(asdict(summary)), flush=True)
 
 

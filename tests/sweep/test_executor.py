@@ -35,8 +35,11 @@ def carry_out(executor: Executor, sweep=None) -> list[RunRecord]:
     return records
 
 
-@pytest.mark.parametrize("make", [SerialExecutor, partial(LokyExecutor, 1), partial(LokyExecutor, 2)],
-                         ids=["serial", "one worker", "two workers"])
+@pytest.mark.parametrize(
+    "make",
+    [SerialExecutor, partial(LokyExecutor, 1), partial(LokyExecutor, 2)],
+    ids=["serial", "one worker", "two workers"],
+)
 def test_every_run_comes_back_once(make):
     records = carry_out(make(sweep_jobs.ok))
     assert {r.spec for r in records} == set(ordered_specs(make_sweep()))
@@ -109,8 +112,10 @@ def test_no_jobs_are_refused():
 def test_a_fault_in_a_run_becomes_a_row(monkeypatch):
     spec = ordered_specs(make_sweep())[0]
     for fault, text in (MemoryError(), "MemoryError\n"), (ValueError("two\nlines"), "ValueError: two lines"):
+
         def explode(_spec, fault=fault):
             raise fault
+
         monkeypatch.setattr("bns.loop.run", explode)
         record = run_job(spec)
         assert record.run["status"] == "failed"

@@ -23,11 +23,15 @@ def combos(sweep: Sweep) -> list[tuple]:
 
 
 def test_grid_is_a_product_on_top_of_fixed(tmp_path):
-    sweep = sweep_of(tmp_path, "seeds: 3\nfixed: {evaluations: 5}\n"
-                               "grid: {mutation_rate: [0, 1e-2], population_size: [10, 20]}\n")
+    sweep = sweep_of(
+        tmp_path, "seeds: 3\nfixed: {evaluations: 5}\ngrid: {mutation_rate: [0, 1e-2], population_size: [10, 20]}\n"
+    )
     assert (sweep.name, sweep.robot, sweep.seeds, sweep.total) == ("demo", "khepera", 3, 12)
-    assert combos(sweep) == [(("evaluations", 5), ("mutation_rate", rate), ("population_size", size))
-                             for rate in (0.0, 0.01) for size in (10, 20)]
+    assert combos(sweep) == [
+        (("evaluations", 5), ("mutation_rate", rate), ("population_size", size))
+        for rate in (0.0, 0.01)
+        for size in (10, 20)
+    ]
 
 
 def test_fixed_alone_and_nothing_at_all_are_one_combination(tmp_path):
@@ -36,14 +40,19 @@ def test_fixed_alone_and_nothing_at_all_are_one_combination(tmp_path):
 
 
 def test_zip_goes_in_step_and_is_multiplied_with_the_grid(tmp_path):
-    sweep = sweep_of(tmp_path, "grid: {evaluations: [1, 2]}\n"
-                               "zip: {mutation_rate: [0.1, 0.2], population_size: [8, 9]}")
+    sweep = sweep_of(tmp_path, "grid: {evaluations: [1, 2]}\nzip: {mutation_rate: [0.1, 0.2], population_size: [8, 9]}")
     assert {(c["evaluations"], c["mutation_rate"], c["population_size"]) for c in sweep.combos} == {
-        (1, 0.1, 8), (1, 0.2, 9), (2, 0.1, 8), (2, 0.2, 9)}
+        (1, 0.1, 8),
+        (1, 0.2, 9),
+        (2, 0.1, 8),
+        (2, 0.2, 9),
+    }
 
 
 def test_exclude_matches_all_its_values_defaults_too_and_include_comes_after(tmp_path):
-    sweep = sweep_of(tmp_path, """
+    sweep = sweep_of(
+        tmp_path,
+        """
 fixed: {evaluations: 7}
 grid: {mutation_rate: [0.1, 0.2], population_size: [8, 9]}
 exclude:
@@ -52,53 +61,70 @@ exclude:
 include:
   - {mutation_rate: 0.1, population_size: 8}
   - {evaluations: 9}
-""")
+""",
+    )
     assert {(c["evaluations"], c.get("mutation_rate"), c.get("population_size")) for c in sweep.combos} == {
-        (7, 0.2, 8), (7, 0.2, 9), (7, 0.1, 8), (9, None, None)}
+        (7, 0.2, 8),
+        (7, 0.2, 9),
+        (7, 0.1, 8),
+        (9, None, None),
+    }
 
 
 def test_include_without_a_grid_adds_nothing_else(tmp_path):
-    sweep = sweep_of(tmp_path, "fixed: {evaluations: 7}\n"
-                               "include: [{population_size: 8}, {population_size: 9}]")
+    sweep = sweep_of(tmp_path, "fixed: {evaluations: 7}\ninclude: [{population_size: 8}, {population_size: 9}]")
     assert [c["population_size"] for c in sweep.combos] == [8, 9]
 
 
 def test_equal_combinations_are_one(tmp_path):
-    sweep = sweep_of(tmp_path, "grid: {mutation_rate: [0.1, 0.1, 0.2]}\n"
-                               "include: [{mutation_rate: 0.2, world: substitute}]")
+    sweep = sweep_of(
+        tmp_path, "grid: {mutation_rate: [0.1, 0.1, 0.2]}\ninclude: [{mutation_rate: 0.2, world: substitute}]"
+    )
     assert len(sweep.combos) == 2
 
 
 ERRORS = {
-    "parameter": ("seeds: 2\ngrid:\n  population_size: [1]\n  mutation_rte: [0.1]\n", 6,
-                  "unknown parameter 'mutation_rte'. Did you mean 'mutation_rate'? Valid: "),
+    "parameter": (
+        "seeds: 2\ngrid:\n  population_size: [1]\n  mutation_rte: [0.1]\n",
+        6,
+        "unknown parameter 'mutation_rte'. Did you mean 'mutation_rate'? Valid: ",
+    ),
     "key": ("sed: 2\n", 3, "unknown key 'sed'. Did you mean 'seeds'? Valid: exclude, fixed, grid"),
     "parameter as key": ("mutation_rate: 0.1\n", 3, "it belongs under fixed or grid"),
     "seed": ("fixed: {seed: 3}\n", 3, "write 'seeds: 30'"),
     "robot": ("grid:\n  robot: [khepera]\n", 4, "one robot a sweep"),
-    "range": ("grid:\n  mutation_rate:\n    - 0.1\n    - 40\n", 6,
-              "mutation_rate is 40.0; it must be a number from 0 to 1. For 40 percent write 0.4."),
+    "range": (
+        "grid:\n  mutation_rate:\n    - 0.1\n    - 40\n",
+        6,
+        "mutation_rate is 40.0; it must be a number from 0 to 1. For 40 percent write 0.4.",
+    ),
     "type": ("fixed:\n  population_size: many\n", 4, "population_size is 'many'; it must be a whole number"),
     "quoted": ("fixed:\n  mutation_rate: '0.1'\n", 4, "mutation_rate is '0.1'"),
     "list in fixed": ("fixed:\n  mutation_rate: [0.1]\n", 4, "Lists belong under grid"),
-    "value in grid": ("grid:\n  mutation_rate: 0.1\n", 4,
-                      "must be a list, such as [1, 2], but this is the value '0.1'"),
+    "value in grid": (
+        "grid:\n  mutation_rate: 0.1\n",
+        4,
+        "must be a list, such as [1, 2], but this is the value '0.1'",
+    ),
     "empty list": ("grid:\n  mutation_rate: []\n", 4, "is an empty list"),
     "empty grid": ("grid:\n", 3, "grid must be a mapping (lines of 'key: value'), but this is empty"),
-    "twice": ("fixed: {evaluations: 1}\ngrid:\n  evaluations: [2]\n", 5,
-              "'evaluations' is given under grid and, on line 3, under fixed"),
-    "zip lengths": ("zip:\n  evaluations: [2]\n  population_size: [3, 4]\n", 4,
-                    "evaluations has 1, population_size has 2"),
-    "duplicate key": ("fixed:\n  evaluations: 1\n  evaluations: 2\n", 5,
-                      "'evaluations' is already given on line 4"),
+    "twice": (
+        "fixed: {evaluations: 1}\ngrid:\n  evaluations: [2]\n",
+        5,
+        "'evaluations' is given under grid and, on line 3, under fixed",
+    ),
+    "zip lengths": (
+        "zip:\n  evaluations: [2]\n  population_size: [3, 4]\n",
+        4,
+        "evaluations has 1, population_size has 2",
+    ),
+    "duplicate key": ("fixed:\n  evaluations: 1\n  evaluations: 2\n", 5, "'evaluations' is already given on line 4"),
     "duplicate section": ("seeds: 1\nseeds: 2\n", 4, "'seeds' is already given on line 3"),
     "syntax": ("fixed: {evaluations: 1\ngrid: 2\n", 4, "not valid YAML"),
     "tab": ("fixed:\n\tevaluations: 1\n", 4, "not valid YAML"),
     "tag": ("fixed:\n  evaluations: !!python/object:os.system x\n", 4, "cannot be understood"),
-    "task": ("grid:\n  task:\n  - circel\n", 5,
-             "unknown task of robot 'khepera' 'circel'. Did you mean 'circle'?"),
-    "exclude nothing": ("grid: {evaluations: [1, 2]}\nexclude:\n  - {evaluations: 3}\n", 5,
-                        "matches no combination"),
+    "task": ("grid:\n  task:\n  - circel\n", 5, "unknown task of robot 'khepera' 'circel'. Did you mean 'circle'?"),
+    "exclude nothing": ("grid: {evaluations: [1, 2]}\nexclude:\n  - {evaluations: 3}\n", 5, "matches no combination"),
     "exclude all": ("fixed: {evaluations: 1}\nexclude:\n  - {evaluations: 1}\n", 1, "leaves no combination"),
     "exclude empty": ("exclude:\n  - {}\n", 4, "would leave everything out"),
     "include unknown": ("include:\n  - {evaluation: 3}\n", 4, "Did you mean 'evaluations'?"),
@@ -116,17 +142,20 @@ def test_mistake_is_answered_with_its_line(tmp_path, case):
     assert str(caught.value).startswith(f"{tmp_path / 'x.yaml'}:{line}: ")
 
 
-@pytest.mark.parametrize(("head", "text"), [
-    ("robot: khepera\n", ":1: the key 'name' is missing"),
-    ("name: demo\n", ":1: the key 'robot' is missing"),
-    ("name: demo\nrobot: kepera\n", ":2: unknown robot 'kepera'. Did you mean 'khepera'?"),
-    ("name: 7up\nrobot: khepera\n", ":1: name is '7up'; it must begin with a letter"),
-    ("name: 2024-01-01\nrobot: khepera\n", ":1: name is datetime.date"),
-    ("", ":1: the file is empty"),
-    ("- name\n", ":1: a sweep file must be a mapping"),
-    ("name: demo\n---\nname: demo\n", ":2: not valid YAML"),
-    ("name: \0\n", ":1: not valid YAML"),
-])
+@pytest.mark.parametrize(
+    ("head", "text"),
+    [
+        ("robot: khepera\n", ":1: the key 'name' is missing"),
+        ("name: demo\n", ":1: the key 'robot' is missing"),
+        ("name: demo\nrobot: kepera\n", ":2: unknown robot 'kepera'. Did you mean 'khepera'?"),
+        ("name: 7up\nrobot: khepera\n", ":1: name is '7up'; it must begin with a letter"),
+        ("name: 2024-01-01\nrobot: khepera\n", ":1: name is datetime.date"),
+        ("", ":1: the file is empty"),
+        ("- name\n", ":1: a sweep file must be a mapping"),
+        ("name: demo\n---\nname: demo\n", ":2: not valid YAML"),
+        ("name: \0\n", ":1: not valid YAML"),
+    ],
+)
 def test_head_of_the_file(tmp_path, head, text):
     with pytest.raises(SpecError, match=re.escape(text)):
         sweep_of(tmp_path, "", head)

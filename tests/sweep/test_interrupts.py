@@ -32,8 +32,16 @@ def start(tmp_path):
         (tmp_path / "marks").mkdir(exist_ok=True)
         environment = os.environ | {sweep_jobs.MARKS: str(tmp_path / "marks")}
         command = [sys.executable, "-W", "error", SCRIPT, *map(str, arguments)]
-        started.append(subprocess.Popen(command, env=environment, text=True, start_new_session=True,
-                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE))
+        started.append(
+            subprocess.Popen(
+                command,
+                env=environment,
+                text=True,
+                start_new_session=True,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+            )
+        )
         return started[-1]
 
     yield begin

@@ -167,8 +167,12 @@ def test_kernels_are_warmed_once_and_only_if_there_is_work(tmp_path):
 
 
 def test_real_runs_are_the_same_for_any_number_of_workers(tmp_path):
-    small = {"population_size": 10, "evaluations": 4, "generations_per_evaluation": 2,
-             "training_iterations_per_evaluation": 20}
+    small = {
+        "population_size": 10,
+        "evaluations": 4,
+        "generations_per_evaluation": 2,
+        "training_iterations_per_evaluation": 20,
+    }
     sweep = Sweep("real", "khepera", 4, (small,), "", Path("x.yaml"))
     tables = []
     for jobs in 1, 2:

@@ -50,8 +50,10 @@ def test_status_counts_by_sweep_and_task_against_the_sweep_file(tmp_path):
     serial(make_sweep("no-file", seeds=1), tmp_path)
     rows = sweep_status(tmp_path)
     assert [(r.sweep, r.task, r.done, r.failed, r.quarantined, r.total, r.remaining) for r in rows] == [
-        ("demo", "circle", 4, 2, 0, 6, 0), ("demo", "letter-s", 4, 2, 0, 6, 0),
-        ("no-file", "circle", 3, 1, 0, None, None)]
+        ("demo", "circle", 4, 2, 0, 6, 0),
+        ("demo", "letter-s", 4, 2, 0, 6, 0),
+        ("no-file", "circle", 3, 1, 0, None, None),
+    ]
     assert rows[0].mean_wall_s == pytest.approx(1.05)
     assert rows[0].last.tzinfo is not None
 
@@ -128,6 +130,7 @@ def test_work_grows_with_everything_that_costs():
 
 def sweep_spec(sweep, **changes):
     from bns.spec import RunSpec
+
     return RunSpec(**{**sweep.combos[0], **changes})
 
 

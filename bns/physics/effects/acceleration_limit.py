@@ -16,16 +16,22 @@ from bns.physics.signals import Wheels
 
 def apply(wheels: Wheels, max_m_s2: float) -> Wheels:
     """Each wheel's speed follows its command with at most ``max_m_s2``, from rest."""
-    return replace(wheels, left_m_s=rate_limited(wheels.left_m_s, wheels.step_s, max_m_s2),
-                   right_m_s=rate_limited(wheels.right_m_s, wheels.step_s, max_m_s2))
+    return replace(
+        wheels,
+        left_m_s=rate_limited(wheels.left_m_s, wheels.step_s, max_m_s2),
+        right_m_s=rate_limited(wheels.right_m_s, wheels.step_s, max_m_s2),
+    )
 
 
 EFFECT = Effect(
-    name="acceleration-limit", stage="wheel",
-    parameters=(Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.2, 10.0), math.inf,
-                          "highest change of a wheel's speed"),),
+    name="acceleration-limit",
+    stage="wheel",
+    parameters=(
+        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.2, 10.0), math.inf, "highest change of a wheel's speed"),
+    ),
     equation="|dw/dt| <= a for each wheel",
     residuals="A start from rest falls short by half the squared speed over a: fast commands lose "
-              "more than in proportion, and steps of speed are ramps.",
+    "more than in proportion, and steps of speed are ramps.",
     lookalikes=("motor-lag", "command-delay"),
-    apply=apply)
+    apply=apply,
+)

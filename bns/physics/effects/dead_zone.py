@@ -12,8 +12,7 @@ from bns.physics.signals import Array, Wheels
 
 def apply(wheels: Wheels, width_m_s: float) -> Wheels:
     """Each wheel's speed drawn towards zero by ``width_m_s``, and no further than zero."""
-    return replace(wheels, left_m_s=_shrunk(wheels.left_m_s, width_m_s),
-                   right_m_s=_shrunk(wheels.right_m_s, width_m_s))
+    return replace(wheels, left_m_s=_shrunk(wheels.left_m_s, width_m_s), right_m_s=_shrunk(wheels.right_m_s, width_m_s))
 
 
 def _shrunk(speed: Array, width: float) -> Array:
@@ -21,11 +20,12 @@ def _shrunk(speed: Array, width: float) -> Array:
 
 
 EFFECT = Effect(
-    name="dead-zone", stage="wheel",
-    parameters=(Parameter("width_m_s", "m/s", 0.0, 1.0, (0.0, 0.03), 0.0,
-                          "speed lost by a wheel to friction"),),
+    name="dead-zone",
+    stage="wheel",
+    parameters=(Parameter("width_m_s", "m/s", 0.0, 1.0, (0.0, 0.03), 0.0, "speed lost by a wheel to friction"),),
     equation="w = sign(u)·max(|u| - d, 0) for each wheel",
     residuals="Slow commands fall short by a larger share than fast ones, in proportion to their "
-              "duration; a very slow wheel stands still.",
+    "duration; a very slow wheel stands still.",
     lookalikes=("speed-gain", "motor-lag"),
-    apply=apply)
+    apply=apply,
+)

@@ -14,11 +14,14 @@ def apply(flow: Flow, x_m_s: float, y_m_s: float) -> Flow:
 
 
 EFFECT = Effect(
-    name="floor-slope", stage="world",
-    parameters=(Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.02, 0.02), 0.0, "drift to the east"),
-                Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.02, 0.02), 0.0, "drift to the north")),
+    name="floor-slope",
+    stage="world",
+    parameters=(
+        Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.02, 0.02), 0.0, "drift to the east"),
+        Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.02, 0.02), 0.0, "drift to the north"),
+    ),
     equation="dx/dt += sx, dy/dt += sy while moving",
-    residuals="Positions are off in one direction of the room, whatever the heading, in proportion "
-              "to the time driven.",
+    residuals="Positions are off in one direction of the room, whatever the heading, in proportion to the time driven.",
     lookalikes=("tether-pull",),
-    apply=apply)
+    apply=apply,
+)

@@ -11,16 +11,20 @@ from bns.physics.signals import Wheels
 
 def apply(wheels: Wheels, tau_s: float) -> Wheels:
     """First-order lag of each wheel, from rest."""
-    return replace(wheels, left_m_s=first_order(wheels.left_m_s, wheels.step_s, tau_s),
-                   right_m_s=first_order(wheels.right_m_s, wheels.step_s, tau_s))
+    return replace(
+        wheels,
+        left_m_s=first_order(wheels.left_m_s, wheels.step_s, tau_s),
+        right_m_s=first_order(wheels.right_m_s, wheels.step_s, tau_s),
+    )
 
 
 EFFECT = Effect(
-    name="motor-lag", stage="wheel",
-    parameters=(Parameter("tau_s", "s", 0.0, 5.0, (0.0, 0.3), 0.0,
-                          "time constant of the wheel's speed control"),),
+    name="motor-lag",
+    stage="wheel",
+    parameters=(Parameter("tau_s", "s", 0.0, 5.0, (0.0, 0.3), 0.0, "time constant of the wheel's speed control"),),
     equation="dw/dt = (u - w)/tau for each wheel",
     residuals="The first command falls short by speed times tau, whatever its duration; later "
-              "commands keep a rest of the command before, and short ones suffer most.",
+    "commands keep a rest of the command before, and short ones suffer most.",
     lookalikes=("command-delay", "acceleration-limit", "speed-gain"),
-    apply=apply)
+    apply=apply,
+)

@@ -14,11 +14,15 @@ def apply(wheels: Wheels, gain: float) -> Wheels:
 
 
 EFFECT = Effect(
-    name="speed-gain", stage="wheel",
-    parameters=(Parameter("gain", "1", 0.2, 5.0, (0.9, 1.1), 1.0,
-                          "driven over commanded speed: true over assumed wheel diameter"),),
+    name="speed-gain",
+    stage="wheel",
+    parameters=(
+        Parameter(
+            "gain", "1", 0.2, 5.0, (0.9, 1.1), 1.0, "driven over commanded speed: true over assumed wheel diameter"
+        ),
+    ),
     equation="l' = g·l, r' = g·r",
-    residuals="Distances and turns are wrong by the same share in every command, whatever its speed "
-              "and duration.",
+    residuals="Distances and turns are wrong by the same share in every command, whatever its speed and duration.",
     lookalikes=("motor-lag", "dead-zone", "turn-slip"),
-    apply=apply)
+    apply=apply,
+)

@@ -13,16 +13,19 @@ from bns.physics.signals import Wheels
 
 def apply(wheels: Wheels, max_m_s: float) -> Wheels:
     """Each wheel's speed clipped to ±``max_m_s``."""
-    return replace(wheels, left_m_s=np.clip(wheels.left_m_s, -max_m_s, max_m_s),
-                   right_m_s=np.clip(wheels.right_m_s, -max_m_s, max_m_s))
+    return replace(
+        wheels,
+        left_m_s=np.clip(wheels.left_m_s, -max_m_s, max_m_s),
+        right_m_s=np.clip(wheels.right_m_s, -max_m_s, max_m_s),
+    )
 
 
 EFFECT = Effect(
-    name="speed-limit", stage="wheel",
-    parameters=(Parameter("max_m_s", "m/s", 1e-3, math.inf, (0.1, 2.0), math.inf,
-                          "highest speed of a wheel"),),
+    name="speed-limit",
+    stage="wheel",
+    parameters=(Parameter("max_m_s", "m/s", 1e-3, math.inf, (0.1, 2.0), math.inf, "highest speed of a wheel"),),
     equation="w = min(max(u, -limit), limit) for each wheel",
-    residuals="Fast commands fall short, slow ones fit; curves of two fast wheels come out "
-              "straighter.",
+    residuals="Fast commands fall short, slow ones fit; curves of two fast wheels come out straighter.",
     lookalikes=("turn-slip", "acceleration-limit"),
-    apply=apply)
+    apply=apply,
+)

@@ -10,19 +10,24 @@ from bns.physics.signals import Flow
 
 def apply(flow: Flow, pull_per_s: float, anchor_x_m: float, anchor_y_m: float) -> Flow:
     """A velocity towards the anchor in proportion to the distance, while the wheels turn."""
-    return replace(flow, x_m_s=flow.x_m_s + pull_per_s * anchor_x_m,
-                   y_m_s=flow.y_m_s + pull_per_s * anchor_y_m,
-                   return_per_s=flow.return_per_s + pull_per_s)
+    return replace(
+        flow,
+        x_m_s=flow.x_m_s + pull_per_s * anchor_x_m,
+        y_m_s=flow.y_m_s + pull_per_s * anchor_y_m,
+        return_per_s=flow.return_per_s + pull_per_s,
+    )
 
 
 EFFECT = Effect(
-    name="tether-pull", stage="world",
-    parameters=(Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.05), 0.0,
-                          "velocity per metre from the anchor"),
-                Parameter("anchor_x_m", "m", -100.0, 100.0, (-2.0, 2.0), 0.0, "where the cable is fixed"),
-                Parameter("anchor_y_m", "m", -100.0, 100.0, (-2.0, 2.0), 0.0, "where the cable is fixed")),
+    name="tether-pull",
+    stage="world",
+    parameters=(
+        Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.05), 0.0, "velocity per metre from the anchor"),
+        Parameter("anchor_x_m", "m", -100.0, 100.0, (-2.0, 2.0), 0.0, "where the cable is fixed"),
+        Parameter("anchor_y_m", "m", -100.0, 100.0, (-2.0, 2.0), 0.0, "where the cable is fixed"),
+    ),
     equation="dx/dt += k·(ax - x), dy/dt += k·(ay - y) while moving",
-    residuals="Positions are off towards one point of the room, more so the farther the robot is "
-              "from it.",
+    residuals="Positions are off towards one point of the room, more so the farther the robot is from it.",
     lookalikes=("floor-slope",),
-    apply=apply)
+    apply=apply,
+)

@@ -14,11 +14,21 @@ def apply(wheels: Wheels, factor: float) -> Wheels:
 
 
 EFFECT = Effect(
-    name="wheelbase", stage="wheel",
-    parameters=(Parameter("factor", "1", 0.2, 5.0, (0.95, 1.2), 1.0,
-                          "effective over nominal distance of the wheels; soft tyres lie above 1"),),
+    name="wheelbase",
+    stage="wheel",
+    parameters=(
+        Parameter(
+            "factor",
+            "1",
+            0.2,
+            5.0,
+            (0.95, 1.2),
+            1.0,
+            "effective over nominal distance of the wheels; soft tyres lie above 1",
+        ),
+    ),
     equation="b' = e·b, so that omega = (r - l)/(e·b)",
-    residuals="Every turn is too small or too large by the same share, left and right alike; "
-              "straight commands fit.",
+    residuals="Every turn is too small or too large by the same share, left and right alike; straight commands fit.",
     lookalikes=("turn-slip", "wheel-mismatch"),
-    apply=apply)
+    apply=apply,
+)
