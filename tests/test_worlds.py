@@ -44,7 +44,7 @@ def test_noise_is_small_against_what_a_command_does(world, commands):
 def test_shorter_list_is_the_beginning_of_the_longer(world, commands):
     whole = world.drive(commands, KEY, Purpose.WORLD_EVALUATED, 1)
     part = world.drive(commands[:3], KEY, Purpose.WORLD_EVALUATED, 1)
-    np.testing.assert_allclose(part, whole[:3], atol=1e-9)
+    np.testing.assert_allclose(part, whole[:3], atol=1e-6)  # float32 networks
 
 
 def test_straight_drive_goes_north(world):

@@ -185,7 +185,7 @@ def _crossed(front: np.ndarray, back: np.ndarray, cut_front: int, cut_back: int,
 
 
 def _mutate(key: Key, child: np.ndarray, index: int, rate: float, bounds: CommandBounds, generation: int) -> None:
-    threshold = rate * _WORD
+    threshold = int(rate * _WORD)
     for j in range(len(child)):
         words = draw(key, Purpose.MUTATION, generation, index, j)
         for c in range(child.shape[1]):

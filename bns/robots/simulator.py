@@ -94,8 +94,9 @@ def save_simulator(simulator: StaticSimulator, path: Path) -> None:
     path.write_bytes(save(tensors(simulator.networks, simulator.weights), metadata=header))
 
 
-def load_simulator(path: Path) -> StaticSimulator:
+def load_simulator(path: Path | str) -> StaticSimulator:
     """Read such a file; ModelError if it is missing or something else."""
+    path = Path(path)
     if not path.is_file():
         raise ModelError(f"there is no network file {path}.")
     try:

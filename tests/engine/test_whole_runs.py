@@ -22,7 +22,7 @@ SMALL = RunSpec(
 OTHER = {
     "task": "infinity", "world": "physics", "seed": 1, "root_seed": 1, "population_size": 15, "tournament_size": 0.1,
     "mutation_rate": 0.5, "real_world_selection_size": 0.1, "evaluations": 5, "generations_per_evaluation": 5,
-    "training_iterations_per_evaluation": 31, "training_algorithm": "irprop-", "min_commands": 8, "max_commands": 5,
+    "training_iterations_per_evaluation": 31, "training_algorithm": "irprop-", "min_commands": 8, "max_commands": 4,
     "record": "full",
 }  # fmt: skip
 

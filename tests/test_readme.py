@@ -1,0 +1,61 @@
+"""What the README shows can be typed as it stands."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import bns as package
+from bns.cli import _parser, main
+from bns.sweep.grid import load_sweep, parse_sweep
+from bns.sweep.order import ordered_specs
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text()
+BLOCKS = re.findall(r"```(\w+)\n(.*?)```", README, re.DOTALL)
+COMMANDS = [
+    shlex.split(line, comments=True)
+    for kind, block in BLOCKS
+    if kind == "sh"
+    for line in block.splitlines()
+    if re.match(r"(\.venv/bin/)?bns ", line)
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_commands_are_understood(command):
+    assert _parser().parse_args(command[1:]).command
+
+
+def test_sweep_example_is_a_sweep():
+    [example] = [block for kind, block in BLOCKS if kind == "yaml"]
+    assert parse_sweep(example, Path("README.md")).total == 30 * (5 * 2 + 1)
+
+
+def test_python_examples_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    quick = ["--evaluations", "1", "--population-size", "8", "--training-iterations-per-evaluation", "1"]
+    assert main(["run", *quick, "--save-snn", "nets.safetensors"]) == 0
+    names: dict = {}
+    for example in [block for kind, block in BLOCKS if kind == "python"]:
+        exec(example, names)
+    assert list(names["modules"]) == ["dx", "dy", "dtheta"]
+    assert len(names["evals"]) == len(names["runs"]) == 1
+    assert names["bns"] is package
+
+
+def test_make_targets_and_files_named_there_exist():
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"(?:^|`)make ([a-z-]+)", README, re.MULTILINE)) <= targets
+    for link in re.findall(r"\]\(([^)#]+)", README):
+        assert (ROOT / link).exists(), link
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "sweeps").glob("*.yaml")), ids=lambda f: f.stem)
+def test_shipped_sweeps_can_be_read_and_are_named_after_their_file(file):
+    sweep = load_sweep(file)
+    assert sweep.name == file.stem
+    assert sweep.total == {"khepera": 45_000, "khepera-small": 480, "prototype": 9, "budget": 720}[file.stem]
+    if sweep.total < 1000:
+        assert len({spec.run_id for spec in ordered_specs(sweep)}) == sweep.total
