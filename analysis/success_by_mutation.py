@@ -6,11 +6,24 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from analysis.common import Drawn, Selection, Store, comparable, coverage, mutation_sweeps, percent, task_title, wilson
+from analysis.common import (
+    Drawn,
+    Selection,
+    Store,
+    comparable,
+    counted,
+    coverage,
+    mutation_sweeps,
+    percent,
+    task_title,
+    wilson,
+)
 from bns.plotting import lettered, note, ordered_styles, panels, style
 
 NAME = "success-by-mutation"
 PAPER = "figure 4.7"
+FEWEST = 5
+"""Runs behind a curve; a thinner one jumps between 0 and 100 % and is left out, unless there are no others."""
 
 
 def counts(store: Store, chosen: Selection) -> pd.DataFrame:
@@ -25,23 +38,33 @@ def counts(store: Store, chosen: Selection) -> pd.DataFrame:
 @style()
 def draw(store: Store) -> list[Drawn]:
     chosen = comparable(store, mutation_sweeps(store))
-    rows = counts(store, chosen)
+    rows, thin = _thick_enough(counts(store, chosen))
+    tasks, n = [pair for pair in chosen.tasks if pair[1] in set(rows.task)], chosen.n - thin
     looks = dict(zip(sorted(rows.mutation_rate.unique()), ordered_styles(rows.mutation_rate.nunique()), strict=True))
-    figure, axes = panels(len(chosen.tasks), 3.6, rows_each=2, ratios=(3, 1))
-    for number, ((robot, task), (ax, below)) in enumerate(zip(chosen.tasks, axes, strict=True)):
+    figure, axes = panels(len(tasks), 3.6, rows_each=2, ratios=(3, 1))
+    for number, ((robot, task), (ax, below)) in enumerate(zip(tasks, axes, strict=True)):
         _panel(ax, rows[rows.task == task], looks)
         ax.set_title(lettered(number, len(axes), task_title(robot, task)))
         below.set_axis_off()
         below.legend(*ax.get_legend_handles_labels(), loc="upper center", title="mutation rate")
     axes[0, 0].set_ylabel("successful runs, 7 cm (%)")
-    said = coverage(store, chosen.sweeps, chosen.n)
-    note(figure, "; ".join((*said.sentences, "bands: 95 % Wilson intervals")) + ".")
+    said = coverage(store, chosen.sweeps, n)
+    too_few = (f"{counted(thin, 'run')} in curves of fewer than {FEWEST} not drawn",) if thin else ()
+    note(figure, "; ".join((*said.sentences, *too_few, "bands: 95 % Wilson intervals")) + ".")
     shows = (
         f"Share of runs whose fittest controller, driven in the world after each evaluation, visits all goals "
-        f"within 7 cm, by mutation rate; all other parameters pooled. n = {chosen.n:,} runs of "
+        f"within 7 cm, by mutation rate; all other parameters pooled. n = {n:,} runs of "
         f"{', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals."
     )
-    return [Drawn(NAME, figure, shows, chosen.n, chosen.sweeps, (*said.missing, *chosen.left_out))]
+    return [Drawn(NAME, figure, shows, n, chosen.sweeps, (*said.missing, *too_few, *chosen.left_out))]
+
+
+def _thick_enough(rows: pd.DataFrame) -> tuple[pd.DataFrame, int]:
+    """The curves to draw, and how many runs stand in the others."""
+    runs = rows.groupby(["task", "mutation_rate"]).runs.transform("max")
+    thick = runs >= FEWEST if (runs >= FEWEST).any() else runs > 0
+    left_out = rows[~thick].groupby(["task", "mutation_rate"]).runs.max().sum()
+    return rows[thick], int(left_out)
 
 
 def _panel(ax: Axes, rows: pd.DataFrame, looks: dict[float, dict[str, str]]) -> None:

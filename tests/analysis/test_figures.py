@@ -107,6 +107,15 @@ def test_sweeps_with_a_grid_of_mutation_rates_are_pooled_and_the_same_run_counts
     assert "n = 10 runs of one, two" in drawn.shows
 
 
+def test_curves_of_a_few_runs_are_left_out_beside_thicker_ones_and_stated(tmp_path):
+    few = [spec for spec in specs(2, task="complex") if spec.mutation_rate == 0.1]
+    written(tmp_path, "one", [record(spec) for spec in (*specs(5), *few)])
+    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    assert set(curves(drawn.figure)) == {"10 % (n = 5)", "50 % (n = 5)"}
+    assert drawn.n == 10
+    assert "2 runs in curves of fewer than 5 not drawn" in drawn.missing
+
+
 def test_runs_of_another_length_are_left_out_and_named(tmp_path):
     written(tmp_path, "one", [record(spec) for spec in specs(3)])
     written(tmp_path, "two", [record(spec) for spec in specs(2, generations_per_evaluation=7)])
