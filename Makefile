@@ -11,6 +11,7 @@ STAMP   := $(VENV)/.installed
 TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
+.NOTPARALLEL:
 .PHONY: help setup test lint sweep-khepera sweep-budget figures bench precompute clean
 
 help: ## list the targets
@@ -38,7 +39,7 @@ clean: ## remove the virtual environment and caches (never the results)
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build *.egg-info
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
-SWEEP = $(BIN)/bns sweep $(if $(BUDGET),--budget $(BUDGET)) $(if $(JOBS),--jobs $(JOBS)) --results $(RESULTS)
+SWEEP = $(BIN)/bns sweep $(if $(BUDGET),--budget "$(BUDGET)") $(if $(JOBS),--jobs "$(JOBS)") --results "$(RESULTS)"
 
 sweep-khepera: setup ## the Khepera study: prototype trials, small slice, all 45,000 runs; BUDGET=10m stops in time
 	$(SWEEP) sweeps/prototype.yaml sweeps/khepera-small.yaml sweeps/khepera.yaml
@@ -47,10 +48,10 @@ sweep-budget: setup ## how much evolution and training an evaluation should get
 	$(SWEEP) sweeps/budget.yaml
 
 figures: setup ## figures from whatever results there are, into results/figures; ONLY=success-by-mutation for one
-	$(BIN)/python -m analysis --results $(RESULTS) $(if $(ONLY),--only $(ONLY))
+	$(BIN)/python -m analysis --results "$(RESULTS)" $(if $(ONLY),--only "$(ONLY)")
 
 bench: setup ## speed, as ratios against named peers measured in the same run
-	$(BIN)/python -m tests.bench --json $(RESULTS)/bench.json
+	$(BIN)/python -m tests.bench --json "$(RESULTS)/bench.json"
 
 precompute: setup ## rebuild the static simulator that ships in the package
 	$(BIN)/bns precompute --robot khepera

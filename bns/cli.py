@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import re
 import sys
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -19,10 +21,14 @@ _INTERRUPTED, _TERMINATED = 130, 143
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of ``bns``. Exit codes: 0 done, 2 bad input, 130 interrupted, 143 terminated."""
+    """Entry point of ``bns``. Exit codes: 0 done, 1 some runs failed, 2 bad input, 130 interrupted, 143 terminated."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by whoever called
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115  # for the life of the process
+    warnings.showwarning = _show_warning
     options = _parser().parse_args(arguments)
     try:
-        return int(options.command(options))
+        return _flushed(int(options.command(options)))
     except BnsError as error:
         print(f"bns: {error}", file=sys.stderr)
         return error.exit_code
@@ -32,6 +38,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output, `head` say, has what it wants
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except MemoryError:
+        print("bns: out of memory; use a smaller population or fewer jobs", file=sys.stderr)
+        return BnsError.exit_code
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print(f"bns: cannot write the output: {error.strerror}", file=sys.stderr)
+        return BnsError.exit_code
+
+
+def _flushed(code: int) -> int:
+    sys.stdout.flush()  # a full disk or a closed pipe shows here, not when the process ends
+    return code
+
+
+def _show_warning(message: Warning | str, *_place: object, **_more: object) -> None:
+    print(f"bns: warning: {message}", file=sys.stderr)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -160,7 +184,7 @@ def sweep(options: argparse.Namespace) -> int:
             print(planned(plan(one, options.results, options.jobs, retry_failed=options.retry_failed), options.jobs))
         return 0
     _say_if_compiling()
-    budget = Budget(options.budget)
+    budget, failed = Budget(options.budget), 0
     with SweepProgress() as bar:
         for one in sweeps:
             summary = run_sweep(
@@ -172,9 +196,10 @@ def sweep(options: argparse.Namespace) -> int:
                 on_progress=bar,
             )
             print(summed_up(summary, options.results), file=sys.stderr)
+            failed += summary.new_failed
             if summary.stopped_by in {"interrupt", "terminated"}:
                 return _INTERRUPTED if summary.stopped_by == "interrupt" else _TERMINATED
-    return 0
+    return 1 if failed else 0
 
 
 def status(options: argparse.Namespace) -> int:

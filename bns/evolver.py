@@ -41,7 +41,7 @@ class Evolver:
     @classmethod
     def start(cls, robot: Robot, task: Task, key: Key, spec: RunSpec, weights: np.ndarray) -> Evolver:
         """A random population, scored on untrained networks."""
-        population = robot.initial_population(key, spec.population_size, spec.max_commands)
+        population = robot.initial_population(key, spec.population_size, spec.min_commands, spec.max_commands)
         return cls(robot, task, key, spec, population, robot.score(population, weights, task))
 
     def __post_init__(self) -> None:

@@ -22,14 +22,11 @@ from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 
-from bns.engine.philox import Key, Purpose
-from bns.engine.snn import predict
 from bns.loop import RunResult
 from bns.robots.base import Robot
 from bns.spec import RunSpec
 from bns.store.files import publish
 from bns.tasks import Task
-from bns.worlds import build_world
 
 COLUMN_IN, PAGE_IN = 3.5, 7.2
 """Widths of one column and of a page."""
@@ -206,7 +203,8 @@ def _tick_alike(ax: Axes) -> None:
 @style()
 def path_figure(spec: RunSpec, task: Task, robot: Robot, result: RunResult, stem: Path) -> Path:
     """Draw and save the path of a run's fittest controller at its end, a column wide; the path of the PNG."""
-    driven, simulated = fittest_poses(spec, robot, result)
+    start = robot.poses(np.zeros((1, len(robot.networks))))
+    driven, simulated = np.vstack([start, result.world_poses]), np.vstack([start, result.snn_poses])
     figure = Figure(figsize=(COLUMN_IN, COLUMN_IN + 0.4))
     ax = figure.subplots()
     draw_paths(ax, task.goals_m, robot.radii_m[0], driven, simulated)
@@ -214,18 +212,6 @@ def path_figure(spec: RunSpec, task: Task, robot: Robot, result: RunResult, stem
     ax.set_title(f"{task.title}, seed {spec.seed}\nevaluation {spec.evaluations}: {outcome(success)}")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return save(figure, stem)[0]
-
-
-def fittest_poses(spec: RunSpec, robot: Robot, result: RunResult) -> tuple[np.ndarray, np.ndarray]:
-    """Poses (n, 3) of the fittest controller at a run's end, start included: driven, and as its networks see it.
-
-    It is driven with the noise of the run's last evaluation again, and so ends where the results say it did.
-    """
-    key = Key.of_run(spec.seed, spec.root_seed, spec.robot, spec.task)
-    start = robot.poses(np.zeros((1, len(robot.networks))))
-    driven = build_world(spec.world, robot).drive(result.fittest, key, Purpose.WORLD_FITTEST, spec.evaluations)
-    simulated = robot.poses(robot.displacements(predict(result.weights, robot.inputs(result.fittest))))
-    return np.vstack([start, driven]), np.vstack([start, simulated])
 
 
 def outcome(success: bool) -> str:

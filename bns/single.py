@@ -20,7 +20,7 @@ from bns.loop import RunResult, run
 from bns.plotting import path_figure
 from bns.recorder import RADII_CM
 from bns.robots import load_robot
-from bns.robots.simulator import StaticSimulator, save_simulator
+from bns.robots.simulator import StaticSimulator, check_writable, save_simulator
 from bns.spec import RunSpec
 from bns.store.lock import SweepLockedError
 from bns.store.record import RunRecord
@@ -34,6 +34,8 @@ _PATIENCE_S = 60.0
 def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None = None) -> str:
     """Carry out a run with a live view, store it, draw the path of its fittest controller; the report in words."""
     robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
+    if save_snn is not None:
+        check_writable(save_snn)
     with _patient_writer(results, sweep):
         pass  # a folder that cannot be written is better found before the run than after it
     started, wall, cpu = datetime.now(UTC), time.perf_counter(), time.process_time()

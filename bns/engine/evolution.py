@@ -64,9 +64,10 @@ def tournament_cdf(n: int, share: float) -> np.ndarray:
     One draw through this table is one tournament, whatever its size. The size is share * n, rounded, at least 1.
     """
     k = min(n, max(1, int(share * n + 0.5)))
-    r = np.arange(n)
-    left = np.maximum(n - 1.0 - r[:, None] - np.arange(k)[None, :], 0.0)  # members ranked behind r, as k are drawn
-    return 1.0 - np.prod(left / (n - np.arange(k))[None, :], axis=1)
+    # P(all k members rank behind r) = C(n-1-r, k) / C(n, k), from r to r + 1 by one factor.
+    behind = n - 1.0 - np.arange(n)
+    factors = np.maximum(behind - k + 1, 0.0) / (behind + 1)
+    return 1.0 - np.cumprod(factors)
 
 
 def rank(fitness: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ _FAST_FLAGS = {"reassoc", "contract", "arcp", "nsz", "afn"}
 
 
 def cache_folder() -> Path:
-    """Where compiled kernels lie: in the package, or in the user's cache if the package cannot be written.
+    """Where compiled kernels lie: in the package, else in the user's cache, else in the temporary folder.
 
     Numba looks only at the date of the file a kernel stands in, not at the helpers it inlines from others; so the
     folder is named after the text of all of them, and a change anywhere begins a new one.
@@ -28,9 +29,15 @@ def cache_folder() -> Path:
         for file in sorted((_PACKAGE / folder).rglob("*.py")):
             digest.update(file.read_bytes())
     name = f"kernels-{digest.hexdigest()[:12]}"
-    if os.access(_PACKAGE, os.W_OK):
-        return _PACKAGE / "__pycache__" / name
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "bns" / name
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path("~/.cache").expanduser())
+    for place in (_PACKAGE / "__pycache__" / name, Path(home) / "bns" / name):
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(place.parent, os.W_OK):
+            return place
+    return Path(tempfile.gettempdir()) / f"bns-{os.getuid()}" / name
 
 
 def _configure() -> None:

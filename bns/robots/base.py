@@ -29,7 +29,7 @@ class Robot(Protocol):
     bounds: CommandBounds
     command_columns: tuple[str, ...]
 
-    def initial_population(self, key: Key, size: int, capacity: int) -> Population:
+    def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """A random population."""
 
     def random_controllers(self, key: Key, count: int, length: int) -> Population:

@@ -126,9 +126,10 @@ class Khepera:
     bounds = CommandBounds(_LOW, _HIGH, np.array([2000.0, 2000.0, 400.0], np.float32))
     command_columns = ("left_units", "right_units", "duration_ms")
 
-    def initial_population(self, key: Key, size: int, capacity: int) -> Population:
-        """4 to 13 random commands a controller."""
-        return random_population(key, size, 4, 13, capacity, self.bounds)
+    def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
+        """4 to 13 random commands a controller; more where the shortest list allowed is longer."""
+        fewest = max(4, shortest)
+        return random_population(key, size, fewest, max(13, fewest), capacity, self.bounds)
 
     def random_controllers(self, key: Key, count: int, length: int) -> Population:
         """Controllers of `length` random commands, apart from every population's draws."""

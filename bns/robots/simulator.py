@@ -1,14 +1,14 @@
 """Simulator networks in files: safetensors with their meaning beside the numbers, and as torch modules.
 
-A file holds one tensor ``weights`` (networks, W) in the order of `bns.engine.snn`, and for readers of other tools the
-same numbers as ``<network>.hidden.weight`` (H, 5), ``<network>.hidden.bias`` (H,), ``<network>.output.weight`` (1, H) and
-``<network>.output.bias`` (1,), which are the names in the torch modules.
+A file holds for each network ``<network>.hidden.weight`` (H, 5), ``<network>.hidden.bias`` (H,),
+``<network>.output.weight`` (1, H) and ``<network>.output.bias`` (1,), which are the names in the torch modules.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
@@ -90,8 +90,25 @@ def save_simulator(simulator: StaticSimulator, path: Path) -> None:
         "provenance": simulator.provenance,
     }
     header = {"bns": json.dumps(about, sort_keys=True)}  # one entry: safetensors writes several in any order
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(save(tensors(simulator.networks, simulator.weights), metadata=header))
+    data = save(tensors(simulator.networks, simulator.weights), metadata=header)
+    check_writable(path)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_bytes(data)
+        part.replace(path)
+    except OSError as error:
+        raise ModelError(f"cannot write {path}: {error.strerror}; choose another file.") from error
+
+
+def check_writable(path: Path) -> None:
+    """ModelError if no file can be written there; makes its folder."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ModelError(f"cannot make the folder of {path}: {error.strerror}; choose another file.") from error
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        reason = "it is a folder" if path.is_dir() else f"{path.parent} cannot be written"
+        raise ModelError(f"cannot write {path}: {reason}; choose another file.")
 
 
 def load_simulator(path: Path | str) -> StaticSimulator:

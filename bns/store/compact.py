@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bns.errors import StoreError
-from bns.store.files import is_name, set_aside
+from bns.store.files import is_name, set_aside, what_is_there
 from bns.store.journal import journals
 from bns.store.lock import SweepLock, SweepLockedError
 from bns.store.merge import Tally, compact_sweep
@@ -47,7 +47,7 @@ def compact(results: Path | str) -> CompactSummary:
     """
     root = Path(results)
     if not root.is_dir():
-        raise StoreError(f"there are no results in {root}: the folder does not exist. Name another with --results DIR.")
+        raise StoreError(f"there are no results in {root}: {what_is_there(root)}. Name another with --results DIR.")
     before, sweeps = _count(root), _sweeps(root)
     work, skipped = Tally(set_aside=_set_aside_strays(root)), []
     for sweep in sweeps:

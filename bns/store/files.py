@@ -18,6 +18,7 @@ JOURNAL, STAGING, SET_ASIDE = "journal", "staging", "set-aside"
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_NO_FOLDER = {errno.ENOTDIR, errno.EEXIST}
 _LOCKED_OUT = {errno.EROFS, errno.EACCES, errno.EPERM}
 
 
@@ -51,7 +52,10 @@ def explained(action: str, path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno in _FULL:
+        obstacle = _obstacle(path) if error.errno in _NO_FOLDER else None
+        if obstacle is not None:
+            reason, remedy = f"{obstacle} is a file.", "choose a folder with --results DIR."
+        elif error.errno in _FULL:
             reason, remedy = (
                 "The disk, quota or file size limit is full.",
                 "free some space and repeat the command, which goes on where it stopped.",
@@ -66,6 +70,31 @@ def explained(action: str, path: Path) -> Iterator[None]:
         raise StoreError(
             f"cannot {action} {path}: {error.strerror or error}. {reason} Nothing that was finished is lost: {remedy}"
         ) from error
+
+
+def what_is_there(results: Path) -> str:
+    """Why nothing can be read from ``results``, to follow its name: "is a file", "does not exist", "is empty"."""
+    obstacle = _obstacle(results)
+    if obstacle is not None:
+        return f"{obstacle} is a file, not a folder"
+    return "the folder is empty" if results.is_dir() else "the folder does not exist"
+
+
+def is_same(path: Path, known: os.stat_result) -> bool:
+    """Whether ``path`` still is the file that ``known`` describes, neither deleted nor moved nor replaced."""
+    try:
+        return os.path.samestat(path.stat(), known)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+
+
+def gone(path: Path, lost: str) -> StoreError:
+    """The error of a writer under whom ``path`` was taken away; ``lost`` says what was in it."""
+    return StoreError(
+        f"{path} is gone: the results were deleted or moved while they were being written. {lost} "
+        "Run the sweep again: it does what is missing. If the folder was moved, move it back first or name its "
+        "new place with --results DIR; and leave it alone while a sweep is running."
+    )
 
 
 def make_folder(folder: Path) -> None:
@@ -140,6 +169,11 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def _obstacle(path: Path) -> Path | None:
+    # The one of path and its parents that is a file where a folder is wanted.
+    return next((place for place in (path, *path.parents) if place.is_file()), None)
 
 
 def _forget(path: Path) -> None:

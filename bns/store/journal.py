@@ -20,7 +20,7 @@ from typing import Any
 import pyarrow as pa
 
 from bns.errors import StoreError
-from bns.store.files import JOURNAL, explained, make_folder, write_all
+from bns.store.files import JOURNAL, explained, gone, is_same, make_folder, write_all
 from bns.store.record import STATUSES
 from bns.store.schema import SCHEMA_VERSION, upgraded
 
@@ -127,6 +127,7 @@ class Journal:
     def __init__(self, file: JournalFile) -> None:
         self.file = file
         self.runs = 0
+        self.run_ids: set[str] = set()
         self._end = 0
         make_folder(file.path.parent)
         with explained("create", file.path):
@@ -134,10 +135,14 @@ class Journal:
             folder = os.open(file.path.parent, os.O_RDONLY)
             os.fsync(folder)
             os.close(folder)
+            self._made = os.fstat(self._descriptor)
 
     def append(self, frame: Frame) -> None:
-        """Write one frame and sync it; StoreError if that fails, and the journal is as before."""
+        """Write one frame and sync it; StoreError if that fails or the file is gone, and the journal is as before."""
         data = encoded(frame)
+        if not is_same(self.file.path, self._made):
+            # Writes to a deleted file go well, and to nowhere.
+            raise gone(self.file.path, f"It held {self.runs} finished runs; run {frame.run_id} is not stored.")
         with explained("write", self.file.path):
             try:
                 self._cut()
@@ -148,6 +153,7 @@ class Journal:
                 raise
         self._end += len(data)
         self.runs += 1
+        self.run_ids.add(frame.run_id)
 
     def close(self) -> None:
         """Close the file; it stays until its runs are folded."""

@@ -12,7 +12,7 @@ from types import TracebackType
 import filelock
 
 from bns.errors import StoreError
-from bns.store.files import JOURNAL, checked_name, explained, make_folder
+from bns.store.files import JOURNAL, checked_name, explained, gone, is_same, make_folder
 
 
 class SweepLockedError(StoreError):
@@ -30,6 +30,7 @@ class SweepLock:
         self._path = results / JOURNAL / f"{sweep}.lock"
         self._holder = self._path.with_name(f"{self._path.name}.json")
         # Not bound to a thread: a sweep may append from another one than it began in.
+        self._taken_file: os.stat_result | None = None
         self._lock = filelock.FileLock(self._path, timeout=0, thread_local=False)
 
     def acquire(self) -> None:
@@ -48,12 +49,19 @@ class SweepLock:
         try:
             with explained("write", self._holder):
                 self._holder.write_text(json.dumps(_myself()))
+                self._taken_file = self._path.stat()
         except StoreError:
             self._lock.release()
             raise
 
+    def check(self) -> None:
+        """StoreError if the lock was taken and its file is gone: then the results are gone too, or elsewhere."""
+        if self._taken_file is not None and not is_same(self._path, self._taken_file):
+            raise gone(self._path, "What was stored before went with it.")
+
     def release(self) -> None:
         """Give the lock back; without effect if it is not held."""
+        self._taken_file = None
         self._lock.release()
 
     def __enter__(self) -> SweepLock:

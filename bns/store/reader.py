@@ -11,6 +11,7 @@ import pandas as pd
 import pyarrow as pa
 
 from bns.errors import StoreError, unknown_name
+from bns.store.question import answer, damage_hint
 from bns.store.schema import SCHEMAS, SORT_KEYS, read_columns
 from bns.store.snapshot import Snapshot, full_snapshot, snapshot
 from bns.store.views import connect_views
@@ -37,8 +38,11 @@ def connect(results: Path | str) -> duckdb.DuckDBPyConnection:
 def query(results: Path | str, sql: str) -> pd.DataFrame:
     """The rows that the SELECT statement ``sql`` gives over the views of `connect`.
 
+    Nothing is written and no file outside ``results`` is read. Columns that share a name are numbered: success,
+    success_1.
+
     Raises:
-        StoreError: as in `connect`, or DuckDB cannot carry out the statement.
+        StoreError: as in `connect`, ``sql`` is not one SELECT (or EXPLAIN), or DuckDB cannot carry it out.
     """
     return _frame(_answer(Path(results), sql))
 
@@ -94,14 +98,7 @@ def _answer(results: Path, sql: str) -> pa.Table:
 
 def _answer_once(found: Snapshot, sql: str) -> pa.Table:
     with connect_views(found) as connection:
-        try:
-            relation = connection.sql(sql)
-            # A statement that is no query gives no relation in some DuckDBs, an empty one in others.
-            return pa.table({}) if relation is None else relation.to_arrow_table()
-        except duckdb.IOException:
-            raise
-        except duckdb.Error as error:
-            raise StoreError(f"DuckDB cannot answer {sql!r}: {error}") from error
+        return answer(connection, found.results, sql)
 
 
 def _settled(results: Path, work: Callable[[], _T]) -> _T:
@@ -112,9 +109,8 @@ def _settled(results: Path, work: Callable[[], _T]) -> _T:
             return work()
         except duckdb.IOException as error:
             fault = error
-    raise StoreError(
-        f"cannot read {results}: {fault}. If a file is damaged, bns compact --results {results} moves it to set-aside/."
-    ) from fault
+    hint = damage_hint(results, fault) if fault is not None else ""
+    raise StoreError(f"cannot read {results}: {fault}.{hint}") from fault
 
 
 def _condition(where: Where) -> str:

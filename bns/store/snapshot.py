@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bns.errors import StoreError
-from bns.store.files import StoreWarning
+from bns.store.files import StoreWarning, what_is_there
 from bns.store.journal import Frame, JournalFile, best_frames, journals, read_journal
 from bns.store.parquet import READ_FAULTS, read_part
 from bns.store.parts import Part, Unreadable, check_version, find_parts, list_files
@@ -53,9 +53,8 @@ def full_snapshot(results: Path) -> Snapshot:
     """`snapshot`, or a StoreError with the commands to begin with if there is nothing."""
     found = snapshot(results) if results.is_dir() else None
     if found is None or found.is_empty:
-        state = "is empty" if results.is_dir() else "does not exist"
         raise StoreError(
-            f"there are no results in {results}: the folder {state}. Make some with: "
+            f"there are no results in {results}: {what_is_there(results)}. Make some with: "
             "bns sweep sweeps/khepera-small.yaml, or: bns run; or name another folder with "
             "--results DIR."
         )

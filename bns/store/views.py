@@ -107,13 +107,14 @@ def _place(folder: Path) -> str:
 
 
 def _read(parts: list[Part]) -> str:
-    names = ", ".join(_pattern(part.path) for part in parts)
+    names = ", ".join(pattern(part.path) for part in parts)
     # Typed as text: a name like 0012 is no number.
     folders = "{'sweep': VARCHAR}" if parts[0].table == "specs" else "{'sweep': VARCHAR, 'task': VARCHAR}"
     return f"read_parquet([{names}], {_OPTIONS}, hive_types={folders})"
 
 
-def _pattern(path: Path) -> str:
+def pattern(path: Path) -> str:
+    """``path`` as a quoted DuckDB text that stands for this path alone, whatever letters are in it."""
     # DuckDB takes names for patterns: what it would expand stands in a character class of its own.
     text = "".join(f"[{letter}]" if letter in "*?[" else letter for letter in str(path))
     return "'" + text.replace("'", "''") + "'"

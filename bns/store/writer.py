@@ -10,7 +10,7 @@ from types import TracebackType
 import pyarrow as pa
 
 from bns.errors import StoreError
-from bns.store.files import checked_name, publish
+from bns.store.files import checked_name, gone, publish
 from bns.store.fold import clear_staging, fold_journal, staged
 from bns.store.journal import Frame, Journal, JournalFile, journals
 from bns.store.lock import SweepLock
@@ -68,25 +68,38 @@ class Writer:
 
         Raises:
             StoreError: the record does not fit the schema, or the disk does not take it (it is not stored
-                then), or the fold that fell due failed (it is stored then: the journal keeps it).
+                then: as when the results were deleted or moved), or the fold that fell due failed (it is stored then:
+                the journal keeps it).
         """
         if not self._open:
             raise StoreError(f"the writer of sweep {self.sweep!r} is not open; use it in a with statement.")
         task = checked_name("task", record.spec.task)
         tables = record_tables(record, provenance())
         if self._journal is None:
+            self._lock.check()
             self._journal = Journal(JournalFile.new(self.results, self.sweep))
         self._journal.append(Frame(record.spec.run_id, task, record.run["status"], spec_hash(self._text), tables))
         if self._journal.runs >= self._fold_at:
             self.fold()
 
     def fold(self) -> int:
-        """Publish the runs in this sweep's journals as parquet parts; the number of runs."""
-        if self._journal is not None:
-            self._journal.close()
-            self._journal = None
+        """Publish the runs in this sweep's journals as parquet parts; the number of runs.
+
+        Raises:
+            StoreError: the disk fails, or what was appended is not there any more.
+        """
+        own, self._journal = self._journal, None
+        if own is not None:
+            own.close()
         # All of them: an earlier fold may have failed on a full disk.
-        return sum(fold_journal(self.results, file) for file in journals(self.results, self.sweep))
+        folded = {file.id: fold_journal(self.results, file) for file in journals(self.results, self.sweep)}
+        if own is not None and folded.get(own.file.id, 0) < len(own.run_ids):
+            raise gone(
+                own.file.path,
+                f"{len(own.run_ids)} runs were written to it and {folded.get(own.file.id, 0)} found in it.",
+            )
+        self._lock.check()
+        return sum(folded.values())
 
     def close(self) -> None:
         """Fold the rest and give the sweep free; without effect if it is not open."""

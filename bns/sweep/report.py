@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -33,8 +34,10 @@ def summed_up(summary: Summary, results: Path) -> str:
     text = f"{summary.sweep}: {summary.new} runs now, {summary.done} of {summary.total} done, in {results}"
     if summary.failed or summary.quarantined:
         text += (
-            f'; {summary.failed} failed, {summary.quarantined} quarantined (why: bns query "SELECT run_id, error FROM runs '
-            f"WHERE sweep = '{summary.sweep}' AND status <> 'ok'\"; again: --retry-failed)"
+            f"; {summary.failed} failed, {summary.quarantined} quarantined (why: bns query "
+            f"--results {shlex.quote(str(results))} "
+            f"\"SELECT run_id, error FROM runs WHERE sweep = '{summary.sweep}' AND status <> 'ok'\"; "
+            "again: --retry-failed)"
         )
     if summary.stopped_by:
         text += f"; stopped: {_WHY[summary.stopped_by]}; the same command goes on from here"
@@ -43,7 +46,7 @@ def summed_up(summary: Summary, results: Path) -> str:
 
 def status_table(rows: Sequence[SweepRow]) -> str:
     """One line a sweep and task."""
-    head = ("sweep", "task", "done", "of", "failed", "quarantined", "mean s a run", "last run began (UTC)")
+    head = ("sweep", "task", "done", "of", "failed", "quarantined", "other", "mean s a run", "last run began (UTC)")
     lines = [head] + [
         (
             row.sweep,
@@ -52,6 +55,7 @@ def status_table(rows: Sequence[SweepRow]) -> str:
             "?" if row.total is None else str(row.total),
             str(row.failed),
             str(row.quarantined),
+            str(row.other),
             "-" if math.isnan(row.mean_wall_s) else f"{row.mean_wall_s:.2f}",
             row.last.strftime("%Y-%m-%d %H:%M:%S"),
         )

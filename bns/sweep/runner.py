@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -23,9 +24,15 @@ from bns.sweep.workers import LokyExecutor
 _POLL_S = 0.2
 
 
+class SweepWarning(UserWarning):
+    """A sweep goes on, but most likely not as it is meant."""
+
+
 @dataclass(frozen=True)
 class Summary:
     """Where a sweep stands. ``done``, ``failed``, ``quarantined`` include earlier calls, ``new`` does not.
+
+    ``new_failed`` is how many of the new ones failed or were quarantined.
 
     ``stopped_by`` is None (nothing left to do), "budget", "limit", "interrupt" (Ctrl-C) or "terminated"
     (SIGTERM).
@@ -37,6 +44,7 @@ class Summary:
     failed: int = 0
     quarantined: int = 0
     new: int = 0
+    new_failed: int = 0
     stopped_by: str | None = None
 
     @property
@@ -68,7 +76,8 @@ def run_sweep(
     With ``retry_failed`` failed and quarantined runs are done again. ``jobs`` is the number of workers
     unless an ``executor`` is given; ``warm_up`` is called once before the first (by default it compiles the
     kernels). ``budget`` can be shared by several calls. After the first SIGINT or SIGTERM, runs in flight may
-    finish for ``grace_s`` seconds; the second gives them up.
+    finish for ``grace_s`` seconds; the second gives them up. `SweepWarning` if there are results under this
+    sweep's name that it does not describe: those of another file of that name.
 
     Raises:
         StoreError: another process writes this sweep, the disk is full, or the store's runs of this sweep
@@ -99,7 +108,7 @@ class _Course:
         self._digests = WorldDigests(results, sweep.name)
         self._statuses: dict[str, str] = {}
         self._counts: Counter[str] = Counter()
-        self._new = self._submitted = self._todo = self._wanted = 0
+        self._new = self._new_failed = self._submitted = self._todo = self._wanted = 0
 
     def plan(self, retry_failed: bool, limit: int | None) -> list[RunSpec]:
         """The runs to do, in order; whatever has a result is counted as such."""
@@ -114,10 +123,22 @@ class _Course:
                 self._count(spec.run_id, status)
             if status not in skipped:
                 todo.append(spec)
+        self._warn_of_others(len(known) - len(self._statuses))
         self._wanted = len(todo)
         todo = todo if limit is None else todo[:limit]
         self._todo = len(todo)
         return todo
+
+    def _warn_of_others(self, others: int) -> None:
+        if others:
+            warnings.warn(
+                f"{self.results} already holds {others} finished runs of a sweep {self._sweep.name!r} that "
+                f"{self._sweep.path} does not describe: they are of an earlier file of that name, and every "
+                "table and figure of this name will show both. Unless that is meant, stop and give the sweep "
+                "another name.",
+                SweepWarning,
+                stacklevel=4,  # the caller of run_sweep
+            )
 
     def carry_out(self, specs: Iterator[RunSpec], executor: Executor, writer: Writer) -> None:
         """Until all runs are stored, the budget is used up or a signal says to stop."""
@@ -146,6 +167,7 @@ class _Course:
         writer.append(record)
         self._count(record.spec.run_id, record.run["status"])
         self._new += 1
+        self._new_failed += record.run["status"] != "ok"
         self._on_progress(self.summary())
 
     def _count(self, run_id: str, status: str) -> None:
@@ -162,6 +184,7 @@ class _Course:
             self._counts["failed"],
             self._counts["quarantined"],
             self._new,
+            self._new_failed,
             self._stopped_by(),
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -9,13 +10,18 @@ from pathlib import Path
 import pandas as pd
 
 from bns.errors import SpecError
+from bns.spec import RunSpec
 from bns.store.reader import load
-from bns.sweep.grid import parse_sweep
+from bns.sweep.grid import Sweep, parse_sweep
 
 
 @dataclass(frozen=True)
 class SweepRow:
-    """One sweep and task. ``total`` is None without a known sweep file; ``last``: when the last run began."""
+    """One sweep and task. ``total`` is None without a known sweep file; ``last``: when the last run began.
+
+    Only runs that the newest sweep file of that name describes are done, failed or quarantined; ``other`` are
+    all the rest, those of an earlier file or an earlier engine. Without a known file there are none.
+    """
 
     sweep: str
     task: str
@@ -25,6 +31,7 @@ class SweepRow:
     total: int | None
     last: datetime
     mean_wall_s: float
+    other: int = 0
 
     @property
     def remaining(self) -> int | None:
@@ -35,16 +42,24 @@ class SweepRow:
 def sweep_status(results: Path) -> list[SweepRow]:
     """A row for every sweep and task with results, in alphabetic order; StoreError if there are none at all.
 
-    ``mean_wall_s`` is the mean of the runs that are ok, NaN without any.
+    ``mean_wall_s`` is the mean of the runs that are done, NaN without any.
     """
-    runs = load(results, "runs", columns=["sweep", "task", "status", "started_at", "wall_s"])
-    totals = _totals(load(results, "specs", columns=["sweep", "written_at", "text"]))
-    groups = runs.groupby(["sweep", "task"])
-    return [_row(str(sweep), str(task), group, totals) for (sweep, task), group in groups]
+    runs = load(results, "runs", columns=["sweep", "task", "status", "started_at", "wall_s", "spec"])
+    files = _newest_files(load(results, "specs", columns=["sweep", "written_at", "text"]))
+    rows = []
+    for name, of_sweep in runs.groupby("sweep"):
+        file = files.get(str(name))
+        described = pd.Series(True, of_sweep.index) if file is None else _described(file, of_sweep["spec"])
+        totals = None if file is None else file.runs_by_task()
+        for task, group in of_sweep.groupby("task"):
+            total = None if totals is None else totals.get(str(task), 0)
+            rows.append(_row(str(name), str(task), group, described[group.index], total))
+    return rows
 
 
-def _row(sweep: str, task: str, runs: pd.DataFrame, totals: dict[tuple[str, str], int]) -> SweepRow:
-    counts = runs["status"].value_counts()
+def _row(sweep: str, task: str, runs: pd.DataFrame, described: pd.Series[bool], total: int | None) -> SweepRow:
+    own = runs[described]
+    counts = own["status"].value_counts()
     done, failed, quarantined = (int(counts.get(status, 0)) for status in ("ok", "failed", "quarantined"))
     last: pd.Timestamp = runs["started_at"].max()
     return SweepRow(
@@ -53,19 +68,31 @@ def _row(sweep: str, task: str, runs: pd.DataFrame, totals: dict[tuple[str, str]
         done,
         failed,
         quarantined,
-        totals.get((sweep, task)),
+        total,
         last.to_pydatetime(),
-        float(runs.loc[runs["status"] == "ok", "wall_s"].mean()),
+        float(own.loc[own["status"] == "ok", "wall_s"].mean()),
+        len(runs) - len(own),
     )
 
 
-def _totals(specs: pd.DataFrame) -> dict[tuple[str, str], int]:
-    """Runs by sweep and task, from the latest sweep file of each sweep."""
-    totals: dict[tuple[str, str], int] = {}
-    for sweep, group in specs.sort_values("written_at").groupby("sweep"):
+def _described(file: Sweep, specs: pd.Series[str]) -> pd.Series[bool]:
+    """Which runs the file describes: combination by combination, for a file may have millions of seeds."""
+    combos = {RunSpec(robot=file.robot, **combo).canonical_json() for combo in file.combos}
+    return specs.map(lambda text: _is_one_of(combos, file.seeds, text)).astype(bool)
+
+
+def _is_one_of(combos: set[str], seeds: int, text: str) -> bool:
+    spec = json.loads(text)
+    first = json.dumps(spec | {"seed": 0}, sort_keys=True, separators=(",", ":"))
+    return bool(spec["seed"] < seeds) and first in combos
+
+
+def _newest_files(specs: pd.DataFrame) -> dict[str, Sweep]:
+    """The latest sweep file of every sweep that has one."""
+    files = {}
+    for name, group in specs.sort_values("written_at").groupby("sweep"):
         try:
-            described = parse_sweep(group["text"].iloc[-1], Path(f"{sweep}.yaml"))
+            files[str(name)] = parse_sweep(group["text"].iloc[-1], Path(f"{name}.yaml"))
         except SpecError:
-            continue  # written by another version: how many runs there should be is not known
-        totals |= {(str(sweep), task): runs for task, runs in described.runs_by_task().items()}
-    return totals
+            continue  # written by another version: what it describes is not known
+    return files

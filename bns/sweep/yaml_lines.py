@@ -25,6 +25,18 @@ _Loader.add_implicit_resolver(
 )
 
 
+# What PyYAML raises for `!!int ""`, `!!bool x`, `!!timestamp x`, endless sexagesimals and deep nesting.
+_CONFUSED = (
+    yaml.YAMLError,
+    ValueError,
+    TypeError,
+    LookupError,
+    AttributeError,
+    ArithmeticError,
+    RecursionError,
+)
+
+
 class Located:
     """A piece of a YAML file: its value on demand, and errors that begin with ``file:line:``."""
 
@@ -44,7 +56,7 @@ class Located:
         """The piece as plain Python data."""
         try:
             return self._loader.construct_object(self._node, deep=True)
-        except (yaml.YAMLError, ValueError, RecursionError) as fault:
+        except _CONFUSED as fault:
             self.fail(f"cannot be understood: {_first_line(fault)}. Write a plain number or text here.")
 
     def items(self, what: str) -> Iterator[tuple[str, Located, Located]]:
@@ -78,7 +90,7 @@ def parse_yaml(text: str, path: Path) -> Located:
     """The root of a YAML text; SpecError with ``path`` and the line if it cannot be parsed."""
     try:
         loader = _Loader(text)
-        node = loader.get_single_node()
+        node = _root_node(loader, path)
     except yaml.MarkedYAMLError as fault:
         mark = fault.problem_mark or fault.context_mark
         line = mark.line + 1 if mark else 1
@@ -91,6 +103,16 @@ def parse_yaml(text: str, path: Path) -> Located:
     if node is None:
         raise SpecError(f"{path}:1: the file is empty. It needs at least the keys 'name' and 'robot'.")
     return Located(node, loader, path)
+
+
+def _root_node(loader: _Loader, path: Path) -> yaml.Node | None:
+    try:
+        return loader.get_single_node()
+    except RecursionError:
+        raise SpecError(
+            f"{path}:{loader.line + 1}: brackets or lists are nested too deeply to be read. "
+            "A sweep file needs three levels: look for brackets that are never closed."
+        ) from None
 
 
 def read_text(path: Path) -> str:

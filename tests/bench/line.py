@@ -26,12 +26,12 @@ class Line:
         """None where nothing was measured."""
         if self.measured is None:
             return None
-        return self.measured <= self.target if self.at_most else self.measured >= self.target
+        return bool(self.measured <= self.target if self.at_most else self.measured >= self.target)
 
     @property
     def distance(self) -> float | None:
         """How many times the floor, or which share of the ceiling, this is."""
-        return self.measured / self.floor if self.measured is not None and self.floor else None
+        return float(self.measured / self.floor) if self.measured is not None and self.floor else None
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""

@@ -14,9 +14,9 @@ from bns.sweep.job import warm
 from tests.bench.clock import one_core, seconds
 from tests.bench.line import Line, at_most
 
-# Operations of our formulas: a multiplication and an addition count as two, a comparison as one.
+# Operations of our formulas: a multiplication and an addition count as two, a comparison and a division as one.
 INPUT_OPS = 10  # five products and sums
-SIGMOID_OPS = 26  # two polynomials, two bounds, a quotient
+SIGMOID_OPS = 2 + 1 + 8 + 6 + 3  # bns.engine.snn.sigmoid: two bounds, x * x, p, q, and 0.5 + x * p / q
 OUTPUT_OPS = 2
 BACKWARD_OPS = 15  # error at the neuron, its slope, six sums for the inputs and the bias, one for the output
 FORWARD = INPUT_OPS + SIGMOID_OPS + OUTPUT_OPS

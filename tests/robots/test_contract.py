@@ -61,7 +61,7 @@ def test_names_and_shapes_fit_together(robot):
 
 
 def test_populations_are_of_their_key_and_within_bounds(robot):
-    one, same, other = (robot.initial_population(Key(seed, 1), 30, 50) for seed in (1, 1, 2))
+    one, same, other = (robot.initial_population(Key(seed, 1), 30, 4, 50) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.commands, same.commands)
     np.testing.assert_array_equal(one.lengths, same.lengths)
     assert not np.array_equal(one.controller(0), other.controller(0))
@@ -75,7 +75,7 @@ def test_random_controllers_are_apart_from_the_population(robot):
     assert probes.lengths.tolist() == [5] * 10
     assert (probes.commands >= robot.bounds.low).all()
     assert (probes.commands <= robot.bounds.high).all()
-    assert not np.array_equal(probes.controller(0)[:4], robot.initial_population(KEY, 10, 50).controller(0)[:4])
+    assert not np.array_equal(probes.controller(0)[:4], robot.initial_population(KEY, 10, 4, 50).controller(0)[:4])
 
 
 def test_inputs_stay_near_one_and_notice_every_component(robot):
@@ -110,7 +110,7 @@ def test_poses_and_measured_displacements_are_inverse(name, displacements):
 
 def test_score_is_what_judge_says_of_the_simulated_path(goal):
     robot, task = goal
-    weights, population = weights_of(robot), robot.initial_population(KEY, 100, 60)
+    weights, population = weights_of(robot), robot.initial_population(KEY, 100, 4, 60)
     scores = robot.score(population, weights, task)
     assert scores.fitness.shape == scores.goals_reached.shape == (100,)
     judged = []
@@ -125,7 +125,7 @@ def test_score_is_what_judge_says_of_the_simulated_path(goal):
 
 def test_a_score_does_not_depend_on_the_neighbours(goal):
     robot, task = goal
-    weights, population = weights_of(robot), robot.initial_population(KEY, 40, 60)
+    weights, population = weights_of(robot), robot.initial_population(KEY, 40, 4, 60)
     together = robot.score(population, weights, task)
     back = Population(population.commands[::-1].copy(), population.lengths[::-1].copy())
     np.testing.assert_allclose(robot.score(back, weights, task).fitness[::-1], together.fitness, rtol=1e-5)
@@ -170,7 +170,7 @@ def test_success_is_monotone_in_the_radius(goal):
 def test_networks_that_failed_are_counted_controller_by_controller(goal):
     robot, task = goal
     weights = np.full_like(weights_of(robot), np.nan)
-    scores = robot.score(robot.initial_population(KEY, 10, 50), weights, task)
+    scores = robot.score(robot.initial_population(KEY, 10, 4, 50), weights, task)
     assert scores.failures == 10
     assert scores.fitness.tolist() == [0] * 10
 

@@ -54,7 +54,7 @@ def algorithm_2(commands, weights, goals):
 @pytest.mark.parametrize("name", ["circle", "infinity", "complex"])
 def test_score_is_algorithm_2(name):
     aim, weights = load_task("khepera", name), initial_weights(Key(3, 1), 3, 20) * np.float32(0.5)
-    some = ROBOT.initial_population(Key(1, 1), 200, 40)
+    some = ROBOT.initial_population(Key(1, 1), 200, 4, 40)
     scores = ROBOT.score(some, weights, aim)
     slow = [algorithm_2(some.controller(i), weights, aim.goals_m.tolist()) for i in range(len(some))]
     # Outputs good to 5e-6, thirteen of them and the arm of a turn: a sum of distances good to about 1e-3 in 10 or more.

@@ -16,7 +16,7 @@ from bns.sweep.budget import Budget
 from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import Sweep
 from bns.sweep.order import ordered_specs
-from bns.sweep.runner import Summary, run_sweep
+from bns.sweep.runner import Summary, SweepWarning, run_sweep
 from bns.sweep.workers import LokyExecutor
 
 
@@ -73,12 +73,24 @@ def test_failed_runs_are_rows_and_redone_only_on_request(tmp_path):
     sweep = make_sweep()
     first = serial(sweep, tmp_path, fails_for_seed_0)
     assert (first.done, first.failed, first.remaining, first.stopped_by) == (4, 4, 0, None)
+    assert first.new_failed == 4
     runs = load(tmp_path, "runs", where={"status": "failed"})
     assert set(runs["error"]) == {"ValueError: seed"}
-    assert serial(sweep, tmp_path).new == 0
+    idle = serial(sweep, tmp_path)
+    assert (idle.new, idle.failed, idle.new_failed) == (0, 4, 0)
     again = serial(sweep, tmp_path, retry_failed=True)
-    assert (again.new, again.done, again.failed) == (4, 8, 0)
+    assert (again.new, again.done, again.failed, again.new_failed) == (4, 8, 0, 0)
     assert load(tmp_path)["run_id"].nunique() == 8
+
+
+def test_results_of_another_sweep_of_that_name_are_warned_of_once(tmp_path):
+    serial(make_sweep(combos=4), tmp_path, fails_for_seed_0)
+    message = r"already holds 6 finished runs of a sweep 'demo' that x\.yaml does not .* give the sweep another name"
+    with pytest.warns(SweepWarning, match=message) as caught:
+        summary = serial(make_sweep(combos=1), tmp_path)
+    assert (len(caught), caught[0].filename) == (1, __file__)
+    assert (summary.total, summary.done, summary.failed) == (2, 1, 1)
+    assert serial(make_sweep(combos=5), tmp_path).new == 2  # it describes all that is there: no warning
 
 
 def test_progress_is_told_after_each_run_that_it_is_stored(tmp_path):

@@ -2,6 +2,7 @@
 
 import io
 import math
+from pathlib import Path
 
 import pytest
 import sweep_jobs
@@ -13,7 +14,8 @@ from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import parse_sweep
 from bns.sweep.plan import plan, work
 from bns.sweep.progress import SweepProgress, describe_rate
-from bns.sweep.runner import Summary, run_sweep
+from bns.sweep.report import status_table, summed_up
+from bns.sweep.runner import Summary, SweepWarning, run_sweep
 from bns.sweep.status import sweep_status
 
 TEXT = """
@@ -61,6 +63,34 @@ def test_status_counts_by_sweep_and_task_against_the_sweep_file(tmp_path):
 def test_status_of_a_sweep_half_done(tmp_path):
     serial(sweep_of(tmp_path), tmp_path, limit=5)
     assert sum(row.remaining for row in sweep_status(tmp_path)) == 7
+
+
+def test_runs_of_an_earlier_file_of_that_name_are_counted_apart(tmp_path):
+    serial(sweep_of(tmp_path), tmp_path)
+    text = "name: demo\nrobot: khepera\nseeds: 1\nfixed: {evaluations: 3}\ngrid: {population_size: [10, 12, 13]}"
+    with pytest.warns(SweepWarning):
+        serial(parse_sweep(text, tmp_path / "y.yaml"), tmp_path, limit=0)
+    rows = sweep_status(tmp_path)
+    assert [(r.task, r.done, r.failed, r.other, r.total, r.remaining) for r in rows] == [
+        ("circle", 1, 1, 4, 3, 1),
+        ("letter-s", 0, 0, 6, 0, 0),
+    ]
+    assert rows[0].mean_wall_s == pytest.approx(1.0)
+    lines = [line.split() for line in status_table(rows).splitlines()]
+    assert lines[0][:7] == ["sweep", "task", "done", "of", "failed", "quarantined", "other"]
+    assert [line[2:7] for line in lines[1:]] == [["1", "3", "1", "0", "4"], ["0", "0", "0", "0", "6"]]
+
+
+def test_a_longer_file_of_that_name_has_no_others(tmp_path):
+    serial(sweep_of(tmp_path), tmp_path)
+    longer = parse_sweep(TEXT.format(name="demo").replace("seeds: 2", "seeds: 3"), tmp_path / "x.yaml")
+    serial(longer, tmp_path, limit=0)
+    assert [(r.done, r.failed, r.other, r.remaining) for r in sweep_status(tmp_path)] == [(4, 2, 0, 3)] * 2
+
+
+def test_question_about_failures_asks_the_folder_they_are_in(tmp_path):
+    text = summed_up(Summary("demo", 4, done=3, failed=1), Path("/data/my results"))
+    assert "bns query --results '/data/my results' \"SELECT run_id, error FROM runs WHERE sweep = 'demo'" in text
 
 
 def test_status_of_nothing_is_explained(tmp_path):

@@ -1,0 +1,94 @@
+"""SQL from outside: one SELECT over the views, which reads the results and nothing else, and writes nothing."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import duckdb
+import pyarrow as pa
+
+from bns.errors import StoreError
+from bns.store.views import pattern
+
+_PARQUET_NAME = re.compile(r"""["']([^"']+\.parquet)["']""")
+_EXPLAIN = re.compile(r"\s*EXPLAIN\s+(ANALYZE\s+)?", re.IGNORECASE)
+
+
+def answer(connection: duckdb.DuckDBPyConnection, results: Path, sql: str) -> pa.Table:
+    """The rows of ``sql`` over the views of ``connection``, which is locked to ``results`` from then on.
+
+    Of columns that share a name the second is called name_1, the third name_2, as DuckDB does in subqueries.
+
+    Raises:
+        StoreError: ``sql`` is not one SELECT (or EXPLAIN of one), or DuckDB cannot carry it out.
+        duckdb.IOException: a file went away or cannot be read.
+    """
+    try:
+        _lock(connection, results)
+        _check(connection, sql)
+        rows: pa.Table = connection.sql(sql).to_arrow_table()
+    except duckdb.IOException:
+        raise
+    except duckdb.Error as error:
+        raise StoreError(f"DuckDB cannot answer {sql!r}: {error}{damage_hint(results, error)}") from error
+    return rows.rename_columns(_distinct(rows.column_names))
+
+
+def damage_hint(results: Path, error: duckdb.Error) -> str:
+    """What to do about a damaged file, if that is what ``error`` is about; "" if not."""
+    named = [Path(name) for name in _PARQUET_NAME.findall(str(error))]
+    # What the decoder of parquet pages throws has no class of its own and names no file. A misspelled name in
+    # a statement is no damage.
+    if type(error) is duckdb.Error or any(path.is_file() and path.is_relative_to(results) for path in named):
+        return f" If a file is damaged, bns compact --results {results} moves it to set-aside/."
+    return ""
+
+
+def _lock(connection: duckdb.DuckDBPyConnection, results: Path) -> None:
+    # Last of all the lock itself: after it a statement can no longer undo the others.
+    folder = "'" + str(results).replace("'", "''") + "'"
+    for setting in (
+        "python_enable_replacements = false",
+        "autoinstall_known_extensions = false",
+        "autoload_known_extensions = false",
+        # The views name their files as patterns, and DuckDB compares letter by letter.
+        f"allowed_directories = [{folder}, {pattern(results)}]",
+        "enable_external_access = false",
+        "lock_configuration = true",
+    ):
+        connection.execute(f"SET {setting}")
+
+
+def _check(connection: duckdb.DuckDBPyConnection, sql: str) -> None:
+    """StoreError if ``sql`` is anything but one SELECT, or EXPLAIN [ANALYZE] of one."""
+    explained = _EXPLAIN.match(sql)
+    asked = sql[explained.end() :] if explained else sql
+    kinds = [statement.type for statement in connection.extract_statements(asked)]
+    if kinds != [duckdb.StatementType.SELECT]:
+        raise _refused(sql, ", ".join(kind.name for kind in kinds) or "no statement")
+    try:
+        # WITH a AS (COPY ... TO 'file') SELECT 1 is of type SELECT and writes; in a view DuckDB refuses it.
+        connection.execute(f"CREATE OR REPLACE TEMP VIEW store_asked AS {asked}")
+    except duckdb.Error:
+        connection.execute(f"EXPLAIN {asked}")  # a plain mistake is reported here, in the words of the statement
+        raise _refused(sql, "a SELECT that writes, or one that cannot be a view") from None
+    connection.execute("DROP VIEW store_asked")
+
+
+def _refused(sql: str, found: str) -> StoreError:
+    return StoreError(
+        f"{sql!r} is {found}; only SELECT is allowed: one SELECT statement, or EXPLAIN of one. "
+        'To keep the rows in a file use: bns query --csv "SELECT ..." > FILE, or bns.load and pandas.'
+    )
+
+
+def _distinct(names: list[str]) -> list[str]:
+    taken: dict[str, None] = {}
+    for name in names:
+        candidate, count = name, 0
+        while candidate in taken or (count and candidate in names):
+            count += 1
+            candidate = f"{name}_{count}"
+        taken[candidate] = None
+    return list(taken)
