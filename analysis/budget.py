@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
-from analysis.common import Drawn, NoDataError, Store, coverage, task_order, task_title, wilson
+from analysis.common import Drawn, NoDataError, Store, coverage, task_order, task_title
+from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
 from bns.plotting import note, ordered_styles, panels, style
 
 NAME = "budget"
@@ -54,12 +55,12 @@ def draw(store: Store) -> list[Drawn]:
     said = coverage(store, (SWEEP,), n)
     note(
         figure,
-        "; ".join((*said.sentences, f"{_runs_each(rows)} a point")) + ". Bars above: 95 % Wilson intervals; below: "
+        "; ".join((*said.sentences, f"{_runs_each(rows)} a point")) + f". Bars above: {INTERVALS}; below: "
         "median, 10 to 90 % of the runs.",
     )
     shows = (
         f"Above: share of runs whose fittest controller visits all goals within 7 cm at the last evaluation "
-        f"(95 % Wilson intervals). Below: CPU time of a run (median, 10 to 90 %). By generations and training "
+        f"(95 % Wilson intervals: {INDEPENDENCE}). Below: CPU time of a run (median, 10 to 90 %). By generations and training "
         f"iterations after each evaluation; {_runs_each(rows)} a point, n = {n:,} runs of {SWEEP}."
     )
     return [Drawn(NAME, figure, shows, n, (SWEEP,), said.missing)]

@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import duckdb
-import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from statsmodels.stats.proportion import proportion_confint
 
 from bns import store as results_store
 from bns.errors import BnsError, SpecError, StoreError
@@ -149,9 +147,7 @@ def comparable(store: Store, sweeps: Sequence[str]) -> Selection:
         WHERE status = 'ok' AND {among("sweep", sweeps)} AND robot = 'khepera' GROUP BY ALL
         ORDER BY n DESC, task, {", ".join(SETTING)}""")
     if groups.empty:
-        failed = failures(store, sweeps)
-        why = f"no run has finished ({failed:,} failed)" if failed else "no sweep compares mutation rates"
-        raise NoDataError(f"{why}; run {BEGIN}")
+        raise NoDataError(f"{_why_none(store, sweeps)}; run {BEGIN}")
     chosen = groups.drop_duplicates("task")
     condition = " OR ".join(f"({_equals(row)})" for row in chosen[["task", *SETTING]].to_dict("records"))
     others = groups.drop(chosen.index)
@@ -165,6 +161,16 @@ def comparable(store: Store, sweeps: Sequence[str]) -> Selection:
     return Selection(
         tuple(sweeps), f"{among('sweep', sweeps)} AND ({condition})", int(chosen.n.sum()), tuple(tasks), left_out
     )
+
+
+def _why_none(store: Store, sweeps: Sequence[str]) -> str:
+    """Why none of ``sweeps``, or of all if there are none to choose from, has a run to count."""
+    among_these = sweeps or store.query("SELECT DISTINCT sweep FROM runs").sweep.tolist()
+    finished, failed = _finished(store, among_these), failures(store, among_these)
+    if not finished:
+        return f"{counted(failed, 'run')} failed and none finished"
+    but = f", {failed:,} failed" if failed else ""
+    return f"no sweep compares mutation rates ({counted(finished, 'finished run')}{but})"
 
 
 def _equals(values: dict[str, Any]) -> str:
@@ -195,10 +201,13 @@ class Coverage:
 
 
 def coverage(store: Store, sweeps: Sequence[str], n: int | None = None) -> Coverage:
-    """What there is of ``sweeps``: ``n`` runs, by default all finished ones, of those that their files ask for."""
+    """What there is of ``sweeps``: ``n`` runs, of those that their files ask for.
+
+    By default ``n`` is all finished runs of those sweeps that have a file; runs by hand have none.
+    """
     plans = {sweep: store.plans[sweep] for sweep in sweeps if sweep in store.plans}
     whole, there = (
-        _finished(store, sweeps),
+        _finished(store, list(plans)),
         _finished_cells(store, [name for name, plan in plans.items() if plan.cells]),
     )
     n = whole if n is None else n
@@ -228,12 +237,6 @@ def _finished_cells(store: Store, sweeps: Sequence[str]) -> int:
         {", ".join(name for name in PARAMETERS if name != "seed")}
         FROM runs WHERE status = 'ok' AND {among("sweep", sweeps)})""").n[0]
     )
-
-
-def wilson(successes: Any, runs: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the Wilson 95 % interval of a share, each as the arguments, in 0..1."""
-    low, high = proportion_confint(np.asarray(successes), np.asarray(runs), alpha=0.05, method="wilson")
-    return np.asarray(low), np.asarray(high)
 
 
 def counted(n: int, noun: str) -> str:

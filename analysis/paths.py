@@ -11,25 +11,34 @@ from bns.tasks import load_task
 
 NAME = "paths"
 PAPER = "figures 4.4 to 4.6"
-SWEEP = "prototype"
+FIRST = "prototype"
+"""The sweep whose runs come first: the source's own trials."""
 MOST_PANELS = 6
 WORLD, SNN = ["x_m", "y_m", "heading_rad"], ["snn_x_m", "snn_y_m", "snn_heading_rad"]
 
 
 def last_successes(store: Store) -> pd.DataFrame:
-    """The evaluation to show of each run that has paths: its last success, or its last."""
+    """The evaluation to show of each run that has paths: its last success, or its last.
+
+    A run that several sweeps have counts once, for the first of them.
+    """
     return store.query(f"""
-        SELECT robot, task, seed, run_id, coalesce(max(evaluation) FILTER (success), max(evaluation)) AS evaluation,
-               bool_or(success) AS success
-        FROM evals SEMI JOIN (SELECT DISTINCT run_id FROM paths WHERE sweep = '{SWEEP}') USING (run_id)
-        WHERE sweep = '{SWEEP}' GROUP BY ALL ORDER BY ALL""")
+        WITH with_paths AS (SELECT run_id, coalesce(min(sweep) FILTER (sweep = '{FIRST}'), min(sweep)) AS sweep
+                            FROM paths GROUP BY run_id)
+        SELECT robot, task, sweep, seed, run_id,
+               coalesce(max(evaluation) FILTER (success), max(evaluation)) AS evaluation, bool_or(success) AS success
+        FROM evals SEMI JOIN with_paths USING (run_id, sweep)
+        GROUP BY ALL ORDER BY ALL""").sort_values("sweep", key=lambda sweep: sweep != FIRST, kind="stable")
 
 
 def poses(store: Store, shown: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Poses of the fittest controller at those evaluations, by run."""
-    which = " OR ".join(f"(run_id = '{row.run_id}' AND evaluation = {row.evaluation})" for row in shown.itertuples())
+    which = " OR ".join(
+        f"(run_id = '{row.run_id}' AND sweep = '{row.sweep}' AND evaluation = {row.evaluation})"
+        for row in shown.itertuples()
+    )
     rows = store.query(f"""SELECT run_id, {", ".join(WORLD + SNN)} FROM paths
-        WHERE sweep = '{SWEEP}' AND who = 'fittest' AND ({which}) ORDER BY run_id, step""")
+        WHERE who = 'fittest' AND ({which}) ORDER BY run_id, step""")
     return dict(iter(rows.groupby("run_id")))
 
 
@@ -37,31 +46,32 @@ def draw(store: Store) -> list[Drawn]:
     runs = last_successes(store)
     if runs.empty:
         raise NoDataError(
-            f"no finished run of the sweep {SWEEP!r} with paths; run bns sweep sweeps/{SWEEP}.yaml (record: full)"
+            f"no finished run has paths; run bns sweep sweeps/{FIRST}.yaml, or one by hand: bns run --record full"
         )
     return [_draw_task(store, robot, task, found) for (robot, task), found in runs.groupby(["robot", "task"])]
 
 
 @style()
 def _draw_task(store: Store, robot: str, task: str, runs: pd.DataFrame) -> Drawn:
-    shown = runs.head(MOST_PANELS)
+    shown, sweeps = runs.head(MOST_PANELS), tuple(runs.sweep.unique())
     walked, goals_m, radius_m = poses(store, shown), load_task(robot, task).goals_m, load_robot(robot).radii_m[0]
-    figure, axes = panels(len(shown), 3.0)
+    figure, axes = panels(len(shown), 3.5)
     for run, ax in zip(shown.itertuples(), axes[:, 0], strict=True):
         path = walked[run.run_id]
         draw_paths(ax, goals_m, radius_m, path[WORLD].to_numpy(), path[SNN].to_numpy())
-        ax.set_title(f"seed {run.seed}, evaluation {run.evaluation}:\n{outcome(run.success)}")
+        origin = f"{run.sweep},\n" if len(sweeps) > 1 else ""
+        ax.set_title(f"{origin}seed {run.seed}, evaluation {run.evaluation}:\n{outcome(run.success)}")
     frame_alike(axes[:, 0])
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     succeeded, n = int(runs.success.sum()), len(runs)
-    said = coverage(store, (SWEEP,)).missing
+    said = coverage(store, sweeps).missing
     if n > len(shown):
         said = (*said, f"{counted(n - len(shown), 'more run')} of this task not shown")
     note(figure, "; ".join((f"Task {task_title(robot, task)}: {succeeded} of {n} runs visited all goals", *said)) + ".")
     shows = (
         f"Paths of the fittest controller of each run at its last success, or at its last evaluation if it had "
-        f"none ({succeeded} of n = {n} runs of {SWEEP} had one), on task {task_title(robot, task)}. Solid: "
+        f"none ({succeeded} of n = {n} runs of {', '.join(sweeps)} had one), on task {task_title(robot, task)}. Solid: "
         f"driven; dashed: as its simulator networks saw it; dots: ends of commands; grey: goals of "
         f"{100 * radius_m:g} cm in order."
     )
-    return Drawn(f"{NAME}-{task}", figure, shows, n, (SWEEP,), said)
+    return Drawn(f"{NAME}-{task}", figure, shows, n, sweeps, said)

@@ -17,8 +17,8 @@ from analysis.common import (
     mutation_sweeps,
     percent,
     task_title,
-    wilson,
 )
+from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
 from bns.plotting import lettered, note, ordered_styles, panels, style
 
 NAME = "success-by-diversity"
@@ -123,7 +123,7 @@ def _drawn(store: Store, chosen: Selection, figure, rows: pd.DataFrame, thin: in
                 f"{counted(len(rows), 'combination')} of {each} runs",
                 *said.sentences,
                 *thinned,
-                "bars: 95 % Wilson intervals",
+                f"bars: {INTERVALS}",
             )
         )
         + ".",
@@ -132,6 +132,6 @@ def _drawn(store: Store, chosen: Selection, figure, rows: pd.DataFrame, thin: in
         f"Share of runs whose fittest controller visits all goals at the last evaluation, against the mean "
         f"diversity (equation 4.1) of their populations then; one dot a combination of population, tournament, "
         f"mutation and real-world selection ({each} runs each, n = {n:,} runs of {', '.join(chosen.sweeps)}); "
-        f"bars are 95 % Wilson intervals."
+        f"bars are 95 % Wilson intervals ({INDEPENDENCE})."
     )
     return Drawn(NAME, figure, shows, n, chosen.sweeps, (*said.missing, *thinned, *chosen.left_out))

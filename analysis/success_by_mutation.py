@@ -16,8 +16,8 @@ from analysis.common import (
     mutation_sweeps,
     percent,
     task_title,
-    wilson,
 )
+from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
 from bns.plotting import lettered, note, ordered_styles, panels, style
 
 NAME = "success-by-mutation"
@@ -50,11 +50,11 @@ def draw(store: Store) -> list[Drawn]:
     axes[0, 0].set_ylabel("successful runs, 7 cm (%)")
     said = coverage(store, chosen.sweeps, n)
     too_few = (f"{counted(thin, 'run')} in curves of fewer than {FEWEST} not drawn",) if thin else ()
-    note(figure, "; ".join((*said.sentences, *too_few, "bands: 95 % Wilson intervals")) + ".")
+    note(figure, "; ".join((*said.sentences, *too_few, f"bands: {INTERVALS}")) + ".")
     shows = (
         f"Share of runs whose fittest controller, driven in the world after each evaluation, visits all goals "
         f"within 7 cm, by mutation rate; all other parameters pooled. n = {n:,} runs of "
-        f"{', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals."
+        f"{', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals ({INDEPENDENCE})."
     )
     return [Drawn(NAME, figure, shows, n, chosen.sweeps, (*said.missing, *too_few, *chosen.left_out))]
 

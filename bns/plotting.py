@@ -80,8 +80,9 @@ def ordered_styles(count: int) -> list[dict[str, Any]]:
 
 def note(figure: Figure, text: str) -> None:
     """A line or more in grey below everything else, wrapped to the figure's width."""
+    # An empty line first: the layout leaves no more than a hair between the note and the axes' labels.
     letters = int((figure.get_figwidth() - 0.2) * 72 / (0.52 * TEXT_PT))
-    figure.supxlabel(textwrap.fill(text, letters), x=0.01, ha="left", color=GREY, fontsize=TEXT_PT)
+    figure.supxlabel("\n" + textwrap.fill(text, letters), x=0.01, ha="left", color=GREY, fontsize=TEXT_PT)
 
 
 def save(figure: Figure, stem: Path | str) -> tuple[Path, Path]:

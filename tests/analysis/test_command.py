@@ -7,7 +7,8 @@ import pytest
 from store.synthetic import failed, record
 
 from analysis.__main__ import figures, main
-from analysis.common import Store, wilson
+from analysis.common import Store
+from analysis.intervals import wilson
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store import Writer, query
@@ -87,7 +88,7 @@ def test_a_figure_without_data_is_skipped_with_one_line(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == len(figures())
     assert (
-        "success-by-mutation (figure 4.7) skipped: no run has finished (2 failed); run make sweep-khepera" in lines[-1]
+        "success-by-mutation (figure 4.7) skipped: 2 runs failed and none finished; run make sweep-khepera" in lines[-1]
     )
     assert not (tmp_path / "figures").exists()
 

@@ -6,7 +6,8 @@ from store.synthetic import failed, make_store, record
 
 from analysis import budget, paths, success_by_diversity, success_by_mutation
 from analysis.__main__ import figures
-from analysis.common import NoDataError, Store, wilson
+from analysis.common import NoDataError, Store
+from analysis.intervals import wilson
 from bns.plotting import COLUMN_IN, PAGE_IN, TEXT_PT
 from bns.spec import RunSpec
 from bns.store import Writer, load
@@ -97,6 +98,21 @@ def test_paths_show_the_last_fittest_controller_of_each_run(real_results):
     assert (x[-1], y[-1]) == (pytest.approx(100 * rows.x_m.iloc[-1]), pytest.approx(100 * rows.y_m.iloc[-1]))
 
 
+def test_paths_of_a_run_by_hand_are_shown_after_the_prototypes_and_named(tmp_path):
+    both = RunSpec(seed=0, evaluations=2, record="full")
+    others = [RunSpec(seed=seed, evaluations=2, record="full") for seed in range(1, 8)]
+    tables = ("evals", "paths")
+    written(tmp_path, "prototype", [record(both, tables)])
+    written(tmp_path, "by-hand", [record(spec, tables) for spec in (both, *others)])
+    written(tmp_path, "without", [record(RunSpec(seed=9, evaluations=2))])
+    drawn = paths.draw(Store(tmp_path))[0]
+    titles = [ax.get_title().split(", evaluation")[0] for ax in drawn.figure.axes]
+    assert titles == ["prototype,\nseed 0", *(f"by-hand,\nseed {seed}" for seed in range(1, 6))]
+    assert (drawn.n, drawn.sweeps) == (8, ("prototype", "by-hand"))
+    assert "runs of prototype, by-hand had one" in drawn.shows
+    assert "2 more runs of this task not shown" in drawn.missing
+
+
 def test_sweeps_with_a_grid_of_mutation_rates_are_pooled_and_the_same_run_counts_once(tmp_path):
     written(tmp_path, "one", [record(spec) for spec in specs(3)])
     written(tmp_path, "two", [record(spec) for spec in specs(5)])  # the first three seeds again
@@ -166,3 +182,25 @@ def test_a_store_of_one_combination_or_of_failures_alone_says_what_would_feed_a_
     for folder in ("same", "bad"):
         with pytest.raises(NoDataError, match=r"run (make sweep|bns sweep)"):
             module.draw(Store(tmp_path / folder))
+
+
+@pytest.mark.parametrize("module", [success_by_mutation, success_by_diversity])
+def test_why_there_is_nothing_to_compare_is_said(tmp_path, module):
+    one, single = RunSpec(seed=0, evaluations=4), RunSpec(seed=1, evaluations=4)
+    written(tmp_path / "bad", "bad", [failed(spec) for spec in (one, single)])  # one rate, so no comparison either
+    with pytest.raises(NoDataError, match=r"^2 runs failed and none finished; run make sweep-khepera"):
+        module.draw(Store(tmp_path / "bad"))
+    written(tmp_path / "one", "one", [record(one)])
+    with pytest.raises(NoDataError, match=r"^no sweep compares mutation rates \(1 finished run\); run make"):
+        module.draw(Store(tmp_path / "one"))
+    written(tmp_path / "one", "more", [failed(single)])
+    with pytest.raises(NoDataError, match=r"\(1 finished run, 1 failed\); run make"):
+        module.draw(Store(tmp_path / "one"))
+
+
+def test_captions_say_what_the_intervals_take_for_granted(real_results, texts):
+    store = Store(real_results)
+    for module in (success_by_mutation, success_by_diversity, budget):
+        drawn = module.draw(store)[0]
+        assert "pointwise; runs taken as independent, though combinations share their seeds" in drawn.shows
+        assert any("pointwise 95 % Wilson intervals" in text.replace("\n", " ") for text, _ in texts(drawn.figure))

@@ -50,6 +50,19 @@ def test_a_path_that_is_not_finite_is_drawn_without_an_error(texts):
     assert np.abs(ax.get_xlim()).max() < 100  # cm: the runaway simulator does not shrink the picture
 
 
+def test_a_note_leaves_room_below_the_axis_labels():
+    with plotting.style():
+        figure, axes = plotting.panels(3, 3.0)
+        for ax in axes[:, 0]:
+            ax.set(xlabel="x, east (cm)", aspect="equal")
+        plotting.note(figure, "said " * 60)
+        figure.draw_without_rendering()
+    written = figure.findobj(match=lambda one: getattr(one, "get_text", str)().startswith("\nsaid"))[0]
+    line = plotting.TEXT_PT / 72 * figure.dpi
+    top = written.get_window_extent().y1 - line  # of the first line that is not empty
+    assert min(ax.xaxis.label.get_window_extent().y0 for ax in axes[:, 0]) > top + 0.8 * line
+
+
 def test_goals_are_numbered_in_order_and_one_visited_twice_has_both_numbers(texts):
     figure = Figure()
     ax = figure.subplots()
@@ -100,15 +113,14 @@ def test_ordered_styles_differ_in_colour_line_and_marker_and_grow_lighter():
 
 def test_the_figure_of_a_run_shows_the_path_that_its_results_speak_of(tmp_path, monkeypatch, texts):
     robot, task, result = load_robot("khepera"), load_task("khepera", "circle"), run(TINY)
-    driven, simulated = plotting.fittest_poses(TINY, robot, result)
-    evals = result.tables["evals"]
-    assert robot.judge(driven[1:], task)[0] == pytest.approx(evals["fitness_world"][-1])
-    assert robot.judge(simulated[1:], task)[0] == pytest.approx(evals["fitness_simulation"][-1], rel=1e-4)
-
     drawn, save = [], plotting.save
     monkeypatch.setattr(plotting, "save", lambda figure, stem: drawn.append(figure) or save(figure, stem))
     png = plotting.path_figure(TINY, task, robot, result, tmp_path / "run")
     written = texts(drawn[0])
+    lines = {line.get_label(): line.get_xydata() for line in drawn[0].axes[0].get_lines()}
+    for label, poses in (("robot", result.world_poses), ("simulator", result.snn_poses)):
+        assert lines[label][0] == pytest.approx([0, 0])
+        assert lines[label][-1] == pytest.approx(100 * poses[-1, :2])
     assert png.read_bytes().startswith(b"\x89PNG")
     assert min(size for _, size in written) >= plotting.TEXT_PT
     assert "circle, seed 0\nevaluation 3: not all goals" in {text for text, _ in written}

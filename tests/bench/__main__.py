@@ -34,7 +34,7 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ.update(ONE_THREAD)
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, load {_load()} before the start")
     lines = [line for part in ([options.only] if options.only else PARTS) for line in _measured(part, options.quick)]
-    met = [line.met for line in lines]
+    met = [line.met for line in lines if line.target is not None]
     print(f"{met.count(True)} met, {met.count(False)} NOT met, {met.count(None)} not measured")
     if options.json:
         _write(options.json, lines, options.quick)

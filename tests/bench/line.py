@@ -10,12 +10,13 @@ from typing import Any
 class Line:
     """`measured` and `target` share a unit; at_most says on which side of the target it should be.
 
-    `floor` is the least (or, for a ratio that should be large, the most) that the machine allows, in the same unit.
+    Without a target a line informs, and is neither met nor missed. `floor` is the least (or, for a ratio that should
+    be large, the most) that the machine allows, in the same unit.
     """
 
     name: str
     measured: float | None
-    target: float
+    target: float | None
     unit: str
     at_most: bool
     floor: float | None = None
@@ -23,8 +24,8 @@ class Line:
 
     @property
     def met(self) -> bool | None:
-        """None where nothing was measured."""
-        if self.measured is None:
+        """None where nothing was measured, or nothing was wanted."""
+        if self.measured is None or self.target is None:
             return None
         return bool(self.measured <= self.target if self.at_most else self.measured >= self.target)
 
@@ -39,11 +40,11 @@ class Line:
 
     def in_words(self) -> str:
         """One row of the table."""
-        sign = "<=" if self.at_most else ">="
-        verdict = {True: "met", False: "NOT met", None: "not measured"}[self.met]
+        wanted = "no target" if self.target is None else f"{'<=' if self.at_most else '>='} {self.target:<5g}"
+        verdict = {True: "met", False: "NOT met", None: "" if self.target is None else "not measured"}[self.met]
         measured = "-" if self.measured is None else f"{self.measured:.3g}"
         told = "; ".join(part for part in (self._floor_in_words(), self.note) if part)
-        return f"{self.name:58s} {measured:>8s} {self.unit:3s} {sign} {self.target:<5g} {verdict:12s} {told}".rstrip()
+        return f"{self.name:58s} {measured:>8s} {self.unit:3s} {wanted:9s} {verdict:12s} {told}".rstrip()
 
     def _floor_in_words(self) -> str:
         if self.floor is None or self.distance is None:
@@ -58,6 +59,11 @@ def at_most(
 ) -> Line:
     """A duration or a share: less is better."""
     return Line(name, measured, target, unit, True, floor, note)
+
+
+def without_target(name: str, measured: float, unit: str, note: str = "") -> Line:
+    """To be known, not to be reached."""
+    return Line(name, measured, None, unit, True, note=note)
 
 
 def at_least(name: str, measured: float | None, target: float, floor: float | None = None, note: str = "") -> Line:
