@@ -27,13 +27,13 @@ from tests.bench.clock import alternating
 from tests.bench.line import Line, at_least, at_most, without_target
 
 JOBS = 2
-EVALUATIONS = 10
+EVALUATIONS = 45
 FOLD_AT = 16
 """Runs between two folds: eight times as often as a sweep folds by itself, so that a short one has some."""
 
 
 def sweep_of(runs: int) -> Sweep:
-    """Prototype settings, cut short: the shorter a run, the harder the test."""
+    """Prototype settings, cut to about a second a run: a fifth of a whole one, so the harder test."""
     text = f"name: bench\nrobot: khepera\nseeds: {runs}\nfixed: {{task: circle, evaluations: {EVALUATIONS}}}\n"
     return parse_sweep(text, Path("bench.yaml"))
 
