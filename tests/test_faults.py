@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +55,7 @@ def test_kernels_are_cached_elsewhere_when_the_package_cannot_be_written(tmp_pat
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     assert jit.cache_folder().parent == tmp_path / "cache" / "bns"
     monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
-    assert str(jit.cache_folder()).startswith("/tmp") or "bns-" in str(jit.cache_folder())
+    assert jit.cache_folder().parent.parent == Path(tempfile.gettempdir())
 
 
 @pytest.mark.parametrize("streams", [">&-", "2>&-", ">/dev/full"])

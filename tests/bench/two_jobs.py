@@ -66,11 +66,6 @@ class Course:
         return self.stamps[JOBS - 1], self.stamps[-JOBS]
 
     @property
-    def throughput(self) -> float:
-        """Runs a second, parts of runs included, while all workers are at work."""
-        return float((self._in_window() / self.runs["wall_s"]).sum()) / (self.window[1] - self.window[0])
-
-    @property
     def overhead(self) -> float:
         """Share of the workers' time that is not spent in runs."""
         return 1 - self._in_window().sum() / (self.window[1] - self.window[0]) / self.jobs
@@ -117,13 +112,20 @@ def hardware_ratio() -> float:
     return JOBS * taken["one"] / taken["both"]
 
 
+def ratio(one: Course, two: Course) -> float:
+    """Throughput of the workers against one worker, on the runs that both sweeps have: runs differ in length."""
+    common = one.runs.merge(two.runs, on="run_id", suffixes=("_one", "_two"))
+    slower = common["wall_s_two"].sum() / common["wall_s_one"].sum()
+    return float(two.jobs * (1 - two.overhead) / (1 - one.overhead) / slower)
+
+
 def measure(quick: bool) -> list[Line]:
     """Two workers against one on the same settings, in turn."""
     warm()
     ratios, overheads, ceilings, ends_of = [], [], [], []
     for _ in range(1 if quick else 2):
         one, two = Course(1, 8 if quick else 12), Course(JOBS, 20 if quick else 40)
-        ratios.append(two.throughput / one.throughput)
+        ratios.append(ratio(one, two))
         overheads.append(100 * two.overhead)
         ceilings.append(hardware_ratio())
         ends_of.append(start_and_end_s())
