@@ -180,8 +180,9 @@ class Khepera:
         return Scores(fitness, reached, int(failures))
 
     def judge(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
-        """Fitness per metre, and goals reached, of one path; fitness 0 if a pose is not finite."""
-        total, goal = 0.0, 0
+        """Fitness per metre, and goals reached, of one path; 0 where `score` would call the arithmetic failed."""
+        # As in `score`, the heading that a command begins with counts, not the one that the last command ends with.
+        total, goal = math.inf if np.any(np.abs(poses[:-1, 2]) > LARGEST_HEADING_RAD) else 0.0, 0
         last = len(task.goals_m) - 1
         for x, y, _ in poses:
             distance = math.hypot(*(task.goals_m[min(goal, last)] - (x, y)))
