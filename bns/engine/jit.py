@@ -12,6 +12,7 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numba
+from numba.extending import intrinsic
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _WITH_KERNELS = ("engine", "physics", "robots")
@@ -84,3 +85,15 @@ def exact(function: Callable[..., Any]) -> Any:
 def inline(function: Callable[..., Any]) -> Any:
     """A helper that disappears into the kernel that calls it, and takes its arithmetic rules."""
     return numba.njit(inline="always", error_model="numpy")(function)
+
+
+@intrinsic
+def smaller(_typing, a, b):  # type: ignore[no-untyped-def]  # compiled
+    """The smaller of two numbers, b where one of them is NaN: one instruction, where ``min`` and ``if`` are branches."""
+    return a(a, a), lambda _context, builder, _signature, ab: builder.select(builder.fcmp_ordered("<", *ab), *ab)
+
+
+@intrinsic
+def larger(_typing, a, b):  # type: ignore[no-untyped-def]  # compiled
+    """The larger of two numbers, b where one of them is NaN."""
+    return a(a, a), lambda _context, builder, _signature, ab: builder.select(builder.fcmp_ordered(">", *ab), *ab)
