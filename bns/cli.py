@@ -153,9 +153,9 @@ def _duration(text: str) -> float:
 
 
 def _say_if_compiling() -> None:
-    from bns.engine.jit import cache_folder
+    from bns.engine.jit import compiled
 
-    if sys.stderr.isatty() and not cache_folder().exists():
+    if sys.stderr.isatty() and not compiled():
         print("bns: compiling the kernels, once on this machine (about 20 s)", file=sys.stderr)
 
 
