@@ -77,7 +77,7 @@ def test_the_best_of_each_task_come_in_the_order_of_the_source(sweep, tmp_path):
 
 
 def test_equals_stand_in_the_order_of_the_file(sweep, tmp_path):
-    carried_out(sweep, tmp_path, lambda spec: values(spec))
+    carried_out(sweep, tmp_path, values)
     assert named(best(sweep, tmp_path, 2)) == [
         (task, 10, rate) for task in ("circle", "infinity") for rate in (0.1, 0.3)
     ]
@@ -118,8 +118,8 @@ def test_a_confirmation_has_the_same_runs_on_seeds_beyond_those_of_the_file(swee
 
 def test_it_is_resumed_and_listed_like_any_sweep_and_its_results_do_not_change_the_choice(sweep, tmp_path):
     carried_out(sweep, tmp_path, luck)
-    first = carried_out(confirmation(sweep, tmp_path, 2), tmp_path, lambda spec: values(spec), limit=5)
-    again = carried_out(confirmation(sweep, tmp_path, 2), tmp_path, lambda spec: values(spec))
+    first = carried_out(confirmation(sweep, tmp_path, 2), tmp_path, values, limit=5)
+    again = carried_out(confirmation(sweep, tmp_path, 2), tmp_path, values)
     assert (first.new, first.stopped_by, again.new, again.done) == (5, "limit", 11, 16)
     rows = {(row.sweep, row.task): (row.done, row.total, row.other) for row in sweep_status(tmp_path)}
     assert rows["demo-confirm", "circle"] == rows["demo-confirm", "infinity"] == (8, 8, 0)
@@ -151,13 +151,15 @@ def test_a_name_that_leaves_no_room_is_refused(sweep, tmp_path):
         confirmation(long, tmp_path, 1)
 
 
+@pytest.mark.filterwarnings("always::bns.sweep.runner.SweepWarning")
 def test_from_the_command_line_twice_and_dry(tmp_path, capsys):
     file, results = tmp_path / "little.yaml", tmp_path / "results"
     file.write_text(REAL)
     command = ["sweep", str(file), "--confirm-top", "2", "--jobs", "1", "--results", str(results)]
-    with pytest.warns(SweepWarning, match="little is confirmed when all of its runs are done"):
-        assert main([*command, "--dry-run"]) == 0
-    assert "little: 8 runs, 0 done" in capsys.readouterr().out
+    assert main([*command, "--dry-run"]) == 0
+    out, err = capsys.readouterr()
+    assert "little: 8 runs, 0 done" in out
+    assert "little is confirmed when all of its runs are done" in err
     assert main(command) == 0
     assert "little-confirm: 4 runs now, 4 of 4 done" in capsys.readouterr().err
     before = load(results)
