@@ -9,6 +9,7 @@ import sweep_jobs
 from sweep_jobs import make_sweep
 
 from bns.errors import StoreError
+from bns.store.reader import load
 from bns.store.record import RunRecord
 from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import parse_sweep
@@ -79,6 +80,16 @@ def test_runs_of_an_earlier_file_of_that_name_are_counted_apart(tmp_path):
     lines = [line.split() for line in status_table(rows).splitlines()]
     assert lines[0][:7] == ["sweep", "task", "done", "of", "failed", "quarantined", "other"]
     assert [line[2:7] for line in lines[1:]] == [["1", "3", "1", "0", "4"], ["0", "0", "0", "0", "6"]]
+
+
+def test_the_file_that_was_used_last_counts_even_if_it_was_used_before(tmp_path):
+    text = "name: demo\nrobot: khepera\nfixed: {evaluations: 3}\ngrid: {population_size: [10, 13]}"
+    first, second = sweep_of(tmp_path), parse_sweep(text, tmp_path / "y.yaml")
+    with pytest.warns(SweepWarning):
+        for file, total in ((first, 6), (second, 2), (first, 6), (second, 2)):
+            serial(file, tmp_path)
+            assert next(row.total for row in sweep_status(tmp_path) if row.task == "circle") == total
+    assert len(load(tmp_path, "specs")) == 2
 
 
 def test_a_longer_file_of_that_name_has_no_others(tmp_path):
