@@ -113,10 +113,10 @@ def described(
     runs = each(rows.runs.min(), rows.runs.max())
     note(
         figure,
-        "; ".join((f"{counted(len(rows), 'combination')} of {runs}", *said.sentences, *thinned, f"bars: {intervals}")) + ".",
+        "; ".join((f"{counted(len(rows), 'dot')} of {runs} each", *said.sentences, *thinned, f"bars: {intervals}")) + ".",
     )
     shows = (
-        f"{what}; one dot a combination of {', '.join(SHORT.values())} ({runs} each, n = {n:,} runs of "
+        f"{what}; one dot a task and combination of {', '.join(SHORT.values())} ({runs} each, n = {n:,} runs of "
         f"{', '.join(chosen.sweeps)})."
     )
     missing = (*said.missing, *thinned, *chosen.left_out)

@@ -70,5 +70,5 @@ def task_number(robot: str, task: str) -> int | None:
 
 def place(paper: str) -> tuple[float, float]:
     """Where a figure stands in the source, (4, 12) for "figures 4.12 and 5.27"; last of all what the source lacks."""
-    number = re.search(r"(\d+)\.(\d+)", paper)
+    number = re.search(r"(?:figure|table)s? (\d+)\.(\d+)", paper)
     return (float(number[1]), float(number[2])) if number else (float("inf"), 0.0)

@@ -33,6 +33,7 @@ COLUMN_IN, PAGE_IN = 3.5, 7.2
 TEXT_PT = 8
 """No text is smaller than this at those widths."""
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+BLUE, RED = OKABE_ITO[:2]
 GREY = "#555555"
 
 _SIZES = (
@@ -93,6 +94,9 @@ def save(figure: Figure, stem: Path | str) -> tuple[Path, Path]:
     """
     stem = Path(stem)
     made = []
+    with style():
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the places are found: to find them again for each file would take as long
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
         buffer, place = io.BytesIO(), stem.with_name(f"{stem.name}.{kind}")
         with style():
