@@ -13,7 +13,7 @@ from analysis.coverage import coverage
 from analysis.drawn import Drawn
 from analysis.outcomes import FEWEST, at_the_end
 from analysis.selection import Selection
-from analysis.store import BEGIN, NoDataError, Store
+from analysis.store import BEGIN, NoDataError, Store, remembered
 from analysis.words import SHORT, TITLES, counted, each, valued
 from bns.plotting import lettered, note, ordered_styles, panels, style
 
@@ -29,6 +29,7 @@ class Panel:
     rows: pd.DataFrame
 
 
+@remembered
 def combinations(store: Store, chosen: Selection) -> tuple[pd.DataFrame, int]:
     """Every combination with enough runs at its last evaluation, and how many have fewer.
 

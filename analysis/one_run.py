@@ -55,8 +55,8 @@ def _draw(store: Store, run) -> Drawn:
     shows = (
         f"One run ({run.run_id} of {run.sweep}, task {task_title(run.robot, run.task)}, seed {run.seed}, {of}). (a) Largest "
         f"fitness of each generation in simulation, and of the same controller driven in the world. (b) Distance between the "
-        f"ends of {counted(many, 'random controller')} of five commands in simulation and in the world; thick: the median. (c) How far "
-        f"those ends moved from one simulator to the next, summed over the {many}."
+        f"ends of {counted(many, 'random controller')} of five commands in simulation and in the world; thick: the median. "
+        f"(c) How far those ends moved from one simulator to the next, summed over the {many}."
     )
     return Drawn(
         f"{NAME}-{run.robot}", "One run over time", figure, shows, 1, (run.sweep,),

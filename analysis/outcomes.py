@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import pandas as pd
 
 from analysis.selection import Selection
-from analysis.store import Store
+from analysis.store import Store, remembered
 from analysis.words import CELL
 from bns.store.schema import NEAR_CM
 
@@ -29,6 +29,7 @@ def outcomes(store: Store, chosen: Selection) -> str:
     )
 
 
+@remembered
 def radii_cm(store: Store, chosen: Selection) -> tuple[int, ...]:
     """Goal radii that successes of these runs are known at; none where a task has goal regions instead of points."""
     known = store.query(f"SELECT {', '.join(f'count({name}) AS {name}' for name in NEAR)} FROM {outcomes(store, chosen)}")

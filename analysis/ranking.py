@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
 from analysis.clouds import combinations
 from analysis.outcomes import NEAR
 from analysis.selection import Selection
-from analysis.store import NoDataError, Store
+from analysis.store import NoDataError, Store, remembered
 from analysis.words import CELL, SHORT, valued
 
 TEN = 10
@@ -16,6 +18,7 @@ ORDER = ("success", *NEAR, "fitness_world")
 """Best first: success by the task's own criterion, then at each goal radius, then mean fitness of the fittest in the world."""
 
 
+@remembered
 def ranking(store: Store, chosen: Selection) -> pd.DataFrame:
     """Combinations with enough runs at their last evaluation, task by task from best to worst; ``rank`` counts from 1.
 
@@ -53,9 +56,14 @@ def any_of(cells: pd.DataFrame) -> str:
     )
 
 
-def in_words(row: object) -> str:
-    """A combination as it stands on a figure."""
-    return ", ".join(f"{SHORT[name]} {valued(name, getattr(row, name))}" for name in CELL)
+def varied(rows: pd.DataFrame) -> list[str]:
+    """Those of the four parameters that take more than one value."""
+    return [name for name in CELL if rows[name].nunique() > 1]
+
+
+def in_words(row: object, names: Sequence[str] = CELL) -> str:
+    """A combination as it stands on a figure; by default all four parameters."""
+    return ", ".join(f"{SHORT[name]} {valued(name, getattr(row, name))}" for name in names or CELL)
 
 
 def by_seed_array(rows: pd.DataFrame, value: str, column: str = "evaluation") -> tuple[np.ndarray, pd.Index]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.store import BEGIN, NoDataError, Store, among
+from analysis.store import BEGIN, NoDataError, Store, among, remembered
 from analysis.words import CELL, TITLES, counted, task_order
 
 CONFIRMING = "-confirm"
@@ -44,6 +44,7 @@ class Selection:
         )
 
 
+@remembered
 def selections(store: Store, parameter: str | None = None) -> list[Selection]:
     """One selection a robot, of the sweeps that compare ``parameter`` (by default any of the source's four).
 

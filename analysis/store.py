@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import duckdb
 import pandas as pd
@@ -18,6 +19,8 @@ from bns.sweep.grid import parse_sweep
 
 BEGIN = "make sweep-khepera BUDGET=10m"
 _TRIES = 5
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 class NoDataError(BnsError):
@@ -44,6 +47,7 @@ class Store:
     def __init__(self, results: Path | str) -> None:
         self.results = Path(results)
         self._tables: dict[str, str] = {}
+        self.memory: dict[tuple[Any, ...], Any] = {}
         written = any((self.results / name).is_dir() for name in ("runs", "journal"))
         if not written or not self.query("SELECT count(*) AS n FROM runs").n[0]:
             raise StoreError(
@@ -94,6 +98,19 @@ def _plan(text: str, runs: float) -> Plan:
         name for name in CELL if len({float(combo.get(name, FIELDS[name].default)) for combo in sweep.combos}) > 1
     }
     return Plan(sweep.total, len(sweep.combos), frozenset(varied))
+
+
+def remembered(work: Callable[Concatenate[Store, P], R]) -> Callable[Concatenate[Store, P], R]:
+    """Let what ``work`` finds in a store be found once for all figures; its other arguments must be hashable."""
+
+    @wraps(work)
+    def find(store: Store, *arguments: P.args, **named: P.kwargs) -> R:
+        key = (work, arguments, tuple(sorted(named.items())))
+        if key not in store.memory:
+            store.memory[key] = work(store, *arguments, **named)
+        return store.memory[key]
+
+    return find
 
 
 def among(column: str, values: Iterable[str]) -> str:

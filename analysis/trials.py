@@ -72,7 +72,8 @@ def _draw(store: Store, robot: str, rows: pd.DataFrame) -> Drawn:
     _dots(axes[0, 0], robot, rows, tasks)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=1)
     said, never = coverage(store, sweeps), int(rows.consistent.isna().sum())
-    note(figure, "; ".join((*said.sentences, *([f"{never} never consistent"] if never else []), "one mark a trial")) + ".")
+    not_yet = (f"{never} never {IN_A_ROW} in succession",) if never else ()
+    note(figure, "; ".join((*said.sentences, *not_yet, "one mark a trial")) + ".")
     shows = (
         f"Evaluations until success of each trial of {', '.join(sweeps)} beside the source's trials on the robot. First: the "
         f"fittest controller visits all goals. Consistent: in {IN_A_ROW} evaluations in succession (the source judged by eye). "
