@@ -129,8 +129,9 @@ def half_by(store: Store, chosen: Selection, task: str, evaluation: int) -> Chec
     (sums, evaluations), (counts, _) = (by_seed_array(rows, name) for name in ("successes_20cm", "runs"))
     first, low, high = _first_half(ratios(np.ones((1, len(sums))), sums, counts), evaluations)[0], math.nan, math.nan
     if len(sums) >= FEWEST_SEEDS:
-        low, high = np.quantile(_first_half(ratios(resampled(len(sums), DRAWS), sums, counts), evaluations), (0.025, 0.975))
-    ours = f"by evaluation {first:g}{_interval(low, high, 'g')}" if math.isfinite(first) else "never half of them"
+        drawn = _first_half(ratios(resampled(len(sums), DRAWS), sums, counts), evaluations)
+        low, high = np.quantile(drawn, (0.025, 0.975), method="inverted_cdf")  # between a number and never lies nothing
+    ours = f"by evaluation {first:g}{_interval(low, high, 'g')}".replace("inf", "never")
     claim = f"half of the best within {RADIUS_CM} cm by evaluation {evaluation}"
     return Checked(claim, ours, near(low, high, evaluation))
 

@@ -13,7 +13,7 @@ from analysis.intervals import BOOTSTRAP, bootstrap
 from analysis.outcomes import by_seed
 from analysis.ranking import any_of, by_seed_array, extremes, ranking
 from analysis.selection import Selection, selections
-from analysis.store import NoDataError, Store
+from analysis.store import BEGIN, NoDataError, Store
 from analysis.words import CELL, task_title
 from bns.plotting import BLUE, GREY, lettered, note, panels, style
 
@@ -38,9 +38,18 @@ def draw(store: Store) -> list[Drawn]:
 
 
 def curves(store: Store, chosen: Selection, task: str, cells: pd.DataFrame) -> pd.DataFrame:
-    """Of each combination, seed and evaluation from the fifth on: summed diversity and how many runs are in it."""
+    """Of each combination, seed and evaluation from the fifth on: summed diversity and how many runs are in it.
+
+    Raises:
+        NoDataError: the runs end before.
+    """
     where = f"task = '{task}' AND evaluation >= {FIRST_EVALUATION} AND ({any_of(cells)})"
-    return by_seed(store, chosen, ("evaluation", *CELL), where)
+    rows = by_seed(store, chosen, ("evaluation", *CELL), where)
+    if rows.empty:
+        raise NoDataError(
+            f"the runs of {task} end before evaluation {FIRST_EVALUATION}, when populations are still random; run {BEGIN}"
+        )
+    return rows
 
 
 @style()

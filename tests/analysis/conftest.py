@@ -15,7 +15,7 @@ MUTATION = """
 name: mutation
 robot: khepera
 seeds: 5
-fixed: {evaluations: 4, population_size: 8, generations_per_evaluation: 2, training_iterations_per_evaluation: 20}
+fixed: {evaluations: 6, population_size: 8, generations_per_evaluation: 2, training_iterations_per_evaluation: 20}
 grid: {task: [circle, complex], mutation_rate: [0.1, 0.5]}
 """
 PROTOTYPE = """
