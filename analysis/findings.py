@@ -60,7 +60,7 @@ def _check(store: Store, chosen: Selection, name: str, task: str, arguments: dic
 
 def _drawn(store: Store, chosen: Selection, table: pd.DataFrame) -> Drawn:
     said, counts = coverage(store, chosen.sweeps, chosen.n), Counter(table.verdict)
-    see = ", ".join(f"{counts[word]} {word}" for word in (AGREES, DIFFERS, UNDECIDED))
+    see = f"{counts[AGREES]} agree, {counts[DIFFERS]} differ, {counts[UNDECIDED]} are undecided"
     shows = (
         f"Each finding of the source that a number can be put to, beside the same measure of these results with its 95 % "
         f"interval (bootstrap over seeds, or Wilson). Agrees: the interval lies within 5, or a fifth of the source's value, of "

