@@ -34,7 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = _parser().parse_args(arguments)
     try:
         modules, out = _chosen(wanted.only), wanted.out or wanted.results / "figures"
-        _draw_all(modules, wanted.results, out, everything=wanted.only is None)
+        if not wanted.page:
+            _draw_all(modules, wanted.results, out, everything=wanted.only is None)
         print(f"page: {write_page(out, wanted.refresh)}")
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -51,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--only", metavar="NAME", help="one figure: " + ", ".join(figures()))
     parser.add_argument("--out", type=Path, help="folder of the figures (RESULTS/figures)")
     parser.add_argument("--refresh", type=int, metavar="S", help="let the page reload itself every S seconds")
+    parser.add_argument("--page", action="store_true", help="write the page from the figures there are; draw none")
     return parser
 
 

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.coverage import coverage
 from analysis.drawn import Drawn
-from analysis.intervals import BOOTSTRAP, bootstrap
+from analysis.intervals import BOOTSTRAP, bootstrap, ratios
 from analysis.outcomes import by_seed
 from analysis.ranking import any_of, by_seed_array, extremes, ranking
 from analysis.selection import Selection, selections
@@ -41,13 +41,13 @@ def curves(store: Store, chosen: Selection, task: str, cells: pd.DataFrame) -> p
     """Of each combination, seed and evaluation from the fifth on: summed diversity and how many runs are in it.
 
     Raises:
-        NoDataError: the runs end before.
+        NoDataError: the runs end before, or no diversity is known.
     """
     where = f"task = '{task}' AND evaluation >= {FIRST_EVALUATION} AND ({any_of(cells)})"
     rows = by_seed(store, chosen, ("evaluation", *CELL), where)
-    if rows.empty:
+    if not rows.diversities.any():
         raise NoDataError(
-            f"the runs of {task} end before evaluation {FIRST_EVALUATION}, when populations are still random; run {BEGIN}"
+            f"no run of {task} has a diversity after evaluation {FIRST_EVALUATION}, before which populations are random; run {BEGIN}"
         )
     return rows
 
@@ -93,7 +93,7 @@ def _panel(ax: Axes, rows: pd.DataFrame) -> pd.DataFrame:
         ax.plot(line.index, line.diversity / line.diversities, color=GREY, linewidth=0.6, alpha=0.7, label=label)
     (sums, evaluations), (counts, _) = (by_seed_array(rows, name) for name in ("diversity", "diversities"))
     low, high = bootstrap(sums, counts)
-    mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
+    mean = ratios(np.ones((1, len(sums))), sums, counts)[0]
     ax.fill_between(evaluations, low, high, color=BLUE, alpha=0.3, linewidth=0)
     ax.plot(evaluations, mean, color=BLUE, linewidth=2, label="their mean")
     ax.xaxis.set_major_locator(MaxNLocator(6, integer=True, steps=[1, 2, 5, 10]))

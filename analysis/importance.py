@@ -124,7 +124,7 @@ def _shares(cells: pd.DataFrame, rates: np.ndarray, names: Sequence[str], noise:
     effects, total = sums_of_squares(cells, rates, names)
     degrees = np.array([cells[name].nunique() - 1 for name in names])
     signal = (total - (len(cells) - 1) * noise)[..., None]
-    shares = np.divide(effects - degrees * noise, signal, out=np.full(effects.shape, np.nan), where=signal > 0)
+    shares = np.divide(effects - degrees * noise, signal, out=np.full(effects.shape, np.nan), where=signal > 1e-9)
     return np.clip(shares, 0, 1)
 
 

@@ -15,9 +15,11 @@ CONFIRMING = "-confirm"
 """Ending of the sweeps that rerun the best combinations of another on fresh seeds: they confirm, and compare nothing."""
 SETTING = (
     *("world", "world_digest", "training_algorithm", "evaluations", "min_commands", "max_commands"),
-    *("generations_per_evaluation", "training_iterations_per_evaluation"),
+    *("generations_per_evaluation", "training_iterations_per_evaluation", "engine"),
 )
-"""Columns of runs that must agree before runs of a robot and task are counted together."""
+"""What must agree before runs of a robot and task are counted together: columns of `RUNS`."""
+RUNS = """(SELECT *, regexp_extract(spec, '"engine_version":([0-9]+)', 1) AS engine FROM runs)"""
+"""The runs with the version of the engine, whose numbers differ from those of another, out of their specs."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Selection:
     def of(self, sweeps: Sequence[str]) -> str:
         """The same of other sweeps, at the same setting."""
         return (
-            f"SELECT run_id, min(sweep) AS sweep, any_value(evaluations) AS evaluations FROM runs "
+            f"SELECT run_id, min(sweep) AS sweep, any_value(evaluations) AS evaluations FROM {RUNS} "
             f"WHERE status = 'ok' AND {among('sweep', sweeps)} AND ({self.setting}) GROUP BY run_id"
         )
 
@@ -53,7 +55,7 @@ def selections(store: Store, parameter: str | None = None) -> list[Selection]:
     """
     sweeps = comparing(store, parameter)
     groups = store.query(f"""
-        SELECT robot, task, {", ".join(SETTING)}, count(DISTINCT run_id) AS n FROM runs
+        SELECT robot, task, {", ".join(SETTING)}, count(DISTINCT run_id) AS n FROM {RUNS}
         WHERE status = 'ok' AND {among("sweep", sweeps)} GROUP BY ALL
         ORDER BY n DESC, robot, task, {", ".join(SETTING)}""")
     if groups.empty:
@@ -80,11 +82,11 @@ def _selection(store: Store, robot: str, groups: pd.DataFrame, sweeps: Sequence[
     left_out = tuple(
         f"{counted(row.n, 'run')} of {row.task} with {row.evaluations} evaluations, "
         f"{row.generations_per_evaluation} generations and {row.training_iterations_per_evaluation} "
-        "iterations each, or of another world or other bounds, left out"
+        "iterations each, or of another world, engine or other bounds, left out"
         for row in groups.drop(chosen.index).itertuples()
     )
     tasks = tuple(sorted(chosen.task, key=lambda task: task_order(robot, task)))
-    rows = store.query(f"SELECT DISTINCT sweep FROM runs WHERE status = 'ok' AND {among('sweep', sweeps)} AND ({setting})")
+    rows = store.query(f"SELECT DISTINCT sweep FROM {RUNS} WHERE {among('sweep', sweeps)} AND status = 'ok' AND ({setting})")
     own = tuple(sweep for sweep in sweeps if sweep in set(rows.sweep))
     return Selection(robot, tasks, own, setting, int(chosen.n.sum()), left_out)
 

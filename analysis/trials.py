@@ -37,11 +37,14 @@ def draw(store: Store) -> list[Drawn]:
 
 
 def trials(store: Store) -> pd.DataFrame:
-    """Of each trial the evaluation of each of MARKS, empty where it never came, and driving minutes until the first."""
+    """Of each trial the evaluation of each of MARKS, empty where it never came, and driving minutes until the first.
+
+    Of trials with the same seed (of an older engine, say) the newest counts.
+    """
     rows = store.query(f"""
         SELECT robot, task, sweep, seed, run_id, evaluation, success, success_10cm, driven_ms
-        FROM evals SEMI JOIN (SELECT run_id, min(sweep) AS sweep FROM runs
-                              WHERE status = 'ok' AND starts_with(sweep, '{SWEEPS}') GROUP BY run_id) USING (run_id, sweep)
+        FROM evals SEMI JOIN (SELECT run_id, sweep FROM runs WHERE status = 'ok' AND starts_with(sweep, '{SWEEPS}')
+            QUALIFY row_number() OVER (PARTITION BY robot, task, seed ORDER BY started_at DESC, sweep) = 1) USING (run_id, sweep)
         ORDER BY robot, task, seed, run_id, evaluation""")
     return pd.DataFrame([_trial(one) for _, one in rows.groupby("run_id", sort=False)])
 
