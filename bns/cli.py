@@ -101,6 +101,9 @@ def _parser() -> argparse.ArgumentParser:
     ask = command("query", query, "answer an SQL query over evals, runs, specs, paths, generations, probes (DuckDB)")
     ask.add_argument("sql", metavar="SELECT ...")
     ask.add_argument("--csv", action="store_true", help="bare rows, no header")
+    look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
+    look.add_argument("results", nargs="?", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
+    look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     ready = command("precompute", precompute, "train the static simulator of a robot and write it")
     ready.add_argument("--robot", default="khepera")
@@ -240,6 +243,14 @@ def query(options: argparse.Namespace) -> int:
     else:
         print(rows.to_string(index=False, max_rows=100) if len(rows) else "no rows")
     sys.stdout.flush()
+    return 0
+
+
+def watch(options: argparse.Namespace) -> int:
+    """The page of figures, kept up to date."""
+    from bns.watch import watch as keep_drawing
+
+    keep_drawing(options.results, options.every, say=lambda text: print(f"bns: {text}", file=sys.stderr, flush=True))
     return 0
 
 
