@@ -123,7 +123,9 @@ def too_little(tracks: Tracks) -> str:
         )
     frames = np.diff(tracks.first)
     if np.median(frames) < 2:
-        return "Most trials have a single tracked pose; a displacement needs two: log the pose before and after commands."
+        return (
+            "Most trials have a single tracked pose; a displacement needs two: log the pose before and after commands."
+        )
     if not (np.abs(tracks.left_m_s) + np.abs(tracks.right_m_s) * (tracks.duration_s > 0)).any():
         return "The robot was never told to move; give it commands of different speeds."
     ends = [tracks.pose[a:b, :2] for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
@@ -183,7 +185,7 @@ def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def ties_of(found: Found) -> list[list[str]]:
-    """Groups of names that stand for each other: whichever of a group is exchanged for another, the tracks are explained as well."""
+    """Groups of names that stand for each other: exchange one of a group for another, and the tracks are explained as well."""
     groups: list[set[str]] = []
     for rival in found.rivals:
         group = set(found.accepted) ^ set(rival)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def echo(problem: Problem, fit: Fit) -> Echo:
     """How far the unforeseen repeats itself along time; foreseen well, frames are independent."""
     first, found = problem.predictor.tracks.first, []
     for direction, name in enumerate(("forward", "left", "heading")):
-        rows = [np.clip(fit.white[a + 1 : b, direction], -4, 4) for a, b in zip(first[:-1], first[1:], strict=True)]
+        rows = [np.clip(fit.white[a + 1 : b, direction], -4, 4) for a, b in pairwise(first)]
         for lag in LAGS:
             pairs = np.array([[x[lag:] @ x[:-lag], x @ x] for x in rows if len(x) > 2 * lag])
             if len(pairs) > 1 and pairs[:, 1].sum() > 0:

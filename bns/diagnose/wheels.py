@@ -76,6 +76,17 @@ class WheelPredictor:
             **{name: self._seen_on_grid(name) for name in self._seen()},
         }
 
+    def at_frames(self, frames: NDArray[np.int64]) -> dict[str, Array]:
+        """`variables` at the times of some frames, (frames,) each."""
+        rows = self.tracks.trial[frames]
+        steps = np.array(
+            [
+                np.searchsorted(self.grid.node_s[r], t + 1e-9, side="right") - 1
+                for r, t in zip(rows, self.tracks.t_s[frames], strict=True)
+            ]
+        ).clip(0, self.grid.step_s.shape[1] - 1)
+        return {name: values[rows, steps] for name, values in self.variables().items()}
+
     def _seen_on_grid(self, name: str) -> Array:
         middle, values = (self.grid.node_s[:, 1:] + self.grid.node_s[:, :-1]) / 2, self._seen()[name]
         return np.stack([_held(self.tracks, values, row, middle[row]) for row in range(len(self.tracks))])
