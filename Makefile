@@ -25,7 +25,7 @@ $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -c 'import torch' 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check "$(TORCH)+cpu" 2>/dev/null \
 		|| $(BIN)/pip install --disable-pip-version-check --index-url https://download.pytorch.org/whl/cpu "$(TORCH)"
-	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,lint,bench]'
+	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,lint,bench,cluster]'
 	@touch $@
 
 test: setup ## all tests

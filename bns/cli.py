@@ -82,9 +82,8 @@ def _parser() -> argparse.ArgumentParser:
     many.add_argument(
         "--jobs",
         type=_positive,
-        default=os.cpu_count() or 1,
         metavar="N",
-        help="worker processes (default: one a core)",
+        help="worker processes a machine (default: one a core)",
     )
     many.add_argument(
         "--budget", type=_duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
@@ -92,6 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     many.add_argument(
         "--shard", type=_shard, metavar="K/N", help="only the K-th of N shares: one command a machine, one folder for all"
     )
+    _add_cluster_options(many)
     many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
     many.add_argument(
         "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
@@ -113,6 +113,15 @@ def _parser() -> argparse.ArgumentParser:
             help="folder of all results (default: results)",
         )
     return parser
+
+
+def _add_cluster_options(parser: argparse.ArgumentParser) -> None:
+    """Where the runs are carried out."""
+    group = parser.add_argument_group("more than one machine", "see docs/cluster.md")
+    group.add_argument("--executor", default="joblib", metavar="NAME", help="joblib (default), dask or slurm")
+    group.add_argument(
+        "--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler (default: one of this machine's own)"
+    )
 
 
 def _add_spec_options(parser: argparse.ArgumentParser) -> None:
@@ -188,30 +197,34 @@ def run(options: argparse.Namespace) -> int:
 def sweep(options: argparse.Namespace) -> int:
     """Runs of sweep files, one file after the other, on one budget."""
     from bns.sweep.budget import Budget
+    from bns.sweep.executors import load_executor
     from bns.sweep.grid import load_sweep
     from bns.sweep.plan import plan
     from bns.sweep.progress import SweepProgress
     from bns.sweep.report import planned, summed_up
-    from bns.sweep.runner import run_sweep
+    from bns.sweep.request import Request
 
-    sweeps = [load_sweep(file) for file in options.files]
-    if options.dry_run:
-        for one in sweeps:
-            print(planned(plan(one, options.results, options.jobs, retry_failed=options.retry_failed), options.jobs))
-        return 0
-    _say_if_compiling()
-    budget, failed = Budget(options.budget), 0
+    sweeps, way = [load_sweep(file) for file in options.files], load_executor(options.executor)
     with SweepProgress() as bar:
+        request = Request(
+            options.results,
+            options.jobs,
+            Budget(options.budget),
+            options.retry_failed,
+            options.shard,
+            bar,
+            options.scheduler,
+        )
+        if options.dry_run:
+            place = way.place(request)
+            for one in sweeps:
+                estimate = plan(one, options.results, place.workers, retry_failed=options.retry_failed)
+                print(planned(estimate, place))
+            return 0
+        _say_if_compiling()
+        failed = 0
         for one in sweeps:
-            summary = run_sweep(
-                one,
-                options.results,
-                jobs=options.jobs,
-                budget=budget,
-                retry_failed=options.retry_failed,
-                on_progress=bar,
-                shard=options.shard,
-            )
+            summary = way.carry_out(one, request)
             print(summed_up(summary, options.results), file=sys.stderr)
             failed += summary.new_failed
             if summary.stopped_by in {"interrupt", "terminated"}:

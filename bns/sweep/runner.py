@@ -54,7 +54,7 @@ class Summary:
         return self.total - self.done - self.failed - self.quarantined
 
 
-def _silent(_summary: Summary) -> None:
+def silent(_summary: Summary) -> None:
     """Progress that nobody wants to see."""
 
 
@@ -69,7 +69,7 @@ def run_sweep(
     job: Job = run_job,
     executor: Executor | None = None,
     warm_up: Callable[[], object] | None = None,
-    on_progress: Callable[[Summary], None] = _silent,
+    on_progress: Callable[[Summary], None] = silent,
     grace_s: float = GRACE_S,
     shard: Shard | None = None,
 ) -> Summary:
