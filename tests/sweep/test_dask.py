@@ -1,9 +1,6 @@
 """Dask: real scheduler and worker processes on this machine, some of which die."""
 
 import os
-import signal
-import socket
-import subprocess
 import sys
 import time
 import types
@@ -14,48 +11,16 @@ import pytest
 import sweep_jobs
 from sweep_jobs import make_sweep
 
+pytest.importorskip("distributed")
+
+from dask_cluster import Cluster
+
 from bns.errors import ClusterError
 from bns.store import load
 from bns.sweep.dask_workers import DaskExecutor, DaskWarning
 from bns.sweep.executor import SerialExecutor
 from bns.sweep.order import ordered_specs
 from bns.sweep.runner import run_sweep
-
-pytest.importorskip("distributed")
-
-
-class Cluster:
-    """A scheduler and workers as processes; the workers come back when they are killed."""
-
-    def __init__(self, workers: int, threads: int = 1) -> None:
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
-        self._workers, self._threads = workers, threads
-        self.scheduler, self.worker = None, None
-
-    def start(self) -> None:
-        port = self.address.rsplit(":", 1)[1]
-        self.scheduler = self._process("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard", "--no-show")
-        options = "--nworkers", str(self._workers), "--nthreads", str(self._threads), "--no-dashboard"
-        self.worker = self._process("worker", self.address, *options, "--death-timeout", "60", "--memory-limit", "0")
-
-    def stop(self) -> None:
-        for process in (self.worker, self.scheduler):
-            if process is not None:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-        self.worker = self.scheduler = None
-
-    def _process(self, *arguments: str) -> subprocess.Popen:
-        path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
-        return subprocess.Popen(
-            [sys.executable, "-m", "distributed.cli.dask_" + arguments[0], *arguments[1:]],
-            env=os.environ | {"PYTHONPATH": path},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +33,8 @@ def marks(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def cluster(marks):
-    started = Cluster(2)
-    started.start()
-    yield started
-    started.stop()
+    with Cluster(2) as started:
+        yield started
 
 
 def carry_out(cluster, folder, job, sweep=None, **options):
@@ -134,18 +97,12 @@ def test_no_scheduler_is_explained():
 
 
 def test_scheduler_without_workers_is_explained():
-    empty = Cluster(0)
-    empty.start()
-    try:
-        with pytest.raises(ClusterError, match=r"no worker has joined.*dask worker tcp://"):
-            DaskExecutor(empty.address, patience_s=3).__enter__()
-    finally:
-        empty.stop()
+    with Cluster(0) as empty, pytest.raises(ClusterError, match=r"no worker has joined.*dask worker tcp://"):
+        DaskExecutor(empty.address, patience_s=3).__enter__()
 
 
 def test_killed_scheduler_is_waited_for_and_the_sweep_goes_on(tmp_path, marks):
-    cluster, stored = Cluster(1, threads=2), []
-    cluster.start()
+    stored = []
 
     def restart(summary):
         stored.append(summary.new)
@@ -153,11 +110,8 @@ def test_killed_scheduler_is_waited_for_and_the_sweep_goes_on(tmp_path, marks):
             cluster.stop()
             cluster.start()
 
-    try:
-        with pytest.warns(DaskWarning, match="more than one thread .* --nthreads 1"):
-            summary = carry_out(cluster, tmp_path, sweep_jobs.short, on_progress=restart)
-    finally:
-        cluster.stop()
+    with Cluster(1, threads=2) as cluster, pytest.warns(DaskWarning, match="more than one thread .* --nthreads 1"):
+        summary = carry_out(cluster, tmp_path, sweep_jobs.short, on_progress=restart)
     assert (summary.done, summary.new) == (8, 8)
     assert load(tmp_path, "runs")["run_id"].is_unique
     assert len(load(tmp_path)) == 8 * 3
