@@ -122,6 +122,13 @@ def _add_cluster_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler (default: one of this machine's own)"
     )
+    group.add_argument("--shards", type=_positive, metavar="N", help="jobs of the SLURM array (default: 16)")
+    group.add_argument("--time-limit", type=_duration, default=4 * 3600.0, metavar="TIME", help="time of a job (default: 4h)")
+    group.add_argument(
+        "--slurm", type=_named, action="append", default=[], metavar="NAME=VALUE", help="an option of sbatch (repeatable)"
+    )
+    group.add_argument("--try-locally", action="store_true", help="let the jobs of SLURM run on this machine")
+    group.add_argument("--wait", action="store_true", help="stay until the jobs of SLURM are done")
 
 
 def _add_spec_options(parser: argparse.ArgumentParser) -> None:
@@ -166,6 +173,13 @@ def _shard(text: str) -> Shard:
         return Shard.parse(text)
     except SpecError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _named(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, as in partition=long")
+    return name, value
 
 
 def _duration(text: str) -> float:
@@ -214,6 +228,11 @@ def sweep(options: argparse.Namespace) -> int:
             options.shard,
             bar,
             options.scheduler,
+            options.shards,
+            options.time_limit,
+            tuple(options.slurm),
+            "local" if options.try_locally else "slurm",
+            options.wait,
         )
         if options.dry_run:
             place = way.place(request)

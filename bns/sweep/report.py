@@ -40,7 +40,9 @@ def summed_up(summary: Summary, results: Path) -> str:
             f"\"SELECT run_id, error FROM runs WHERE sweep = '{summary.sweep}' AND status <> 'ok'\"; "
             "again: --retry-failed)"
         )
-    if summary.stopped_by:
+    if summary.stopped_by == "submitted":
+        text += "; the rest is queued: see squeue --me, and bns status for what is done"
+    elif summary.stopped_by:
         text += f"; stopped: {_WHY[summary.stopped_by]}; the same command goes on from here"
     return text
 

@@ -35,8 +35,8 @@ class Summary:
 
     ``new_failed`` is how many of the new ones failed or were quarantined.
 
-    ``stopped_by`` is None (nothing left to do), "budget", "limit", "interrupt" (Ctrl-C) or "terminated"
-    (SIGTERM).
+    ``stopped_by`` is None (nothing left to do), "budget", "limit", "interrupt" (Ctrl-C), "terminated"
+    (SIGTERM) or "submitted" (the rest is queued with a batch system).
     """
 
     sweep: str
