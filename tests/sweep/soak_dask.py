@@ -19,7 +19,7 @@ from bns.sweep.dask_workers import DaskExecutor
 from bns.sweep.executor import Job
 from bns.sweep.grid import Sweep, parse_sweep
 from bns.sweep.job import run_job
-from bns.sweep.runner import Summary, run_sweep
+from bns.sweep.runner import run_sweep
 
 TEXT = """
 name: soak
@@ -33,19 +33,26 @@ WANTED = 0.85
 
 @dataclass(frozen=True)
 class Stretch:
-    """What was swept at a stretch: ``timed`` runs in ``seconds``, after the first result; ``stored`` in all."""
+    """What was swept at a stretch: ``runs`` in ``seconds``, of which workers spent ``work_s`` on the stored runs."""
 
-    stored: int
-    timed: int
+    runs: int
     seconds: float
+    work_s: float
+
+    def __add__(self, other: "Stretch") -> "Stretch":
+        return Stretch(self.runs + other.runs, self.seconds + other.seconds, self.work_s + other.work_s)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """``kept`` is the rate with kills over the rate without; the rest counts kills and runs."""
+    """The rate with kills over the rate without, and the same of the workers' time that went into stored runs.
+
+    The second is the one to trust where other programs disturb the machine: a run that they slow down counts for more.
+    """
 
     kills: int
-    kept: float
+    kept_rate: float
+    kept_time: float
     counted: int
     stored: int
     twice: int
@@ -68,16 +75,17 @@ def soak(
     job: Job = run_job,
 ) -> Verdict:
     """Sweep undisturbed, with kills, and undisturbed again."""
+    warm_up = stretch(cluster, results, sweep, every_s, job, limit=2)
     before = stretch(cluster, results, sweep, undisturbed_s, job)
     with Killer(cluster.address, every_s) as killer:
         disturbed = stretch(cluster, results, sweep, disturbed_s, job)
-    after = stretch(cluster, results, sweep, undisturbed_s, job)
+    undisturbed = before + stretch(cluster, results, sweep, undisturbed_s, job)
     runs, evals = load(results, "runs"), load(results, columns=["run_id", "evaluation"])
-    undisturbed = (before.timed + after.timed) / (before.seconds + after.seconds)
     return Verdict(
         kills=killer.kills,
-        kept=disturbed.timed / disturbed.seconds / undisturbed,
-        counted=before.stored + disturbed.stored + after.stored,
+        kept_rate=disturbed.runs / disturbed.seconds / (undisturbed.runs / undisturbed.seconds),
+        kept_time=disturbed.work_s / disturbed.seconds / (undisturbed.work_s / undisturbed.seconds),
+        counted=(warm_up + undisturbed + disturbed).runs,
         stored=len(runs),
         twice=int(runs["run_id"].duplicated().sum() + evals.duplicated().sum()),
         not_ok=int((runs["status"] != "ok").sum()),
@@ -85,19 +93,18 @@ def soak(
     )
 
 
-def stretch(cluster: Cluster, results: Path, sweep: Sweep, seconds: float, job: Job) -> Stretch:
+def stretch(
+    cluster: Cluster, results: Path, sweep: Sweep, seconds: float, job: Job, limit: int | None = None
+) -> Stretch:
     """Sweep for about that long."""
-    marks: list[tuple[int, float]] = []
-
-    def note(summary: Summary) -> None:
-        if summary.new:
-            marks.append((summary.new, time.monotonic()))
-
-    executor = DaskExecutor(cluster.address, job=job)
-    run_sweep(sweep, results, job=job, executor=executor, warm_up=int, budget=Budget(seconds), on_progress=note)
-    (first, begin), (last, end) = marks[0], marks[-1]
-    print(f"{last - first} runs in {end - begin:.1f} s", file=sys.stderr, flush=True)
-    return Stretch(last, last - first, end - begin)
+    before_s = load(results, "runs")["wall_s"].sum() if results.exists() and any(results.iterdir()) else 0.0
+    executor, began = DaskExecutor(cluster.address, job=job), time.monotonic()
+    summary = run_sweep(
+        sweep, results, job=job, executor=executor, warm_up=int, budget=Budget(seconds), limit=limit
+    )
+    elapsed_s = time.monotonic() - began
+    print(f"{summary.new} runs in {elapsed_s:.1f} s", file=sys.stderr, flush=True)
+    return Stretch(summary.new, elapsed_s, load(results, "runs")["wall_s"].sum() - before_s)
 
 
 def main() -> int:
@@ -109,7 +116,7 @@ def main() -> int:
         sweep = parse_sweep(TEXT, Path("soak.yaml"))
         verdict = soak(cluster, Path(folder), sweep, 30 * options.minutes, 60 * options.minutes, options.every)
     print(json.dumps(asdict(verdict)))
-    return 0 if verdict.is_clean and verdict.kills and verdict.kept >= WANTED else 1
+    return 0 if verdict.is_clean and verdict.kills and verdict.kept_time >= WANTED else 1
 
 
 if __name__ == "__main__":
