@@ -11,14 +11,11 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from bns import __version__
+from bns.cluster_options import add_cluster_options, request_of
 from bns.errors import BnsError, SpecError
 from bns.spec import FIELDS, RunSpec, checked, field_type
-
-if TYPE_CHECKING:
-    from bns.sweep.shard import Shard
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
 _INTERRUPTED, _TERMINATED = 130, 143
@@ -88,23 +85,31 @@ def _parser() -> argparse.ArgumentParser:
     many.add_argument(
         "--budget", type=_duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
     )
-    many.add_argument(
-        "--shard", type=_shard, metavar="K/N", help="only the K-th of N shares: one command a machine, one folder for all"
-    )
-    _add_cluster_options(many)
+    add_cluster_options(many, _positive, _duration)
     many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
+    many.add_argument(
+        "--confirm-top",
+        type=_positive,
+        metavar="K",
+        help="when a sweep is done, run the K best combinations of each task again on fresh seeds, as sweep NAME-confirm",
+    )
     many.add_argument(
         "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
     )
+    costs = command("plan", plan, "what sweeps would cost on a laptop, a server and a cluster, from this machine's pace")
+    costs.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML)")
     status_ = command("status", status, "how far the sweeps in a store are")
     ask = command("query", query, "answer an SQL query over evals, runs, specs, paths, generations, probes (DuckDB)")
     ask.add_argument("sql", metavar="SELECT ...")
     ask.add_argument("--csv", action="store_true", help="bare rows, no header")
+    look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
+    look.add_argument("results", nargs="?", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
+    look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     ready = command("precompute", precompute, "train the static simulator of a robot and write it")
     ready.add_argument("--robot", default="khepera")
     ready.add_argument("-o", "--output", type=Path, metavar="FILE", help="where (default: into the package)")
-    for with_results in (one, many, status_, ask, small):
+    for with_results in (one, many, costs, status_, ask, small):
         with_results.add_argument(
             "--results",
             type=Path,
@@ -113,22 +118,6 @@ def _parser() -> argparse.ArgumentParser:
             help="folder of all results (default: results)",
         )
     return parser
-
-
-def _add_cluster_options(parser: argparse.ArgumentParser) -> None:
-    """Where the runs are carried out."""
-    group = parser.add_argument_group("more than one machine", "see docs/cluster.md")
-    group.add_argument("--executor", default="joblib", metavar="NAME", help="joblib (default), dask or slurm")
-    group.add_argument(
-        "--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler (default: one of this machine's own)"
-    )
-    group.add_argument("--shards", type=_positive, metavar="N", help="jobs of the SLURM array (default: 16)")
-    group.add_argument("--time-limit", type=_duration, default=4 * 3600.0, metavar="TIME", help="time of a job (default: 4h)")
-    group.add_argument(
-        "--slurm", type=_named, action="append", default=[], metavar="NAME=VALUE", help="an option of sbatch (repeatable)"
-    )
-    group.add_argument("--try-locally", action="store_true", help="let the jobs of SLURM run on this machine")
-    group.add_argument("--wait", action="store_true", help="stay until the jobs of SLURM are done")
 
 
 def _add_spec_options(parser: argparse.ArgumentParser) -> None:
@@ -166,22 +155,6 @@ def _positive(text: str) -> int:
     return int(text)
 
 
-def _shard(text: str) -> Shard:
-    from bns.sweep.shard import Shard
-
-    try:
-        return Shard.parse(text)
-    except SpecError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
-
-
-def _named(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not (name and equals):
-        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, as in partition=long")
-    return name, value
-
-
 def _duration(text: str) -> float:
     """Seconds of ``90``, ``90s``, ``10m``, ``1h30m``."""
     match = re.fullmatch(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?", text)
@@ -192,9 +165,9 @@ def _duration(text: str) -> float:
 
 
 def _say_if_compiling() -> None:
-    from bns.engine.jit import cache_folder
+    from bns.engine.jit import compiled
 
-    if sys.stderr.isatty() and not cache_folder().exists():
+    if sys.stderr.isatty() and not compiled():
         print("bns: compiling the kernels, once on this machine (about 20 s)", file=sys.stderr)
 
 
@@ -210,34 +183,21 @@ def run(options: argparse.Namespace) -> int:
 
 def sweep(options: argparse.Namespace) -> int:
     """Runs of sweep files, one file after the other, on one budget."""
-    from bns.sweep.budget import Budget
+    from bns.sweep.confirm import in_turn
     from bns.sweep.executors import load_executor
     from bns.sweep.grid import load_sweep
-    from bns.sweep.plan import plan
+    from bns.sweep.plan import plan as foretell
     from bns.sweep.progress import SweepProgress
     from bns.sweep.report import planned, summed_up
-    from bns.sweep.request import Request
 
-    sweeps, way = [load_sweep(file) for file in options.files], load_executor(options.executor)
+    sweeps = in_turn([load_sweep(file) for file in options.files], options.results, options.confirm_top)
+    way = load_executor(options.executor)
     with SweepProgress() as bar:
-        request = Request(
-            options.results,
-            options.jobs,
-            Budget(options.budget),
-            options.retry_failed,
-            options.shard,
-            bar,
-            options.scheduler,
-            options.shards,
-            options.time_limit,
-            tuple(options.slurm),
-            "local" if options.try_locally else "slurm",
-            options.wait,
-        )
+        request = request_of(options, bar)
         if options.dry_run:
             place = way.place(request)
             for one in sweeps:
-                estimate = plan(one, options.results, place.workers, retry_failed=options.retry_failed)
+                estimate = foretell(one, options.results, place.workers, options.shard, retry_failed=options.retry_failed)
                 print(planned(estimate, place))
             return 0
         _say_if_compiling()
@@ -249,6 +209,20 @@ def sweep(options: argparse.Namespace) -> int:
             if summary.stopped_by in {"interrupt", "terminated"}:
                 return _INTERRUPTED if summary.stopped_by == "interrupt" else _TERMINATED
     return 1 if failed else 0
+
+
+def plan(options: argparse.Namespace) -> int:
+    """A table of costs; nothing is written."""
+    from bns.sweep.cores import cores
+    from bns.sweep.cost import MACHINES, Cost, Machine, cost_table
+    from bns.sweep.grid import load_sweep
+    from bns.sweep.plan import plan as planned
+
+    plans = [planned(load_sweep(file), options.results, 1) for file in options.files]
+    here = Machine("here", 1, cores())
+    print(cost_table([Cost.of(each) for each in plans], (here, *MACHINES)))
+    print("every core as fast as one of this machine's; from " + "; ".join(f"{p.sweep}: {p.basis}" for p in plans))
+    return 0
 
 
 def status(options: argparse.Namespace) -> int:
@@ -270,6 +244,14 @@ def query(options: argparse.Namespace) -> int:
     else:
         print(rows.to_string(index=False, max_rows=100) if len(rows) else "no rows")
     sys.stdout.flush()
+    return 0
+
+
+def watch(options: argparse.Namespace) -> int:
+    """The page of figures, kept up to date."""
+    from bns.watch import watch as keep_drawing
+
+    keep_drawing(options.results, options.every, say=lambda text: print(f"bns: {text}", file=sys.stderr, flush=True))
     return 0
 
 

@@ -20,8 +20,8 @@ FLOORS = (
     {"evolver", "trainer", "recorder", "loop", "precompute"},
     {"store"},
     {"sweep"},
-    {"plotting", "single"},
-    {"cli"},
+    {"diagnose", "plotting", "single", "watch"},
+    {"cli", "cluster_options"},
     {"__main__"},
 )
 """Rooms of the package, the ground first. Rooms on one floor may use each other."""

@@ -6,6 +6,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from bns.spec import RunSpec
@@ -17,7 +18,7 @@ from bns.sweep.digests import WorldDigests
 from bns.sweep.executor import Executor, Job
 from bns.sweep.grid import Sweep
 from bns.sweep.interrupt import GRACE_S, Interrupts
-from bns.sweep.job import run_job, warm
+from bns.sweep.job import prepare, run_job
 from bns.sweep.order import ordered_specs
 from bns.sweep.shard import Shard
 from bns.sweep.workers import LokyExecutor
@@ -95,7 +96,7 @@ def run_sweep(
             ) as writer:
                 todo = course.plan(retry_failed, limit)
                 if todo and course.budget.allows_another():
-                    (warm_up or (warm if job is run_job else lambda: None))()
+                    (warm_up or (partial(prepare, todo) if job is run_job else lambda: None))()
                     with executor or LokyExecutor(jobs, job) as ready:
                         course.interrupts.arm(ready.cancel)
                         course.carry_out(iter(todo), ready, writer)
