@@ -21,7 +21,7 @@ FLOORS = (
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "single", "watch"},
-    {"measuring"},
+    {"cluster_options", "measuring"},
     {"cli"},
     {"__main__"},
 )
