@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def echo(problem: Problem, fit: Fit) -> Echo:
     """How far the unforeseen repeats itself along time; foreseen well, frames are independent."""
     first, found = problem.predictor.tracks.first, []
     for direction, name in enumerate(("forward", "left", "heading")):
-        rows = [np.clip(fit.white[a + 1 : b, direction], -4, 4) for a, b in zip(first[:-1], first[1:], strict=True)]
+        rows = [np.clip(fit.white[a + 1 : b, direction], -4, 4) for a, b in pairwise(first)]
         for lag in LAGS:
             pairs = np.array([[x[lag:] @ x[:-lag], x @ x] for x in rows if len(x) > 2 * lag])
             if len(pairs) > 1 and pairs[:, 1].sum() > 0:
@@ -116,13 +117,9 @@ def nudge(channel: str, curve: Array, heading_rad: Array) -> Effect:
 
     def apply(body: Body, size: float) -> Body:
         added = size * curve * body.moving
-        if channel == "east_m_s":
-            added_forward, added_right = added * np.cos(heading_rad), added * np.sin(heading_rad)
-        elif channel == "north_m_s":
-            added_forward, added_right = added * np.sin(heading_rad), -added * np.cos(heading_rad)
-        else:
-            return body.with_added(channel, added)
-        return body.with_added("forward_m_s", added_forward).with_added("sideways_m_s", added_right)
+        if channel in WORLD:
+            return body.with_drift(channel.removesuffix("_m_s"), added, heading_rad)
+        return body.with_added(channel, added)
 
     return Effect(
         name="nudge",

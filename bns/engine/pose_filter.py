@@ -10,6 +10,9 @@ from bns.engine.jit import exact
 Array = NDArray[np.float64]
 
 
+ASTRAY = 20.0
+ASTRAY_FRAMES = 4
+"""So many frames in a row so many standard deviations away: the filter began at a mistaken marker, and begins anew."""
 TRUSTED = 5.0
 """A frame pulls the filter no harder than one this many standard deviations away."""
 
@@ -67,8 +70,8 @@ def filter_gains(
 ) -> tuple[Array, Array, Array]:
     """An extended Kalman filter over x, y, heading, as far as it does not depend on what is seen.
 
-    ``body`` (frames, 3) is the displacement since the frame before, ``way_m`` (frames,) the way of the wheels. ``noise``: standard
-    deviations of a tracked position (m) and heading (rad), then of the drive's scatter forward, sideways (m) and of its
+    ``body`` (frames, 3) is the displacement since the frame before, ``way_m`` (frames,) the way of the wheels. ``noise``:
+    standard deviations of a tracked position (m) and heading (rad), then of the drive's scatter forward, sideways (m) and of its
     heading (rad), each per square root of a metre driven. Returns, in the robot's frame (forward, left, heading): gains
     (frames, 3, 3), inverse Cholesky factors of the innovations' covariance (frames, 3, 3), its half log determinant (frames,).
     """
@@ -137,9 +140,11 @@ def innovations(
     """
     white = np.zeros((len(pose), 3))
     x = y = th = 0.0
+    astray = 0
     for k in range(len(pose)):
-        if is_first[k]:
+        if is_first[k] or astray == ASTRAY_FRAMES:
             x, y, th = pose[k, 0], pose[k, 1], pose[k, 2]
+            astray = 0
             continue
         c, s = np.cos(th), np.sin(th)
         x += c * body[k, 0] - s * body[k, 1] + drift_m[k, 0]
@@ -153,6 +158,7 @@ def innovations(
         white[k, 1] = whiten[k, 1, 0] * e0 + whiten[k, 1, 1] * e1 + whiten[k, 1, 2] * eh
         white[k, 2] = whiten[k, 2, 2] * eh
         length = np.sqrt(white[k, 0] ** 2 + white[k, 1] ** 2 + white[k, 2] ** 2)
+        astray = astray + 1 if length > ASTRAY else 0
         if length > TRUSTED:  # a marker that jumped must not carry the filter away
             e0, e1, eh = e0 * TRUSTED / length, e1 * TRUSTED / length, eh * TRUSTED / length
         u0 = gain[k, 0, 0] * e0 + gain[k, 0, 1] * e1 + gain[k, 0, 2] * eh
