@@ -47,7 +47,7 @@ sweep-khepera: setup ## the Khepera study: prototype trials, small slice, all 45
 sweep-budget: setup ## how much evolution and training an evaluation should get
 	$(SWEEP) sweeps/budget.yaml
 
-figures: setup ## figures from whatever results there are, into results/figures; ONLY=success-by-mutation for one
+figures: setup ## page and figures of whatever results there are, into results/figures; ONLY=success-by-mutation for one
 	$(BIN)/python -m analysis --results "$(RESULTS)" $(if $(ONLY),--only "$(ONLY)")
 
 bench: setup ## speed, as ratios against named peers measured in the same run
