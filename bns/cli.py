@@ -11,10 +11,14 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bns import __version__
 from bns.errors import BnsError, SpecError
 from bns.spec import FIELDS, RunSpec, checked, field_type
+
+if TYPE_CHECKING:
+    from bns.sweep.shard import Shard
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
 _INTERRUPTED, _TERMINATED = 130, 143
@@ -85,6 +89,9 @@ def _parser() -> argparse.ArgumentParser:
     many.add_argument(
         "--budget", type=_duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
     )
+    many.add_argument(
+        "--shard", type=_shard, metavar="K/N", help="only the K-th of N shares: one command a machine, one folder for all"
+    )
     many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
     many.add_argument(
         "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
@@ -143,6 +150,15 @@ def _positive(text: str) -> int:
     return int(text)
 
 
+def _shard(text: str) -> Shard:
+    from bns.sweep.shard import Shard
+
+    try:
+        return Shard.parse(text)
+    except SpecError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
 def _duration(text: str) -> float:
     """Seconds of ``90``, ``90s``, ``10m``, ``1h30m``."""
     match = re.fullmatch(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?", text)
@@ -153,9 +169,9 @@ def _duration(text: str) -> float:
 
 
 def _say_if_compiling() -> None:
-    from bns.engine.jit import cache_folder
+    from bns.engine.jit import compiled
 
-    if sys.stderr.isatty() and not cache_folder().exists():
+    if sys.stderr.isatty() and not compiled():
         print("bns: compiling the kernels, once on this machine (about 20 s)", file=sys.stderr)
 
 
@@ -194,6 +210,7 @@ def sweep(options: argparse.Namespace) -> int:
                 budget=budget,
                 retry_failed=options.retry_failed,
                 on_progress=bar,
+                shard=options.shard,
             )
             print(summed_up(summary, options.results), file=sys.stderr)
             failed += summary.new_failed

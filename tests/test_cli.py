@@ -9,6 +9,7 @@ import pytest
 import bns as package
 from bns.cli import _duration, main
 from bns.errors import BnsError
+from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import load_sweep
 from bns.sweep.runner import run_sweep
 
@@ -78,14 +79,14 @@ def test_physics_world_answers_otherwise_than_the_substitute(tmp_path):
 
 def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
     results = tmp_path / "results"
-    plan = bns("sweep", sweep_file, "--dry-run", "--results", results)
-    assert "little: 8 runs, 0 done, 8 to do" in plan.stdout
+    assert main(["sweep", str(sweep_file), "--dry-run", "--results", str(results)]) == 0
+    assert "little: 8 runs, 0 done, 8 to do" in capsys.readouterr().out
     assert not results.exists(), "a dry run writes nothing"
     done = bns("sweep", sweep_file, "--jobs", 2, "--results", results)
     assert done.returncode == 0, done.stderr
     assert "8 runs now, 8 of 8 done" in done.stderr
-    again = bns("sweep", sweep_file, "--jobs", 1, "--results", results)
-    assert "0 runs now, 8 of 8 done" in again.stderr
+    assert main(["sweep", str(sweep_file), "--jobs", "1", "--results", str(results)]) == 0
+    assert "0 runs now, 8 of 8 done" in capsys.readouterr().err
     assert main(["status", "--results", str(results)]) == 0
     assert re.search(r"little\s+circle\s+4\s+4\s+0\s+0", capsys.readouterr().out)
     assert (
@@ -99,7 +100,7 @@ def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
 
 def test_one_and_two_jobs_and_a_resumed_sweep_give_the_same_rows(tmp_path, sweep_file):
     frames = []
-    part = run_sweep(load_sweep(sweep_file), tmp_path / "resumed", limit=3)
+    part = run_sweep(load_sweep(sweep_file), tmp_path / "resumed", limit=3, executor=SerialExecutor())
     assert 0 < part.done < part.total
     assert len(package.load(tmp_path / "resumed", "runs")) == part.done
     for name, jobs in {"one": "1", "two": "2", "resumed": "2"}.items():

@@ -90,8 +90,15 @@ class Model:
 
     def values_of(self, name: str) -> dict[str, float]:
         """The values of an effect; the neutral ones if it is switched off."""
-        found = [active.by_name for active in self.effects if active.effect.name == name]
-        return found[0] if found else effect_named(name).neutral
+        for active in self.effects:
+            if active.effect.name == name:
+                return active.by_name
+        return effect_named(name).neutral
+
+    def with_active(self, effect: Effect, values: tuple[float, ...]) -> Model:
+        """The model with an effect object at these values, listed or not; in its place by rank."""
+        others = tuple(a for a in self.effects if a.effect.name != effect.name)
+        return replace(self, effects=(*others, ActiveEffect(effect, values))).arranged()
 
     def with_effect(self, name: str, basis: str = "guess", reason: str = "", **values: float) -> Model:
         """The model with that effect switched on at these values; in its old place, else last."""
@@ -101,9 +108,24 @@ class Model:
             return replace(self, effects=(*self.effects, active))
         return replace(self, effects=tuple(active if a.effect.name == name else a for a in self.effects))
 
+    def with_values(self, values: Mapping[str, Mapping[str, float]]) -> Model:
+        """The model with other values of effects that are switched on; bounds are the caller's business."""
+        changed = tuple(
+            replace(a, values=tuple(values[a.effect.name][p.name] for p in a.effect.parameters))
+            if a.effect.name in values
+            else a
+            for a in self.effects
+        )
+        return replace(self, effects=changed)
+
+    def arranged(self) -> Model:
+        """The model with its effects in the order in which they act, by their ranks."""
+        return replace(self, effects=tuple(sorted(self.effects, key=lambda a: a.effect.rank)))
+
     def without(self, name: str) -> Model:
         """The model with that effect switched off."""
-        effect_named(name)
+        if all(a.effect.name != name for a in self.effects):
+            effect_named(name)
         return replace(self, effects=tuple(a for a in self.effects if a.effect.name != name))
 
     def canonical_json(self) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from bns.spec import RunSpec
-from bns.store.compact import bytes_per_run
+from bns.store.compaction import bytes_per_run
 from bns.store.reader import finished, load
 from bns.sweep.executor import Job
 from bns.sweep.grid import Sweep

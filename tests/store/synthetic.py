@@ -53,6 +53,11 @@ def columns(table: str, rows: int, random: np.random.Generator) -> dict[str, np.
     return made
 
 
+def _rows_each(table: str) -> int:
+    """Rows an evaluation: one, or one for each controller that is told apart."""
+    return 2 if "who" in SCHEMAS[table].names else 1
+
+
 def run_row(status: str = "ok", **values: Any) -> dict[str, Any]:
     """The runs columns that the caller of the store provides."""
     return {"status": status, "started_at": START, "wall_s": 1.5, "cpu_s": 1.25, "attempts": 1, **values}
@@ -61,9 +66,9 @@ def run_row(status: str = "ok", **values: Any) -> dict[str, Any]:
 def record(spec: RunSpec, tables: tuple[str, ...] = ("evals",), **values: Any) -> RunRecord:
     """A run that went well; its numbers depend on its spec alone."""
     random = np.random.default_rng(int(spec.run_id[1:9], 16))
-    made = {name: columns(name, spec.evaluations, random) for name in tables}
-    for one in made.values():
-        one["evaluation"] = np.arange(1, spec.evaluations + 1)
+    made = {name: columns(name, spec.evaluations * _rows_each(name), random) for name in tables}
+    for name, one in made.items():
+        one["evaluation"] = np.repeat(np.arange(1, spec.evaluations + 1), _rows_each(name))
     return RunRecord(spec, run_row(world_digest="w0", peak_memory_mib=80.0, **values), made)
 
 
