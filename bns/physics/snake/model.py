@@ -26,7 +26,7 @@ def model_xml(p: SnakeParameters) -> str:
 <mujoco model="snake">
   <compiler angle="radian"/>
   <option timestep="{p.dt_s}" integrator="implicitfast" cone="elliptic" impratio="10"/>
-  <visual><global offwidth="960" offheight="540"/><headlight ambient="0.4 0.4 0.4"/><quality shadowsize="0"/></visual>
+  <visual><global offwidth="960" offheight="544"/><headlight ambient="0.4 0.4 0.4"/><quality shadowsize="0"/></visual>
   <default>
     <joint damping="{p.damping_n_m_s_rad}" armature="{p.armature_kg_m2}" frictionloss="{p.friction_loss_n_m}"
       range="-1.745 1.745" limited="true"/>

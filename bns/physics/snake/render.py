@@ -34,8 +34,8 @@ class Film:
         """Called with every integration step; keeps every 25th of a second."""
 
         def on_step(_: mujoco.MjModel, data: mujoco.MjData) -> None:
-            if data.time >= self._next_s:
-                self._next_s = data.time + 1.0 / FRAMES_A_SECOND
+            if data.time >= self._next_s - 1e-6:
+                self._next_s += 1.0 / FRAMES_A_SECOND
                 self.frames.append(self._draw(data))
 
         return on_step
@@ -72,7 +72,7 @@ def camera(model: mujoco.MjModel) -> Draw:
 
 def _rendered(model: mujoco.MjModel) -> Draw:
     renderer, view = mujoco.Renderer(model, HEIGHT_PX, WIDTH_PX), mujoco.MjvCamera()
-    view.lookat[:], view.distance, view.azimuth, view.elevation = (0.0, 0.0, 0.0), 2.3, 90.0, -50.0
+    view.lookat[:], view.distance, view.azimuth, view.elevation = (0.0, 0.0, 0.0), 1.9, 90.0, -60.0
 
     def draw(data: mujoco.MjData) -> np.ndarray:
         renderer.update_scene(data, view)
@@ -94,7 +94,6 @@ def stick_figure(model: mujoco.MjModel) -> Draw:
         beside.plot(body[:, 0], body[:, 2], "o-", color="#444444")
         above.set(xlim=(-1.35, 1.35), ylim=(-0.925, 0.925), aspect="equal", ylabel="y, north (m)")
         beside.set(ylim=(0, 0.4), xlabel="x, east (m)", ylabel="height (m)")
-        above.set_title(f"{data.time:.1f} s")
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()

@@ -12,6 +12,15 @@ from bns.physics.snake.parameters import SnakeParameters
 TIPPED, COLLISION, STALLED, BLEW_UP = "tipped-over", "self-collision", "torque-limit", "not-finite"
 CAUSES = (TIPPED, COLLISION, STALLED, BLEW_UP)
 """Not upright; links touch; a servo sits at its torque limit; the arithmetic failed."""
+_FAILURES = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
+"""MuJoCo puts such a body back to its start and goes on: the state looks sound, only the warning tells."""
+
+# Left alone, MuJoCo writes a log file into whatever folder it is run in.
+mujoco.set_mju_user_warning(lambda _message: None)
 
 
 def mean_roll_rad(rotations: np.ndarray) -> float:
@@ -36,7 +45,7 @@ class Watch:
     def look(self, data: mujoco.MjData, elapsed_s: float) -> None:
         """Take in the state ``elapsed_s`` after the last look."""
         p = self.parameters
-        if not np.isfinite(data.qpos).all() or data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number:
+        if not np.isfinite(data.qpos).all() or any(data.warning[kind].number for kind in _FAILURES):
             self.seen.add(BLEW_UP)
             return
         if abs(mean_roll_rad(data.xmat[1:].reshape(-1, 3, 3))) > p.tipped_rad:
