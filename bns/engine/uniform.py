@@ -52,4 +52,4 @@ def mutation_moves(key: Key, shape: tuple[int, int, int], rate: float, generatio
     draws = component_draws(key, Purpose.MUTATION, generation, shape)
     mutates = draws < rate
     mutates[0] = False
-    return mutates, 2.0 * draws / max(rate, 1e-300) - 1.0
+    return mutates, np.where(mutates, 2.0 * draws / max(rate, 1e-300) - 1.0, 0.0)

@@ -64,7 +64,7 @@ def judge(observations: np.ndarray, task: Task) -> tuple[float, int, int]:
     total, goal, used = 0.0, 0, len(observations)
     half_x, half_y = task.surface_m[0] / 2, task.surface_m[1] / 2
     position = np.mean(START_M, axis=0)
-    for i, position in enumerate(middles(observations)):  # noqa: B007  # the last one counts below
+    for i, position in enumerate(middles(observations)):  # the last one counts below
         if abs(position[0]) > half_x or abs(position[1]) > half_y:
             total += PENALTY_M
         goal += int(np.abs(position - task.goals_m[goal]).max() <= task.region_m / 2)

@@ -94,7 +94,7 @@ class Snake:
         return in_full[: path.judge(self.poses(self.displacements(outputs)), task)[2]]
 
     def score(self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None) -> Scores:
-        """Mean fitness over ten noisy evaluations, all controllers of a generation under the same noise; without luck no noise."""
+        """Mean fitness over ten noisy evaluations, all controllers under the same noise; without luck there is none."""
         commands = population.commands
         n, length, _ = commands.shape
         moves = np.ascontiguousarray(
