@@ -79,13 +79,8 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
-    many.add_argument(
-        "--jobs",
-        type=_positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="worker processes (default: one a core)",
-    )
+    cores = os.cpu_count() or 1
+    many.add_argument("--jobs", type=_positive, default=cores, metavar="N", help="worker processes (default: one a core)")
     many.add_argument(
         "--budget", type=_duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
     )
@@ -94,12 +89,21 @@ def _parser() -> argparse.ArgumentParser:
     )
     many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
     many.add_argument(
+        "--confirm-top",
+        type=_positive,
+        metavar="K",
+        help="when a sweep is done, run the K best combinations of each task again on fresh seeds, as sweep NAME-confirm",
+    )
+    many.add_argument(
         "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
     )
     status_ = command("status", status, "how far the sweeps in a store are")
     ask = command("query", query, "answer an SQL query over evals, runs, specs, paths, generations, probes (DuckDB)")
     ask.add_argument("sql", metavar="SELECT ...")
     ask.add_argument("--csv", action="store_true", help="bare rows, no header")
+    look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
+    look.add_argument("results", nargs="?", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
+    look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     ready = command("precompute", precompute, "train the static simulator of a robot and write it")
     ready.add_argument("--robot", default="khepera")
@@ -188,13 +192,14 @@ def run(options: argparse.Namespace) -> int:
 def sweep(options: argparse.Namespace) -> int:
     """Runs of sweep files, one file after the other, on one budget."""
     from bns.sweep.budget import Budget
+    from bns.sweep.confirm import in_turn
     from bns.sweep.grid import load_sweep
     from bns.sweep.plan import plan
     from bns.sweep.progress import SweepProgress
     from bns.sweep.report import planned, summed_up
     from bns.sweep.runner import run_sweep
 
-    sweeps = [load_sweep(file) for file in options.files]
+    sweeps = in_turn([load_sweep(file) for file in options.files], options.results, options.confirm_top)
     if options.dry_run:
         for one in sweeps:
             print(planned(plan(one, options.results, options.jobs, retry_failed=options.retry_failed), options.jobs))
@@ -238,6 +243,14 @@ def query(options: argparse.Namespace) -> int:
     else:
         print(rows.to_string(index=False, max_rows=100) if len(rows) else "no rows")
     sys.stdout.flush()
+    return 0
+
+
+def watch(options: argparse.Namespace) -> int:
+    """The page of figures, kept up to date."""
+    from bns.watch import watch as keep_drawing
+
+    keep_drawing(options.results, options.every, say=lambda text: print(f"bns: {text}", file=sys.stderr, flush=True))
     return 0
 
 

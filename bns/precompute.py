@@ -15,6 +15,7 @@ from bns import __version__
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.rprop import Rprop
 from bns.engine.snn import INPUTS, initial_weights, predict
+from bns.refinement import refined
 from bns.robots.base import Robot
 from bns.robots.simulator import StaticSimulator
 from bns.worlds.base import World
@@ -52,6 +53,8 @@ def precompute(
     robot: Robot, world: World, seed: int = 0, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> StaticSimulator:
     """Collect, train, verify. Same seed, same numbers."""
+    if robot.recipe is not None:
+        return refined(robot, world, robot.recipe, seed, progress)
     key = Key.of_run(seed, 0, robot.name, "precompute")
     patterns = collect(robot, world, key)
     learn = ~patterns.verification

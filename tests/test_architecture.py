@@ -17,10 +17,10 @@ FLOORS = (
     {"robots"},
     {"physics"},
     {"worlds"},
-    {"evolver", "trainer", "recorder", "loop", "precompute"},
+    {"evolver", "trainer", "recorder", "loop", "precompute", "refinement"},
     {"store"},
     {"sweep"},
-    {"diagnose", "plotting", "single"},
+    {"diagnose", "plotting", "single", "watch"},
     {"cli"},
     {"__main__"},
 )

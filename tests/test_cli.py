@@ -1,14 +1,17 @@
 """The command line as a user meets it: what it prints, where it writes, how it ends."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import bns as package
 from bns.cli import _duration, main
 from bns.errors import BnsError
+from bns.robots.simulator import load_static_simulator
 from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import load_sweep
 from bns.sweep.runner import run_sweep
@@ -68,6 +71,22 @@ def test_two_runs_by_hand_of_one_spec_count_once(tmp_path, capsys):
         assert main(["run", *QUICK, "--results", str(tmp_path)]) == 0
     assert len(package.load(tmp_path)) == 2
     assert len(package.load(tmp_path, "runs")) == 1
+
+
+def test_a_run_by_hand_is_refused_beside_runs_of_another_simulator(tmp_path, capsys, monkeypatch):
+    assert main(["run", *QUICK, "--results", str(tmp_path)]) == 0
+    before = package.load(tmp_path)
+    static = load_static_simulator("khepera")
+    changed = replace(static, weights=static.weights * np.float32(1.01))
+    monkeypatch.setattr("bns.worlds.substitute.load_static_simulator", lambda _robot: changed)
+    capsys.readouterr()
+    assert main(["run", *QUICK, "--results", str(tmp_path)]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert re.search(rf"made with world {static.digest} .* now one with world {changed.digest}", captured.err)
+    pd.testing.assert_frame_equal(package.load(tmp_path), before)
+    for elsewhere in (["--world", "physics"], ["--task", "complex"]):  # nothing there to be mixed with
+        assert main(["run", *QUICK, *elsewhere, "--results", str(tmp_path)]) == 0
 
 
 def test_physics_world_answers_otherwise_than_the_substitute(tmp_path):

@@ -12,9 +12,11 @@ from bns.physics.effect import Effect, Parameter
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
 
-_SHARES = (0.003, 0.03, 0.2)
+_SHARES = (0.01, 0.1)
 """Starts of an ordinary number: these shares of the way from neutral to either end of what is plausible."""
-_LIMITS = 14
+NOTHING = 5e-3
+"""A gain of fewer trials' losses than this, over all trials, is not worth a fit: what counts is a hundred times that."""
+_LIMITS = 30
 """Starts of a number that is neutral at infinity: so many, evenly spaced on a logarithmic scale."""
 
 
@@ -25,9 +27,14 @@ def listed(model: Model, extra: Mapping[str, Effect] | None = None) -> dict[str,
     return {name: effect for name, effect in everything.items() if name not in present}
 
 
-def fit_with(problem: Problem, model: Model, effect: Effect) -> Fit:
-    """The model with that effect, all numbers fitted; from the best of the effect's starts."""
-    return problem.fit(best_start(problem, model, effect)[0])
+def fit_with(problem: Problem, base: Fit, effect: Effect) -> Fit:
+    """The model with that effect, all numbers fitted; from the best of the effect's starts.
+
+    An effect that earns next to nothing there is not followed further: the answer would be the same.
+    """
+    start, loss = best_start(problem, base.model, effect)
+    hopeless = base.loss - loss < NOTHING * base.loss / len(base.losses)
+    return problem.fit(start, rounds=0 if hopeless else None)
 
 
 def best_start(problem: Problem, model: Model, effect: Effect) -> tuple[Model, float]:

@@ -21,8 +21,8 @@ from bns.physics.effect import Parameter
 from bns.physics.model import Model
 
 _ROUNDS = 25
-_SETTLED = 1e-3
-"""A step this small, in standard errors, ends the search."""
+_SETTLED = 1e-2
+"""A step that lowers the loss by less than this ends the search: numbers are then within a tenth of their standard error."""
 
 
 @dataclass(frozen=True)
@@ -72,15 +72,18 @@ class Fit:
 class Problem:
     """Tracks, a filter that follows them, and which numbers may be fitted."""
 
-    def __init__(self, predictor: Predictor, following: Filter) -> None:
+    def __init__(self, predictor: Predictor, following: Filter, counted: Array | None = None) -> None:
+        """``counted`` (trials,): what each trial counts; 1 for all where it is not given."""
         self.predictor = predictor
         self.following = following
+        self._counted = None if counted is None else np.sqrt(counted)[predictor.tracks.trial][:, None]
         tracks = predictor.tracks
         self._trial, self._trials = tracks.trial, len(tracks)
 
     def white(self, model: Model) -> Array:
         """Whitened innovations under a model, (frames, 3)."""
-        return self.following.white(self.predictor.tracks, self.predictor.steps(model))
+        white = self.following.white(self.predictor.tracks, self.predictor.steps(model))
+        return white if self._counted is None else white * self._counted
 
     def per_trial(self, values: Array) -> Array:
         """Sums over the frames of each trial; (trials, ...)."""
@@ -109,14 +112,13 @@ class Problem:
         there = moved_by(model, free, _damped_step(curvature, gradient, 1e-9))
         return there, self.loss(there)
 
-    def fit(self, model: Model) -> Fit:
-        """Levenberg-Marquardt from the values the model has, within the bounds of every number."""
+    def fit(self, model: Model, rounds: int | None = None) -> Fit:
+        """Levenberg-Marquardt from the values the model has, within the bounds of every number; ``rounds`` 0 keeps them."""
         free = self.free(model)
         white = self.white(model)
-        loss, damping, rounds = float(huber(white).sum()), 1e-3, 0
+        loss, damping = float(huber(white).sum()), 1e-3
         jacobian = self._jacobian(model, free, white)
-        while free and rounds < _ROUNDS:
-            rounds += 1
+        for _ in range(_ROUNDS if rounds is None and free else 0):
             curvature, gradient = _normal(jacobian, white)
             moved = False
             for _ in range(8):

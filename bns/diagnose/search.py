@@ -88,13 +88,14 @@ class Search:
         self.predictor, self.model, self.tick = predictor, model.arranged(), tick
         self.jobs = min(os.cpu_count() or 1, 8)
         self.catalogue = listed(self.model, extra)
+        self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 
     def run(self) -> Found:
         """Forwards and back until nothing more is earned; then rivals of the same size."""
         problem, nominal = self._settled(self.model)
         if nominal.free:
-            problem, nominal = self._settled(nominal.model)
+            problem, nominal = self._settled(nominal.model, problem.following.noise)
         fit = nominal
         accepted: tuple[str, ...] = ()
         steps: list[Step] = []
@@ -106,18 +107,22 @@ class Search:
                 break
             accepted = (*accepted, step.taken)
             chosen = next(c for c in step.ranking if c.name == step.taken)
-            problem, fit = self._settled(chosen.fit.model)
+            problem, fit = self._settled(chosen.fit.model, problem.following.noise)
             problem, fit, accepted = self._swapped(problem, fit, accepted)
             problem, fit, accepted = self._looked_back(problem, fit, accepted)
             if frozenset(accepted) in tried:
                 break
             tried.add(frozenset(accepted))
         rivals = self._rivals(problem, fit, accepted)
-        return Found(problem, problem.fit(self.model), fit, accepted, tuple(steps), rivals)
+        simplest = min(rivals, key=lambda r: len(r[1].free), default=None)
+        if simplest is not None and len(simplest[1].free) < len(fit.free):
+            rivals = [(accepted, fit), *(r for r in rivals if r is not simplest)]
+            accepted, fit = simplest
+        return Found(problem, problem.fit(self.model), fit, accepted, tuple(steps), tuple(names for names, _ in rivals))
 
-    def _settled(self, model: Model) -> tuple[Problem, Fit]:
+    def _settled(self, model: Model, start: Array | None = None) -> tuple[Problem, Fit]:
         """Noise and numbers that belong together."""
-        problem = problem_for(self.predictor, model)
+        problem = problem_for(self.predictor, model, start)
         return problem, problem.fit(model)
 
     def _round(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> Step:
@@ -130,7 +135,7 @@ class Search:
 
     def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
         self.tick(effect.name)
-        added = fit_with(problem, fit.model, effect)
+        added = fit_with(problem, fit, effect)
         return Candidate(effect.name, added, problem.evidence(fit, added), veto_of(added, effect.name))
 
     def _earned(self, candidate: Candidate, before: Fit, bar: float) -> bool:
@@ -150,7 +155,7 @@ class Search:
             if new == accepted:
                 break
             accepted = new
-            problem, fit = self._settled(best.model)
+            problem, fit = self._settled(best.model, problem.following.noise)
         return problem, fit, accepted
 
     def _looked_back(
@@ -162,24 +167,27 @@ class Search:
             earned = problem.evidence(without, fit)
             if not self._earned(Candidate(name, fit, earned), without, 0.0):
                 accepted = tuple(a for a in accepted if a != name)
-                problem, fit = self._settled(without.model)
+                problem, fit = self._settled(without.model, problem.following.noise)
         return problem, fit, accepted
 
     def _exchanges(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
         """Every accepted effect exchanged for every other one that might do the same."""
+        if self._exchanged is not None and self._exchanged[0] is problem and self._exchanged[1] == accepted:
+            return self._exchanged[2]
         found = []
         for name in accepted:
             without = problem.fit(fit.model.without(name))
             others = [effect for other, effect in self.catalogue.items() if other not in accepted]
             fits = self._all(partial(self._in_place, problem, fit, without), others)
             found += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
+        self._exchanged = (problem, accepted, found)
         return found
 
     def _in_place(self, problem: Problem, fit: Fit, without: Fit, effect: Effect) -> Fit | None:
         if not self._might_replace(problem, fit, without, effect):
             return None
         self.tick(effect.name)
-        return fit_with(problem, without.model, effect)
+        return fit_with(problem, without, effect)
 
     def _all(self, work: Callable[[Effect], T], effects: Sequence[Effect]) -> list[T]:
         """In threads: the kernels let go of the interpreter. The order of the answers is that of the effects."""
@@ -191,17 +199,17 @@ class Search:
         worth = without.loss - fit.loss
         return without.loss - best_start(problem, without.model, effect)[1] > SCREEN * worth
 
-    def _rivals(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+    def _rivals(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[tuple[str, ...], Fit]]:
         """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one."""
-        rivals = []
+        rivals: list[tuple[tuple[str, ...], Fit]] = []
         for name, other, tried in self._exchanges(problem, fit, accepted):
             without = problem.fit(fit.model.without(name))
             worth = held_out_gain(without.held_out, fit.held_out)[0]
             lost, se = held_out_gain(tried.held_out, fit.held_out)
             alike = lost < TIE_Z * se or lost < TIE_SHARE * worth
             if alike and not veto_of(tried, other):
-                rivals.append(tuple(other if a == name else a for a in accepted))
-        return tuple(rivals)
+                rivals.append((tuple(other if a == name else a for a in accepted), tried))
+        return rivals
 
 
 def problem_for(predictor: Predictor, model: Model, start: Array | None = None) -> Problem:

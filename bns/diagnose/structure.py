@@ -116,13 +116,9 @@ def nudge(channel: str, curve: Array, heading_rad: Array) -> Effect:
 
     def apply(body: Body, size: float) -> Body:
         added = size * curve * body.moving
-        if channel == "east_m_s":
-            added_forward, added_right = added * np.cos(heading_rad), added * np.sin(heading_rad)
-        elif channel == "north_m_s":
-            added_forward, added_right = added * np.sin(heading_rad), -added * np.cos(heading_rad)
-        else:
-            return body.with_added(channel, added)
-        return body.with_added("forward_m_s", added_forward).with_added("sideways_m_s", added_right)
+        if channel in WORLD:
+            return body.with_drift(channel.removesuffix("_m_s"), added, heading_rad)
+        return body.with_added(channel, added)
 
     return Effect(
         name="nudge",

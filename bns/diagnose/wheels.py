@@ -21,7 +21,7 @@ _TAIL_S = 1.0
 class WheelPredictor:
     """Drives the commands of tracks once, and answers any model with the displacement between successive frames."""
 
-    def __init__(self, tracks: Tracks, dt_s: float = 0.02) -> None:
+    def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
         self.tracks = tracks
         tail = np.full((len(tracks), 1), _TAIL_S)
         last = np.maximum((tracks.duration_s > 0).cumsum(axis=1).argmax(axis=1), 0)
@@ -30,6 +30,7 @@ class WheelPredictor:
         right = np.hstack([tracks.right_m_s, tracks.right_m_s[rows, last][:, None]])
         self.grid = step_grid(left, right, np.hstack([tracks.duration_s, tail]), dt_s)
         self.conditions = _conditions(tracks, self.grid.node_s)
+        self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
         zero = np.zeros_like(self.grid.step_s)
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
         way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[:, 0]
@@ -38,7 +39,7 @@ class WheelPredictor:
     def steps(self, model: Model) -> Steps:
         """Displacement of the tracked point since the frame before, in the frame of the robot there."""
         grid, tracks = self.grid, self.tracks
-        body = body_motion(model, grid, self.conditions)
+        body = body_motion(model, grid, self.conditions, self._place)
         at = followed(
             grid.step_s,
             body.forward_m_s,
@@ -61,10 +62,6 @@ class WheelPredictor:
         began = np.maximum.accumulate(np.where(changed, grid.node_s[:, :-1], 0.0), axis=1)
         speed, turn = (grid.left_m_s + grid.right_m_s) / 2, grid.right_m_s - grid.left_m_s
         way = np.cumsum((np.abs(grid.left_m_s) + np.abs(grid.right_m_s)) / 2 * grid.step_s, axis=1)
-        seen = {
-            name: np.stack([_held(tracks, values, row, middle[row]) for row in range(len(tracks))])
-            for name, values in self._seen().items()
-        }
         return {
             "left_m_s": grid.left_m_s,
             "right_m_s": grid.right_m_s,
@@ -76,8 +73,12 @@ class WheelPredictor:
             "time_in_trial_s": middle,
             "session_s": tracks.start_s[:, None] + middle,
             "way_m": way,
-            **seen,
+            **{name: self._seen_on_grid(name) for name in self._seen()},
         }
+
+    def _seen_on_grid(self, name: str) -> Array:
+        middle, values = (self.grid.node_s[:, 1:] + self.grid.node_s[:, :-1]) / 2, self._seen()[name]
+        return np.stack([_held(self.tracks, values, row, middle[row]) for row in range(len(self.tracks))])
 
     def _seen(self) -> dict[str, Array]:
         tracks = self.tracks

@@ -10,6 +10,9 @@ from bns.engine.jit import exact
 Array = NDArray[np.float64]
 
 
+ASTRAY = 20.0
+ASTRAY_FRAMES = 4
+"""So many frames in a row so many standard deviations away: the filter began at a mistaken marker, and begins anew."""
 TRUSTED = 5.0
 """A frame pulls the filter no harder than one this many standard deviations away."""
 
@@ -137,9 +140,11 @@ def innovations(
     """
     white = np.zeros((len(pose), 3))
     x = y = th = 0.0
+    astray = 0
     for k in range(len(pose)):
-        if is_first[k]:
+        if is_first[k] or astray == ASTRAY_FRAMES:
             x, y, th = pose[k, 0], pose[k, 1], pose[k, 2]
+            astray = 0
             continue
         c, s = np.cos(th), np.sin(th)
         x += c * body[k, 0] - s * body[k, 1] + drift_m[k, 0]
@@ -153,6 +158,7 @@ def innovations(
         white[k, 1] = whiten[k, 1, 0] * e0 + whiten[k, 1, 1] * e1 + whiten[k, 1, 2] * eh
         white[k, 2] = whiten[k, 2, 2] * eh
         length = np.sqrt(white[k, 0] ** 2 + white[k, 1] ** 2 + white[k, 2] ** 2)
+        astray = astray + 1 if length > ASTRAY else 0
         if length > TRUSTED:  # a marker that jumped must not carry the filter away
             e0, e1, eh = e0 * TRUSTED / length, e1 * TRUSTED / length, eh * TRUSTED / length
         u0 = gain[k, 0, 0] * e0 + gain[k, 0, 1] * e1 + gain[k, 0, 2] * eh

@@ -17,6 +17,9 @@ from bns.physics.motion import arcs, body_motion, flow_of
 from bns.physics.scans import flow_along
 from bns.physics.signals import Array, Stamps, View
 
+_PLACE_ROUNDS = 4
+"""An effect that depends on the place is first driven without it, then again where that led to: each round adds a power of
+the effect's size, and a fourth power of some percent is nothing."""
 _CHUNK = 32  # trials at a time: their signals stay in the cache
 
 
@@ -100,7 +103,16 @@ def observe(poses: ArrayLike, normals: ArrayLike | None, model: Model) -> Array:
 
 def _integrate(model: Model, grid: Grid, start: Array) -> Array:
     """Poses at every node, (batch, steps + 1, 3): each step is the arc of its mean velocities."""
-    driven, flow = arcs(body_motion(model, grid), grid.step_s, start[:, 2]), flow_of(model)
+    nodes = _nodes(model, grid, start, None)
+    if any(active.effect.needs_place for active in model.effects):
+        for _ in range(_PLACE_ROUNDS):
+            nodes = _nodes(model, grid, start, (nodes[:, 1:] + nodes[:, :-1]) / 2.0)
+    return nodes
+
+
+def _nodes(model: Model, grid: Grid, start: Array, place: Array | None) -> Array:
+    driven = arcs(body_motion(model, grid, place=place), grid.step_s, start[:, 2])
+    flow = flow_of(model)
     x = flow_along(start[:, 0], driven.east_m, driven.moving_s, flow.x_m_s, flow.return_per_s)
     y = flow_along(start[:, 1], driven.north_m, driven.moving_s, flow.y_m_s, flow.return_per_s)
     return np.stack([x, y, driven.heading_rad], axis=2)

@@ -51,6 +51,9 @@ class Effect:
     rank: float = 50.0
     """Place in the chain where effects are put together by the machine: lower ranks act first."""
 
+    needs_place: bool = False
+    """Does it look at `Body.place`?"""
+
     @property
     def of_measuring(self) -> bool:
         """Is it a fault of the measuring, not of the robot?"""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,12 +25,14 @@ class Arcs:
     moving_s: Array
 
 
-def body_motion(model: Model, grid: Grid, conditions: Conditions = NO_CONDITIONS) -> Body:
-    """Velocities of the body under the model's ``wheel`` and ``body`` effects."""
+def body_motion(
+    model: Model, grid: Grid, conditions: Conditions = NO_CONDITIONS, place: Array | None = None
+) -> Body:
+    """Velocities of the body under the model's ``wheel`` and ``body`` effects; ``place`` as in `Body`."""
     wheels = Wheels(grid.step_s, grid.left_m_s, grid.right_m_s, model.wheelbase_m, conditions)
     for active in model.at("wheel"):
         wheels = active.effect.apply(wheels, **active.by_name)
-    body = _body(wheels)
+    body = replace(_body(wheels), place=place)
     for active in model.at("body"):
         body = active.effect.apply(body, **active.by_name)
     return body

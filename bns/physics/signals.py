@@ -70,10 +70,19 @@ class Body:
     left_m_s: Array
     right_m_s: Array
     session_s: Array
+    place: Array | None = None
+    """Where the robot is in each step, (batch, steps, 3): x_m, y_m, heading_rad; None while nobody knows."""
 
     def with_added(self, velocity: str, values: Array) -> Body:
         """Something added to the velocity of that name."""
         return replace(self, **{velocity: getattr(self, velocity) + values})
+
+    def with_drift(self, direction: str, values: Array, heading_rad: Array) -> Body:
+        """Something added to the velocity ``east`` or ``north`` of a robot that heads so."""
+        cos, sin = np.cos(heading_rad), np.sin(heading_rad)
+        forward, right = (cos, sin) if direction == "east" else (sin, -cos)
+        added = self.with_added("forward_m_s", values * forward)
+        return added.with_added("sideways_m_s", values * right)
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,24 @@ class Luck(NamedTuple):
     step: int
 
 
+class Recipe(NamedTuple):
+    """How a static simulator is made where random commands alone do not do: worst patterns are driven again, with variants."""
+
+    random: int
+    """Commands drawn at random, each driven by itself."""
+    worst: int
+    """Worst patterns of each network that are driven again."""
+    variants: int
+    """Further commands near each of them."""
+    evolved_worst: int
+    """Worst commands of controllers evolved on the simulator, driven again likewise."""
+    evolved_variants: int
+    iterations: int
+    """Iterations of the last training; it ends earlier where patterns that are only watched get worse."""
+    noise_sd: tuple[float, ...]
+    """Standard deviations of the substitute world, SI, a network."""
+
+
 class Robot(Protocol):
     """A robot's commands, their bounds, its networks' inputs and outputs, and its fitness.
 
@@ -40,6 +58,8 @@ class Robot(Protocol):
     input_count: int
     """Inputs that the networks have, up to five."""
     sigmoid_output: bool
+    recipe: Recipe | None
+    """None: the static simulator learns from random controllers, and its noise is that of its residuals."""
     repeats_inputs: bool
     """Whether the same inputs come up again and again, so that training gains by taking them together."""
     radii_m: tuple[float, ...]
@@ -51,6 +71,9 @@ class Robot(Protocol):
 
     def random_controllers(self, key: Key, count: int, length: int) -> Population:
         """Random controllers that all have the same number of commands."""
+
+    def near(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+        """Allowed commands (n, components) as far from these as a mutation can go."""
 
     def inputs(self, commands: np.ndarray) -> np.ndarray:
         """Normalised network inputs (inputs, n) float32 of one controller's commands (n, components)."""

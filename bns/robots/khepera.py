@@ -136,6 +136,7 @@ class Khepera:
     input_count = INPUTS
     sigmoid_output = False
     repeats_inputs = False
+    recipe = None
     radii_m = (0.07, 0.10, 0.14, 0.20)
     bounds = CommandBounds(_LOW, _HIGH, np.array([2000.0, 2000.0, 400.0], np.float32))
     command_columns = ("left_units", "right_units", "duration_ms")
@@ -150,6 +151,12 @@ class Khepera:
         u = uniforms(key, Purpose.PROBE, 0, count, length)[..., :3]
         commands = (_LOW + u * (_HIGH - _LOW)).astype(np.float32)
         return Population(commands, np.full(count, length, np.int32))
+
+    def near(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+        """Commands (n, 3), each component moved within its mutation span."""
+        u = uniforms(key, Purpose.PROBE, step, 1, len(commands))[0, :, :3]
+        moved = commands + (2 * u - 1) * self.bounds.mutation_span
+        return np.clip(moved, _LOW, _HIGH).astype(np.float32)
 
     def inputs(self, commands: np.ndarray) -> np.ndarray:
         """Inputs (5, n): previous left, previous right, left, right, duration, normalised; at rest before the first."""

@@ -143,7 +143,8 @@ class Writer:
     def _publish_spec(self) -> None:
         name = spec_hash(self._text)
         place = self.results / "specs" / f"sweep={self.sweep}" / f"spec-{name}.parquet"
-        if not name or place.exists():
+        # Beside others it is written again, with today's date: the latest file is the one that the sweep follows.
+        if not name or (place.exists() and len(list(place.parent.glob("spec-*.parquet"))) == 1):
             return
         made = provenance()
         row = {"spec_hash": [name], "written_at": [datetime.now(UTC)], "text": [self._text], "runs": [self._planned]}

@@ -16,4 +16,4 @@ class World(Protocol):
     """Changes whenever the world would answer otherwise; stored with every run."""
 
     def drive(self, commands: np.ndarray, key: Key, purpose: Purpose, step: int) -> np.ndarray:
-        """Measured poses (m, columns) of commands (n, components), m < n where the drive had to end; draws: key, purpose, step."""
+        """Measured poses (m, columns) of commands (n, components); m < n where the drive had to end."""

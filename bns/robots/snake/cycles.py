@@ -63,6 +63,12 @@ def _allowed(commands: np.ndarray) -> np.ndarray:
     return commands
 
 
+def near(commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+    """Cycles (n, 5) with every component moved at random within its mutation span."""
+    u = component_draws(key, Purpose.PROBE, step, (1, *commands.shape))[0]
+    return _allowed(_mutated(commands, np.ones(commands.shape, bool), 2 * u - 1))
+
+
 def in_full(controller: np.ndarray) -> np.ndarray:
     """The cycles of one controller (n, 5) in the order in which they are driven, every repeat a row."""
     return np.repeat(controller, controller[:, REPEATS].astype(int), axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 from bns.engine.evolution import Population, diversity
 from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import predict
-from bns.robots.base import Luck, Scores
+from bns.robots.base import Luck, Recipe, Scores
 from bns.robots.snake import cycles, path
 from bns.robots.snake.rollout import evaluate
 from bns.tasks import Task
@@ -31,6 +31,8 @@ class Snake:
     input_count = 4
     sigmoid_output = True
     repeats_inputs = True
+    recipe: Recipe | None = Recipe(400, 20, 3, 20, 4, 12_000, (0.08, 0.08, 0.08, 0.08, 0.0))
+    """Section 5.4.1; the noise of the substitute world is 8 cm on every displacement (section 5.8)."""
     radii_m: tuple[float, ...] = ()
     bounds = cycles.BOUNDS
     command_columns = cycles.COLUMNS
@@ -42,6 +44,10 @@ class Snake:
     def random_controllers(self, key: Key, count: int, length: int) -> Population:
         """Controllers of `length` random cycles, apart from every population's draws."""
         return cycles.random_cycles(key, Purpose.PROBE, 0, count, length)
+
+    def near(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+        """Cycles (n, 5), each component moved within its mutation span."""
+        return cycles.near(commands, key, step)
 
     def inputs(self, commands: np.ndarray) -> np.ndarray:
         """Inputs (5, n): A_lat, A_vert, ω, α, each from -1 to 1, and one that is not used."""
