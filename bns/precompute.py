@@ -110,9 +110,9 @@ def describe(simulator: StaticSimulator) -> str:
     ]
     for name, noise in zip(simulator.networks, simulator.noise_sd, strict=True):
         got = made["accuracy"][name]
-        unit = "rad" if name == "dtheta" else "m"
+        unit = {"dtheta": " rad", "stable": ""}.get(name, " m")
         lines.append(
-            f"  {name:7s} R² {got['r2']:.4f}  slope {got['slope']:.4f}  RMSE {got['rmse']:.5f} {unit}  "
-            f"bias {got['bias']:+.5f} {unit}  noise of the substitute world {noise:.5f} {unit}"
+            f"  {name:9s} R² {got['r2']:.4f}  slope {got['slope']:.4f}  RMSE {got['rmse']:.5f}{unit}  "
+            f"bias {got['bias']:+.5f}{unit}  noise of the substitute world {noise:.5f}{unit}"
         )
     return "\n".join(lines)

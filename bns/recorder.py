@@ -44,7 +44,7 @@ class Recorder:
 
     def __init__(self, robot: Robot, task: Task, world: World, key: Key, spec: RunSpec) -> None:
         self._robot, self._task, self._world, self._key = robot, task, world, key
-        self._full = spec.record == "full"
+        self._full, self._with_paths = spec.record == "full", spec.record in {"paths", "full"}
         self._evals, self._paths, self._generations, self._probe_rows = (_Columns() for _ in range(4))
         self.last_poses = self.last_simulated = robot.start_pose()[:0]
         self._ever: dict[str, bool | None] = {}
@@ -70,7 +70,7 @@ class Recorder:
             "commands": len(poses),
             "driven_ms": self._robot.driven_ms(controller[: len(poses)]),
         } | self._successes("evaluated_success", poses)
-        if self._full:
+        if self._with_paths:
             self._add_path(evaluation, "evaluated", controller, poses, simulated)
         return poses
 
@@ -93,8 +93,10 @@ class Recorder:
             # None stays None: where there is no distance to a goal, nothing has ever come within one.
             self._ever["ever_" + name] = value if value is None else self._ever.get("ever_" + name, False) or value
         training_error, validation_error = trainer.errors()
+        if self._with_paths:
+            self._add_path(evaluation, "fittest", fittest, poses, self.last_simulated)
         if self._full:
-            self._record_full(evaluation, fittest, poses, evolver, weights)
+            self._record_full(evaluation, evolver, weights)
         return self._evals.add(
             evaluation=evaluation,
             diversity=evolver.diversity(),
@@ -123,12 +125,11 @@ class Recorder:
     def tables(self) -> dict[str, dict[str, np.ndarray]]:
         """Everything kept, table by table."""
         found = {"evals": self._evals.arrays()}
-        if self._full:
-            found |= {
-                "paths": self._paths.arrays(),
-                "generations": self._generations.arrays(),
-                "probes": self._probe_rows.arrays(),
-            }
+        found |= {
+            "paths": self._paths.arrays(),
+            "generations": self._generations.arrays(),
+            "probes": self._probe_rows.arrays(),
+        }
         return {name: columns for name, columns in found.items() if columns}
 
     def _drive(self, controller: np.ndarray, purpose: Purpose, step: int) -> np.ndarray:
@@ -143,10 +144,7 @@ class Recorder:
         by_radius = {f"{prefix}_{cm}cm": ok for cm, ok in zip(RADII_CM, within, strict=True)}
         return {prefix: self._robot.succeeded(poses, self._task)} | by_radius
 
-    def _record_full(
-        self, evaluation: int, fittest: np.ndarray, poses: np.ndarray, evolver: Evolver, weights: np.ndarray
-    ) -> None:
-        self._add_path(evaluation, "fittest", fittest, poses, self.last_simulated)
+    def _record_full(self, evaluation: int, evolver: Evolver, weights: np.ndarray) -> None:
         for generation in evolver.history:
             best = self._robot.plan(generation.best, weights, self._task)
             driven = self._drive(best, Purpose.WORLD_GENERATION, generation.number)

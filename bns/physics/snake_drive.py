@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from bns.engine.philox import Key, Purpose, normals
@@ -49,6 +51,25 @@ class SnakePhysics:
             if ENDING & set(driven.causes):
                 break
         return np.array(rows).reshape(-1, 9)
+
+    def render(self, commands: np.ndarray, picture: Path) -> None:
+        """Drive these cycles once more, on a floor of even friction, and write .mp4 or .png."""
+        from bns.physics.snake.render import Film  # noqa: PLC0415  # pictures need libraries that driving does not
+
+        self._body.lay_straight(START_M, START_HEADING_RAD)
+        self._body.set_friction(1.0)
+        film = Film(self._body.model)
+        for cycle in commands[:, :4].astype(np.float64):
+            if ENDING & set(self._body.drive_cycle(cycle, film.take).causes):
+                break
+        film.save(picture)
+
+    @staticmethod
+    def check_picture(picture: Path) -> None:
+        """ModelError for a file that `render` cannot write."""
+        from bns.physics.snake.render import check_ending  # noqa: PLC0415
+
+        check_ending(picture)
 
     def _seen(self, driven: Driven, noise_before: np.ndarray, noise_after: np.ndarray) -> np.ndarray:
         sigma = self._parameters.marker_noise_m
