@@ -17,7 +17,7 @@ FLOORS = (
     {"robots"},
     {"physics"},
     {"worlds"},
-    {"evolver", "trainer", "recorder", "loop", "precompute"},
+    {"evolver", "trainer", "recorder", "loop", "precompute", "refinement"},
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "single", "watch"},
