@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.engine.philox import Key, Purpose, normals
+from bns.errors import ModelError
 from bns.physics.snake.body import Body, Driven, OnStep
 from bns.physics.snake.parameters import SnakeParameters, shipped_parameters
 from bns.physics.snake.stability import BLEW_UP, TIPPED
