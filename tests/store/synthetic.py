@@ -88,13 +88,16 @@ def make_store(
     """A store of ``runs`` runs in folded files, as a finished study leaves it (75,000 runs take a minute)."""
     random, made = np.random.default_rng(seed), list(specs(runs, evaluations))
     for number, start in enumerate(range(0, runs, runs_per_file)):
-        _publish(path, sweep, f"part-j{number:032x}-0", made[start : start + runs_per_file], random)
+        publish_chunk(path, sweep, f"part-j{number:032x}-0", made[start : start + runs_per_file], random)
     return made
 
 
-def _publish(path: Path, sweep: str, part: str, chunk: list[RunSpec], random: np.random.Generator) -> None:
+def publish_chunk(
+    path: Path, sweep: str, part: str, chunk: list[RunSpec], random: np.random.Generator, **own: np.ndarray
+) -> None:
+    """One file a table with the runs of ``chunk``, all of one task; ``own`` are columns of evals that are not random."""
     evaluations = chunk[0].evaluations
-    evals = columns("evals", evaluations * len(chunk), random)
+    evals = columns("evals", evaluations * len(chunk), random) | own
     evals["evaluation"] = np.tile(np.arange(1, evaluations + 1), len(chunk))
     rows = {
         "error": None,
