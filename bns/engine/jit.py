@@ -62,7 +62,7 @@ def _mark(robot: str, world: str) -> Path:
 
 
 def compiled(robot: str, world: str) -> bool:
-    """Whether the kernels that this robot needs in this world, as they now stand, were compiled on this machine and lie on its disk."""
+    """Whether the kernels of this robot in this world, as they now stand, were compiled on this machine and lie on its disk."""
     return _mark(robot, world).exists()
 
 
