@@ -232,7 +232,7 @@ def innovations(
         moved = np.array([cos * body[k, 0] - sin * body[k, 1], sin * body[k, 0] + cos * body[k, 1]])
         change = np.eye(3)
         change[:2, 2] = -moved[1], moved[0]
-        state = state + [*(moved + drift_m[k]), body[k, 2]]
+        state = state + np.append(moved + drift_m[k], body[k, 2])
         cos, sin = np.cos(state[2]), np.sin(state[2])
         turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
         drive = turn @ np.diag(noise[2:] ** 2 * way_m[k]) @ turn.T
