@@ -1,15 +1,15 @@
 """Which answers are right, worked out from what a set of effects does to poses, never from what the product says.
 
-An answer is a verdict with explanations (sets of effects that are said to explain the data equally well). It is right when it holds
-every `required` explanation and none beyond `required` and `allowed`.
+An answer is a verdict with explanations (sets of effects that are said to explain the data equally well). It is right when
+it holds every `required` explanation and none beyond `required` and `allowed`.
 
 Exact equivalences, seen from outside (open loop, the robot at rest before its first command):
 * A command that acts d late moves every path by d, and so does a clock that stamps poses d late: pose stamped t taken at
   t - d. command-delay d = clock-offset -d. A positive offset would be a negative delay, which no robot has.
 * speed-gain g, wheelbase e and camera-scale f make the displacement of every moment (v g f, w g / e): two numbers for three
   causes. One of them alone is the simplest of its kind, but any two of them equal any other two.
-* floor-slope is a tether whose anchor is far: the pull differs across the arena by (arena / distance), here a tenth, which at these
-  speeds is less than the wheels' own jitter.
+* floor-slope is a tether whose anchor is far: the pull differs across the arena by (arena / distance), which at the speeds
+  planned here is less than the wheels' own jitter.
 """
 
 from __future__ import annotations

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from tests.hidden_effects.camera import Camera, Layout
-from tests.hidden_effects.world import Parameters, World
+from tests.hidden_effects.world import USUAL, Parameters, World
 
-FINE, USUAL, COARSE = Camera(0.0005, 0.005, 0.0001), Camera(0.0015, 0.007), Camera(0.003, 0.009, 0.001)
+FINE, COARSE = Camera(0.0005, 0.005, 0.0001), Camera(0.003, 0.009, 0.001)
 ROUGH = Camera(0.0015, 0.007, outliers=0.01, stamp_s=0.002)
 LEVELS = ("weak", "medium", "strong")
 

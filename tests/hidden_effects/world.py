@@ -19,6 +19,10 @@ from tests.hidden_effects.unlisted import UNLISTED
 
 Parameters = dict[str, float]
 
+USUAL = Camera(0.0015, 0.007)
+"""1.5 mm and 0.4 degrees."""
+FRAMES = Layout()
+
 SIGNS = {
     "frame": "x east, y north, heading counter-clockwise from x",
     "clock-offset": "a pose stamped t was taken at t + offset_s",
@@ -39,8 +43,8 @@ class World:
     robot: str = "khepera"
     plan: str = "forward"
     trials: int = 60
-    camera: Camera = Camera(0.0015, 0.007)
-    layout: Layout = Layout()
+    camera: Camera = USUAL
+    layout: Layout = FRAMES
     jitter: float = 0.004
     seed: int = 0
 
