@@ -17,12 +17,9 @@ from tests.hidden_effects.asking import Record, answers
 from tests.hidden_effects.figure import confusion
 from tests.hidden_effects.heldout import ratios
 from tests.hidden_effects.judge import WRONG, coverage, judge, said
-from tests.hidden_effects.plan import worlds
+from tests.hidden_effects.plan import QUICK, select, worlds
 from tests.hidden_effects.summary import Result, mistakes, table
 from tests.hidden_effects.world import World, write
-
-QUICK = {"single": 6, "pair": 3, "none": 3, "unlisted": 3, "tie": 3, "single-hard": 2}
-"""How many worlds of each family a quick look takes, evenly spread over it."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -52,20 +49,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--jobs", type=int, default=2, help="worlds asked at a time (2)")
     parser.add_argument("--results", type=Path, default=Path("results/hidden-effects"), help="folder of the answers")
     return parser
-
-
-def select(made: Sequence[World], only: str, quick: bool) -> list[World]:
-    """A family or worlds of a name; of these, with `quick`, a few evenly spread."""
-    chosen = [world for world in made if world.family == only] or [world for world in made if only in world.name]
-    if not quick:
-        return chosen
-    return [world for family, count in QUICK.items() for world in _spread(chosen, family, count)]
-
-
-def _spread(made: Sequence[World], family: str, count: int) -> list[World]:
-    of = [world for world in made if world.family == family]
-    step = len(of) / count
-    return [of[int((i + 0.5) * step)] for i in range(count)] if len(of) > count else of
 
 
 def _shown(items: Iterator[tuple[World, Record]] | Sequence[World], total: int):  # type: ignore[no-untyped-def]

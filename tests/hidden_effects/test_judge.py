@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from tests.hidden_effects.__main__ import QUICK, result_of, select
+from tests.hidden_effects.__main__ import result_of
 from tests.hidden_effects.acceptable import acceptable
 from tests.hidden_effects.answer import read
 from tests.hidden_effects.camera import Camera
 from tests.hidden_effects.figure import confusion
 from tests.hidden_effects.heldout import ratios
 from tests.hidden_effects.judge import coverage, judge
-from tests.hidden_effects.plan import worlds
+from tests.hidden_effects.plan import QUICK, select, worlds
 from tests.hidden_effects.summary import table
 from tests.hidden_effects.world import World
 
