@@ -6,7 +6,6 @@ import contextlib
 import hashlib
 import io
 import json
-import os
 import tempfile
 import time
 import traceback
@@ -21,6 +20,7 @@ from tests.hidden_effects.world import World, write
 
 Record = dict[str, Any]
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+"""Set before workers are started: worlds are asked side by side, one core each."""
 
 
 def answers(
@@ -35,7 +35,7 @@ def answers(
             left.append(world)
         else:
             yield world, kept
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_quiet) as pool:
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         asked = {pool.submit(ask, world, list(options)): world for world in left}
         try:
             for done in as_completed(asked):
@@ -58,10 +58,6 @@ def ask(world: World, options: Sequence[str] = ()) -> Record:
     except ValueError:
         given, fault = None, fault or f"no JSON on stdout: {out[-300:]!r}"
     return {"answer": given, "seconds_s": seconds, "exit": status, "error": fault}
-
-
-def _quiet() -> None:
-    os.environ.update(ONE_THREAD)
 
 
 def _call(arguments: list[str]) -> tuple[int, str, str]:
