@@ -14,12 +14,12 @@ from tests.hidden_effects.listed import LISTED
 from tests.hidden_effects.summary import Result
 
 FAMILIES = {"pair": "two effects", "tie": "confusable set", "unlisted": "unlisted effect", "none": "nothing hidden"}
-ELSE = ("several effects", "tie", "unlisted", "none", "insufficient-data", "no answer")
+ELSE = ("right set", "other set", "right tie", "other tie", "unlisted", "none", "insufficient-data", "no answer")
 ENOUGH_FOR_WHITE = 0.5
 
 
 def confusion(results: Sequence[Result], path: Path) -> list[Path]:
-    """PNG and SVG of the counts, shaded by their share of the row; a frame marks where the right answer is."""
+    """PNG and SVG of the counts, shaded by their share of the row; right answers are bold."""
     rows, columns = _rows(results), _columns(results)
     counts = np.array([[Counter(one.said for one in of)[column] for column in columns] for of in rows.values()])
     right = np.array([[any(o.outcome == "right" and o.said == c for o in of) for c in columns] for of in rows.values()])
@@ -62,6 +62,6 @@ def _drawn(counts: np.ndarray, right: np.ndarray, rows: list[str], columns: list
         colour = "white" if share[row, column] > ENOUGH_FOR_WHITE else "black"
         weight = "bold" if right[row, column] else "normal"
         axes.text(column, row, counts[row, column], ha="center", va="center", color=colour, weight=weight)
-    axes.set_xlabel("what was said (verdict, or the one effect named); bold: right answers among them")
+    axes.set_xlabel("what was said: one effect, a set of effects, or a verdict\n(count of worlds; shade: share of the row; bold: right)")
     axes.set_ylabel("what was hidden (worlds)")
     return figure

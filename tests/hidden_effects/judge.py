@@ -54,8 +54,11 @@ def _as_sets(explanations: object) -> frozenset[frozenset[str]]:
 
 def said(world: World, answer: Answer) -> str:
     """The answer in few words, for the confusion matrix."""
-    if answer.verdict == "effects":
-        return answer.effects[0] if len(answer.effects) == 1 else "several effects"
+    if answer.verdict == "effects" and len(answer.effects) == 1:
+        return answer.effects[0]
+    several = {"effects": "set", "tie": "tie"}
+    if answer.verdict in several:
+        return f"{'right' if judge(world, answer) == RIGHT else 'other'} {several[answer.verdict]}"
     return answer.verdict
 
 

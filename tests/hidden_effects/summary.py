@@ -33,6 +33,7 @@ TARGETS = {
     "single-hard": ("single, harder conditions", None),
 }
 COVERAGE, ERROR_RATIO, SECONDS_S = 0.90, 1.05, 60.0
+SILENT = {"none", "insufficient-data", "no answer"}
 HARDER = {
     "20-trials": "20 trials",
     "ends": "poses at ends of commands",
@@ -78,7 +79,7 @@ def _alarms(results: Sequence[Result]) -> list[str]:
     of = [one for one in results if one.world.family == "none"]
     if not of:
         return []
-    false = sum(one.outcome == WRONG for one in of)
+    false = sum(one.said not in SILENT for one in of)
     met = "met" if false / len(of) <= 0.05 else "NOT met"
     return [f"false alarms                 {false} of {len(of)}: {_share(false, len(of))}  <= 5% {met}"]
 
