@@ -12,13 +12,13 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.hidden_effects.evidence import GUESSES, Evidence
+from tests.hidden_effects.evidence import GUESSES, Evidence, Values
 from tests.hidden_effects.plan import select, worlds
 from tests.hidden_effects.world import World
 
 DECIDABLE = 30.0
 """Chi-square from which on the truth can be told from a rival by anyone: five and a half standard errors."""
-STEPS = 4
+STEPS, FINALISTS = 3, 2
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -57,14 +57,16 @@ def rivals(hidden: list[str]) -> Iterator[list[str]]:
 
 
 def _climb(evidence: Evidence) -> Iterator[tuple[float, list[str]]]:
-    """What listed effects make of an unlisted one, the best added each time."""
+    """What listed effects make of an unlisted one: the best added each time, of those that look best before refitting."""
     names: list[str] = []
     yield evidence.distance([])[0], []
+    values: Values = {}
     for _ in range(STEPS):
         others = [name for name in GUESSES if name not in names]
-        best, add = min((evidence.distance([*names, name])[0], name) for name in others)
-        names = [*names, add]
-        yield best, names
+        likely = sorted((evidence.distance([name], values)[0], name) for name in others)[:FINALISTS]
+        distance, values = min((evidence.distance([*names, name]) for _, name in likely), key=lambda found: found[0])
+        names = list(values)
+        yield distance, names
 
 
 if __name__ == "__main__":

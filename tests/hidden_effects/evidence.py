@@ -22,12 +22,13 @@ from tests.hidden_effects.luck import luck
 from tests.hidden_effects.motion import move
 from tests.hidden_effects.world import World
 
-TRIALS, STEP_S, PLACED_STEP_S = 12, 4e-3, 0.02
+TRIALS, STEP_S, PLACED_STEP_S = 10, 8e-3, 0.02
 PER_TRIAL = 0.5
 """Of a wheel's jitter, the part that stays through a trial, as a share of the part that changes with every command."""
 FREE_START = 10.0
 """Metres and radians: as good as unknown."""
 
+Values = dict[str, dict[str, float]]
 Guess = dict[str, tuple[float, float, float, float]]
 
 GUESSES: dict[str, Guess] = {  # parameter: (start, step, least, most)
@@ -70,21 +71,19 @@ class Evidence:
         self.noise = _noise(self.world)
         self.free = [np.linalg.qr(rows)[0] for rows in self._nuisances()]
 
-    def distance(self, names: Sequence[str]) -> tuple[float, dict[str, dict[str, float]]]:
-        """(chi-square of all trials, parameters) of the best model with these effects."""
+    def distance(self, names: Sequence[str], beside: Values | None = None) -> tuple[float, Values]:
+        """(chi-square of all trials, parameters) of the best model with these effects; `beside` are not refitted."""
+        fixed = [cause(name, parameters) for name, parameters in (beside or {}).items()]
         guess = [(name, key, *values) for name in names for key, values in GUESSES[name].items()]
         if not guess:
-            return self._chi_square(self._rest([])), {}
+            return self._chi_square(self._rest(fixed)), {}
         start, step, least, most = (np.array([row[i] for row in guess], float) for i in range(2, 6))
 
         def rest(point: np.ndarray) -> np.ndarray:
-            return self._rest(self._causes(guess, point * step))
+            return self._rest([*fixed, *self._causes(guess, point * step)])
 
-        found = least_squares(rest, start / step, bounds=(least / step, most / step), diff_step=1e-3, max_nfev=30)
-        values: dict[str, dict[str, float]] = {name: {} for name in names}
-        for (name, key, *_), value in zip(guess, found.x * step, strict=True):
-            values[name][key] = float(value)
-        return self._chi_square(found.fun), values
+        found = least_squares(rest, start / step, bounds=(least / step, most / step), diff_step=1e-3, max_nfev=20)
+        return self._chi_square(found.fun), self._values(guess, found.x * step)
 
     def poses(self, causes: Sequence[Cause], jitter: np.ndarray | None = None) -> list[np.ndarray]:
         """Noise-free tracked poses (rows, 3) of every trial."""
@@ -100,11 +99,14 @@ class Evidence:
         return out
 
     def _causes(self, guess: Sequence[tuple], point: Iterable[float]) -> list[Cause]:  # type: ignore[type-arg]
-        values: dict[str, dict[str, float]] = {}
+        return [cause(name, parameters) for name, parameters in self._values(guess, point).items()]
+
+    def _values(self, guess: Sequence[tuple], point: Iterable[float]) -> Values:  # type: ignore[type-arg]
+        values: Values = {}
         for (name, key, *_), value in zip(guess, point, strict=True):
             share = self.world.nominal.fastest_m_s if key == "max_m_s" else 1.0
-            values.setdefault(name, {})[key] = value * share
-        return [cause(name, parameters) for name, parameters in values.items()]
+            values.setdefault(name, {})[key] = float(value) * share
+        return values
 
     def _rest(self, causes: Sequence[Cause]) -> np.ndarray:
         """Whitened differences from the truth that the nuisances cannot explain."""

@@ -15,6 +15,9 @@ from tests.hidden_effects.summary import Result
 
 FAMILIES = {"pair": "two effects", "tie": "confusable set", "unlisted": "unlisted effect", "none": "nothing hidden"}
 ELSE = ("right set", "other set", "right tie", "other tie", "unlisted", "none", "insufficient-data", "no answer")
+LABEL = (
+    "what was said: one effect, a set of effects, or a verdict\n(count of worlds; shade: share of the row; bold: right)"
+)
 ENOUGH_FOR_WHITE = 0.5
 
 
@@ -62,6 +65,6 @@ def _drawn(counts: np.ndarray, right: np.ndarray, rows: list[str], columns: list
         colour = "white" if share[row, column] > ENOUGH_FOR_WHITE else "black"
         weight = "bold" if right[row, column] else "normal"
         axes.text(column, row, counts[row, column], ha="center", va="center", color=colour, weight=weight)
-    axes.set_xlabel("what was said: one effect, a set of effects, or a verdict\n(count of worlds; shade: share of the row; bold: right)")
+    axes.set_xlabel(LABEL)
     axes.set_ylabel("what was hidden (worlds)")
     return figure
