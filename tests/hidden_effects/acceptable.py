@@ -5,7 +5,7 @@ it holds every `required` explanation and none beyond `required` and `allowed`.
 
 Exact equivalences, seen from outside (open loop, the robot at rest before its first command):
 * A command that acts d late moves every path by d, and so does a clock that stamps poses d late: pose stamped t taken at
-  t - d. command-delay d = clock-offset -d. A positive offset would be a negative delay, which no robot has.
+  t - d. command-delay d = clock-offset d. A negative offset would be a negative delay, which no robot has.
 * speed-gain g, wheelbase e and camera-scale f make the displacement of every moment (v g f, w g / e): two numbers for three
   causes. One of them alone is the simplest of its kind, but any two of them equal any other two.
 
@@ -68,7 +68,7 @@ def _others(hidden: dict[str, Parameters]) -> list[tuple[str, Parameters]]:
 
 
 def _required(name: str, parameters: Parameters) -> list[Explanation]:
-    late = name == "clock-offset" and parameters["offset_s"] < 0
+    late = name == "clock-offset" and parameters["offset_s"] > 0
     far = name == "tether-pull" and _distance_m(parameters) >= FAR_M
     swaps = {"command-delay": "clock-offset"}
     if late:

@@ -92,8 +92,8 @@ class Evidence:
         jitter = self.still if jitter is None else jitter
         tail = self.world.layout.tail_s
         paths = move(self.driving, self.world.nominal.wheelbase_m, causes, jitter, rng, tail, step)
-        offset = sum(each.offset_s for each in causes)
-        out = [paths.at(trial, times + offset) for trial, times in enumerate(self.times)]
+        late = sum(each.late_s for each in causes)
+        out = [paths.at(trial, times - late) for trial, times in enumerate(self.times)]
         for each in causes:
             out = [each.seen(poses) for poses in out]
         return out

@@ -77,10 +77,10 @@ def _predicted(world: World, driving: Driving, causes: Sequence[Cause]) -> list[
 
 def _seen(paths: Paths, driving: Driving, causes: Sequence[Cause]) -> list[np.ndarray]:
     """Tracked places (n, 2) at each horizon."""
-    offset = sum(cause.offset_s for cause in causes)
+    late = sum(cause.late_s for cause in causes)
     out = []
     for horizon in HORIZONS_S:
-        times = _times(driving, horizon) + offset
+        times = _times(driving, horizon) - late
         poses = np.concatenate([paths.at(trial, times[trial : trial + 1]) for trial in range(len(times))])
         for each in causes:
             poses = each.seen(poses)

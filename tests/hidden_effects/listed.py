@@ -187,9 +187,12 @@ class TetherPull(Cause):
 
 @dataclass
 class ClockOffset(Cause):
-    """A pose stamped t was taken at t + offset_s."""
+    """Poses are stamped late: one stamped t was taken at t - offset_s."""
 
     offset_s: float
+
+    def __post_init__(self) -> None:
+        self.late_s = self.offset_s
 
 
 @dataclass

@@ -34,7 +34,7 @@ STRENGTHS: dict[str, tuple[Parameters, Parameters, Parameters]] = {
         {"anchor_x_m": 1.2, "anchor_y_m": 0.1, "pull_per_s": 0.008},
         {"anchor_x_m": 0.6, "anchor_y_m": 0.8, "pull_per_s": 0.02},
     ),
-    "clock-offset": ({"offset_s": 0.04}, {"offset_s": 0.08}, {"offset_s": 0.15}),
+    "clock-offset": ({"offset_s": -0.04}, {"offset_s": -0.08}, {"offset_s": -0.15}),
     "marker-offset": (
         {"forward_m": 0.005, "left_m": -0.003},
         {"forward_m": -0.012, "left_m": 0.006},
@@ -95,15 +95,15 @@ TIES: dict[str, dict[str, Parameters]] = {
     "delay-weak": {"command-delay": {"delay_s": 0.04}},
     "delay-medium": {"command-delay": {"delay_s": 0.1}},
     "delay-strong": {"command-delay": {"delay_s": 0.22}},
-    "late-clock-weak": {"clock-offset": {"offset_s": -0.05}},
-    "late-clock-strong": {"clock-offset": {"offset_s": -0.12}},
+    "late-clock-weak": {"clock-offset": {"offset_s": 0.05}},
+    "late-clock-strong": {"clock-offset": {"offset_s": 0.12}},
     "gain-base": {"speed-gain": {"gain": 0.95}, "wheelbase": {"factor": 1.06}},
     "gain-scale": {"speed-gain": {"gain": 1.06}, "camera-scale": {"factor": 1.04}},
     "base-scale": {"wheelbase": {"factor": 0.94}, "camera-scale": {"factor": 1.05}},
     "base-scale-strong": {"wheelbase": {"factor": 1.1}, "camera-scale": {"factor": 1.12}},
     "delay-and-gain": {"command-delay": {"delay_s": 0.08}, "speed-gain": {"gain": 0.94}},
     "delay-and-mismatch": {"command-delay": {"delay_s": 0.12}, "wheel-mismatch": {"ratio": 1.04}},
-    "late-clock-and-base": {"clock-offset": {"offset_s": -0.09}, "wheelbase": {"factor": 1.06}},
+    "late-clock-and-base": {"clock-offset": {"offset_s": 0.09}, "wheelbase": {"factor": 1.06}},
     "delay-and-side-slip": {"command-delay": {"delay_s": 0.1}, "side-slip": {"slip_s": 0.07}},
 }
 

@@ -96,7 +96,7 @@ def test_delay_and_late_clock_are_the_same_from_outside():
     commands = [(0.05, 0.1, 1.0), (0.1, 0.02, 0.7)]
     late = pose_after([CommandDelay(0.1)], *commands, at=1.5)
     np.testing.assert_allclose(late, pose_after([], *commands, at=1.4), atol=1e-9)
-    assert ClockOffset(-0.1).offset_s == -CommandDelay(0.1).delay_s
+    assert ClockOffset(0.1).late_s == CommandDelay(0.1).delay_s
 
 
 def test_turning_slip_shortens_the_arc_and_keeps_the_turn():

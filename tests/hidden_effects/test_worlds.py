@@ -71,9 +71,9 @@ def test_commands_hold_from_their_row_on_and_end_with_nan():
     assert first["left_m_s"].iloc[:-1].notna().all()
 
 
-def test_a_positive_clock_offset_sees_the_future():
+def test_an_early_clock_sees_the_future():
     clean = replace(SMALL, camera=STILL).table()
-    ahead = replace(SMALL, camera=STILL, hidden=SMALL.hidden | {"clock-offset": {"offset_s": 0.04}}).table()
+    ahead = replace(SMALL, camera=STILL, hidden=SMALL.hidden | {"clock-offset": {"offset_s": -0.04}}).table()
     one, two = clean[clean["trial"] == 0], ahead[ahead["trial"] == 0]
     np.testing.assert_allclose(two["x_m"].to_numpy()[:-1], one["x_m"].to_numpy()[1:], atol=2e-6)
 
@@ -102,8 +102,8 @@ def test_acceptable_answers():
     assert named({"speed-gain": {"gain": 1.1}}) == [[("speed-gain",)]]
     both = {"speed-gain": {"gain": 1.1}, "wheelbase": {"factor": 0.9}}
     assert named(both) == [[("camera-scale", "speed-gain"), ("camera-scale", "wheelbase"), ("speed-gain", "wheelbase")]]
-    assert named({"clock-offset": {"offset_s": 0.1}}) == [[("clock-offset",)]]
-    assert named({"clock-offset": {"offset_s": -0.1}}) == [[("clock-offset",), ("command-delay",)]]
+    assert named({"clock-offset": {"offset_s": -0.1}}) == [[("clock-offset",)]]
+    assert named({"clock-offset": {"offset_s": 0.1}}) == [[("clock-offset",), ("command-delay",)]]
     slope = acceptable(World("w", "single", {"floor-slope": {"x_m_s": 0.01, "y_m_s": 0.0}}))
     assert [answer["verdict"] for answer in slope] == ["effects", "tie"]
     assert slope[1]["allowed"] == [("tether-pull",)]
