@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.common import Drawn, NoDataError, Store, counted, coverage, task_title
+from analysis.coverage import coverage
+from analysis.drawn import Drawn
+from analysis.store import NoDataError, Store
+from analysis.words import counted, task_title
 from bns.plotting import draw_paths, frame_alike, note, outcome, panels, style
 from bns.robots import load_robot
 from bns.tasks import load_task
@@ -37,7 +40,7 @@ def poses(store: Store, shown: pd.DataFrame) -> dict[str, pd.DataFrame]:
         f"(run_id = '{row.run_id}' AND sweep = '{row.sweep}' AND evaluation = {row.evaluation})"
         for row in shown.itertuples()
     )
-    rows = store.query(f"""SELECT run_id, {", ".join(WORLD + SNN)} FROM paths
+    rows = store.query(f"""SELECT run_id, step, {", ".join(WORLD + SNN)} FROM paths
         WHERE who = 'fittest' AND ({which}) ORDER BY run_id, step""")
     return dict(iter(rows.groupby("run_id")))
 
@@ -74,4 +77,5 @@ def _draw_task(store: Store, robot: str, task: str, runs: pd.DataFrame) -> Drawn
         f"driven; dashed: as its simulator networks saw it; dots: ends of commands; grey: goals of "
         f"{100 * radius_m:g} cm in order."
     )
-    return Drawn(f"{NAME}-{task}", figure, shows, n, sweeps, said)
+    title = f"Paths of robot and simulator, {task_title(robot, task)}"
+    return Drawn(f"{NAME}-{robot}-{task}", title, figure, shows, n, sweeps, said, data=pd.concat(walked.values()))

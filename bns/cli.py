@@ -11,10 +11,14 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bns import __version__
 from bns.errors import BnsError, SpecError
 from bns.spec import FIELDS, RunSpec, checked, field_type
+
+if TYPE_CHECKING:
+    from bns.sweep.shard import Shard
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
 _INTERRUPTED, _TERMINATED = 130, 143
@@ -75,17 +79,21 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
-    many.add_argument(
-        "--jobs",
-        type=_positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="worker processes (default: one a core)",
-    )
+    cores = os.cpu_count() or 1
+    many.add_argument("--jobs", type=_positive, default=cores, metavar="N", help="worker processes (default: one a core)")
     many.add_argument(
         "--budget", type=_duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
     )
+    many.add_argument(
+        "--shard", type=_shard, metavar="K/N", help="only the K-th of N shares: one command a machine, one folder for all"
+    )
     many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
+    many.add_argument(
+        "--confirm-top",
+        type=_positive,
+        metavar="K",
+        help="when a sweep is done, run the K best combinations of each task again on fresh seeds, as sweep NAME-confirm",
+    )
     many.add_argument(
         "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
     )
@@ -93,6 +101,9 @@ def _parser() -> argparse.ArgumentParser:
     ask = command("query", query, "answer an SQL query over evals, runs, specs, paths, generations, probes (DuckDB)")
     ask.add_argument("sql", metavar="SELECT ...")
     ask.add_argument("--csv", action="store_true", help="bare rows, no header")
+    look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
+    look.add_argument("results", nargs="?", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
+    look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     ready = command("precompute", precompute, "train the static simulator of a robot and write it")
     ready.add_argument("--robot", default="khepera")
@@ -143,6 +154,15 @@ def _positive(text: str) -> int:
     return int(text)
 
 
+def _shard(text: str) -> Shard:
+    from bns.sweep.shard import Shard
+
+    try:
+        return Shard.parse(text)
+    except SpecError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
 def _duration(text: str) -> float:
     """Seconds of ``90``, ``90s``, ``10m``, ``1h30m``."""
     match = re.fullmatch(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?", text)
@@ -153,9 +173,9 @@ def _duration(text: str) -> float:
 
 
 def _say_if_compiling() -> None:
-    from bns.engine.jit import cache_folder
+    from bns.engine.jit import compiled
 
-    if sys.stderr.isatty() and not cache_folder().exists():
+    if sys.stderr.isatty() and not compiled():
         print("bns: compiling the kernels, once on this machine (about 20 s)", file=sys.stderr)
 
 
@@ -172,13 +192,14 @@ def run(options: argparse.Namespace) -> int:
 def sweep(options: argparse.Namespace) -> int:
     """Runs of sweep files, one file after the other, on one budget."""
     from bns.sweep.budget import Budget
+    from bns.sweep.confirm import in_turn
     from bns.sweep.grid import load_sweep
     from bns.sweep.plan import plan
     from bns.sweep.progress import SweepProgress
     from bns.sweep.report import planned, summed_up
     from bns.sweep.runner import run_sweep
 
-    sweeps = [load_sweep(file) for file in options.files]
+    sweeps = in_turn([load_sweep(file) for file in options.files], options.results, options.confirm_top)
     if options.dry_run:
         for one in sweeps:
             print(planned(plan(one, options.results, options.jobs, retry_failed=options.retry_failed), options.jobs))
@@ -194,6 +215,7 @@ def sweep(options: argparse.Namespace) -> int:
                 budget=budget,
                 retry_failed=options.retry_failed,
                 on_progress=bar,
+                shard=options.shard,
             )
             print(summed_up(summary, options.results), file=sys.stderr)
             failed += summary.new_failed
@@ -221,6 +243,14 @@ def query(options: argparse.Namespace) -> int:
     else:
         print(rows.to_string(index=False, max_rows=100) if len(rows) else "no rows")
     sys.stdout.flush()
+    return 0
+
+
+def watch(options: argparse.Namespace) -> int:
+    """The page of figures, kept up to date."""
+    from bns.watch import watch as keep_drawing
+
+    keep_drawing(options.results, options.every, say=lambda text: print(f"bns: {text}", file=sys.stderr, flush=True))
     return 0
 
 

@@ -24,6 +24,10 @@ class ModelError(BnsError):
     """A robot model, network file or table of measurements that cannot be used."""
 
 
+class DataError(BnsError):
+    """Measurements that cannot be used as they are."""
+
+
 def unknown_name(kind: str, given: object, valid: Iterable[str]) -> str:
     """Say that ``given`` is no ``kind``, which one was probably meant, and list the valid names."""
     names = sorted(valid)

@@ -33,6 +33,7 @@ COLUMN_IN, PAGE_IN = 3.5, 7.2
 TEXT_PT = 8
 """No text is smaller than this at those widths."""
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+BLUE, RED = OKABE_ITO[:2]
 GREY = "#555555"
 
 _SIZES = (
@@ -93,6 +94,9 @@ def save(figure: Figure, stem: Path | str) -> tuple[Path, Path]:
     """
     stem = Path(stem)
     made = []
+    with style():
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the places are found: to find them again for each file would take as long
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
         buffer, place = io.BytesIO(), stem.with_name(f"{stem.name}.{kind}")
         with style():
@@ -226,16 +230,22 @@ def lettered(number: int, count: int, title: str) -> str:
 
 
 def panels(
-    count: int, height_in: float, columns: int = 3, rows_each: int = 1, ratios: Sequence[float] | None = None
+    count: int,
+    height_in: float,
+    columns: int = 3,
+    rows_each: int = 1,
+    ratios: Sequence[float] | None = None,
+    *,
+    wide: bool = False,
 ) -> tuple[Figure, np.ndarray]:
-    """Figure with ``count`` panels (count, rows_each): a column wide if there is one, else a page wide.
+    """Figure with ``count`` panels (count, rows_each): a column wide if there is one and not ``wide``, else a page wide.
 
     ``rows_each`` axes stand above each other in a panel, of relative heights ``ratios``; ``height_in`` is the
     height of one row of panels. Rows are filled from the left; places that stay empty are blank.
     """
     across = min(count, 2 if count == 4 else columns)
     down = -(-count // across)
-    figure = Figure(figsize=(COLUMN_IN if count == 1 else PAGE_IN, height_in * down))
+    figure = Figure(figsize=(COLUMN_IN if count == 1 and not wide else PAGE_IN, height_in * down))
     heights = list(ratios or [1] * rows_each) * down
     grid = figure.subplots(down * rows_each, across, squeeze=False, gridspec_kw={"height_ratios": heights})
     axes = np.array(

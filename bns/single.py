@@ -23,10 +23,13 @@ from bns.robots import load_robot
 from bns.robots.simulator import StaticSimulator, check_writable, save_simulator
 from bns.spec import RunSpec
 from bns.store.lock import SweepLockedError
+from bns.store.reader import finished
 from bns.store.record import RunRecord
 from bns.store.writer import Writer
 from bns.sweep import memory
+from bns.sweep.digests import WorldDigests
 from bns.tasks import load_task
+from bns.worlds import build_world
 
 _PATIENCE_S = 60.0
 
@@ -36,12 +39,13 @@ def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None 
     robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
     if save_snn is not None:
         check_writable(save_snn)
-    with _patient_writer(results, sweep):
-        pass  # a folder that cannot be written is better found before the run than after it
+    world = build_world(spec.world, robot)
+    with _patient_writer(results, sweep):  # what does not fit is better found before the run than after it
+        _check_world(spec, results, sweep, world.digest)
     started, wall, cpu = datetime.now(UTC), time.perf_counter(), time.process_time()
     memory.reset_peak()
     with live_view(spec) as show:
-        result = run(spec, show)
+        result = run(spec, show, world)
     wall_s = time.perf_counter() - wall
     row = {
         "status": "ok",
@@ -70,6 +74,13 @@ def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None 
         results / "figures" / f"run-{spec.task}-{spec.seed}-{spec.run_id}",
     )
     return _report(spec, result, wall_s, figure)
+
+
+def _check_world(spec: RunSpec, results: Path, sweep: str, digest: str) -> None:
+    if finished(results, sweep):
+        digests = WorldDigests(results, sweep)
+        digests.read()
+        digests.compare(spec.task, spec.world, digest)
 
 
 @contextmanager

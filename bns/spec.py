@@ -16,7 +16,7 @@ from typing import Any
 
 from bns.errors import SpecError, unknown_name
 
-ENGINE_VERSION = 1
+ENGINE_VERSION = 2
 """Raised whenever the same spec would give other numbers; part of every run's name."""
 
 

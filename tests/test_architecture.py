@@ -20,7 +20,7 @@ FLOORS = (
     {"evolver", "trainer", "recorder", "loop", "precompute"},
     {"store"},
     {"sweep"},
-    {"plotting", "single"},
+    {"diagnose", "plotting", "single", "watch"},
     {"cli"},
     {"__main__"},
 )

@@ -10,12 +10,13 @@ from pathlib import Path
 import pandas as pd
 
 from bns.spec import RunSpec
-from bns.store.compact import bytes_per_run
+from bns.store.compaction import bytes_per_run
 from bns.store.reader import finished, load
 from bns.sweep.executor import Job
 from bns.sweep.grid import Sweep
 from bns.sweep.job import run_job, warm
 from bns.sweep.order import ordered_specs
+from bns.sweep.pace import Pace
 
 _TRIAL_EVALUATIONS = 20
 _BYTES_PER_EVALUATION = 100
@@ -108,9 +109,9 @@ def _from_trial(todo: list[RunSpec], job: Job, warm_up: Callable[[], object]) ->
     record = job(trial)
     if record.run["status"] != "ok":
         return math.nan, f"none: a trial run of {trial.canonical_json()} failed with {record.run['error']}"
-    seconds = record.run["wall_s"]
-    basis = f"one trial run of {trial.evaluations} evaluations ({seconds:.2f} s), scaled by work: rough"
-    return math.fsum(work(spec) for spec in todo) * seconds / work(trial), basis
+    basis = f"the parts of one trial run of {trial.evaluations} evaluations ({record.run['wall_s']:.2f} s)"
+    pace = Pace.of(record)
+    return math.fsum(pace.seconds(spec) for spec in todo), basis
 
 
 def _bytes(results: Path, sweep: str, todo: list[RunSpec]) -> float:

@@ -78,13 +78,13 @@ def _row(sweep: str, task: str, runs: pd.DataFrame, described: pd.Series[bool], 
 def _described(file: Sweep, specs: pd.Series[str]) -> pd.Series[bool]:
     """Which runs the file describes: combination by combination, for a file may have millions of seeds."""
     combos = {RunSpec(robot=file.robot, **combo).canonical_json() for combo in file.combos}
-    return specs.map(lambda text: _is_one_of(combos, file.seeds, text)).astype(bool)
+    return specs.map(lambda text: _is_one_of(combos, file.all_seeds, text)).astype(bool)
 
 
-def _is_one_of(combos: set[str], seeds: int, text: str) -> bool:
+def _is_one_of(combos: set[str], seeds: range, text: str) -> bool:
     spec = json.loads(text)
     first = json.dumps(spec | {"seed": 0}, sort_keys=True, separators=(",", ":"))
-    return bool(spec["seed"] < seeds) and first in combos
+    return spec["seed"] in seeds and first in combos
 
 
 def _newest_files(specs: pd.DataFrame) -> dict[str, Sweep]:

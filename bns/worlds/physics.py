@@ -28,7 +28,7 @@ class PhysicsWorld:
 
 
 def build(robot: Robot) -> PhysicsWorld:
-    """The robot's own model, as shipped."""
+    """The model of the robot's world, as shipped."""
     if not isinstance(robot, Khepera):
         raise TypeError(f"no physics world for {robot.name}")
-    return PhysicsWorld(robot, load_model(robot.name))
+    return PhysicsWorld(robot, load_model(f"{robot.name}-world"))

@@ -9,13 +9,13 @@ import pytest
 from matplotlib.text import Text
 
 TESTS = Path(__file__).parents[1]
-sys.path[:0] = [str(path) for path in (TESTS.parent, TESTS) if str(path) not in sys.path]
+sys.path[:0] = [str(path) for path in (TESTS.parent, TESTS, TESTS / "analysis") if str(path) not in sys.path]
 
 MUTATION = """
 name: mutation
 robot: khepera
 seeds: 5
-fixed: {evaluations: 4, population_size: 8, generations_per_evaluation: 2, training_iterations_per_evaluation: 20}
+fixed: {evaluations: 6, population_size: 8, generations_per_evaluation: 2, training_iterations_per_evaluation: 20}
 grid: {task: [circle, complex], mutation_rate: [0.1, 0.5]}
 """
 PROTOTYPE = """
@@ -73,3 +73,14 @@ def texts():
         ]
 
     return walk
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory) -> Path:
+    """A made-up study: two tasks, 20 combinations of three parameters, eight seeds, ten evaluations, planted effects."""
+    from study import make_study
+
+    results = tmp_path_factory.mktemp("study")
+    fixed = {"tournament_size": (0.1, 0.5), "population_size": (50, 400), "real_world_selection_size": 0.7}
+    make_study(results, seeds=8, tasks=("circle", "infinity"), evaluations=10, **fixed)
+    return results
