@@ -20,14 +20,18 @@ class Answer:
 
 
 def read(given: dict[str, Any]) -> Answer:
-    """Of the product's object; a verdict that nobody knows is kept, and is never right."""
+    """Of the product's object; a verdict that nobody knows is kept, and is never right.
+
+    Where whole sets are tied, `explanations` lists them; else they are read from `ties`, whose elements may be joined by "+".
+    """
     verdict, effects = str(given.get("verdict")), tuple(given.get("effects") or ())
     groups = given.get("ties") or []
     explanations: set[frozenset[str]] = set()
     if verdict == "effects":
         explanations = {frozenset(effects)}
     if verdict == "tie":
-        explanations = _expanded(frozenset(effects), groups)
+        told = given.get("explanations")
+        explanations = {frozenset(names) for names in told} if told else _expanded(frozenset(effects), groups)
     return Answer(verdict, effects, frozenset(explanations), given.get("parameters") or {})
 
 

@@ -75,6 +75,13 @@ def test_a_tie_of_sets(given, expected):
     assert outcome(GAIN | BASE, given) == expected
 
 
+def test_sets_that_are_listed_whole_are_taken_as_they_are():
+    ties = [["camera-scale", "speed-gain", "wheelbase"]]
+    sets = [name.split("+") for name in TWO_OF_THREE[0]]
+    assert outcome(GAIN | BASE, canned("tie", sets[0], ties) | {"explanations": sets}) == "right"
+    assert outcome(GAIN | BASE, canned("tie", sets[0], ties) | {"explanations": sets[:2]}) == "wrong"
+
+
 def test_a_tie_beside_another_effect_can_be_told_in_two_ways():
     hidden = DELAY | {"side-slip": {"slip_s": 0.1}}
     assert outcome(hidden, canned("tie", ["side-slip"], [["command-delay", "clock-offset"]])) == "right"
