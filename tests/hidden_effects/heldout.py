@@ -76,16 +76,26 @@ def _predicted(world: World, driving: Driving, causes: Sequence[Cause]) -> list[
 
 
 def _seen(paths: Paths, driving: Driving, causes: Sequence[Cause]) -> list[np.ndarray]:
-    """Tracked places (n, 2) at each horizon."""
-    late = sum(cause.late_s for cause in causes)
-    out = []
-    for horizon in HORIZONS_S:
-        times = _times(driving, horizon) - late
-        poses = np.concatenate([paths.at(trial, times[trial : trial + 1]) for trial in range(len(times))])
-        for each in causes:
-            poses = each.seen(poses)
-        out.append(poses[:, :2])
-    return out
+    """How far the tracked point is from where it was first seen, in the frame of the robot there; (n, 2) at each horizon.
+
+    What a camera does to the first pose is nobody's prediction: models that agree on all that follows are equally good.
+    """
+    first = _tracked(paths, np.zeros(len(driving.counts)), causes)
+    return [_from(first, _tracked(paths, _times(driving, horizon), causes)) for horizon in HORIZONS_S]
+
+
+def _tracked(paths: Paths, stamps_s: np.ndarray, causes: Sequence[Cause]) -> np.ndarray:
+    """Tracked poses (n, 3), one a trial, as stamped."""
+    times = stamps_s - sum(cause.late_s for cause in causes)
+    poses = np.concatenate([paths.at(trial, times[trial : trial + 1]) for trial in range(len(times))])
+    for each in causes:
+        poses = each.seen(poses)
+    return poses
+
+
+def _from(first: np.ndarray, then: np.ndarray) -> np.ndarray:
+    away, cos, sin = then[:, :2] - first[:, :2], np.cos(first[:, 2]), np.sin(first[:, 2])
+    return np.stack([cos * away[:, 0] + sin * away[:, 1], cos * away[:, 1] - sin * away[:, 0]], axis=1)
 
 
 def _errors(predicted: list[np.ndarray], measured: list[np.ndarray]) -> list[float]:

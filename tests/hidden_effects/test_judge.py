@@ -127,6 +127,13 @@ def test_a_model_with_the_true_value_is_as_good_as_the_truth_and_another_is_wors
     assert ratios(world, read(canned("unlisted"))) is None
 
 
+def test_models_that_are_tied_are_equally_good():
+    world = World("w", "tie", {"wheelbase": {"factor": 0.94}, "camera-scale": {"factor": 1.05}})
+    tied = reported(1.05, 1, 2) | {"wheelbase": {"factor": {"value": 0.94 * 1.05}}}
+    found = ratios(world, read(canned("tie", ["speed-gain", "wheelbase"], TWO_OF_THREE, tied)))
+    np.testing.assert_allclose(list(found.values()), 1, atol=1e-3)
+
+
 def test_a_plan_answered_rightly_meets_every_target_and_wrongly_none(tmp_path):
     def told(world):
         right = acceptable(world)[0]
