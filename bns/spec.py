@@ -59,7 +59,9 @@ class RunSpec:
     min_commands: int = _field(4, "shortest command list that crossover may make", low=1, high=10_000)
     max_commands: int = _field(100, "longest command list that crossover may make", low=1, high=10_000)
     record: str = _field(
-        "evals", "what is kept: one row an evaluation, or paths and generations too", choices=("evals", "full")
+        "evals",
+        "what is kept: one row an evaluation, or paths too, or with generations and probes, which are driven for it",
+        choices=("evals", "paths", "full"),
     )
 
     def __post_init__(self) -> None:

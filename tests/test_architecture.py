@@ -17,11 +17,11 @@ FLOORS = (
     {"robots"},
     {"physics"},
     {"worlds"},
-    {"evolver", "trainer", "recorder", "loop", "precompute"},
+    {"evolver", "trainer", "recorder", "loop", "precompute", "refinement"},
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "single", "watch"},
-    {"measuring"},
+    {"cluster_options", "measuring"},
     {"cli"},
     {"__main__"},
 )
