@@ -15,6 +15,7 @@ from pathlib import Path
 from bns import __version__
 from bns.cluster_options import add_cluster_options, request_of
 from bns.errors import BnsError, SpecError
+from bns.measuring import add_commands
 from bns.spec import FIELDS, RunSpec, checked, field_type
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
@@ -74,6 +75,9 @@ def _parser() -> argparse.ArgumentParser:
     one = command("run", run, "carry out one run and draw its path")
     _add_spec_options(one)
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
+    one.add_argument(
+        "--render", type=Path, metavar="FILE", help="show the fittest controller move, where the world can: .mp4 or .png"
+    )
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
     many.add_argument(
@@ -105,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
     look.add_argument("results", nargs="?", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
     look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
+    add_commands(command)
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     ready = command("precompute", precompute, "train the static simulator of a robot and write it")
     ready.add_argument("--robot", default="khepera")
@@ -128,9 +133,9 @@ def _add_spec_options(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             "--" + name.replace("_", "-"),
             type=_of_parameter(name),
-            default=field.default,
+            default=None if name == "task" else field.default,
             metavar={int: "N", float: "SHARE", str: "NAME"}[field_type(name)],
-            help=f"{text} (default: {field.default})",
+            help=f"{text} (default: {'the first of that robot' if name == 'task' else field.default})",
         )
 
 
@@ -174,10 +179,13 @@ def _say_if_compiling() -> None:
 def run(options: argparse.Namespace) -> int:
     """One run by hand: live view, rows in the store, figure of the path."""
     from bns.single import run_by_hand
+    from bns.tasks import default_task
 
+    if options.task is None:
+        options.task = default_task(options.robot)
     spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
     _say_if_compiling()
-    print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn))
+    print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn, options.render))
     return 0
 
 

@@ -16,6 +16,7 @@ from rich.live import Live
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from bns.errors import ModelError
 from bns.loop import RunResult, run
 from bns.plotting import path_figure
 from bns.recorder import RADII_CM
@@ -34,9 +35,13 @@ from bns.worlds import build_world
 _PATIENCE_S = 60.0
 
 
-def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None = None) -> str:
+def run_by_hand(
+    spec: RunSpec, results: Path, sweep: str, save_snn: Path | None = None, render: Path | None = None
+) -> str:
     """Carry out a run with a live view, store it, draw the path of its fittest controller; the report in words."""
     robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
+    if render is not None:
+        check_renderable(spec, build_world(spec.world, robot), render)
     if save_snn is not None:
         check_writable(save_snn)
     world = build_world(spec.world, robot)
@@ -73,7 +78,19 @@ def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None 
         result,
         results / "figures" / f"run-{spec.task}-{spec.seed}-{spec.run_id}",
     )
-    return _report(spec, result, wall_s, figure)
+    told = _report(spec, result, wall_s, figure)
+    if render is not None:
+        world.render(robot.plan(result.fittest, result.weights, task), render)  # type: ignore[attr-defined]  # checked above
+        told += f"\nmoving picture: {render}"
+    return told
+
+
+def check_renderable(spec: RunSpec, world: Any, path: Path) -> None:
+    """ModelError if this world has no picture of its robot, or none in such a file."""
+    if not hasattr(world, "render"):
+        raise ModelError(f"the {spec.world} world of {spec.robot} has nothing to render; leave --render out.")
+    check_writable(path)
+    world.check_picture(path)
 
 
 def _check_world(spec: RunSpec, results: Path, sweep: str, digest: str) -> None:
@@ -104,11 +121,15 @@ def _patient_writer(results: Path, sweep: str) -> Iterator[Writer]:
 
 def _report(spec: RunSpec, result: RunResult, wall_s: float, figure: Path) -> str:
     evals = result.tables["evals"]
-    reached = [f"{cm} cm " + _first(evals[f"success_{cm}cm"], evals["evaluation"]) for cm in RADII_CM]
+    names = [f"success_{cm}cm" for cm in RADII_CM]
+    within = [f"within {cm} cm " for cm in RADII_CM]
+    if evals[names[0]][0] is None:
+        names, within = ["success"], [""]
+    reached = [text + _first(evals[name], evals["evaluation"]) for text, name in zip(within, names, strict=True)]
     return "\n".join(
         [
             f"run {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {spec.evaluations} evaluations in {wall_s:.1f} s",
-            "all goals reached by the fittest controller, within " + "; ".join(reached),
+            "all goals reached by the fittest controller: " + "; ".join(reached),
             f"fitness of the fittest at the end: {evals['fitness_simulation'][-1]:.3f} in simulation, "
             f"{evals['fitness_world'][-1]:.3f} in the world ({spec.world})",
             f"path: {figure}",
@@ -138,12 +159,12 @@ def _view(spec: RunSpec, row: Mapping[str, Any]) -> Table:
         "fitness: simulation",
         "world",
         "goals",
-        *(f"{cm} cm" for cm in RADII_CM),
+        *_radii(row),
         "diversity",
         "training error",
     ):
         table.add_column(heading, justify="right")
-    marks = [("yes" if row[f"success_{cm}cm"] else "ever" if row[f"ever_success_{cm}cm"] else "no") for cm in RADII_CM]
+    marks = [_mark(row, f"success_{name.replace(' ', '')}" if name in _CM else "success") for name in _radii(row)]
     table.add_row(
         f"{row['evaluation']}/{spec.evaluations}",
         f"{row['fitness_simulation']:.3f}",
@@ -154,6 +175,18 @@ def _view(spec: RunSpec, row: Mapping[str, Any]) -> Table:
         f"{row['training_error']:.5f}",
     )
     return table
+
+
+_CM = tuple(f"{cm} cm" for cm in RADII_CM)
+
+
+def _radii(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """Headings of success: a radius each, or one where goals have none."""
+    return ("success",) if row[f"success_{RADII_CM[0]}cm"] is None else _CM
+
+
+def _mark(row: Mapping[str, Any], name: str) -> str:
+    return "yes" if row[name] else "ever" if row[f"ever_{name}"] else "no"
 
 
 @contextmanager

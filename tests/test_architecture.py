@@ -17,11 +17,12 @@ FLOORS = (
     {"robots"},
     {"physics"},
     {"worlds"},
-    {"evolver", "trainer", "recorder", "loop", "precompute"},
+    {"evolver", "trainer", "recorder", "loop", "precompute", "refinement"},
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "single", "watch"},
-    {"cli", "cluster_options"},
+    {"cluster_options", "measuring"},
+    {"cli"},
     {"__main__"},
 )
 """Rooms of the package, the ground first. Rooms on one floor may use each other."""

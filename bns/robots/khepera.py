@@ -9,11 +9,11 @@ import math
 
 import numpy as np
 
-from bns.engine.evolution import CommandBounds, Population, random_population
+from bns.engine.evolution import CommandBounds, Population, breed, diversity, random_population
 from bns.engine.jit import exact, fast, inline
 from bns.engine.philox import Key, Purpose, uniforms
-from bns.engine.snn import predict_into
-from bns.robots.base import Scores
+from bns.engine.snn import INPUTS, predict_into
+from bns.robots.base import Luck, Scores
 from bns.tasks import Task
 
 UNITS_PER_M_S = 144_010.0
@@ -133,6 +133,10 @@ class Khepera:
     name = "khepera"
     networks = ("dx", "dy", "dtheta")
     hidden = 20
+    input_count = INPUTS
+    sigmoid_output = False
+    repeats_inputs = False
+    recipe = None
     radii_m = (0.07, 0.10, 0.14, 0.20)
     bounds = CommandBounds(_LOW, _HIGH, np.array([2000.0, 2000.0, 400.0], np.float32))
     command_columns = ("left_units", "right_units", "duration_ms")
@@ -147,6 +151,12 @@ class Khepera:
         u = uniforms(key, Purpose.PROBE, 0, count, length)[..., :3]
         commands = (_LOW + u * (_HIGH - _LOW)).astype(np.float32)
         return Population(commands, np.full(count, length, np.int32))
+
+    def near(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+        """Commands (n, 3), each component moved within its mutation span."""
+        u = uniforms(key, Purpose.PROBE, step, 1, len(commands))[0, :, :3]
+        moved = commands + (2 * u - 1) * self.bounds.mutation_span
+        return np.clip(moved, _LOW, _HIGH).astype(np.float32)
 
     def inputs(self, commands: np.ndarray) -> np.ndarray:
         """Inputs (5, n): previous left, previous right, left, right, duration, normalised; at rest before the first."""
@@ -178,8 +188,42 @@ class Khepera:
         cos, sin = np.cos(before[:, 2]), np.sin(before[:, 2])
         return np.column_stack([step[:, 0] * sin - step[:, 1] * cos, step[:, 0] * cos + step[:, 1] * sin, step[:, 2]])
 
-    def score(self, population: Population, weights: np.ndarray, task: Task) -> Scores:
-        """Fitness on simulator networks (algorithm 2)."""
+    def learnable(self, displacements: np.ndarray) -> np.ndarray:
+        """Every network learns from every command."""
+        return np.ones(displacements.shape[::-1], bool)
+
+    def start_pose(self) -> np.ndarray:
+        """Pose (1, 3) between the goals, facing north."""
+        return np.array([START])
+
+    def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
+        """Position, m, and heading, rad."""
+        return dict(zip(("x_m", "y_m", "heading_rad"), poses.T, strict=True))
+
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
+        """A controller is driven as it is."""
+        return controller
+
+    def breed(
+        self,
+        key: Key,
+        parents: Population,
+        order: np.ndarray,
+        cdf: np.ndarray,
+        rate: float,
+        shortest: int,
+        generation: int,
+        children: Population,
+    ) -> int:
+        """First segments of two lists swapped, and mutation (section 4.3)."""
+        return breed(key, parents, order, cdf, rate, self.bounds, shortest, generation, children)
+
+    def diversity(self, population: Population, scores: Scores) -> float:
+        """Equation 4.1."""
+        return diversity(population, self.bounds)
+
+    def score(self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None) -> Scores:
+        """Fitness on simulator networks (algorithm 2), without noise."""
         n, total = len(population), int(population.lengths.sum())
         X = np.empty((5, total), np.float32)
         outputs = np.empty((3, total), np.float32)
@@ -203,6 +247,10 @@ class Khepera:
             total += distance
         total += MISSED_GOAL_M * (len(task.goals_m) - goal)
         return (1.0 / max(total, SMALLEST_SUM_M) if math.isfinite(total) else 0.0), goal
+
+    def succeeded(self, poses: np.ndarray, task: Task) -> bool:
+        """Whether all goals are visited in order within 7 cm."""
+        return _visited(poses, task.goals_m, GOAL_RADIUS_M) == len(task.goals_m)
 
     def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
         """Whether all goals are visited in order, within each radius."""

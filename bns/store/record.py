@@ -60,6 +60,7 @@ def table_of(name: str, spec: RunSpec, columns: Mapping[str, Any]) -> pa.Table:
     schema = SCHEMAS[name]
     own = [field for field in schema if field.name not in _identity(schema)]
     where = f"table {name} of run {spec.run_id}"
+    columns = _with_empty(own, columns)
     _check_names(where, columns, [field.name for field in own])
     rows = _common_length(where, columns)
     identity = {"run_id": spec.run_id, "robot": spec.robot, **{key: getattr(spec, key) for key in PARAMETERS}}
@@ -69,6 +70,12 @@ def table_of(name: str, spec: RunSpec, columns: Mapping[str, Any]) -> pa.Table:
         if field.name in _identity(schema)
     ]
     return pa.table([*repeated, *(_array(where, field, columns[field.name]) for field in own)], schema=schema)
+
+
+def _with_empty(own: list[pa.Field], columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns that may be empty and are not given, as those of another kind of robot, filled with nothing."""
+    rows = len(next(iter(columns.values()), ()))
+    return {field.name: [None] * rows for field in own if field.nullable} | dict(columns)
 
 
 def _identity(schema: pa.Schema) -> tuple[str, ...]:

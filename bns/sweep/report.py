@@ -60,7 +60,7 @@ def status_table(rows: Sequence[SweepRow]) -> str:
             str(row.quarantined),
             str(row.other),
             "-" if math.isnan(row.mean_wall_s) else f"{row.mean_wall_s:.2f}",
-            row.last.strftime("%Y-%m-%d %H:%M:%S"),
+            "-" if row.last is None else row.last.strftime("%Y-%m-%d %H:%M:%S"),
         )
         for row in rows
     ]
