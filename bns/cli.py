@@ -184,11 +184,12 @@ def _say_if_compiling() -> None:
 
 def run(options: argparse.Namespace) -> int:
     """One run by hand: live view, rows in the store, figure of the path."""
+    from bns.robots import load_robot
     from bns.single import run_by_hand
     from bns.tasks import default_task
 
     if options.task is None:
-        options.task = default_task(options.robot)
+        options.task = default_task(load_robot(options.robot).name)
     spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
     _say_if_compiling()
     print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn, options.render))
