@@ -84,7 +84,8 @@ def diversity_range(store: Store, chosen: Selection, task: str, range: list[floa
     last = curves(store, chosen, task, best).query("evaluation == evaluation.max()")
     sums, counts = (by_seed_array(last, name)[0][:, 0] for name in ("diversity", "diversities"))
     low, high = _bootstrapped(sums, counts)
-    ours = f"mean of the best {ratios(np.ones((1, len(sums))), sums, counts)[0]:.2f}{_interval(low, high, '.2f')} at the last evaluation"
+    mean = ratios(np.ones((1, len(sums))), sums, counts)[0]
+    ours = f"mean of the best {mean:.2f}{_interval(low, high, '.2f')} at the last evaluation"
     return Checked(f"good diversity {range[0]:g} to {range[1]:g}", ours, within(low, high, *range))
 
 

@@ -47,7 +47,8 @@ def curves(store: Store, chosen: Selection, task: str, cells: pd.DataFrame) -> p
     rows = by_seed(store, chosen, ("evaluation", *CELL), where)
     if not rows.diversities.any():
         raise NoDataError(
-            f"no run of {task} has a diversity after evaluation {FIRST_EVALUATION}, before which populations are random; run {BEGIN}"
+            f"no run of {task} has a diversity from evaluation {FIRST_EVALUATION} on (populations are random before it); "
+            f"run {BEGIN}"
         )
     return rows
 

@@ -13,15 +13,19 @@ from bns.plotting import COLUMN_IN, PAGE_IN
 from bns.store.files import publish
 
 STYLE_SHEET = Path(__file__).with_name("page.css")
+FIRST = "findings"
+"""Figures whose names begin so stand on top of the page, and on one of their own."""
 PIXELS_IN = 96
 """CSS pixels in an inch: figures stand on the page in the size they are made for."""
 
 
 def write_page(out: Path, refresh_s: int | None = None) -> Path:
-    """Write ``out``/index.html; with ``refresh_s`` it reloads itself. The path of the page."""
-    place = out / "index.html"
-    publish(page(captions(out), out, refresh_s).encode(), out / ".index.html.part", place)
-    return place
+    """Write ``out``/index.html, and findings.html with the findings alone; with ``refresh_s`` both reload. Path of the first."""
+    found = captions(out)
+    findings = [one for one in found if one["name"].startswith(FIRST)]
+    for name, shown in (("findings", findings), ("index", found)):
+        publish(page(shown, out, refresh_s).encode(), out / f".{name}.html.part", out / f"{name}.html")
+    return out / "index.html"
 
 
 def page(found: list[dict[str, Any]], out: Path, refresh_s: int | None = None) -> str:
@@ -52,13 +56,13 @@ def page(found: list[dict[str, Any]], out: Path, refresh_s: int | None = None) -
 
 
 def _place(caption: dict[str, Any]) -> tuple[Any, ...]:
-    return (not caption["name"].startswith("findings"), place(caption["paper"]), caption["name"])
+    return (not caption["name"].startswith(FIRST), place(caption["paper"]), caption["name"])
 
 
 def _summary(drawn: list[dict[str, Any]], refresh_s: int | None) -> str:
     sweeps = sorted({sweep for one in drawn for sweep in one["sweeps"]})
     again = f" This page reloads every {refresh_s} seconds." if refresh_s else ""
-    what = f"{len(drawn)} figures and tables of the sweeps {', '.join(sweeps)}." if drawn else "Nothing could be drawn yet."
+    what = f"Figures and tables: {len(drawn)}, of the sweeps {', '.join(sweeps)}." if drawn else "Nothing could be drawn yet."
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
     return f'<p>{_text(what)}{again}</p>\n<p class="small">Drawn {when}.</p>'
 

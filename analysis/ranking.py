@@ -12,22 +12,23 @@ from analysis.outcomes import NEAR
 from analysis.selection import Selection
 from analysis.store import NoDataError, Store, remembered
 from analysis.words import CELL, SHORT, valued
+from bns.sweep.confirm import RANKED_BY
 
 TEN = 10
-ORDER = ("success", *NEAR, "fitness_world")
-"""Best first: success by the task's own criterion, then at each goal radius, then mean fitness of the fittest in the world."""
 
 
 @remembered
 def ranking(store: Store, chosen: Selection) -> pd.DataFrame:
     """Combinations with enough runs at their last evaluation, task by task from best to worst; ``rank`` counts from 1.
 
+    Success by the task's own criterion decides, then at wider goal radii, then mean fitness of the fittest in the world.
+
     Raises:
         NoDataError: no combination has enough runs yet.
     """
     rows, _ = combinations(store, chosen)
     shares = rows.assign(**{name: rows[name] / rows.runs for name in ("success", *NEAR)}, successes=rows.success)
-    ordered = shares.sort_values([*ORDER, *CELL], ascending=[False] * len(ORDER) + [True] * len(CELL))
+    ordered = shares.sort_values([*RANKED_BY, *CELL], ascending=[False] * len(RANKED_BY) + [True] * len(CELL))
     ordered = ordered.assign(rank=ordered.groupby("task").cumcount() + 1)
     places = {task: number for number, task in enumerate(chosen.tasks)}
     return ordered.sort_values(["task", "rank"], key=lambda column: column.map(places) if column.name == "task" else column)

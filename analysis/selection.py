@@ -10,8 +10,9 @@ import pandas as pd
 
 from analysis.store import BEGIN, NoDataError, Store, among, remembered
 from analysis.words import CELL, TITLES, counted, task_order
+from bns.sweep.confirm import confirmed_name
 
-CONFIRMING = "-confirm"
+CONFIRMING = confirmed_name("")
 """Ending of the sweeps that rerun the best combinations of another on fresh seeds: they confirm, and compare nothing."""
 SETTING = (
     *("world", "world_digest", "training_algorithm", "evaluations", "min_commands", "max_commands"),

@@ -11,14 +11,12 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from bns import __version__
+from bns.cluster_options import add_cluster_options, request_of
 from bns.errors import BnsError, SpecError
+from bns.measuring import add_commands
 from bns.spec import FIELDS, RunSpec, checked, field_type
-
-if TYPE_CHECKING:
-    from bns.sweep.shard import Shard
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
 _INTERRUPTED, _TERMINATED = 130, 143
@@ -82,14 +80,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
-    cores = os.cpu_count() or 1
-    many.add_argument("--jobs", type=_positive, default=cores, metavar="N", help="worker processes (default: one a core)")
+    many.add_argument(
+        "--jobs",
+        type=_positive,
+        metavar="N",
+        help="worker processes a machine (default: one a core)",
+    )
     many.add_argument(
         "--budget", type=_duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
     )
-    many.add_argument(
-        "--shard", type=_shard, metavar="K/N", help="only the K-th of N shares: one command a machine, one folder for all"
-    )
+    add_cluster_options(many, _positive, _duration)
     many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
     many.add_argument(
         "--confirm-top",
@@ -100,6 +100,8 @@ def _parser() -> argparse.ArgumentParser:
     many.add_argument(
         "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
     )
+    costs = command("plan", plan, "what sweeps would cost on a laptop, a server and a cluster, from this machine's pace")
+    costs.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML)")
     status_ = command("status", status, "how far the sweeps in a store are")
     ask = command("query", query, "answer an SQL query over evals, runs, specs, paths, generations, probes (DuckDB)")
     ask.add_argument("sql", metavar="SELECT ...")
@@ -107,11 +109,12 @@ def _parser() -> argparse.ArgumentParser:
     look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
     look.add_argument("results", nargs="?", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
     look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
+    add_commands(command)
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     ready = command("precompute", precompute, "train the static simulator of a robot and write it")
     ready.add_argument("--robot", default="khepera")
     ready.add_argument("-o", "--output", type=Path, metavar="FILE", help="where (default: into the package)")
-    for with_results in (one, many, status_, ask, small):
+    for with_results in (one, many, costs, status_, ask, small):
         with_results.add_argument(
             "--results",
             type=Path,
@@ -157,15 +160,6 @@ def _positive(text: str) -> int:
     return int(text)
 
 
-def _shard(text: str) -> Shard:
-    from bns.sweep.shard import Shard
-
-    try:
-        return Shard.parse(text)
-    except SpecError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
-
-
 def _duration(text: str) -> float:
     """Seconds of ``90``, ``90s``, ``10m``, ``1h30m``."""
     match = re.fullmatch(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?", text)
@@ -198,37 +192,46 @@ def run(options: argparse.Namespace) -> int:
 
 def sweep(options: argparse.Namespace) -> int:
     """Runs of sweep files, one file after the other, on one budget."""
-    from bns.sweep.budget import Budget
     from bns.sweep.confirm import in_turn
+    from bns.sweep.executors import load_executor
     from bns.sweep.grid import load_sweep
-    from bns.sweep.plan import plan
+    from bns.sweep.plan import plan as foretell
     from bns.sweep.progress import SweepProgress
     from bns.sweep.report import planned, summed_up
-    from bns.sweep.runner import run_sweep
 
     sweeps = in_turn([load_sweep(file) for file in options.files], options.results, options.confirm_top)
-    if options.dry_run:
-        for one in sweeps:
-            print(planned(plan(one, options.results, options.jobs, retry_failed=options.retry_failed), options.jobs))
-        return 0
-    _say_if_compiling()
-    budget, failed = Budget(options.budget), 0
+    way = load_executor(options.executor)
     with SweepProgress() as bar:
+        request = request_of(options, bar)
+        if options.dry_run:
+            place = way.place(request)
+            for one in sweeps:
+                estimate = foretell(one, options.results, place.workers, options.shard, retry_failed=options.retry_failed)
+                print(planned(estimate, place))
+            return 0
+        _say_if_compiling()
+        failed = 0
         for one in sweeps:
-            summary = run_sweep(
-                one,
-                options.results,
-                jobs=options.jobs,
-                budget=budget,
-                retry_failed=options.retry_failed,
-                on_progress=bar,
-                shard=options.shard,
-            )
+            summary = way.carry_out(one, request)
             print(summed_up(summary, options.results), file=sys.stderr)
             failed += summary.new_failed
             if summary.stopped_by in {"interrupt", "terminated"}:
                 return _INTERRUPTED if summary.stopped_by == "interrupt" else _TERMINATED
     return 1 if failed else 0
+
+
+def plan(options: argparse.Namespace) -> int:
+    """A table of costs; nothing is written."""
+    from bns.sweep.cores import cores
+    from bns.sweep.cost import MACHINES, Cost, Machine, cost_table
+    from bns.sweep.grid import load_sweep
+    from bns.sweep.plan import plan as planned
+
+    plans = [planned(load_sweep(file), options.results, 1) for file in options.files]
+    here = Machine("here", 1, cores())
+    print(cost_table([Cost.of(each) for each in plans], (here, *MACHINES)))
+    print("every core as fast as one of this machine's; from " + "; ".join(f"{p.sweep}: {p.basis}" for p in plans))
+    return 0
 
 
 def status(options: argparse.Namespace) -> int:

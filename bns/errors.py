@@ -24,6 +24,10 @@ class ModelError(BnsError):
     """A robot model, network file or table of measurements that cannot be used."""
 
 
+class ClusterError(BnsError):
+    """Other machines that cannot be used as asked: a scheduler, its workers, a batch system."""
+
+
 class DataError(BnsError):
     """Measurements that cannot be used as they are."""
 

@@ -21,6 +21,7 @@ FLOORS = (
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "single", "watch"},
+    {"cluster_options", "measuring"},
     {"cli"},
     {"__main__"},
 )

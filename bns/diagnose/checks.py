@@ -1,9 +1,13 @@
-"""What is odd about measurements before anything is concluded from them. Every finding names trial and row; nothing goes in silence."""
+"""What is odd about measurements, before anything is concluded from them.
+
+Every finding names trial and row; nothing goes in silence.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -79,7 +83,7 @@ def _forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) ->
     latest = np.maximum.accumulate(t)
     good = np.ones(len(t), dtype=bool)
     good[1:] = t[1:] > latest[:-1]
-    for i in np.flatnonzero(~good):
+    for i in map(int, np.flatnonzero(~good)):
         what = "repeats" if t[i] == latest[i - 1] else "lies before"
         findings.append(Finding(trial, int(rows.index[i]), f"time {t[i]:g} s {what} an earlier one; row left out"))
     if (~good).mean() > 0.5 and len(t) > 4:
@@ -91,7 +95,10 @@ def _forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) ->
 
 
 def _without_jumps(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
-    """Poses far from where their neighbours put them are emptied: a marker was mistaken. Repeated, since jumps come in pairs too."""
+    """Poses far from where their neighbours put them are emptied: a marker was mistaken.
+
+    Repeated, since jumps come in pairs too.
+    """
     out = rows
     for _ in range(_JUMP_ROUNDS):
         seen = out[list(POSE)].notna().all(axis=1).to_numpy()
@@ -101,7 +108,9 @@ def _without_jumps(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> p
         bad = out.index[seen][_jumps(pose, t)]
         if not len(bad):
             break
-        findings += [Finding(trial, int(row), "the tracked pose jumps away and back; pose taken as lost") for row in bad]
+        findings += [
+            Finding(trial, int(row), "the tracked pose jumps away and back; pose taken as lost") for row in bad
+        ]
         out = out.copy()
         out.loc[bad, list(POSE)] = np.nan
     return out
@@ -140,12 +149,14 @@ def _gaps_and_losses(trial: str, rows: pd.DataFrame, findings: list[Finding]) ->
     t = rows["t_s"].to_numpy()
     if len(t) > 2:
         usual = float(np.median(np.diff(t)))
-        for i in np.flatnonzero(np.diff(t) > max(5 * usual, 0.2)):
+        for i in map(int, np.flatnonzero(np.diff(t) > max(5 * usual, 0.2))):
             if usual < 0.2:
                 findings.append(Finding(trial, int(rows.index[i]), f"no row for {t[i + 1] - t[i]:.2f} s"))
     lost = rows[list(POSE)].isna().any(axis=1)
     if lost.any():
-        findings.append(Finding(trial, int(rows.index[np.flatnonzero(lost)[0]]), f"{lost.sum()} poses lost, the first here"))
+        findings.append(
+            Finding(trial, int(rows.index[lost][0]), f"{lost.sum()} poses lost, the first here")
+        )
 
 
 def _units(table: pd.DataFrame) -> None:
@@ -165,12 +176,15 @@ def _units(table: pd.DataFrame) -> None:
             )
     if len(ways) and np.abs(ways[:, 2]).sum() > 1:
         turn = _ratio(np.abs(ways[:, 2]), np.abs(ways[:, 3]))
-        same = float((ways[:, 2] * ways[:, 3]).sum() / np.sqrt((ways[:, 2] ** 2).sum() * (ways[:, 3] ** 2).sum() + 1e-300))
+        same = float(
+            (ways[:, 2] * ways[:, 3]).sum() / np.sqrt((ways[:, 2] ** 2).sum() * (ways[:, 3] ** 2).sum() + 1e-300)
+        )
         if turn * 0.1 > 12:  # wheel differences are turned into angles with a base of 0.1 m: only the size matters
             raise DataError("Headings turn some sixty times as far as the wheels can: heading_rad looks like degrees.")
         if same < -0.5:
             raise DataError(
-                "The robot turns against the wheels: heading_rad must run counter-clockwise, or left_m_s and right_m_s are exchanged."
+                "The robot turns against the wheels: heading_rad must run counter-clockwise, "
+                "or left_m_s and right_m_s are exchanged."
             )
 
 
@@ -188,11 +202,15 @@ def _driven(table: pd.DataFrame) -> Iterator[tuple[float, float, float, float]]:
         turn = np.concatenate([[0], np.cumsum(((right - left) * span)[:-1])])
         pose = rows[list(POSE)].to_numpy()
         seen = np.flatnonzero(np.isfinite(pose).all(axis=1))
-        marks = seen[np.unique(np.searchsorted(t[seen], np.arange(t[0], t[-1] + 1e-9, 1.0)).clip(max=len(seen) - 1))] if len(seen) else seen
+        marks = (
+            seen[np.unique(np.searchsorted(t[seen], np.arange(t[0], t[-1] + 1e-9, 1.0)).clip(max=len(seen) - 1))]
+            if len(seen)
+            else seen
+        )
         heading = np.full(len(t), np.nan)
         if len(seen):
             heading[seen] = pose[seen, 2]
-        for a, b in zip(marks[:-1], marks[1:], strict=True):
+        for a, b in pairwise(marks):
             yield (
                 way[b] - way[a],
                 float(np.hypot(*(pose[b, :2] - pose[a, :2]))),

@@ -13,8 +13,9 @@ from bns.diagnose.folds import errors_at_horizons, held_out_steps
 from bns.diagnose.formula_search import Formula, best_formula
 from bns.diagnose.horizons import HORIZONS, noise_floor
 from bns.diagnose.predictor import Predictor
+from bns.diagnose.rhythm import Rhythm, rhythms
 from bns.diagnose.search import FALSE_ALARM, Candidate, Found, Search
-from bns.diagnose.structure import Echo, Pattern, echo, patterns, remaining
+from bns.diagnose.structure import Pattern, patterns, remaining
 from bns.diagnose.tracks import Tracks
 from bns.physics.effect import Effect
 from bns.physics.effects import all_effects
@@ -24,9 +25,6 @@ VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
 FEWEST_TRIALS = 8
 """With fewer the signs of whole trials cannot all come out alike by a chance that is small enough."""
 FEW_TRIALS = 40
-LOUD_ECHO = 0.065
-LOUD_Z = 4.0
-"""What was not foreseen repeats itself this much, this surely: more than motors that vary from command to command do."""
 _HINT = 5.0
 """A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
 
@@ -38,7 +36,7 @@ class Diagnosis:
     verdict: str
     found: Found | None
     patterns: tuple[Pattern, ...] = ()
-    echo: Echo | None = None
+    rhythm: Rhythm | None = None
     formula: Formula | None = None
     error: Mapping[str, Mapping[str, float]] | None = None
     notes: tuple[str, ...] = ()
@@ -97,20 +95,19 @@ def diagnose(
     found = Search(predictor, model, extra, tick).run()
     tick("what is left")
     seen = patterns(found.problem, found.fit)
-    left, repeated = remaining(seen), echo(found.problem, found.fit)
-    loud = abs(repeated.correlation) > LOUD_ECHO and abs(repeated.z) > LOUD_Z
+    left, rhythm = remaining(seen), rhythms(found.problem, found.fit)[0]
     formula = best_formula(found.problem, found.fit, left) if left else None
     hint = _hint(found, len(predictor.tracks))
-    verdict = _verdict(found, left, loud, hint)
+    verdict = _verdict(found, left, rhythm.loud, hint)
     tick("errors on trials held out")
     return Diagnosis(
         verdict,
         found,
         tuple(seen[:12]),
-        repeated,
+        rhythm,
         formula,
         errors_before_and_after(found),
-        tuple(_notes(found, predictor.tracks, left, repeated if loud else None, formula, hint)),
+        tuple(_notes(found, predictor.tracks, left, rhythm if rhythm.loud else None, formula, hint)),
     )
 
 
@@ -123,7 +120,9 @@ def too_little(tracks: Tracks) -> str:
         )
     frames = np.diff(tracks.first)
     if np.median(frames) < 2:
-        return "Most trials have a single tracked pose; a displacement needs two: log the pose before and after commands."
+        return (
+            "Most trials have a single tracked pose; a displacement needs two: log the pose before and after commands."
+        )
     if not (np.abs(tracks.left_m_s) + np.abs(tracks.right_m_s) * (tracks.duration_s > 0)).any():
         return "The robot was never told to move; give it commands of different speeds."
     ends = [tracks.pose[a:b, :2] for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
@@ -183,7 +182,7 @@ def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def ties_of(found: Found) -> list[list[str]]:
-    """Groups of names that stand for each other: whichever of a group is exchanged for another, the tracks are explained as well."""
+    """Groups of names that stand for each other: exchange one of a group for another, and the tracks are explained as well."""
     groups: list[set[str]] = []
     for rival in found.rivals:
         group = set(found.accepted) ^ set(rival)
@@ -224,7 +223,7 @@ def _notes(
     found: Found,
     tracks: Tracks,
     left: Sequence[Pattern],
-    loud: Echo | None,
+    rhythm: Rhythm | None,
     formula: Formula | None,
     hint: Candidate | None,
 ) -> Iterable[str]:
@@ -243,10 +242,11 @@ def _notes(
             f"Left unexplained: {p.channel} along {p.variable}, {p.share:.2%} of the loss on held-out trials "
             f"(p {'<' if p.evidence.p_value < 1e-4 else '='} {max(p.evidence.p_value, 1e-4):.2g})."
         )
-    if loud is not None:
+    if rhythm is not None:
+        after = f"{rhythm.lag} frames later" if rhythm.scale == "within" else "in the next command"
         yield (
-            f"What is not foreseen in the {loud.direction} direction repeats itself {loud.lag_frames} frames later (correlation "
-            f"{loud.correlation:+.2f}): something with a rhythm or a drift of its own that no logged variable shows."
+            f"What is not foreseen in the direction {rhythm.direction} repeats itself {after} (correlation "
+            f"{rhythm.correlation:+.2f}): something with a rhythm or a drift of its own that no logged variable shows."
         )
     if formula is not None:
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())

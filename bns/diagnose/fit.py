@@ -223,8 +223,8 @@ def _normal(jacobian: Array, white: Array) -> tuple[Array, Array]:
 def _damped_step(curvature: Array, gradient: Array, damping: float) -> Array:
     scale = np.diag(curvature).copy()
     scale[scale <= 0] = 1.0
-    step: Array = -np.linalg.lstsq(curvature + damping * np.diag(scale), gradient, rcond=None)[0]
-    return step
+    solved = np.linalg.lstsq(curvature + damping * np.diag(scale), gradient, rcond=None)[0]
+    return np.asarray(-solved, dtype=np.float64)
 
 
 def _inside(model: Model, free: Sequence[Free], gradient: Array) -> np.ndarray:

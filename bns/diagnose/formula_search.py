@@ -24,7 +24,13 @@ from bns.physics.model import Model
 
 NAME = "unlisted"
 _ON = {"forward_m_s": "v", "sideways_m_s": "s", "yaw_rad_s": "w", "east_m_s": "east", "north_m_s": "north"}
-_CARRIERS = {"v": ("v", "moving"), "s": ("v", "v*w", "moving"), "w": ("w", "v", "moving"), "east": ("moving",), "north": ("moving",)}
+_CARRIERS = {
+    "v": ("v", "moving"),
+    "s": ("v", "v*w", "moving"),
+    "w": ("w", "v", "moving"),
+    "east": ("moving",),
+    "north": ("moving",),
+}
 """What a curve may multiply, by the velocity it adds to."""
 _SHAPES = {
     "left_m_s": ("l", "abs(l)", "l**2", "sign(l)"),
@@ -107,7 +113,7 @@ def _bump(problem: Problem, fit: Fit, on: str) -> Formula | None:
                 score = float(column @ _weighted(fit, fit.white)) ** 2 / max(float(column @ column), 1e-300)
                 if best is None or score > best[0]:
                     best = (score, cx, cy, width)
-    assert best is not None  # noqa: S101
+    assert best is not None
     term = f"k * {_CARRIERS[on][0]} * exp(-((x - a)**2 + (y - b)**2) / (2 * c**2))"
     effect = formula_effect(NAME, term, on)
     start = {"k": -1e-3, "a": best[1], "b": best[2], "c": best[3]}

@@ -125,7 +125,9 @@ def noise_floor(predictor: Predictor, noise: Array, horizon: str) -> dict[str, f
     driven = way[end] - way[start]
     straight = np.hypot(*(tracks.pose[end, :2] - tracks.pose[start, :2]).T)
     heading = noise[1] ** 2 * straight**2
-    bent = noise[4] ** 2 * driven * straight**2 / 3  # heading scatter on the way, a third of it as displacement at the end
+    bent = (
+        noise[4] ** 2 * driven * straight**2 / 3
+    )  # heading scatter on the way, a third of it as displacement at the end
     position = 4 * noise[0] ** 2 + heading + bent + (noise[2] ** 2 + noise[3] ** 2) * driven
     return {
         "position_m": float(np.sqrt(position.mean())),

@@ -37,7 +37,15 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "mm/s": ("m/s", 1e-3),
 }
 """Unit -> what it measures in SI units, and its size."""
-_SI = {"t_s": "s", "left_m_s": "m/s", "right_m_s": "m/s", "x_m": "m", "y_m": "m", "heading_rad": "rad", "session_s": "s"}
+_SI = {
+    "t_s": "s",
+    "left_m_s": "m/s",
+    "right_m_s": "m/s",
+    "x_m": "m",
+    "y_m": "m",
+    "heading_rad": "rad",
+    "session_s": "s",
+}
 _KEYS = ("from", "unit", "scale", "offset", "clockwise", "zero_deg")
 
 
@@ -54,7 +62,9 @@ def load_mapping(path: Path) -> dict[str, Any]:
     except (OSError, yaml.YAMLError) as fault:
         raise DataError(f"The mapping {path} does not read: {fault}.") from fault
     if not isinstance(tree, dict) or set(tree) != {"columns"} or not isinstance(tree["columns"], dict):
-        raise DataError(f"The mapping {path} must have the one key columns, with an entry for each column of the table.")
+        raise DataError(
+            f"The mapping {path} must have the one key columns, with an entry for each column of the table."
+        )
     for name, entry in tree["columns"].items():
         _check_entry(path, name, entry)
     return tree

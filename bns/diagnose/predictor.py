@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bns.diagnose.tracks import Array, Tracks
 from bns.physics.model import Model
 
@@ -13,8 +16,8 @@ from bns.physics.model import Model
 class Steps:
     """Predicted displacement since the frame before; zeros where a trial begins.
 
-    ``body`` (frames, 3): forward_m, left_m, turn_rad in the frame of the robot at the frame before; ``drift_m`` (frames, 2): east and
-    north, whatever way the robot faces.
+    ``body`` (frames, 3): forward_m, left_m, turn_rad in the frame of the robot at the frame before; ``drift_m``
+    (frames, 2): east and north, whatever way the robot faces.
     """
 
     body: Array
@@ -22,7 +25,10 @@ class Steps:
 
 
 class Predictor(Protocol):
-    """Tracks with all that can be worked out of them once. ``way_m`` (frames,): how far the wheels went since the frame before."""
+    """Tracks with all that can be worked out of them once.
+
+    ``way_m`` (frames,): how far the wheels went since the frame before.
+    """
 
     tracks: Tracks
     way_m: Array
@@ -32,3 +38,6 @@ class Predictor(Protocol):
 
     def variables(self) -> dict[str, Array]:
         """Name -> values along which errors may show, one a step of the predictor's own grid, (trials, steps)."""
+
+    def at_frames(self, frames: NDArray[np.int64]) -> dict[str, Array]:
+        """`variables` at the times of some frames, (frames,) each."""

@@ -143,9 +143,7 @@ class Search:
         least = MIN_GAIN * float(before.held_out.mean())
         return e.p_value < self.level and e.z > MIN_Z and e.gain > max(bar, least)
 
-    def _swapped(
-        self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
-    ) -> tuple[Problem, Fit, tuple[str, ...]]:
+    def _swapped(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[Problem, Fit, tuple[str, ...]]:
         """Exchange an accepted effect for another one while that makes the held-out loss smaller."""
         for _ in range(len(accepted) if len(accepted) > 1 else 0):
             best, new = fit, accepted

@@ -22,8 +22,6 @@ from bns.physics.signals import Body
 CHANNELS = ("forward_m_s", "sideways_m_s", "yaw_rad_s")
 WORLD = ("east_m_s", "north_m_s")
 """Velocities in the world's frame, for what a place does to the robot."""
-LAGS = (3, 5, 8, 12, 18, 25)
-"""Frames. Not shorter: neighbours share errors of the camera and of its clock."""
 KNOTS = 5
 """Bends of a free curve: at these many quantiles of the variable."""
 FIELD = 5
@@ -58,30 +56,6 @@ def patterns(problem: Problem, fit: Fit) -> list[Pattern]:
     return sorted(found, key=lambda p: -p.evidence.gain)
 
 
-@dataclass(frozen=True)
-class Echo:
-    """The largest correlation of what was not foreseen with itself a while before, in one direction."""
-
-    direction: str
-    lag_frames: int
-    correlation: float
-    z: float
-
-
-def echo(problem: Problem, fit: Fit) -> Echo:
-    """How far the unforeseen repeats itself along time; foreseen well, frames are independent."""
-    first, found = problem.predictor.tracks.first, []
-    for direction, name in enumerate(("forward", "left", "heading")):
-        rows = [np.clip(fit.white[a + 1 : b, direction], -4, 4) for a, b in zip(first[:-1], first[1:], strict=True)]
-        for lag in LAGS:
-            pairs = np.array([[x[lag:] @ x[:-lag], x @ x] for x in rows if len(x) > 2 * lag])
-            if len(pairs) > 1 and pairs[:, 1].sum() > 0:
-                r = float(pairs[:, 0].sum() / pairs[:, 1].sum())
-                se = float(np.std(pairs[:, 0] - r * pairs[:, 1]) * np.sqrt(len(pairs)) / pairs[:, 1].sum())
-                found.append(Echo(name, lag, r, r / se if se > 0 else 0.0))
-    return max(found, key=lambda e: abs(e.correlation), default=Echo("forward", 0, 0.0, 0.0))
-
-
 def remaining(found: list[Pattern]) -> list[Pattern]:
     """The patterns that cannot be luck and are large enough to matter."""
     level = CHANCE / max(len(found), 1)
@@ -97,17 +71,20 @@ def curves(variables: Mapping[str, Array]) -> Iterator[tuple[str, list[Array]]]:
         if len(knots) > 1:
             yield name, [np.interp(values, knots, row) for row in np.eye(len(knots))]
     if {"x_m", "y_m"} <= set(variables):
-        yield "place", _bumps(variables["x_m"], variables["y_m"])
+        yield "place", _bumps(variables["x_m"], variables["y_m"], FIELD)
+    speeds = ("speed_m_s", "wheel_difference_m_s")
+    if set(speeds) <= set(variables):
+        yield "speed and turn", _bumps(variables[speeds[0]], variables[speeds[1]], FIELD - 1)
 
 
-def _bumps(x: Array, y: Array) -> list[Array]:
-    """Gaussian bumps on a grid over where the robot was."""
+def _bumps(x: Array, y: Array, side: int) -> list[Array]:
+    """Gaussian bumps on a grid over two variables."""
     (x0, x1), (y0, y1) = np.quantile(x, [0.01, 0.99]), np.quantile(y, [0.01, 0.99])
-    width = max(x1 - x0, y1 - y0) / (FIELD - 1) + 1e-9
+    wide, high = (0.6 * (top - low) / (side - 1) + 1e-9 for low, top in ((x0, x1), (y0, y1)))
     return [
-        np.exp(-((x - cx) ** 2 + (y - cy) ** 2) / (2 * (0.6 * width) ** 2))
-        for cx in np.linspace(x0, x1, FIELD)
-        for cy in np.linspace(y0, y1, FIELD)
+        np.exp(-(((x - cx) / wide) ** 2 + ((y - cy) / high) ** 2) / 2)
+        for cx in np.linspace(x0, x1, side)
+        for cy in np.linspace(y0, y1, side)
     ]
 
 

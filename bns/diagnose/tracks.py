@@ -20,9 +20,9 @@ class Tracks:
     """Trials one after the other.
 
     ``first`` (trials + 1): where each trial's frames begin. ``t_s`` (frames,) since the trial's first row, ``pose`` (frames, 3),
-    all finite. ``left_m_s, right_m_s, duration_s`` (trials, commands): what was in force, back to back from the first row,
-    padded with commands of 0 s. ``extra``: further numeric columns, (frames,) each. ``start_s`` (trials,): time of the session at the
-    first row; ``start_known``: it was logged, not made up from the order of the trials.
+    all finite. ``left_m_s, right_m_s, duration_s`` (trials, commands): what was in force, back to back from the first
+    row, padded with commands of 0 s. ``extra``: further numeric columns, (frames,) each. ``start_s`` (trials,): time of
+    the session at the first row; ``start_known``: it was logged, not made up from the order of the trials.
     """
 
     names: tuple[str, ...]

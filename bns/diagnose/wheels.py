@@ -73,8 +73,21 @@ class WheelPredictor:
             "time_in_trial_s": middle,
             "session_s": tracks.start_s[:, None] + middle,
             "way_m": way,
+            "left_since_reversal_s": _since_reversal(grid.left_m_s, grid.step_s),
+            "right_since_reversal_s": _since_reversal(grid.right_m_s, grid.step_s),
             **{name: self._seen_on_grid(name) for name in self._seen()},
         }
+
+    def at_frames(self, frames: NDArray[np.int64]) -> dict[str, Array]:
+        """`variables` at the times of some frames, (frames,) each."""
+        rows = self.tracks.trial[frames]
+        steps = np.array(
+            [
+                np.searchsorted(self.grid.node_s[r], t + 1e-9, side="right") - 1
+                for r, t in zip(rows, self.tracks.t_s[frames], strict=True)
+            ]
+        ).clip(0, self.grid.step_s.shape[1] - 1)
+        return {name: values[rows, steps] for name, values in self.variables().items()}
 
     def _seen_on_grid(self, name: str) -> Array:
         middle, values = (self.grid.node_s[:, 1:] + self.grid.node_s[:, :-1]) / 2, self._seen()[name]
@@ -120,6 +133,17 @@ def _before(values: Array, changed: NDArray[np.bool_]) -> Array:
     for k in range(values.shape[1]):
         current = np.where(changed[:, k], before[:, k], current)
         out[:, k] = current
+    return out
+
+
+def _since_reversal(speed: Array, step_s: Array) -> Array:
+    """Time since a wheel last changed its direction, at most 1 s, with the sign of its speed; 1 s where it never did."""
+    out, since, sign = np.empty_like(speed), np.ones(len(speed)), np.zeros(len(speed))
+    for k in range(speed.shape[1]):
+        now = np.sign(speed[:, k])
+        since = np.where((now != 0) & (sign != 0) & (now != sign), 0.0, np.minimum(since + step_s[:, k], 1.0))
+        sign = np.where(now != 0, now, sign)
+        out[:, k] = since * np.where(sign == 0, 1.0, sign)
     return out
 
 

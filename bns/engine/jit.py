@@ -57,8 +57,8 @@ _configure()
 
 
 def _mark() -> Path:
-    # One for each numba and kind of processor: what another has compiled is of no use.
-    return Path(_config.CACHE_DIR) / f"compiled-{numba.__version__}-{llvm.get_host_cpu_name()}"
+    # One for each text of the kernels, numba and kind of processor: what another has compiled is of no use.
+    return Path(_config.CACHE_DIR) / f"{cache_folder().name}-{numba.__version__}-{llvm.get_host_cpu_name()}"
 
 
 def compiled() -> bool:

@@ -70,8 +70,8 @@ def filter_gains(
 ) -> tuple[Array, Array, Array]:
     """An extended Kalman filter over x, y, heading, as far as it does not depend on what is seen.
 
-    ``body`` (frames, 3) is the displacement since the frame before, ``way_m`` (frames,) the way of the wheels. ``noise``: standard
-    deviations of a tracked position (m) and heading (rad), then of the drive's scatter forward, sideways (m) and of its
+    ``body`` (frames, 3) is the displacement since the frame before, ``way_m`` (frames,) the way of the wheels. ``noise``:
+    standard deviations of a tracked position (m) and heading (rad), then of the drive's scatter forward, sideways (m) and of its
     heading (rad), each per square root of a metre driven. Returns, in the robot's frame (forward, left, heading): gains
     (frames, 3, 3), inverse Cholesky factors of the innovations' covariance (frames, 3, 3), its half log determinant (frames,).
     """

@@ -93,7 +93,9 @@ def _parsed(name: str, term: str) -> tuple[set[str], Any]:
         raise ModelError(f"formula {name}: {term!r} is no formula: {fault}. Write it as in k * v * abs(w).") from fault
     called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
     for node in ast.walk(tree):
-        if not isinstance(node, _ALLOWED) or (isinstance(node, ast.Constant) and not isinstance(node.value, int | float)):
+        if not isinstance(node, _ALLOWED) or (
+            isinstance(node, ast.Constant) and not isinstance(node.value, int | float)
+        ):
             raise ModelError(
                 f"formula {name}: {ast.unparse(node)!r} is not allowed; use + - * / **, numbers, names and "
                 f"{', '.join(FUNCTIONS)}."
@@ -109,7 +111,7 @@ def _apply(name: str, code: Any, on: str, body: Body, **numbers: float) -> Body:
         return body  # first round of a simulation: nobody knows yet where the robot goes
     values = {**_values(body), **numbers}
     with np.errstate(all="ignore"):
-        added = np.asarray(eval(code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # noqa: S307  # checked by _parsed
+        added = np.asarray(eval(code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
     added = np.broadcast_to(added, body.forward_m_s.shape) * (body.moving if on in {"east", "north"} else 1.0)
     if not np.isfinite(added).all():
         raise ModelError(
@@ -118,7 +120,7 @@ def _apply(name: str, code: Any, on: str, body: Body, **numbers: float) -> Body:
         )
     if on not in {"east", "north"}:
         return body.with_added(ON[on], added)
-    assert body.place is not None  # noqa: S101
+    assert body.place is not None
     return body.with_drift(on, added, body.place[..., 2])
 
 

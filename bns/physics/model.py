@@ -82,9 +82,9 @@ class Model:
     def __post_init__(self) -> None:
         if self.base not in BASES:
             raise ModelError(unknown_name("base", self.base, BASES))
-        for field, (low, high) in LIMITS.items():
-            value = number(f"model {self.name}: {field}", getattr(self, field), low, high)
-            object.__setattr__(self, field, value)
+        for name, (low, high) in LIMITS.items():
+            value = number(f"model {self.name}: {name}", getattr(self, name), low, high)
+            object.__setattr__(self, name, value)
         names = [active.effect.name for active in self.effects]
         for name in names:
             if names.count(name) > 1:
@@ -201,7 +201,7 @@ def parse_model(text: str, name: str, folder: Path | None = None) -> Model:
 def _effect(model: str, entry: Any, folder: Path) -> ActiveEffect:
     where = f"an effect of model {model}"
     keys = _keys(where, entry, (*_EFFECT_KEYS, *_EFFECT_MAY), required=_EFFECT_KEYS)
-    written = {key: str(keys[key]) for key in ("term", "on", "file") if key in keys}
+    written: dict[str, str] = {str(key): str(keys[key]) for key in ("term", "on", "file") if key in keys}
     effect = _written_effect(where, str(keys["name"]), written, folder)
     names = tuple(p.name for p in effect.parameters)
     values = _keys(f"values of {effect.name} in model {model}", keys["values"], names)

@@ -80,6 +80,8 @@ class SnakePhysics:
         return np.concatenate([before, after, [float(not driven.causes)]])
 
 
-def build(robot: Robot) -> SnakePhysics:
-    """The model as shipped."""
+def build(robot: Robot, model: str | None = None) -> SnakePhysics:
+    """The model as shipped; ModelError if another one is asked for."""
+    if model is not None:
+        raise ModelError(f"{model} is a model of a differential drive; the snake is driven with --world physics.")
     return SnakePhysics(shipped_parameters())

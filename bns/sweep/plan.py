@@ -17,6 +17,7 @@ from bns.sweep.grid import Sweep
 from bns.sweep.job import run_job, warm
 from bns.sweep.order import ordered_specs
 from bns.sweep.pace import Pace
+from bns.sweep.shard import Shard
 
 _TRIAL_EVALUATIONS = 20
 _BYTES_PER_EVALUATION = 100
@@ -53,18 +54,20 @@ def plan(
     sweep: Sweep,
     results: Path,
     jobs: int,
+    shard: Shard | None = None,
     *,
     retry_failed: bool = False,
     job: Job = run_job,
     warm_up: Callable[[], object] = warm,
 ) -> Plan:
-    """Count and estimate. Without stored runs of this sweep, one short run is carried out and timed.
+    """Count and estimate, the whole or one ``shard``. Without stored runs of this sweep, one short run is carried out and timed.
 
     Nothing is written. The seconds are wall time with ``jobs`` workers; NaN if the trial run failed.
     """
     known = finished(results, sweep.name)
     had = {run_id for run_id, status in known.items() if status == "ok" or not retry_failed}
-    specs = ordered_specs(sweep)
+    everything = ordered_specs(sweep)
+    specs = everything if shard is None else list(shard.share(everything))
     todo = [spec for spec in specs if spec.run_id not in had] if had else specs
     if not todo:
         return Plan(sweep.name, len(specs), len(specs), 0, 0.0, 0.0, "nothing is left to do")

@@ -36,8 +36,8 @@ class Summary:
 
     ``new_failed`` is how many of the new ones failed or were quarantined.
 
-    ``stopped_by`` is None (nothing left to do), "budget", "limit", "interrupt" (Ctrl-C) or "terminated"
-    (SIGTERM).
+    ``stopped_by`` is None (nothing left to do), "budget", "limit", "interrupt" (Ctrl-C), "terminated"
+    (SIGTERM) or "submitted" (the rest is queued with a batch system).
     """
 
     sweep: str
@@ -55,7 +55,7 @@ class Summary:
         return self.total - self.done - self.failed - self.quarantined
 
 
-def _silent(_summary: Summary) -> None:
+def silent(_summary: Summary) -> None:
     """Progress that nobody wants to see."""
 
 
@@ -70,7 +70,7 @@ def run_sweep(
     job: Job = run_job,
     executor: Executor | None = None,
     warm_up: Callable[[], object] | None = None,
-    on_progress: Callable[[Summary], None] = _silent,
+    on_progress: Callable[[Summary], None] = silent,
     grace_s: float = GRACE_S,
     shard: Shard | None = None,
 ) -> Summary:

@@ -6,9 +6,9 @@ import itertools
 from pathlib import Path
 
 import numpy as np
-from store.synthetic import publish_chunk
 
 from bns.spec import RunSpec
+from tests.store.synthetic import publish_chunk
 
 GRID = {
     "population_size": (50, 100, 200, 400),

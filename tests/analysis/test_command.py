@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+from statsmodels.stats.proportion import proportion_confint
 from store.synthetic import failed, record
 
 from analysis.__main__ import figures, main
@@ -22,6 +23,13 @@ def test_wilson_agrees_with_the_formula_by_hand():
     assert high == pytest.approx([0.60322, 0.27753, 1.0], abs=5e-6)
     z2 = 1.959963984540054**2
     assert low[0] == pytest.approx((3 + z2 / 2 - np.sqrt(z2 * (2.1 + z2 / 4))) / (10 + z2))
+
+
+def test_wilson_agrees_with_statsmodels_for_every_count_of_thirty():
+    runs = np.repeat([1, 5, 30, 3000], 31)
+    successes = np.minimum(np.tile(np.arange(31), 4), runs)
+    theirs = proportion_confint(successes, runs, method="wilson")
+    assert np.array(wilson(successes, runs)) == pytest.approx(np.array(theirs), abs=1e-12)
 
 
 def test_all_figures_come_with_their_captions_and_numbers(real_results, tmp_path, capsys):
@@ -47,7 +55,7 @@ def test_all_figures_come_with_their_captions_and_numbers(real_results, tmp_path
 def test_a_figure_drawn_again_has_the_same_bytes(real_results, tmp_path):
     for out in ("one", "two"):
         main(["--results", str(real_results), "--only", "success-by-diversity", "--out", str(tmp_path / out)])
-    made = [path for path in sorted((tmp_path / "one").iterdir()) if path.name != "index.html"]  # which has a date
+    made = [path for path in sorted((tmp_path / "one").iterdir()) if path.suffix != ".html"]  # which has a date
     assert len(made) == 4
     assert [path.read_bytes() for path in made] == [(tmp_path / "two" / path.name).read_bytes() for path in made]
 

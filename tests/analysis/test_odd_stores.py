@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers import with_evals, written
+from figure_helpers import with_evals, written
 from store.synthetic import failed, make_store, record
 
 from analysis import checks, findings, one_run, success_by_mutation, success_by_population, trials

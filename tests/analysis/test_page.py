@@ -65,6 +65,8 @@ def test_every_figure_has_a_section_with_its_caption_and_origin(drawn):
     assert text.index('id="findings-khepera"') < text.index('id="trials-khepera"') < text.index('id="success-by')
     assert 'class="verdict undecided"' in text
     assert "http-equiv" not in text
+    alone = (drawn / "findings.html").read_text()
+    assert re.findall(r'<section id="(.*?)">', alone) == ["findings-khepera"]
 
 
 def test_the_page_needs_nothing_from_elsewhere(drawn):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 import pytest
-from helpers import curves, with_evals, written
+from figure_helpers import MUTATION, carry_out, curves, with_evals, written
 
 from analysis import best_combinations, diversity_of_extremes, potential_success
 from analysis.ranking import extremes, in_words, ranking
@@ -13,6 +15,8 @@ from analysis.store import NoDataError, Store
 from analysis.words import CELL
 from bns.spec import RunSpec
 from bns.store import load
+from bns.sweep.confirm import confirmation
+from bns.sweep.grid import parse_sweep
 
 NEAR = {f"success_{cm}cm": False for cm in (7, 10, 14, 20)}
 
@@ -104,3 +108,14 @@ def test_who_cannot_be_told_from_the_best_is_corrected_for_many_comparisons(tmp_
     # Fisher's test of 10 of 10 against 5 of 10 gives 0.033: below 0.05 alone, not among seven.
     assert "7 of the 7 others cannot be told from it" in drawn.see
     assert any("bns sweep sweeps/grid.yaml --confirm-top 10" in text for text in drawn.missing)
+
+
+def test_what_the_sweep_command_confirms_is_what_stands_first(real_results, tmp_path):
+    results = tmp_path / "results"
+    shutil.copytree(real_results, results)
+    sweep = parse_sweep(MUTATION, tmp_path / "mutation.yaml")
+    again = confirmation(sweep, results, top=1)
+    carry_out(results, again.text)
+    for drawn in best_combinations.draw(Store(results)):
+        assert drawn.data.confirm_runs.tolist() == [5, 0]
+        assert drawn.n == 15

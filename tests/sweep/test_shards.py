@@ -135,7 +135,7 @@ def test_the_journal_of_a_killed_shard_is_read_and_folded_later(tmp_path):
     specs = ordered_specs(make_sweep())
     killed = Writer(tmp_path / "a", "demo", shard="1-of-2").__enter__()
     killed.append(sweep_jobs.ok(specs[0]))
-    killed.__exit__(KeyboardInterrupt, None, None)  # leaves the files as a kill does
+    killed.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)  # leaves the files as a kill does
     summaries = [carry_out(tmp_path / "a", Shard(number, 2)) for number in (1, 2)]
     assert [(s.new, s.done) for s in summaries] == [(3, 4), (4, 4)]
     assert len(journals(tmp_path / "a")) == 1

@@ -81,6 +81,16 @@ def test_status_of_a_sweep_half_done(tmp_path):
     assert sum(row.remaining for row in sweep_status(tmp_path)) == 7
 
 
+def test_tasks_and_sweeps_that_are_not_begun_are_listed(tmp_path):
+    serial(sweep_of(tmp_path), tmp_path, limit=1)
+    serial(sweep_of(tmp_path, "later"), tmp_path, limit=0)
+    begun, *others = sorted(sweep_status(tmp_path), key=lambda row: row.last is None)
+    assert (begun.sweep, begun.remaining, begun.done + begun.failed) == ("demo", 5, 1)
+    assert {(row.sweep, row.total, row.remaining, row.other) for row in others} == {("demo", 6, 6, 0), ("later", 6, 6, 0)}
+    lines = status_table([begun, *others]).splitlines()
+    assert all(line.split()[2:] == ["0", "6", "0", "0", "0", "-", "-"] for line in lines[2:])
+
+
 def test_runs_of_an_earlier_file_of_that_name_are_counted_apart(tmp_path):
     serial(sweep_of(tmp_path), tmp_path)
     text = "name: demo\nrobot: khepera\nseeds: 1\nfixed: {evaluations: 3}\ngrid: {population_size: [10, 12, 13]}"

@@ -9,6 +9,16 @@ from store.synthetic import record
 
 from bns.spec import RunSpec
 from bns.store import RunRecord, Writer
+from bns.sweep.grid import parse_sweep
+from bns.sweep.order import ordered_specs
+
+MUTATION = """
+name: mutation
+robot: khepera
+seeds: 5
+fixed: {evaluations: 6, population_size: 8, generations_per_evaluation: 2, training_iterations_per_evaluation: 20}
+grid: {task: [circle, complex], mutation_rate: [0.1, 0.5]}
+"""
 
 
 def written(results: Path, sweep: str, records: list[RunRecord], **more) -> None:
@@ -30,3 +40,13 @@ def with_evals(spec: RunSpec, **columns) -> RunRecord:
         empty = value is None
         made.tables["evals"][name] = np.full(spec.evaluations, value, object if empty else None) if np.ndim(value) == 0 else value
     return made
+
+
+def carry_out(results: Path, text: str, keep: slice = slice(None)) -> None:
+    """Do a sweep (a part of its runs) in this process."""
+    from bns.sweep.job import run_job  # which loads the compiled kernels
+
+    sweep = parse_sweep(text, Path("test.yaml"))
+    with Writer(results, sweep.name, sweep_text=text, sweep_runs=sweep.total) as writer:
+        for spec in list(ordered_specs(sweep))[keep]:
+            writer.append(run_job(spec))
