@@ -157,7 +157,7 @@ def test_a_file_of_parameters_makes_another_world(tmp_path):
     (tmp_path / "ice.yaml").write_text(text.replace("{value: 0.35,", "{value: 0.05,"))
     (tmp_path / "half.yaml").write_text(text[: len(text) // 2].rsplit("\n", 1)[0])
     assert build(robot, str(tmp_path / "ice.yaml")).digest != build(robot).digest
-    with pytest.raises(ModelError, match="lack .*floor_friction"):
+    with pytest.raises(ModelError, match=r"lack .*floor_friction"):
         build(robot, str(tmp_path / "half.yaml"))
     with pytest.raises(ModelError, match=r"cannot read .*none\.yaml: No such file"):
         build(robot, str(tmp_path / "none.yaml"))
