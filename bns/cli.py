@@ -73,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     one = command("run", run, "carry out one run and draw its path")
     _add_spec_options(one)
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
+    _add_trial(command("trial", trial, "carry out a run on a robot, or on its emulator"))
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
     many.add_argument(
@@ -108,9 +109,29 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_spec_options(parser: argparse.ArgumentParser) -> None:
+def _add_trial(parser: argparse.ArgumentParser) -> None:
+    _add_spec_options(parser, without=("world",))
+    parser.set_defaults(task=None, record="full")
+    switch = {"action": "store_true"}
+    parser.add_argument("--rig", type=Path, metavar="FILE", help="ports, tracker and surface of your set-up (YAML)")
+    parser.add_argument("--emulated", **switch, help="drive the emulator of the robot: the same drivers, no hardware")  # type: ignore[arg-type]
+    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="of the emulator's clock (default: 1)")
+    parser.add_argument("--faults", type=Path, metavar="FILE", help="what the emulator shall do wrong (YAML)")
+    parser.add_argument("--yes", **switch, help="nobody is there to be asked")  # type: ignore[arg-type]
+    parser.add_argument("--resume", **switch, help="go on from the last evaluation driven")  # type: ignore[arg-type]
+    parser.add_argument("--replay", type=Path, metavar="JOURNAL", help="run a trial again from its journal, without a robot")
+    parser.add_argument("--commands", type=Path, metavar="FILE", help="drive given commands (CSV) instead of evolving")
+    parser.add_argument(
+        "--most-rounds", type=_positive, default=50, metavar="N", help="of training and evolution while one controller drives"
+    )
+    parser.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
+
+
+def _add_spec_options(parser: argparse.ArgumentParser, without: tuple[str, ...] = ()) -> None:
     """One option a parameter, named and explained as in `RunSpec`."""
     for name, field in FIELDS.items():
+        if name in without:
+            continue
         allowed = field.metadata["choices"]
         text = field.metadata["help"] + (f": {', '.join(allowed)}" if allowed else "")
         parser.add_argument(
@@ -166,6 +187,15 @@ def run(options: argparse.Namespace) -> int:
     spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
     _say_if_compiling()
     print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn))
+    return 0
+
+
+def trial(options: argparse.Namespace) -> int:
+    """A run whose world is a robot; codes 0 done, 2 bad input, 3 paused, 4 a robot that may still be moving."""
+    from bns.trial.command import carried_out
+
+    _say_if_compiling()
+    print(carried_out(options, {name: getattr(options, name) for name in FIELDS if name != "world"}))
     return 0
 
 

@@ -44,12 +44,14 @@ class Recorder:
 
     def __init__(self, robot: Robot, task: Task, world: World, key: Key, spec: RunSpec) -> None:
         self._robot, self._task, self._world, self._key = robot, task, world, key
+        self._once = not world.repeatable
         self._full = spec.record == "full"
         self._evals, self._paths, self._generations, self._probe_rows = (_Columns() for _ in range(4))
         self.last_poses = self.last_simulated = np.empty((0, 3))
         self._ever: dict[str, bool] = {}
         self._evaluated: dict[str, Any] = {}
-        if self._full:
+        self._path = (np.empty((0, 0)), self.last_poses, self.last_poses)
+        if self._full and not self._once:
             self._probes = robot.random_controllers(key, PROBES, PROBE_COMMANDS)
             self._probe_world = [
                 self._final(self._drive(self._probes.controller(i), Purpose.PROBE, 1 + i)) for i in range(PROBES)
@@ -70,8 +72,9 @@ class Recorder:
             "commands": len(controller),
             "driven_ms": self._robot.driven_ms(controller),
         } | self._successes("evaluated_success", poses)
+        self._path = (controller, poses, simulated)
         if self._full:
-            self._add_path(evaluation, "evaluated", controller, poses, simulated)
+            self._add_path(evaluation, "evaluated", *self._path)
         return poses
 
     def record(
@@ -84,10 +87,10 @@ class Recorder:
         evolution_cpu_s: float,
     ) -> dict[str, Any]:
         """Measure the fittest controller in the world and add this evaluation's row."""
-        fittest = evolver.fittest()
-        poses = self._drive(fittest, Purpose.WORLD_FITTEST, evaluation)
+        fittest, poses, simulated = self._fittest(evaluation, evolver, weights)
         in_world, goals = self._robot.judge(poses, self._task)
-        self.last_poses, self.last_simulated = poses, self._simulated(fittest, weights)
+        in_simulation = self._robot.judge(simulated, self._task)[0] if self._once else evolver.best_fitness
+        self.last_poses, self.last_simulated = poses, simulated
         successes = self._successes("success", poses)
         for name, value in successes.items():
             self._ever["ever_" + name] = self._ever.get("ever_" + name, False) or value
@@ -97,8 +100,8 @@ class Recorder:
         return self._evals.add(
             evaluation=evaluation,
             diversity=evolver.diversity(),
-            fitness_error=abs(evolver.best_fitness - in_world),
-            fitness_simulation=evolver.best_fitness,
+            fitness_error=abs(in_simulation - in_world),
+            fitness_simulation=in_simulation,
             fitness_world=in_world,
             best_fitness=evolver.best_fitness,
             mean_fitness=evolver.mean_fitness,
@@ -142,10 +145,22 @@ class Recorder:
         by_radius = {f"{prefix}_{cm}cm": ok for cm, ok in zip(RADII_CM, within, strict=True)}
         return {prefix: within[0]} | by_radius
 
+    def _fittest(
+        self, evaluation: int, evolver: Evolver, weights: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Controller, path in the world and in simulation. A robot drives only what was picked: that one stands in."""
+        if self._once:
+            return self._path
+        fittest = evolver.fittest()
+        poses = self._drive(fittest, Purpose.WORLD_FITTEST, evaluation)
+        return fittest, poses, self._simulated(fittest, weights)
+
     def _record_full(
         self, evaluation: int, fittest: np.ndarray, poses: np.ndarray, evolver: Evolver, weights: np.ndarray
     ) -> None:
         self._add_path(evaluation, "fittest", fittest, poses, self.last_simulated)
+        if self._once:
+            return
         for generation in evolver.history:
             driven = self._drive(generation.best, Purpose.WORLD_GENERATION, generation.number)
             self._generations.add(

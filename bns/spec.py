@@ -41,7 +41,7 @@ class RunSpec:
 
     robot: str = _field("khepera", "robot")
     task: str = _field("circle", "goal task of that robot")
-    world: str = _field("substitute", "what answers a controller", choices=("substitute", "physics"))
+    world: str = _field("substitute", "what answers a controller", choices=("substitute", "physics", "robot"))
     seed: int = _field(0, "seed of this run", low=0, high=2**32 - 1)
     root_seed: int = _field(0, "seed of the whole study", low=0, high=2**32 - 1)
     population_size: int = _field(400, "controllers in the population", low=1, high=1_000_000)

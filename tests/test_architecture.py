@@ -16,11 +16,13 @@ FLOORS = (
     {"tasks"},
     {"robots"},
     {"physics"},
+    {"hardware"},
     {"worlds"},
     {"evolver", "trainer", "recorder", "loop", "precompute"},
     {"store"},
     {"sweep"},
     {"plotting", "single"},
+    {"trial"},
     {"cli"},
     {"__main__"},
 )

@@ -15,5 +15,8 @@ class World(Protocol):
     digest: str
     """Changes whenever the world would answer otherwise; stored with every run."""
 
+    repeatable: bool
+    """Whether it answers whatever is asked of it, as often as wanted; a robot only drives what was picked."""
+
     def drive(self, commands: np.ndarray, key: Key, purpose: Purpose, step: int) -> np.ndarray:
         """Measured poses (n, 3) at the end of each command (n, components); draws come from key, purpose and step."""

@@ -14,6 +14,8 @@ from bns.robots.khepera import START, Khepera
 class PhysicsWorld:
     """Drives a model of two wheels; motor jitter and tracking noise are drawn for every command."""
 
+    repeatable = True
+
     def __init__(self, robot: Khepera, model: Model) -> None:
         self._robot = robot
         self._model = model
