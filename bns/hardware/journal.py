@@ -1,7 +1,7 @@
 """Everything sent, received and seen in a trial, one JSON line each, with time stamps; a trial goes on from it, or is replayed.
 
-`t_s` is the trial's clock, `wall_s` the computer's (seconds since 1970). A line that a kill cut in two is dropped when the file is
-opened again; evaluations are synced to the disk before the next one begins.
+`t_s` is the trial's clock, `wall_s` the computer's (seconds since 1970). A line that a kill cut in two is dropped when the
+file is opened again; evaluations are synced to the disk before the next one begins.
 """
 
 from __future__ import annotations

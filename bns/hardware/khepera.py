@@ -21,6 +21,8 @@ ATTEMPTS = 4
 """How often a question is asked before the robot counts as lost."""
 STILL_M_S = 0.005
 """A wheel slower than this stands still: three quanta of the speed reading, and less than half a millimetre to coast."""
+_READINGS = 2
+"""The protocol has no checksum: one reading can be garbled into a zero, two in a row hardly."""
 HIGHEST_UNITS = 43_000
 """End of the range that the firmware regulates."""
 _FLAT_V = 6.0
@@ -94,17 +96,18 @@ class KheperaIII:
 
     def stop(self, patience_s: float = 5.0) -> Stop:
         """Set both speeds to zero until the robot acknowledges it and reads back still wheels; what came of it."""
-        began_s, acknowledged_s, problem = self._clock.now_s(), None, "the wheels still turn"
+        began_s, acknowledged_s, problem, still = self._clock.now_s(), None, "the wheels still turn", 0
         while True:
             try:
                 if acknowledged_s is None:
                     self._once(b"D,l0,l0", "d")
                     acknowledged_s = self._clock.now_s() - began_s
                 left, right = (int(v) / self.firmware.units_per_m_s for v in self._once(b"E", r"e,(-?\d+),(-?\d+)"))
-                if max(abs(left), abs(right)) <= STILL_M_S:
+                still = still + 1 if max(abs(left), abs(right)) <= STILL_M_S else 0
+                if still == _READINGS:
                     return self._stopped(Stop(True, self._clock.now_s() - began_s, acknowledged_s))
             except NoReplyError as error:
-                problem, acknowledged_s = str(error), None
+                problem, acknowledged_s, still = str(error), None, 0
             if self._clock.now_s() - began_s > patience_s:
                 return self._stopped(Stop(False, self._clock.now_s() - began_s, acknowledged_s, problem))
 

@@ -21,8 +21,8 @@ class Driven:
     """What a controller became on the robot.
 
     commands (k, components): those carried out to their end, with what was really sent and how long it really lasted;
-    poses (k + 1, 3): tracked, in the world frame, headings unwrapped, the first at the start, the others at the end of each command;
-    rows: measurements, a row a look; ended: why it was over before its end, or nothing; seconds it took.
+    poses (k + 1, 3): tracked, in the world frame, headings unwrapped, the first at the start, the others at the end of each
+    command; rows: measurements, a row a look; ended: why it was over before its end, or nothing; seconds it took.
     """
 
     commands: np.ndarray
@@ -71,7 +71,8 @@ class Emulation(Protocol):
 
 
 def platform_module(robot: str) -> ModuleType:
-    """The module of a robot's platform: `open_platform(rig, clock, journal, stopping)` and `emulate(rig, folder, clock, plan, seed)`."""
+    """The module of a robot's platform; it has `open_platform(rig, clock, journal, stopping)` and
+    `emulate(rig, folder, clock, plan, seed)`."""
     names = sorted(m.name for m in pkgutil.iter_modules(platforms.__path__))
     if robot not in names:
         raise HardwareError(unknown_name("robot with a driver", robot, names))

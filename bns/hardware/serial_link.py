@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 import serial
+from serial.tools.list_ports import comports
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
@@ -87,7 +88,5 @@ def _why_not(port: str, error: serial.SerialException) -> str:
 
 
 def _ports_there_are() -> str:
-    from serial.tools.list_ports import comports
-
     found = sorted(p.device for p in comports()) + sorted(str(p) for p in Path("/dev").glob("rfcomm*"))
     return f"Ports there are: {', '.join(found)}." if found else "No serial port was found; is it plugged in or paired?"

@@ -29,7 +29,7 @@ class Rounds:
         self._pool.shutdown()
 
     def while_driving(self, drive: Callable[[], None]) -> int:
-        """Call `drive` here and go on with rounds there; how many were done, one at least. A fault there is raised after the drive."""
+        """Call `drive` here and go on with rounds there; how many were done, one at least. A fault there is raised after it."""
         self._enough.clear()
         rounds = self._pool.submit(self._repeat)
         try:

@@ -38,7 +38,7 @@ def how_of(options: argparse.Namespace) -> Set:
             "a real robot needs --rig FILE, which names its port, tracker and surface (docs/trials.md shows one); "
             "without a robot at hand, say --emulated."
         )
-    if not 0.0 < options.speed or math.isnan(options.speed):
+    if math.isnan(options.speed) or options.speed <= 0.0:
         raise HardwareError(f"--speed is {options.speed:g}; it must be above 0.")
     for name in ("faults", "speed"):
         if not options.emulated and getattr(options, name) not in {None, 1.0}:

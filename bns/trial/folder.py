@@ -32,7 +32,7 @@ class TrialFolder:
         return self.path / JOURNAL
 
     def open(self, resume: bool) -> list[Evaluation]:
-        """Lock it; the evaluations it holds. HardwareError if there is something and `resume` is not asked for, or the reverse."""
+        """Lock it; the evaluations it holds. HardwareError if it was begun and is not to be resumed, or the reverse."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         try:
             self._lock.acquire(timeout=0)
@@ -80,7 +80,7 @@ def past_evaluations(journal: Path) -> list[Evaluation]:
             driven.pop(number, None)
         else:
             rounds[number] = event["rounds"]
-    found = []
+    found: list[Evaluation] = []
     while len(found) + 1 in driven:
         event, number = driven[len(found) + 1], len(found) + 1
         picked, commands = (np.asarray(event[name], np.float32) for name in ("picked", "commands"))

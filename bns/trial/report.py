@@ -18,22 +18,26 @@ def report(spec: RunSpec, result: TrialResult, crew: Crew, wall_s: float, how: A
     evals = result.run.tables["evals"]
     firsts = [f"{cm} cm {_first(evals[f'evaluated_success_{cm}cm'])}" for cm in RADII_CM]
     driven_min = float(np.sum(evals["driven_ms"])) / 60_000.0
-    speed = f", at {how.speed:g} times its speed" if how.emulated else ""
+    what = f"emulated, at {how.speed:g} times its speed" if how.emulated else "robot"
     return "\n".join(
         [
-            f"trial {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {'emulated' + speed if how.emulated else 'robot'}",
+            f"trial {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {what}",
             f"{spec.evaluations} evaluations, {driven_min:.1f} min of driving, {wall_s:.0f} s by the clock on the wall",
             "all goals reached, within " + "; ".join(firsts),
             f"the robot waited for computations {result.waited_share:.1%} of the time; {result.rounds} rounds of training and "
             "evolution went on while it drove",
-            f"stops: {len(crew.stops_s)} confirmed, {_ms(np.median(crew.stops_s))} at the median, {_ms(max(crew.stops_s))} at most"
-            if crew.stops_s
-            else "nothing was driven in this session",
+            _stops(crew.stops_s),
             *([f"drives that ended early: {len(crew.ends)}, the last because {crew.ends[-1]}"] if crew.ends else []),
             f"measurements and journal: {folder}",
             f"path: {figure}",
         ]
     )
+
+
+def _stops(seconds: list[float]) -> str:
+    if not seconds:
+        return "nothing was driven in this session"
+    return f"stops: {len(seconds)} confirmed, {_ms(float(np.median(seconds)))} at the median, {_ms(max(seconds))} at most"
 
 
 def _ms(seconds: float) -> str:

@@ -6,14 +6,14 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bns.errors import HardwareError, StopNotConfirmedError
+from bns.errors import HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.journal import Journal
@@ -42,7 +42,7 @@ class Set:
     rig: Rig
     emulated: bool = False
     speed: float = 1.0
-    plan: FaultPlan = FaultPlan()
+    plan: FaultPlan = field(default_factory=FaultPlan)
     yes: bool = False
     resume: bool = False
     most_rounds: int = MOST_ROUNDS
@@ -103,7 +103,7 @@ def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: l
         if not past:  # nothing has moved: the next attempt is no resumption
             _forget_if_empty(folder)
         raise
-    except (StopNotConfirmedError, Exception):
+    except BaseException:
         folder.write_measurements()
         raise
     folder.write_measurements()

@@ -1,7 +1,7 @@
 """The body of an emulated two-wheeled robot: the physics model, moved by whatever speeds were set, whenever they were.
 
-All of the drive since it was put down is integrated at once by `bns.physics.simulate`'s own code, so that an emulated trial and the
-physics world cannot disagree about physics.
+All of the drive since it was put down is integrated at once by the code of the physics world, so that an emulated trial
+and that world cannot disagree about physics.
 """
 
 from __future__ import annotations

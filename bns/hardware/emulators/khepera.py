@@ -43,8 +43,8 @@ class KheperaEmulator:
         self._answers: dict[str, Callable[[list[int]], str]] = {
             "B": lambda _a: f"b,{firmware.version},{firmware.revision}",
             "D": self._drive,
-            "E": lambda _a: "e,%d,%d" % self._speed_units(),
-            "R": lambda _a: "r,%d,%d" % self._pulses(),
+            "E": lambda _a: "e,{},{}".format(*self._speed_units()),
+            "R": lambda _a: "r,{},{}".format(*self._pulses()),
             "I": self._set_encoders,
             "M": lambda _a: "m",
             "H": lambda _a: "h",
@@ -122,7 +122,7 @@ class KheperaEmulator:
     def _battery(self, which: list[int]) -> str:
         volts = max(self._full_v - self._clock.now_s() * 1e-4, 0.0)
         readings = {0: volts, 1: 0.21, 3: 1.05, 4: 27.5, 5: 78.0}
-        value = readings[which[0]] if which[0] in readings else 0.0
+        value = readings.get(which[0], 0.0)
         return f"v,{int(value)},{round(10000 * (value % 1.0)) % 10000:04d}"
 
     def _brown_out(self, now_s: float) -> None:

@@ -1,6 +1,7 @@
 """The infra-red camera of a Wii remote above the floor, as Linux reports it: input events of a device file.
 
-The remote reports up to four lights; which is which it does not say. Three LEDs in a triangle without two equal sides tell the pose.
+The remote reports up to four lights; which is which it does not say. Three LEDs in a triangle without two equal sides
+tell the pose.
 """
 
 from __future__ import annotations
