@@ -12,7 +12,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench precompute clean
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench soak precompute clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-14s %s\n", $$1, $$2}'
@@ -52,6 +52,9 @@ figures: setup ## figures from whatever results there are, into results/figures;
 
 bench: setup ## speed, as ratios against named peers measured in the same run
 	$(BIN)/python -m tests.bench --json "$(RESULTS)/bench.json"
+
+soak: setup ## 200 emulated trials with faults at random: how they end
+	$(BIN)/python -m tests.hardware.soak 200
 
 precompute: setup ## rebuild the static simulator that ships in the package
 	$(BIN)/bns precompute --robot khepera

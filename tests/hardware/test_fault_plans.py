@@ -70,5 +70,5 @@ def test_bad_plans_are_named(tmp_path, text, message):
 
 
 def test_a_missing_plan_is_named(tmp_path):
-    with pytest.raises(HardwareError, match="cannot read the fault plan .*nowhere.yaml"):
+    with pytest.raises(HardwareError, match=r"cannot read the fault plan .*nowhere\.yaml"):
         load_plan(tmp_path / "nowhere.yaml")

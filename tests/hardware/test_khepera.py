@@ -67,7 +67,8 @@ def test_both_firmwares_drive_the_same_way_in_metres(bench, version):
 
 
 def test_units_differ_between_firmwares():
-    assert firmware(2, 9).units_per_m_s == 144_010 and firmware(3, 0).units_per_m_s == 218_720
+    assert firmware(2, 9).units_per_m_s == 144_010
+    assert firmware(3, 0).units_per_m_s == 218_720
 
 
 def test_what_is_sent_after_clipping_is_returned(bench):
@@ -120,7 +121,9 @@ def test_stop_is_confirmed_by_still_wheels(bench, speed_m_s):
     rig.driver.set_speed_m_s(speed_m_s, speed_m_s)
     rig.clock.sleep(1.0)
     stop = rig.driver.stop()
-    assert stop.confirmed and stop.acknowledged_s <= 0.05 and stop.seconds <= 0.45
+    assert stop.confirmed
+    assert stop.acknowledged_s <= 0.05
+    assert stop.seconds <= 0.45
     before = rig.body.pose(rig.clock.now_s())
     rig.clock.sleep(5.0)
     assert np.hypot(*(rig.body.pose(rig.clock.now_s()) - before)[:2]) <= STILL_M_S * 0.1
@@ -131,7 +134,8 @@ def test_stop_outlasts_a_fault(bench, fault):
     rig.driver.set_speed_m_s(0.2, 0.2)
     rig.clock.sleep(1.0)
     stop = rig.driver.stop()
-    assert stop.confirmed and 1.2 < stop.seconds < 2.0
+    assert stop.confirmed
+    assert 1.2 < stop.seconds < 2.0
 
 
 def test_a_stop_that_nobody_confirms_is_not_confirmed(bench):
@@ -139,7 +143,9 @@ def test_a_stop_that_nobody_confirms_is_not_confirmed(bench):
     rig.driver.set_speed_m_s(0.1, 0.1)
     rig.line.cut()
     stop = rig.driver.stop()
-    assert not stop.confirmed and stop.acknowledged_s is None and "is gone" in stop.problem
+    assert not stop.confirmed
+    assert stop.acknowledged_s is None
+    assert "is gone" in stop.problem
     rig.line.plug_in()
     assert rig.driver.stop().confirmed
 
@@ -149,7 +155,9 @@ def test_wheels_that_turn_although_told_to_stop_are_no_stop(bench):
     rig.driver.set_speed_m_s(0.1, 0.1)
     rig.body.order = lambda *_: None  # takes the order, does not carry it out
     stop = rig.driver.stop(patience_s=1.0)
-    assert not stop.confirmed and "still turn" in stop.problem and stop.acknowledged_s is not None
+    assert not stop.confirmed
+    assert "still turn" in stop.problem
+    assert stop.acknowledged_s is not None
 
 
 class _Deaf:
@@ -169,14 +177,14 @@ def test_what_is_no_khepera_is_named_so(tmp_path, clock, device):
     journal = Journal(None, clock)
     with PseudoTerminal(device, tmp_path, "other") as line:
         link = SerialLink(str(line.path), 115200, clock, journal)
-        with pytest.raises(HardwareError, match="no Khepera III answers .*switched on, paired"):
+        with pytest.raises(HardwareError, match=r"no Khepera III answers .*switched on, paired"):
             KheperaIII(link, clock, journal)
         link.close()
 
 
 def test_ports_that_cannot_be_used(tmp_path, clock, bench):
     journal = Journal(None, clock)
-    with pytest.raises(HardwareError, match="there is no port /dev/nowhere.*bns doctor"):
+    with pytest.raises(HardwareError, match=r"there is no port /dev/nowhere.*bns doctor"):
         SerialLink("/dev/nowhere", 115200, clock, journal)
     rig = bench()
     with pytest.raises(HardwareError, match="in use by another program"):

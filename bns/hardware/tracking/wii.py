@@ -26,9 +26,10 @@ EV_SYN, EV_ABS, SYN_REPORT, SYN_DROPPED, ABS_HAT0X = 0, 3, 0, 3, 0x10
 LIGHTS, WIDTH_PX, HEIGHT_PX = 4, 1024, 768
 NOTHING_PX = 1023
 """What the driver reports in both coordinates of a light that is not there."""
-LEDS_M = np.array([[0.0, 0.055], [-0.045, -0.030], [0.030, -0.040]])
-"""Where the LEDs sit on the robot: to the right of the axle's middle, ahead of it. No two sides are equal."""
-_WORST_M = 0.008
+LEDS_M = np.array([[0.0, 0.060], [-0.045, -0.020], [0.020, -0.050]])
+"""Where the LEDs sit on the robot: to the right of the axle's middle, ahead of it. The sides differ by
+2 cm, so that its mirror image fits nowhere."""
+_WORST_M = 0.006
 
 
 @dataclass(frozen=True)
