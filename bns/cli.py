@@ -74,6 +74,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_spec_options(one)
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
     _add_trial(command("trial", trial, "carry out a run on a robot, or on its emulator"))
+    _add_looking(
+        command("calibrate", calibrate, "calibrate a camera with a ChArUco board"),
+        command("track", track, "show what the tracker of a rig sees"),
+    )
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
     many.add_argument(
@@ -125,6 +129,22 @@ def _add_trial(parser: argparse.ArgumentParser) -> None:
         "--most-rounds", type=_positive, default=50, metavar="N", help="of training and evolution while one controller drives"
     )
     parser.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
+
+
+def _add_looking(calibrating: argparse.ArgumentParser, tracking: argparse.ArgumentParser) -> None:
+    source = calibrating.add_mutually_exclusive_group(required=True)
+    source.add_argument("--camera", metavar="SOURCE", help="number, device file or address of the camera")
+    source.add_argument("--frames", type=Path, metavar="DIR", help="pictures of the board taken before")
+    source.add_argument("--print-board", type=Path, metavar="FILE", help="write the board to be printed (PNG), true to size")
+    calibrating.add_argument("--floor", type=Path, metavar="FILE", help="picture of the board on the floor (default: the last)")
+    calibrating.add_argument("--square-mm", type=float, default=68.0, help="side of a printed square (default: 68, A3)")
+    calibrating.add_argument("--views", type=_positive, default=15, help="views to take (default: 15)")
+    calibrating.add_argument("-o", "--output", type=Path, default=Path("camera.json"), metavar="FILE")
+    tracking.add_argument("--robot", default="khepera")
+    tracking.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML)")
+    tracking.add_argument("--emulated", action="store_true", help="look at the emulated rig")
+    tracking.add_argument("--seconds", type=_duration, default=5.0, metavar="TIME", help="how long to look (default: 5s)")
+    tracking.add_argument("--frames", type=Path, metavar="DIR", help="write annotated frames into this folder")
 
 
 def _add_spec_options(parser: argparse.ArgumentParser, without: tuple[str, ...] = ()) -> None:
@@ -196,6 +216,22 @@ def trial(options: argparse.Namespace) -> int:
 
     _say_if_compiling()
     print(carried_out(options, {name: getattr(options, name) for name in FIELDS if name != "world"}))
+    return 0
+
+
+def calibrate(options: argparse.Namespace) -> int:
+    """Print the board, or find the lens and the floor of a camera."""
+    from bns.trial.looking import calibrated
+
+    print(calibrated(options))
+    return 0
+
+
+def track(options: argparse.Namespace) -> int:
+    """Poses, one a line, and annotated frames."""
+    from bns.trial.looking import tracked
+
+    print(tracked(options))
     return 0
 
 

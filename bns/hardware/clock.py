@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 _SMALLEST_SLEEP_S = 0.002  # shorter ones cost more than they last, so they are saved up
-_SMALLEST_PATIENCE_S = 0.1  # a busy machine may take this long to bring an emulator's answer
+_LONGEST_ANSWER_S = 5.0  # an emulator that takes longer by the computer's clock is broken
 
 
 class Clock(Protocol):
@@ -26,8 +26,8 @@ class Clock(Protocol):
     def waited(self, seconds: float) -> None:
         """Somebody waited this long in vain (for bytes, say) by the computer's own clock."""
 
-    def patience_s(self, seconds: float) -> float:
-        """How long to wait by the computer's clock where `seconds` of this one are meant."""
+    def in_vain(self, seconds: float) -> Callable[[], bool]:
+        """Begin to wait for an answer; call what is returned to learn whether it is in vain to wait on."""
 
 
 class RealClock:
@@ -44,9 +44,10 @@ class RealClock:
     def waited(self, seconds: float) -> None:
         """Nothing to do: the time has passed by itself."""
 
-    def patience_s(self, seconds: float) -> float:
-        """The same."""
-        return seconds
+    def in_vain(self, seconds: float) -> Callable[[], bool]:
+        """After that time."""
+        end_s = self.now_s() + seconds
+        return lambda: self.now_s() > end_s
 
 
 class EmulatedClock:
@@ -55,6 +56,7 @@ class EmulatedClock:
     def __init__(self, speed: float = 1.0) -> None:
         self.speed = speed
         self._now_s, self._owed_s = 0.0, 0.0
+        self._silences = 0
         self._lock = threading.Lock()
         self.listeners: list[Callable[[float], None]] = []
         """Emulated devices that act by themselves as time goes on; called with the new time."""
@@ -87,6 +89,12 @@ class EmulatedClock:
         for listener in tuple(self.listeners):
             listener(now_s)
 
-    def patience_s(self, seconds: float) -> float:
-        """Scaled, but long enough for a busy machine."""
-        return max(seconds / self.speed, _SMALLEST_PATIENCE_S)
+    def in_vain(self, seconds: float) -> Callable[[], bool]:
+        """When an emulated device has let it be known that it will not answer: a busy computer is no lost answer."""
+        before, end_s = self._silences, time.monotonic() + _LONGEST_ANSWER_S
+        return lambda: self._silences != before or time.monotonic() > end_s
+
+    def fell_silent(self) -> None:
+        """An emulated device heard something and will not answer it."""
+        with self._lock:
+            self._silences += 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import serial
@@ -14,6 +15,7 @@ from bns.hardware.clock import Clock
 from bns.hardware.journal import Journal
 
 _LONGEST_LINE = 256
+_SLICE_S = 0.01
 
 
 class NoReplyError(Exception):
@@ -30,27 +32,36 @@ class SerialLink:
         self.port, self._baud, self._clock, self._journal = port, baud, clock, journal
         self._timeout_s = timeout_s
         self._serial: serial.Serial | None = None
-        self._serial = open_port(port, baud, clock.patience_s(timeout_s))
+        self._serial = open_port(port, baud)
 
     def exchange(self, request: bytes) -> bytes:
         """Send `request`, return the line that answers without its end; NoReplyError if none does."""
         began_s = self._clock.now_s()
         try:
             if self._serial is None:
-                self._serial = open_port(self.port, self._baud, self._clock.patience_s(self._timeout_s))
+                self._serial = open_port(self.port, self._baud)
             self._serial.reset_input_buffer()  # an answer that came too late belongs to no question
             self._journal.note("sent", data=request.decode("latin-1"))
+            in_vain = self._clock.in_vain(self._timeout_s)
             self._serial.write(request)
-            line = self._serial.read_until(b"\n", _LONGEST_LINE)
+            line = self._line(in_vain)
         except (serial.SerialException, OSError, HardwareError) as error:
             self._lose(error)
             self._wait_out(began_s)
             raise NoReplyError(f"the port {self.port} is gone ({error})") from error
         self._journal.note("received", data=line.decode("latin-1"))
-        if not line.endswith(b"\n"):
+        late = self._clock.now_s() - began_s > self._timeout_s + _SLICE_S
+        if late or not line.endswith(b"\n"):
             self._wait_out(began_s)
             raise NoReplyError(f"no answer to {request!r} within {self._timeout_s:g} s")
         return line.strip(b"\r\n")
+
+    def _line(self, in_vain: Callable[[], bool]) -> bytes:
+        assert self._serial is not None
+        line = bytes(self._serial.read_until(b"\n", _LONGEST_LINE))
+        while not line.endswith(b"\n") and len(line) < _LONGEST_LINE and not in_vain():
+            line += self._serial.read_until(b"\n", _LONGEST_LINE)
+        return line
 
     def _wait_out(self, began_s: float) -> None:
         self._clock.waited(began_s + self._timeout_s - self._clock.now_s())
@@ -66,12 +77,12 @@ class SerialLink:
             port.close()
 
 
-def open_port(port: str, baud: int, timeout_s: float) -> serial.Serial:
+def open_port(port: str, baud: int) -> serial.Serial:
     """An open port; HardwareError says why there is none and what to try."""
     if not Path(port).exists():
         raise HardwareError(f"there is no port {port}. {_ports_there_are()} Try: bns doctor")
     try:
-        return serial.Serial(port, baud, timeout=timeout_s, write_timeout=max(timeout_s, 1.0), exclusive=True)
+        return serial.Serial(port, baud, timeout=_SLICE_S, write_timeout=1.0, exclusive=True)
     except serial.SerialException as error:
         raise HardwareError(_why_not(port, error)) from error
 

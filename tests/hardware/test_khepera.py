@@ -160,22 +160,25 @@ def test_wheels_that_turn_although_told_to_stop_are_no_stop(bench):
     assert stop.acknowledged_s is not None
 
 
-class _Deaf:
+class Other:
+    """A device that is no Khepera: it says something else, or nothing."""
+
+    def __init__(self, clock, answer):
+        self.clock, self.answer = clock, answer
+
     def receive(self, data):
-        return b""
+        if not self.answer:
+            self.clock.fell_silent()
+        return self.answer
 
 
-class _Other:
-    def receive(self, data):
-        return b"OK\r\n"
-
-
-@pytest.mark.parametrize("device", [_Deaf(), _Other()])
-def test_what_is_no_khepera_is_named_so(tmp_path, clock, device):
+@pytest.mark.parametrize("answer", [b"", b"OK\r\n", b"no end"])
+def test_what_is_no_khepera_is_named_so(tmp_path, clock, answer, monkeypatch):
+    monkeypatch.setattr("bns.hardware.clock._LONGEST_ANSWER_S", 0.1)
     from bns.hardware.khepera import KheperaIII
 
     journal = Journal(None, clock)
-    with PseudoTerminal(device, tmp_path, "other") as line:
+    with PseudoTerminal(Other(clock, answer), tmp_path, "other") as line:
         link = SerialLink(str(line.path), 115200, clock, journal)
         with pytest.raises(HardwareError, match=r"no Khepera III answers .*switched on, paired"):
             KheperaIII(link, clock, journal)

@@ -66,15 +66,23 @@ class KheperaEmulator:
             self._brown_out(now_s)
         if self._faults.strikes("hang-up", now_s):
             self.cut_line(self._faults.length_s("hang-up"))
-            return b""
+            return self._nothing()
         deaf = self._faults.strikes("lost-request", now_s) or self._faults.strikes("bus-fault", now_s)
         if deaf or now_s < self._silent_until_s:
-            return b""
+            return self._nothing()
         answer = self._carried_out(line.decode("latin-1")).encode() + b"\r\n"
         self._clock.sleep(_LATE_S if self._faults.strikes("late-reply", now_s) else self._latency_s)
         if self._faults.strikes("lost-reply", now_s):
-            return b""
-        return self._faults.byte(answer) if self._faults.strikes("corrupt-reply", now_s) else answer
+            return self._nothing()
+        if self._faults.strikes("corrupt-reply", now_s):
+            answer = self._faults.byte(answer)
+            if not answer.endswith(b"\n"):
+                self._clock.fell_silent()  # a line without its end is waited for in vain
+        return answer
+
+    def _nothing(self) -> bytes:
+        self._clock.fell_silent()
+        return b""
 
     def _carried_out(self, line: str) -> str:
         letter, *arguments = line.split(",")

@@ -1,4 +1,4 @@
-"""A whole emulated rig: a Khepera III on a pseudo-terminal, under a Wii remote that writes input events."""
+"""A whole emulated rig: a Khepera III on a pseudo-terminal, under the tracker that its rig names."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from bns.hardware.emulators.body import DifferentialBody
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.khepera import KheperaEmulator
 from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.emulators.wii import WiiEmulator
+from bns.hardware.emulators.watchers import emulated_tracker
 from bns.hardware.khepera import firmware
 from bns.hardware.rig import Rig
-from bns.hardware.tracking.wii import overhead
 from bns.physics.model import load_model
 from bns.robots.khepera import START
 
@@ -33,9 +32,8 @@ class EmulatedKheperaRig:
         self.robot = KheperaEmulator(self.body, clock, firmware(*_FIRMWARE), plan.of("khepera"))
         self.robot.cut_line = self._cut
         self._line = PseudoTerminal(self.robot, folder, "khepera")
-        path = folder / "wiimote"
-        self._wii = WiiEmulator(path, self.body.seen, overhead(rig.tracker), clock, plan.of("wii"), seed)
-        self.rig = replace(rig, port=str(self._line.path), tracker={**rig.tracker, "device": str(path)})
+        tracker, self._watcher = emulated_tracker(rig.tracker, folder, self.body.seen, clock, plan.of("tracker"), seed)
+        self.rig = replace(rig, port=str(self._line.path), tracker=tracker)
         clock.listeners.append(self._moved_on)
 
     def put_down(self, pose: np.ndarray) -> None:
@@ -46,7 +44,7 @@ class EmulatedKheperaRig:
         """Take it away."""
         self._clock.listeners.remove(self._moved_on)
         self._line.close()
-        self._wii.close()
+        self._watcher.close()
 
     def _cut(self, for_s: float) -> None:
         self._line.cut()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -11,11 +12,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Sight:
-    """A pose (3,): x_m, y_m, heading_rad, when it was seen, and how well the markers fit (RMS, m)."""
+    """A pose (3,): x_m, y_m, heading_rad, when it was seen, how well the markers fit (RMS, m), and where each is (2,), m."""
 
     t_s: float
     pose: np.ndarray
     residual_m: float = 0.0
+    points: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 class Tracker(Protocol):
