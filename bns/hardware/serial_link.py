@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import termios
 from collections.abc import Callable
 from pathlib import Path
 
@@ -45,7 +46,7 @@ class SerialLink:
             in_vain = self._clock.in_vain(self._timeout_s)
             self._serial.write(request)
             line = self._line(in_vain)
-        except (serial.SerialException, OSError, HardwareError) as error:
+        except (serial.SerialException, OSError, termios.error, HardwareError) as error:
             self._lose(error)
             self._wait_out(began_s)
             raise NoReplyError(f"the port {self.port} is gone ({error})") from error

@@ -171,6 +171,9 @@ class Other:
             self.clock.fell_silent()
         return self.answer
 
+    def written(self):
+        pass
+
 
 @pytest.mark.parametrize("answer", [b"", b"OK\r\n", b"no end"])
 def test_what_is_no_khepera_is_named_so(tmp_path, clock, answer, monkeypatch):

@@ -35,7 +35,7 @@ class KheperaEmulator:
         self.body, self._clock, self._firmware = body, clock, firmware
         self._faults = faults or Faults()
         self._latency_s, self._full_v = latency_s, battery_v
-        self._buffer, self._silent_until_s = b"", -1.0
+        self._buffer, self._silent_until_s, self._endless = b"", -1.0, False
         self._encoders_m = [0.0, 0.0]
         self._encoders_at_s = clock.now_s()
         self._lock = threading.Lock()
@@ -60,6 +60,12 @@ class KheperaEmulator:
             *lines, self._buffer = re.split(rb"[\r\n]", self._buffer)
             return b"".join(self._answer(line) for line in lines if line)
 
+    def written(self) -> None:
+        """The answer is on the line; one whose end was garbled is waited for in vain."""
+        if self._endless:
+            self._endless = False
+            self._clock.fell_silent()
+
     def _answer(self, line: bytes) -> bytes:
         now_s = self._clock.now_s()
         if self._faults.strikes("brown-out", now_s):
@@ -76,8 +82,7 @@ class KheperaEmulator:
             return self._nothing()
         if self._faults.strikes("corrupt-reply", now_s):
             answer = self._faults.byte(answer)
-            if not answer.endswith(b"\n"):
-                self._clock.fell_silent()  # a line without its end is waited for in vain
+            self._endless = not answer.endswith(b"\n")
         return answer
 
     def _nothing(self) -> bytes:

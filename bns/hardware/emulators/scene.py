@@ -12,6 +12,7 @@ from bns.hardware.tracking.lens import Lens
 _OVER = 3  # samples a pixel and axis: edges come out grey where they should
 _FLOOR_BGR = (120, 125, 130)
 _SHIFTS = 64
+_LARGE = 100_000
 
 
 @dataclass(frozen=True)
@@ -66,10 +67,8 @@ class Scene:
         self._lens, self._blur_px = lens, blur_px
         self._draw = np.random.default_rng([seed, 5])
         width, height = lens.size
-        # The lens is smooth: straightened at every pixel and interpolated in between.
         px = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
-        straight = lens.straightened(px).reshape(height, width, 2)
-        self._rays = cv2.resize(straight, (width * _OVER, height * _OVER), interpolation=cv2.INTER_LINEAR)
+        self._straight = lens.straightened(px).reshape(height, width, 2)
         # Drawing noise takes longer than all the rest: one sheet, larger than a frame, is cut out anew for every frame.
         sheet = noise * self._draw.standard_normal((height + _SHIFTS, width + _SHIFTS, 3), np.float32)
         self._sheet = np.rint(sheet).astype(np.int16)
@@ -91,7 +90,7 @@ class Scene:
         (top, bottom), (left, right) = self._window(patch)
         if bottom <= top or right <= left:
             return
-        local = self._local(patch, slice(_OVER * top, _OVER * bottom), slice(_OVER * left, _OVER * right)).astype(np.float32)
+        local = self._local(patch, slice(top, bottom), slice(left, right)).astype(np.float32)
         rows, columns = patch.mask.shape
         scale = columns / patch.width_m
         u, v = columns / 2 + local[..., 0] * scale - 0.5, rows / 2 - local[..., 1] * scale - 0.5
@@ -117,7 +116,10 @@ class Scene:
 
     def _local(self, patch: Patch, rows: slice, columns: slice) -> np.ndarray:
         """Coordinates on the patch, m, of the canvas's samples."""
-        rays = self._rays[rows, columns]
+        straight = self._straight[rows, columns]
+        over = _OVER if straight.size < _LARGE else 2
+        # The lens is smooth: straightened at every pixel and interpolated in between.
+        rays = cv2.resize(straight, None, fx=over, fy=over, interpolation=cv2.INTER_LINEAR)
         return self._lens.rays_hit(rays.reshape(-1, 2), patch.turn, patch.middle_m).reshape(rays.shape)
 
 

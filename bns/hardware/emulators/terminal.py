@@ -17,6 +17,9 @@ class Device(Protocol):
     def receive(self, data: bytes) -> bytes:
         """Take bytes in, give the bytes that answer (none: silence)."""
 
+    def written(self) -> None:
+        """The answer is on the line."""
+
 
 class PseudoTerminal:
     """Pumps bytes between a port and a device, in a thread of its own, while it is open.
@@ -100,3 +103,4 @@ class PseudoTerminal:
         with self._lock, contextlib.suppress(OSError):
             if answer and line == self._master:
                 os.write(line, answer)
+                self._device.written()

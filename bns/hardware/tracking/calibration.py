@@ -112,8 +112,9 @@ def calibrate(frames: Sequence[np.ndarray], floor: np.ndarray, board: Board, cam
     seen = [pair for pair in (corners(frame, board) for frame in frames) if pair is not None]
     if len(seen) < FEWEST_VIEWS:
         raise HardwareError(
-            f"the board was seen in {len(seen)} of {len(frames)} frames; at least {FEWEST_VIEWS} are needed. "
-            f"Hold it closer, tilt it, light it evenly, and check that it has {board.across} x {board.down} squares of {1000 * board.square_m:g} mm."
+            f"the board was seen in {len(seen)} of {len(frames)} frames; at least {FEWEST_VIEWS} are "
+            f"needed. Hold it closer, tilt it, light it evenly; it must have {board.across} x {board.down} squares of "
+            f"{1000 * board.square_m:g} mm."
         )
     height, width = frames[0].shape[:2]
     rms, matrix, distortion, _, _ = cv2.calibrateCamera(
