@@ -16,7 +16,7 @@ from bns.hardware.journal import Journal
 from bns.hardware.stop import Stop
 
 BAUD = 1_000_000
-ATTEMPTS = 4
+ATTEMPTS = 6
 _AX12 = 12
 _BETWEEN_S = 0.02
 _GOAL = REGISTERS["goal_position"]

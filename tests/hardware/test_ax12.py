@@ -141,7 +141,7 @@ def test_angle_limits_are_kept(chain):
 
 
 def test_lost_and_garbled_answers_are_asked_for_again(chain, clock):
-    driver, *_ = chain(Fault("lost-reply", rate=0.1), Fault("corrupt-reply", rate=0.1))
+    driver, *_ = chain(Fault("lost-reply", rate=0.06), Fault("corrupt-reply", rate=0.06))
     driver.arm()
     for angle in (0.1, 0.2, 0.3):
         driver.move([angle] * 3, [1.0] * 3)
