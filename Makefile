@@ -12,7 +12,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench soak precompute clean
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench soak precompute soak-dask clean sweep-snake
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-14s %s\n", $$1, $$2}'
@@ -25,7 +25,7 @@ $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -c 'import torch' 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check "$(TORCH)+cpu" 2>/dev/null \
 		|| $(BIN)/pip install --disable-pip-version-check --index-url https://download.pytorch.org/whl/cpu "$(TORCH)"
-	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,lint,bench]'
+	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,lint,bench,cluster]'
 	@touch $@
 
 test: setup ## all tests
@@ -44,10 +44,13 @@ SWEEP = $(BIN)/bns sweep $(if $(BUDGET),--budget "$(BUDGET)") $(if $(JOBS),--job
 sweep-khepera: setup ## the Khepera study: prototype trials, small slice, all 45,000 runs; BUDGET=10m stops in time
 	$(SWEEP) sweeps/prototype.yaml sweeps/khepera-small.yaml sweeps/khepera.yaml
 
+sweep-snake: setup ## the snake study: trials in physics, small slice, all 30,000 runs; BUDGET=10m stops in time
+	$(SWEEP) sweeps/snake-prototype.yaml sweeps/snake-small.yaml sweeps/snake.yaml
+
 sweep-budget: setup ## how much evolution and training an evaluation should get
 	$(SWEEP) sweeps/budget.yaml
 
-figures: setup ## figures from whatever results there are, into results/figures; ONLY=success-by-mutation for one
+figures: setup ## page and figures of whatever results there are, into results/figures; ONLY=success-by-mutation for one
 	$(BIN)/python -m analysis --results "$(RESULTS)" $(if $(ONLY),--only "$(ONLY)")
 
 bench: setup ## speed, as ratios against named peers measured in the same run
@@ -56,5 +59,9 @@ bench: setup ## speed, as ratios against named peers measured in the same run
 soak: setup ## 200 emulated trials with faults at random: how they end
 	$(BIN)/python -m tests.hardware.soak 200
 
-precompute: setup ## rebuild the static simulator that ships in the package
+soak-dask: setup ## twenty minutes of a sweep on Dask whose workers are killed: what it costs, and that no run is lost
+	$(BIN)/python tests/sweep/soak_dask.py
+
+precompute: setup ## rebuild the static simulators that ship in the package
 	$(BIN)/bns precompute --robot khepera
+	$(BIN)/bns precompute --robot snake

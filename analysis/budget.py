@@ -9,12 +9,16 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
-from analysis.common import Drawn, NoDataError, Store, coverage, task_order, task_title
+from analysis.coverage import coverage
+from analysis.drawn import Drawn
 from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
+from analysis.store import NoDataError, Store
+from analysis.words import each, task_order, task_title
 from bns.plotting import note, ordered_styles, panels, style
 
 NAME = "budget"
 PAPER = "choice of defaults, not in the source"
+TITLE = "How much evolution and training an evaluation gets"
 SWEEP = "budget"
 RUNS = 1000
 """The core-hours are those of this many runs."""
@@ -51,24 +55,19 @@ def draw(store: Store) -> list[Drawn]:
     axes[0, 0].set_ylabel("successful runs, 7 cm (%)")
     handles, labels = max((ax.get_legend_handles_labels() for ax in axes[:, 0]), key=lambda pair: len(pair[1]))
     figure.legend(handles, labels, loc="outside upper center", ncols=4, title="training iterations an evaluation")
-    n = int(rows.runs.sum())
+    n, runs_each = int(rows.runs.sum()), each(rows.runs.min(), rows.runs.max())
     said = coverage(store, (SWEEP,), n)
     note(
         figure,
-        "; ".join((*said.sentences, f"{_runs_each(rows)} a point")) + f". Bars above: {INTERVALS}; below: "
+        "; ".join((*said.sentences, f"{runs_each} a point")) + f". Bars above: {INTERVALS}; below: "
         "median, 10 to 90 % of the runs.",
     )
     shows = (
         f"Above: share of runs whose fittest controller visits all goals within 7 cm at the last evaluation "
         f"(95 % Wilson intervals: {INDEPENDENCE}). Below: CPU time of a run (median, 10 to 90 %). By generations and training "
-        f"iterations after each evaluation; {_runs_each(rows)} a point, n = {n:,} runs of {SWEEP}."
+        f"iterations after each evaluation; {runs_each} a point, n = {n:,} runs of {SWEEP}."
     )
-    return [Drawn(NAME, figure, shows, n, (SWEEP,), said.missing)]
-
-
-def _runs_each(rows: pd.DataFrame) -> str:
-    few, most = rows.runs.min(), rows.runs.max()
-    return f"{few} runs" if few == most else f"{few} to {most} runs"
+    return [Drawn(NAME, TITLE, figure, shows, n, (SWEEP,), said.missing, data=rows)]
 
 
 def _lines(ax: Axes, rows: pd.DataFrame, looks: dict, columns: list[int], value: str, low: str, high: str) -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.common import Drawn, NoDataError, Store, counted, coverage, task_title
-from bns.plotting import draw_paths, frame_alike, note, outcome, panels, style
+from analysis.coverage import coverage
+from analysis.drawn import Drawn
+from analysis.store import NoDataError, Store
+from analysis.words import counted, task_title
+from bns.plotting import draw_paths, frame_alike, goal_reach, note, outcome, panels, style
 from bns.robots import load_robot
 from bns.tasks import load_task
 
@@ -37,7 +40,7 @@ def poses(store: Store, shown: pd.DataFrame) -> dict[str, pd.DataFrame]:
         f"(run_id = '{row.run_id}' AND sweep = '{row.sweep}' AND evaluation = {row.evaluation})"
         for row in shown.itertuples()
     )
-    rows = store.query(f"""SELECT run_id, {", ".join(WORLD + SNN)} FROM paths
+    rows = store.query(f"""SELECT run_id, step, {", ".join(WORLD + SNN)} FROM paths
         WHERE who = 'fittest' AND ({which}) ORDER BY run_id, step""")
     return dict(iter(rows.groupby("run_id")))
 
@@ -54,11 +57,12 @@ def draw(store: Store) -> list[Drawn]:
 @style()
 def _draw_task(store: Store, robot: str, task: str, runs: pd.DataFrame) -> Drawn:
     shown, sweeps = runs.head(MOST_PANELS), tuple(runs.sweep.unique())
-    walked, goals_m, radius_m = poses(store, shown), load_task(robot, task).goals_m, load_robot(robot).radii_m[0]
+    walked, goals_m = poses(store, shown), load_task(robot, task).goals_m
+    radius_m, square = goal_reach(load_robot(robot), load_task(robot, task))
     figure, axes = panels(len(shown), 3.5)
     for run, ax in zip(shown.itertuples(), axes[:, 0], strict=True):
         path = walked[run.run_id]
-        draw_paths(ax, goals_m, radius_m, path[WORLD].to_numpy(), path[SNN].to_numpy())
+        draw_paths(ax, goals_m, radius_m, path[WORLD].to_numpy(), path[SNN].to_numpy(), square)
         origin = f"{run.sweep},\n" if len(sweeps) > 1 else ""
         ax.set_title(f"{origin}seed {run.seed}, evaluation {run.evaluation}:\n{outcome(run.success)}")
     frame_alike(axes[:, 0])
@@ -71,7 +75,8 @@ def _draw_task(store: Store, robot: str, task: str, runs: pd.DataFrame) -> Drawn
     shows = (
         f"Paths of the fittest controller of each run at its last success, or at its last evaluation if it had "
         f"none ({succeeded} of n = {n} runs of {', '.join(sweeps)} had one), on task {task_title(robot, task)}. Solid: "
-        f"driven; dashed: as its simulator networks saw it; dots: ends of commands; grey: goals of "
-        f"{100 * radius_m:g} cm in order."
+        f"driven; dashed: as its simulator networks saw it; dots: ends of commands; grey: goals, "
+        f"{100 * radius_m:g} cm from their middle to their edge, in order."
     )
-    return Drawn(f"{NAME}-{task}", figure, shows, n, sweeps, said)
+    title = f"Paths of robot and simulator, {task_title(robot, task)}"
+    return Drawn(f"{NAME}-{robot}-{task}", title, figure, shows, n, sweeps, said, data=pd.concat(walked.values()))

@@ -17,7 +17,7 @@ def draw(out: Path) -> Path:
     robot = load_robot("khepera")
     names = sorted(task_names(robot.name), key=lambda name: load_task(robot.name, name).source)
     figure, axes = panels(len(names), 2.9)
-    start = robot.poses(np.zeros((1, 3)))[0]
+    start = robot.start_pose()[0]
     for name, ax in zip(names, axes[:, 0], strict=True):
         task = load_task(robot.name, name)
         draw_goals(ax, task.goals_m, robot.radii_m[0])

@@ -13,8 +13,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bns import __version__
+from bns.cluster_options import add_cluster_options, request_of
 from bns.errors import BnsError, SpecError
+from bns.measuring import add_commands
 from bns.spec import FIELDS, RunSpec, checked, field_type
+from bns.trial.options import add_looking_options, add_trial_options
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
 _INTERRUPTED, _TERMINATED = 130, 143
@@ -73,36 +76,54 @@ def _parser() -> argparse.ArgumentParser:
     one = command("run", run, "carry out one run and draw its path")
     _add_spec_options(one)
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
-    _add_trial(command("trial", trial, "carry out a run on a robot, or on its emulator"))
-    _add_looking(
+    one.add_argument(
+        "--render", type=Path, metavar="FILE", help="show the fittest controller move, where the world can: .mp4 or .png"
+    )
+    _add_spec_options(taken := command("trial", trial, "carry out a run on a robot, or on its emulator"), without=("world",))
+    add_trial_options(taken, _positive)
+    add_looking_options(
         command("calibrate", calibrate, "calibrate a camera with a ChArUco board"),
         command("track", track, "show what the tracker of a rig sees"),
+        _positive,
+        _duration,
     )
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
     many.add_argument(
         "--jobs",
         type=_positive,
-        default=os.cpu_count() or 1,
         metavar="N",
-        help="worker processes (default: one a core)",
+        help="worker processes a machine (default: one a core)",
     )
     many.add_argument(
         "--budget", type=_duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
     )
+    add_cluster_options(many, _positive, _duration)
     many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
+    many.add_argument(
+        "--confirm-top",
+        type=_positive,
+        metavar="K",
+        help="when a sweep is done, run the K best combinations of each task again on fresh seeds, as sweep NAME-confirm",
+    )
     many.add_argument(
         "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
     )
+    costs = command("plan", plan, "what sweeps would cost on a laptop, a server and a cluster, from this machine's pace")
+    costs.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML)")
     status_ = command("status", status, "how far the sweeps in a store are")
     ask = command("query", query, "answer an SQL query over evals, runs, specs, paths, generations, probes (DuckDB)")
     ask.add_argument("sql", metavar="SELECT ...")
     ask.add_argument("--csv", action="store_true", help="bare rows, no header")
+    look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
+    look.add_argument("results", nargs="?", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
+    look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
+    add_commands(command)
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     ready = command("precompute", precompute, "train the static simulator of a robot and write it")
     ready.add_argument("--robot", default="khepera")
     ready.add_argument("-o", "--output", type=Path, metavar="FILE", help="where (default: into the package)")
-    for with_results in (one, many, status_, ask, small):
+    for with_results in (one, many, costs, status_, ask, small):
         with_results.add_argument(
             "--results",
             type=Path,
@@ -111,40 +132,6 @@ def _parser() -> argparse.ArgumentParser:
             help="folder of all results (default: results)",
         )
     return parser
-
-
-def _add_trial(parser: argparse.ArgumentParser) -> None:
-    _add_spec_options(parser, without=("world",))
-    parser.set_defaults(task=None, record="full")
-    switch = {"action": "store_true"}
-    parser.add_argument("--rig", type=Path, metavar="FILE", help="ports, tracker and surface of your set-up (YAML)")
-    parser.add_argument("--emulated", **switch, help="drive the emulator of the robot: the same drivers, no hardware")  # type: ignore[arg-type]
-    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="of the emulator's clock (default: 1)")
-    parser.add_argument("--faults", type=Path, metavar="FILE", help="what the emulator shall do wrong (YAML)")
-    parser.add_argument("--yes", **switch, help="nobody is there to be asked")  # type: ignore[arg-type]
-    parser.add_argument("--resume", **switch, help="go on from the last evaluation driven")  # type: ignore[arg-type]
-    parser.add_argument("--replay", type=Path, metavar="JOURNAL", help="run a trial again from its journal, without a robot")
-    parser.add_argument("--commands", type=Path, metavar="FILE", help="drive given commands (CSV) instead of evolving")
-    parser.add_argument(
-        "--most-rounds", type=_positive, default=50, metavar="N", help="of training and evolution while one controller drives"
-    )
-    parser.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
-
-
-def _add_looking(calibrating: argparse.ArgumentParser, tracking: argparse.ArgumentParser) -> None:
-    source = calibrating.add_mutually_exclusive_group(required=True)
-    source.add_argument("--camera", metavar="SOURCE", help="number, device file or address of the camera")
-    source.add_argument("--frames", type=Path, metavar="DIR", help="pictures of the board taken before")
-    source.add_argument("--print-board", type=Path, metavar="FILE", help="write the board to be printed (PNG), true to size")
-    calibrating.add_argument("--floor", type=Path, metavar="FILE", help="picture of the board on the floor (default: the last)")
-    calibrating.add_argument("--square-mm", type=float, default=68.0, help="side of a printed square (default: 68, A3)")
-    calibrating.add_argument("--views", type=_positive, default=15, help="views to take (default: 15)")
-    calibrating.add_argument("-o", "--output", type=Path, default=Path("camera.json"), metavar="FILE")
-    tracking.add_argument("--robot", default="khepera")
-    tracking.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML)")
-    tracking.add_argument("--emulated", action="store_true", help="look at the emulated rig")
-    tracking.add_argument("--seconds", type=_duration, default=5.0, metavar="TIME", help="how long to look (default: 5s)")
-    tracking.add_argument("--frames", type=Path, metavar="DIR", help="write annotated frames into this folder")
 
 
 def _add_spec_options(parser: argparse.ArgumentParser, without: tuple[str, ...] = ()) -> None:
@@ -157,9 +144,9 @@ def _add_spec_options(parser: argparse.ArgumentParser, without: tuple[str, ...] 
         parser.add_argument(
             "--" + name.replace("_", "-"),
             type=_of_parameter(name),
-            default=field.default,
+            default=None if name == "task" else field.default,
             metavar={int: "N", float: "SHARE", str: "NAME"}[field_type(name)],
-            help=f"{text} (default: {field.default})",
+            help=f"{text} (default: {'the first of that robot' if name == 'task' else field.default})",
         )
 
 
@@ -194,19 +181,22 @@ def _duration(text: str) -> float:
 
 
 def _say_if_compiling() -> None:
-    from bns.engine.jit import cache_folder
+    from bns.engine.jit import compiled
 
-    if sys.stderr.isatty() and not cache_folder().exists():
+    if sys.stderr.isatty() and not compiled():
         print("bns: compiling the kernels, once on this machine (about 20 s)", file=sys.stderr)
 
 
 def run(options: argparse.Namespace) -> int:
     """One run by hand: live view, rows in the store, figure of the path."""
     from bns.single import run_by_hand
+    from bns.tasks import default_task
 
+    if options.task is None:
+        options.task = default_task(options.robot)
     spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
     _say_if_compiling()
-    print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn))
+    print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn, options.render))
     return 0
 
 
@@ -237,35 +227,46 @@ def track(options: argparse.Namespace) -> int:
 
 def sweep(options: argparse.Namespace) -> int:
     """Runs of sweep files, one file after the other, on one budget."""
-    from bns.sweep.budget import Budget
+    from bns.sweep.confirm import in_turn
+    from bns.sweep.executors import load_executor
     from bns.sweep.grid import load_sweep
-    from bns.sweep.plan import plan
+    from bns.sweep.plan import plan as foretell
     from bns.sweep.progress import SweepProgress
     from bns.sweep.report import planned, summed_up
-    from bns.sweep.runner import run_sweep
 
-    sweeps = [load_sweep(file) for file in options.files]
-    if options.dry_run:
-        for one in sweeps:
-            print(planned(plan(one, options.results, options.jobs, retry_failed=options.retry_failed), options.jobs))
-        return 0
-    _say_if_compiling()
-    budget, failed = Budget(options.budget), 0
+    sweeps = in_turn([load_sweep(file) for file in options.files], options.results, options.confirm_top)
+    way = load_executor(options.executor)
     with SweepProgress() as bar:
+        request = request_of(options, bar)
+        if options.dry_run:
+            place = way.place(request)
+            for one in sweeps:
+                estimate = foretell(one, options.results, place.workers, options.shard, retry_failed=options.retry_failed)
+                print(planned(estimate, place))
+            return 0
+        _say_if_compiling()
+        failed = 0
         for one in sweeps:
-            summary = run_sweep(
-                one,
-                options.results,
-                jobs=options.jobs,
-                budget=budget,
-                retry_failed=options.retry_failed,
-                on_progress=bar,
-            )
+            summary = way.carry_out(one, request)
             print(summed_up(summary, options.results), file=sys.stderr)
             failed += summary.new_failed
             if summary.stopped_by in {"interrupt", "terminated"}:
                 return _INTERRUPTED if summary.stopped_by == "interrupt" else _TERMINATED
     return 1 if failed else 0
+
+
+def plan(options: argparse.Namespace) -> int:
+    """A table of costs; nothing is written."""
+    from bns.sweep.cores import cores
+    from bns.sweep.cost import MACHINES, Cost, Machine, cost_table
+    from bns.sweep.grid import load_sweep
+    from bns.sweep.plan import plan as planned
+
+    plans = [planned(load_sweep(file), options.results, 1) for file in options.files]
+    here = Machine("here", 1, cores())
+    print(cost_table([Cost.of(each) for each in plans], (here, *MACHINES)))
+    print("every core as fast as one of this machine's; from " + "; ".join(f"{p.sweep}: {p.basis}" for p in plans))
+    return 0
 
 
 def status(options: argparse.Namespace) -> int:
@@ -287,6 +288,14 @@ def query(options: argparse.Namespace) -> int:
     else:
         print(rows.to_string(index=False, max_rows=100) if len(rows) else "no rows")
     sys.stdout.flush()
+    return 0
+
+
+def watch(options: argparse.Namespace) -> int:
+    """The page of figures, kept up to date."""
+    from bns.watch import watch as keep_drawing
+
+    keep_drawing(options.results, options.every, say=lambda text: print(f"bns: {text}", file=sys.stderr, flush=True))
     return 0
 
 

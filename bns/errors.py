@@ -40,6 +40,14 @@ class StopNotConfirmedError(BnsError):
     exit_code = 4
 
 
+class ClusterError(BnsError):
+    """Other machines that cannot be used as asked: a scheduler, its workers, a batch system."""
+
+
+class DataError(BnsError):
+    """Measurements that cannot be used as they are."""
+
+
 def unknown_name(kind: str, given: object, valid: Iterable[str]) -> str:
     """Say that ``given`` is no ``kind``, which one was probably meant, and list the valid names."""
     names = sorted(valid)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bns.engine.evolution import Population, breed, diversity, pick, rank, tournament_cdf
+from bns.engine.evolution import Population, pick, rank, tournament_cdf
 from bns.engine.philox import Key, Purpose
-from bns.robots.base import Robot, Scores
+from bns.robots.base import Luck, Robot, Scores
 from bns.spec import RunSpec
 from bns.tasks import Task
 
@@ -42,7 +42,7 @@ class Evolver:
     def start(cls, robot: Robot, task: Task, key: Key, spec: RunSpec, weights: np.ndarray) -> Evolver:
         """A random population, scored on untrained networks."""
         population = robot.initial_population(key, spec.population_size, spec.min_commands, spec.max_commands)
-        return cls(robot, task, key, spec, population, robot.score(population, weights, task))
+        return cls(robot, task, key, spec, population, robot.score(population, weights, task, Luck(key, 0)))
 
     def __post_init__(self) -> None:
         self.order = rank(self.scores.fitness)
@@ -64,13 +64,12 @@ class Evolver:
         self._score(weights)
         for _ in range(self.spec.generations_per_evaluation):
             self.generations += 1
-            self.bound_hits += breed(
+            self.bound_hits += self.robot.breed(
                 self.key,
                 self.population,
                 self.order,
                 self._parents,
                 self.spec.mutation_rate,
-                self.robot.bounds,
                 self.spec.min_commands,
                 self.generations,
                 self._spare,
@@ -81,7 +80,7 @@ class Evolver:
                 self.history.append(Generation(self.generations, self.fittest(), self.best_fitness, self.mean_fitness))
 
     def _score(self, weights: np.ndarray) -> None:
-        self.scores = self.robot.score(self.population, weights, self.task)
+        self.scores = self.robot.score(self.population, weights, self.task, Luck(self.key, self.generations))
         self.order = rank(self.scores.fitness)
         self.failures += self.scores.failures
 
@@ -96,5 +95,5 @@ class Evolver:
         return float(self.scores.fitness.mean())
 
     def diversity(self) -> float:
-        """Equation 4.1."""
-        return diversity(self.population, self.robot.bounds)
+        """Diversity of the population, as the robot's study defines it."""
+        return self.robot.diversity(self.population, self.scores)

@@ -29,7 +29,7 @@ Progress = Callable[[Mapping[str, Any]], None]
 @dataclass(frozen=True)
 class RunResult:
     """Tables of one run (name -> columns of equal length), the world's digest, the final networks (networks, W), the
-    fittest controller (n, components) and its last path (n, 3), in the world and as its networks saw it."""
+    fittest controller (n, components) and its last path (n, columns), in the world and as its networks saw it."""
 
     tables: dict[str, dict[str, np.ndarray]]
     world_digest: str
@@ -52,7 +52,7 @@ def run(spec: RunSpec, progress: Progress | None = None, world: World | None = N
 
     for evaluation in range(1, spec.evaluations + 1):
         # 1. A controller is picked from the population and driven in the world.
-        controller = evolver.pick(evaluation)
+        controller = robot.plan(evolver.pick(evaluation), weights, task)
         poses = recorder.drive_evaluated(evaluation, controller, weights)
         # 2. What it did joins the training set, and the training networks go on training.
         began = thread_time()

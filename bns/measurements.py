@@ -17,6 +17,8 @@ from bns.errors import ModelError
 
 COMMANDS = ("left_m_s", "right_m_s")
 POSE = ("x_m", "y_m", "heading_rad")
+SESSION = "session_s"
+"""Time since the session began, where it was logged."""
 COLUMNS = ("trial", "t_s", *COMMANDS, *POSE)
 """trial: number; t_s: since the trial began; wheel-surface speeds; heading counter-clockwise from x."""
 

@@ -18,7 +18,7 @@ import numpy as np
 from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 
@@ -33,6 +33,7 @@ COLUMN_IN, PAGE_IN = 3.5, 7.2
 TEXT_PT = 8
 """No text is smaller than this at those widths."""
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+BLUE, RED = OKABE_ITO[:2]
 GREY = "#555555"
 
 _SIZES = (
@@ -93,6 +94,9 @@ def save(figure: Figure, stem: Path | str) -> tuple[Path, Path]:
     """
     stem = Path(stem)
     made = []
+    with style():
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the places are found: to find them again for each file would take as long
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
         buffer, place = io.BytesIO(), stem.with_name(f"{stem.name}.{kind}")
         with style():
@@ -122,18 +126,37 @@ def arcs(poses: np.ndarray, step_rad: float = 0.05) -> np.ndarray:
     return np.vstack(points)
 
 
-def draw_paths(ax: Axes, goals_m: np.ndarray, radius_m: float, world_poses: np.ndarray, snn_poses: np.ndarray) -> None:
+def goal_reach(robot: Robot, task: Task) -> tuple[float, bool]:
+    """How far a goal reaches from its middle, m, and whether it is a square (else a disc)."""
+    return (task.region_m / 2, True) if task.region_m else (robot.radii_m[0], False)
+
+
+def floor_poses(robot: Robot, poses: np.ndarray) -> np.ndarray:
+    """x_m, y_m, heading_rad (n + 1, 3) of a robot's own poses, with the start before them."""
+    columns = robot.pose_columns(np.vstack([robot.start_pose(), poses]))
+    return np.column_stack([columns[name] for name in ("x_m", "y_m", "heading_rad")])
+
+
+def draw_paths(
+    ax: Axes,
+    goals_m: np.ndarray,
+    radius_m: float,
+    world_poses: np.ndarray,
+    snn_poses: np.ndarray,
+    square: bool = False,
+) -> None:
     """Robot's path (solid) and the simulator's idea of it (dashed) among the goals, in cm.
 
     Poses are (n, 3), x_m, y_m, heading_rad, first the start, then the end of each command (dots). A simulator that is
-    far off runs out of the picture rather than shrink it.
+    far off runs out of the picture rather than shrink it. Among square goals commands are joined by straight lines.
     """
-    draw_goals(ax, goals_m, radius_m)
+    draw_goals(ax, goals_m, radius_m, square)
+    drawn = _chords if square else arcs
     for poses, label, color, line in (
         (world_poses, "robot", OKABE_ITO[0], "-"),
         (snn_poses, "simulator", OKABE_ITO[1], "--"),
     ):
-        path = 100 * arcs(poses)
+        path = 100 * drawn(poses)
         ax.plot(path[:, 0], path[:, 1], label=label, color=color, linestyle=line)
         ax.plot(100 * poses[1:, 0], 100 * poses[1:, 1], "o", color=color, markersize=2.2)
     x, y, heading = world_poses[0]
@@ -146,16 +169,20 @@ def draw_paths(ax: Axes, goals_m: np.ndarray, radius_m: float, world_poses: np.n
         linestyle="none",
         label="start",
     )
-    _frame(ax, goals_m, radius_m, arcs(world_poses))
+    _frame(ax, goals_m, radius_m, drawn(world_poses))
 
 
-def draw_goals(ax: Axes, goals_m: np.ndarray, radius_m: float) -> None:
-    """Goals (n, 2) as discs of the radius that counts, numbered in order; one visited twice carries both numbers."""
+def _chords(poses: np.ndarray) -> np.ndarray:
+    return poses[:, :2]
+
+
+def draw_goals(ax: Axes, goals_m: np.ndarray, radius_m: float, square: bool = False) -> None:
+    """Goals (n, 2) as discs (or squares) of the reach that counts, numbered in order; one visited twice carries both numbers."""
     places, first = np.unique(goals_m, axis=0, return_index=True)
     centre = places.mean(axis=0)
     for place in goals_m[np.sort(first)]:
         numbers = ", ".join(str(i + 1) for i in np.flatnonzero((goals_m == place).all(axis=1)))
-        ax.add_patch(Circle(tuple(100 * place), 100 * radius_m, facecolor="#c8c8c8", edgecolor="#777777", zorder=1))
+        ax.add_patch(_goal(100 * place, 100 * radius_m, square))
         # Outside the disc, where a path that reaches the goal does not end: away from the middle, or to the right.
         outward = place - centre
         length = np.linalg.norm(outward)
@@ -172,6 +199,13 @@ def draw_goals(ax: Axes, goals_m: np.ndarray, radius_m: float) -> None:
             fontweight="bold",
             path_effects=[withStroke(linewidth=2, foreground="white")],
         )
+
+
+def _goal(place: np.ndarray, reach: float, square: bool) -> Circle | Rectangle:
+    look: dict[str, Any] = {"facecolor": "#c8c8c8", "edgecolor": "#777777", "zorder": 1}
+    if square:
+        return Rectangle((place[0] - reach, place[1] - reach), 2 * reach, 2 * reach, **look)
+    return Circle((place[0], place[1]), reach, **look)
 
 
 def _frame(ax: Axes, goals_m: np.ndarray, radius_m: float, path: np.ndarray) -> None:
@@ -204,11 +238,11 @@ def _tick_alike(ax: Axes) -> None:
 @style()
 def path_figure(spec: RunSpec, task: Task, robot: Robot, result: RunResult, stem: Path) -> Path:
     """Draw and save the path of a run's fittest controller at its end, a column wide; the path of the PNG."""
-    start = robot.poses(np.zeros((1, len(robot.networks))))
-    driven, simulated = np.vstack([start, result.world_poses]), np.vstack([start, result.snn_poses])
+    driven, simulated = floor_poses(robot, result.world_poses), floor_poses(robot, result.snn_poses)
+    reach_m, square = goal_reach(robot, task)
     figure = Figure(figsize=(COLUMN_IN, COLUMN_IN + 0.4))
     ax = figure.subplots()
-    draw_paths(ax, task.goals_m, robot.radii_m[0], driven, simulated)
+    draw_paths(ax, task.goals_m, reach_m, driven, simulated, square)
     success = bool(result.tables["evals"]["success"][-1])
     ax.set_title(f"{task.title}, seed {spec.seed}\nevaluation {spec.evaluations}: {outcome(success)}")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
@@ -226,16 +260,22 @@ def lettered(number: int, count: int, title: str) -> str:
 
 
 def panels(
-    count: int, height_in: float, columns: int = 3, rows_each: int = 1, ratios: Sequence[float] | None = None
+    count: int,
+    height_in: float,
+    columns: int = 3,
+    rows_each: int = 1,
+    ratios: Sequence[float] | None = None,
+    *,
+    wide: bool = False,
 ) -> tuple[Figure, np.ndarray]:
-    """Figure with ``count`` panels (count, rows_each): a column wide if there is one, else a page wide.
+    """Figure with ``count`` panels (count, rows_each): a column wide if there is one and not ``wide``, else a page wide.
 
     ``rows_each`` axes stand above each other in a panel, of relative heights ``ratios``; ``height_in`` is the
     height of one row of panels. Rows are filled from the left; places that stay empty are blank.
     """
     across = min(count, 2 if count == 4 else columns)
     down = -(-count // across)
-    figure = Figure(figsize=(COLUMN_IN if count == 1 else PAGE_IN, height_in * down))
+    figure = Figure(figsize=(COLUMN_IN if count == 1 and not wide else PAGE_IN, height_in * down))
     heights = list(ratios or [1] * rows_each) * down
     grid = figure.subplots(down * rows_each, across, squeeze=False, gridspec_kw={"height_ratios": heights})
     axes = np.array(

@@ -15,6 +15,7 @@ from bns import __version__
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.rprop import Rprop
 from bns.engine.snn import INPUTS, initial_weights, predict
+from bns.refinement import refined
 from bns.robots.base import Robot
 from bns.robots.simulator import StaticSimulator
 from bns.worlds.base import World
@@ -52,6 +53,8 @@ def precompute(
     robot: Robot, world: World, seed: int = 0, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> StaticSimulator:
     """Collect, train, verify. Same seed, same numbers."""
+    if robot.recipe is not None:
+        return refined(robot, world, robot.recipe, seed, progress)
     key = Key.of_run(seed, 0, robot.name, "precompute")
     patterns = collect(robot, world, key)
     learn = ~patterns.verification
@@ -107,9 +110,9 @@ def describe(simulator: StaticSimulator) -> str:
     ]
     for name, noise in zip(simulator.networks, simulator.noise_sd, strict=True):
         got = made["accuracy"][name]
-        unit = "rad" if name == "dtheta" else "m"
+        unit = {"dtheta": " rad", "stable": ""}.get(name, " m")
         lines.append(
-            f"  {name:7s} R² {got['r2']:.4f}  slope {got['slope']:.4f}  RMSE {got['rmse']:.5f} {unit}  "
-            f"bias {got['bias']:+.5f} {unit}  noise of the substitute world {noise:.5f} {unit}"
+            f"  {name:9s} R² {got['r2']:.4f}  slope {got['slope']:.4f}  RMSE {got['rmse']:.5f}{unit}  "
+            f"bias {got['bias']:+.5f}{unit}  noise of the substitute world {noise:.5f}{unit}"
         )
     return "\n".join(lines)

@@ -39,19 +39,19 @@ class _Columns:
 class Recorder:
     """Drives controllers for measurement and gathers the tables of one run.
 
-    `last_poses` and `last_simulated` (n, 3) are the latest path of the fittest controller, in the world and in simulation.
+    `last_poses` and `last_simulated` (n, columns) are the latest path of the fittest controller, in the world and in simulation.
     """
 
     def __init__(self, robot: Robot, task: Task, world: World, key: Key, spec: RunSpec) -> None:
         self._robot, self._task, self._world, self._key = robot, task, world, key
-        self._once = not world.repeatable
-        self._full = spec.record == "full"
+        self._once = not getattr(world, "repeatable", True)
+        self._full, self._with_paths = spec.record == "full", spec.record in {"paths", "full"}
         self._evals, self._paths, self._generations, self._probe_rows = (_Columns() for _ in range(4))
-        self.last_poses = self.last_simulated = np.empty((0, 3))
-        self._ever: dict[str, bool] = {}
+        self.last_poses = self.last_simulated = robot.start_pose()[:0]
+        self._ever: dict[str, bool | None] = {}
         self._evaluated: dict[str, Any] = {}
         self._path = (np.empty((0, 0)), self.last_poses, self.last_poses)
-        if self._full and not self._once:
+        if self._full:
             self._probes = robot.random_controllers(key, PROBES, PROBE_COMMANDS)
             self._probe_world = [
                 self._final(self._drive(self._probes.controller(i), Purpose.PROBE, 1 + i)) for i in range(PROBES)
@@ -59,7 +59,7 @@ class Recorder:
             self._probe_before: list[np.ndarray] | None = None
 
     def drive_evaluated(self, evaluation: int, controller: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Drive the controller picked for this evaluation; its measured poses (n, 3) are what the networks learn from."""
+        """Drive the controller picked for this evaluation; its measured poses are what the networks learn from."""
         poses = self._drive(controller, Purpose.WORLD_EVALUATED, evaluation)
         in_world, goals = self._robot.judge(poses, self._task)
         simulated = self._simulated(controller, weights)
@@ -69,11 +69,11 @@ class Recorder:
             "evaluated_fitness_world": in_world,
             "evaluated_fitness_error": abs(in_simulation - in_world),
             "evaluated_goals_reached": goals,
-            "commands": len(controller),
-            "driven_ms": self._robot.driven_ms(controller),
+            "commands": len(poses),
+            "driven_ms": self._robot.driven_ms(controller[: len(poses)]),
         } | self._successes("evaluated_success", poses)
         self._path = (controller, poses, simulated)
-        if self._full:
+        if self._with_paths:
             self._add_path(evaluation, "evaluated", *self._path)
         return poses
 
@@ -89,14 +89,17 @@ class Recorder:
         """Measure the fittest controller in the world and add this evaluation's row."""
         fittest, poses, simulated = self._fittest(evaluation, evolver, weights)
         in_world, goals = self._robot.judge(poses, self._task)
-        in_simulation = self._robot.judge(simulated, self._task)[0] if self._once else evolver.best_fitness
+        in_simulation = self._evaluated["evaluated_fitness_simulation"] if self._once else evolver.best_fitness
         self.last_poses, self.last_simulated = poses, simulated
         successes = self._successes("success", poses)
         for name, value in successes.items():
-            self._ever["ever_" + name] = self._ever.get("ever_" + name, False) or value
+            # None stays None: where there is no distance to a goal, nothing has ever come within one.
+            self._ever["ever_" + name] = value if value is None else self._ever.get("ever_" + name, False) or value
         training_error, validation_error = trainer.errors()
+        if self._with_paths:
+            self._add_path(evaluation, "fittest", fittest, poses, self.last_simulated)
         if self._full:
-            self._record_full(evaluation, fittest, poses, evolver, weights)
+            self._record_full(evaluation, evolver, weights)
         return self._evals.add(
             evaluation=evaluation,
             diversity=evolver.diversity(),
@@ -125,25 +128,24 @@ class Recorder:
     def tables(self) -> dict[str, dict[str, np.ndarray]]:
         """Everything kept, table by table."""
         found = {"evals": self._evals.arrays()}
-        if self._full:
-            found |= {
-                "paths": self._paths.arrays(),
-                "generations": self._generations.arrays(),
-                "probes": self._probe_rows.arrays(),
-            }
+        found |= {
+            "paths": self._paths.arrays(),
+            "generations": self._generations.arrays(),
+            "probes": self._probe_rows.arrays(),
+        }
         return {name: columns for name, columns in found.items() if columns}
 
     def _drive(self, controller: np.ndarray, purpose: Purpose, step: int) -> np.ndarray:
         return self._world.drive(controller, self._key, purpose, step)
 
     def _simulated(self, controller: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        outputs = predict(weights, self._robot.inputs(controller))
+        outputs = predict(weights, self._robot.inputs(controller), self._robot.sigmoid_output)
         return self._robot.poses(self._robot.displacements(outputs))
 
-    def _successes(self, prefix: str, poses: np.ndarray) -> dict[str, bool]:
-        within = self._robot.successes(poses, self._task)
+    def _successes(self, prefix: str, poses: np.ndarray) -> dict[str, bool | None]:
+        within = self._robot.successes(poses, self._task) or (None,) * len(RADII_CM)
         by_radius = {f"{prefix}_{cm}cm": ok for cm, ok in zip(RADII_CM, within, strict=True)}
-        return {prefix: within[0]} | by_radius
+        return {prefix: self._robot.succeeded(poses, self._task)} | by_radius
 
     def _fittest(
         self, evaluation: int, evolver: Evolver, weights: np.ndarray
@@ -151,18 +153,14 @@ class Recorder:
         """Controller, path in the world and in simulation. A robot drives only what was picked: that one stands in."""
         if self._once:
             return self._path
-        fittest = evolver.fittest()
+        fittest = self._robot.plan(evolver.fittest(), weights, self._task)
         poses = self._drive(fittest, Purpose.WORLD_FITTEST, evaluation)
         return fittest, poses, self._simulated(fittest, weights)
 
-    def _record_full(
-        self, evaluation: int, fittest: np.ndarray, poses: np.ndarray, evolver: Evolver, weights: np.ndarray
-    ) -> None:
-        self._add_path(evaluation, "fittest", fittest, poses, self.last_simulated)
-        if self._once:
-            return
+    def _record_full(self, evaluation: int, evolver: Evolver, weights: np.ndarray) -> None:
         for generation in evolver.history:
-            driven = self._drive(generation.best, Purpose.WORLD_GENERATION, generation.number)
+            best = self._robot.plan(generation.best, weights, self._task)
+            driven = self._drive(best, Purpose.WORLD_GENERATION, generation.number)
             self._generations.add(
                 evaluation=evaluation,
                 generation=generation.number,
@@ -175,12 +173,15 @@ class Recorder:
     def _add_path(
         self, evaluation: int, who: str, controller: np.ndarray, poses: np.ndarray, simulated: np.ndarray
     ) -> None:
-        start = self._robot.poses(np.zeros((1, len(self._robot.networks))))
-        nothing = np.full((1, controller.shape[1]), np.nan)
-        rows = np.hstack([np.vstack([nothing, controller]), np.vstack([start, poses]), np.vstack([start, simulated])])
-        names = (*self._robot.command_columns, "x_m", "y_m", "heading_rad", "snn_x_m", "snn_y_m", "snn_heading_rad")
-        for step, row in enumerate(rows):
-            self._paths.add(evaluation=evaluation, who=who, step=step, **dict(zip(names, row.tolist(), strict=True)))
+        start, driven = self._robot.start_pose(), len(poses)
+        commands = np.vstack([np.full((1, controller.shape[1]), np.nan), controller[:driven]])
+        columns = dict(zip(self._robot.command_columns, commands.T, strict=True))
+        columns |= self._robot.pose_columns(np.vstack([start, poses]))
+        simulator = self._robot.pose_columns(np.vstack([start, simulated[:driven]]))
+        columns |= {f"snn_{name}": values for name, values in simulator.items()}
+        for step in range(driven + 1):
+            row = {name: values[step].item() for name, values in columns.items()}
+            self._paths.add(evaluation=evaluation, who=who, step=step, **row)
 
     def _add_probes(self, evaluation: int, probes: Population, weights: np.ndarray) -> None:
         now = [self._final(self._simulated(probes.controller(i), weights)) for i in range(len(probes))]
@@ -194,6 +195,6 @@ class Recorder:
             )
         self._probe_before = now
 
-    @staticmethod
-    def _final(poses: np.ndarray) -> np.ndarray:
-        return poses[-1, :2]
+    def _final(self, poses: np.ndarray) -> np.ndarray:
+        last = self._robot.pose_columns(poses[-1:])
+        return np.concatenate([last["x_m"], last["y_m"]])

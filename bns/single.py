@@ -16,6 +16,7 @@ from rich.live import Live
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from bns.errors import ModelError
 from bns.loop import RunResult, run
 from bns.plotting import path_figure
 from bns.recorder import RADII_CM
@@ -23,25 +24,33 @@ from bns.robots import load_robot
 from bns.robots.simulator import StaticSimulator, check_writable, save_simulator
 from bns.spec import RunSpec
 from bns.store.lock import SweepLockedError
+from bns.store.reader import finished
 from bns.store.record import RunRecord
 from bns.store.writer import Writer
 from bns.sweep import memory
+from bns.sweep.digests import WorldDigests
 from bns.tasks import load_task
+from bns.worlds import build_world
 
 _PATIENCE_S = 60.0
 
 
-def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None = None) -> str:
+def run_by_hand(
+    spec: RunSpec, results: Path, sweep: str, save_snn: Path | None = None, render: Path | None = None
+) -> str:
     """Carry out a run with a live view, store it, draw the path of its fittest controller; the report in words."""
     robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
+    if render is not None:
+        check_renderable(spec, build_world(spec.world, robot), render)
     if save_snn is not None:
         check_writable(save_snn)
-    with _patient_writer(results, sweep):
-        pass  # a folder that cannot be written is better found before the run than after it
+    world = build_world(spec.world, robot)
+    with _patient_writer(results, sweep):  # what does not fit is better found before the run than after it
+        _check_world(spec, results, sweep, world.digest)
     started, wall, cpu = datetime.now(UTC), time.perf_counter(), time.process_time()
     memory.reset_peak()
     with live_view(spec) as show:
-        result = run(spec, show)
+        result = run(spec, show, world)
     wall_s = time.perf_counter() - wall
     keep_run(spec, result, results, sweep, started, wall_s, time.process_time() - cpu)
     if save_snn is not None:
@@ -58,7 +67,26 @@ def run_by_hand(spec: RunSpec, results: Path, sweep: str, save_snn: Path | None 
         result,
         results / "figures" / f"run-{spec.task}-{spec.seed}-{spec.run_id}",
     )
-    return _report(spec, result, wall_s, figure)
+    told = _report(spec, result, wall_s, figure)
+    if render is not None:
+        world.render(robot.plan(result.fittest, result.weights, task), render)  # type: ignore[attr-defined]  # checked above
+        told += f"\nmoving picture: {render}"
+    return told
+
+
+def check_renderable(spec: RunSpec, world: Any, path: Path) -> None:
+    """ModelError if this world has no picture of its robot, or none in such a file."""
+    if not hasattr(world, "render"):
+        raise ModelError(f"the {spec.world} world of {spec.robot} has nothing to render; leave --render out.")
+    check_writable(path)
+    world.check_picture(path)
+
+
+def _check_world(spec: RunSpec, results: Path, sweep: str, digest: str) -> None:
+    if finished(results, sweep):
+        digests = WorldDigests(results, sweep)
+        digests.read()
+        digests.compare(spec.task, spec.world, digest)
 
 
 def keep_run(
@@ -106,11 +134,15 @@ def _patient_writer(results: Path, sweep: str) -> Iterator[Writer]:
 
 def _report(spec: RunSpec, result: RunResult, wall_s: float, figure: Path) -> str:
     evals = result.tables["evals"]
-    reached = [f"{cm} cm " + _first(evals[f"success_{cm}cm"], evals["evaluation"]) for cm in RADII_CM]
+    names = [f"success_{cm}cm" for cm in RADII_CM]
+    within = [f"within {cm} cm " for cm in RADII_CM]
+    if evals[names[0]][0] is None:
+        names, within = ["success"], [""]
+    reached = [text + _first(evals[name], evals["evaluation"]) for text, name in zip(within, names, strict=True)]
     return "\n".join(
         [
             f"run {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {spec.evaluations} evaluations in {wall_s:.1f} s",
-            "all goals reached by the fittest controller, within " + "; ".join(reached),
+            "all goals reached by the fittest controller: " + "; ".join(reached),
             f"fitness of the fittest at the end: {evals['fitness_simulation'][-1]:.3f} in simulation, "
             f"{evals['fitness_world'][-1]:.3f} in the world ({spec.world})",
             f"path: {figure}",
@@ -140,12 +172,12 @@ def _view(spec: RunSpec, row: Mapping[str, Any]) -> Table:
         "fitness: simulation",
         "world",
         "goals",
-        *(f"{cm} cm" for cm in RADII_CM),
+        *_radii(row),
         "diversity",
         "training error",
     ):
         table.add_column(heading, justify="right")
-    marks = [("yes" if row[f"success_{cm}cm"] else "ever" if row[f"ever_success_{cm}cm"] else "no") for cm in RADII_CM]
+    marks = [_mark(row, f"success_{name.replace(' ', '')}" if name in _CM else "success") for name in _radii(row)]
     table.add_row(
         f"{row['evaluation']}/{spec.evaluations}",
         f"{row['fitness_simulation']:.3f}",
@@ -156,6 +188,18 @@ def _view(spec: RunSpec, row: Mapping[str, Any]) -> Table:
         f"{row['training_error']:.5f}",
     )
     return table
+
+
+_CM = tuple(f"{cm} cm" for cm in RADII_CM)
+
+
+def _radii(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """Headings of success: a radius each, or one where goals have none."""
+    return ("success",) if row[f"success_{RADII_CM[0]}cm"] is None else _CM
+
+
+def _mark(row: Mapping[str, Any], name: str) -> str:
+    return "yes" if row[name] else "ever" if row[f"ever_{name}"] else "no"
 
 
 @contextmanager

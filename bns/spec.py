@@ -16,7 +16,7 @@ from typing import Any
 
 from bns.errors import SpecError, unknown_name
 
-ENGINE_VERSION = 1
+ENGINE_VERSION = 2
 """Raised whenever the same spec would give other numbers; part of every run's name."""
 
 
@@ -27,8 +27,11 @@ def _field(
     low: float | None = None,
     high: float | None = None,
     choices: tuple[str, ...] | None = None,
+    or_file: tuple[str, ...] = (),
 ) -> Any:
-    return dataclasses.field(default=default, metadata={"help": text, "low": low, "high": high, "choices": choices})
+    """``or_file``: endings of file names that may stand instead of one of the choices."""
+    bounds = {"low": low, "high": high, "choices": choices, "or_file": or_file}
+    return dataclasses.field(default=default, metadata={"help": text, **bounds})
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,12 @@ class RunSpec:
 
     robot: str = _field("khepera", "robot")
     task: str = _field("circle", "goal task of that robot")
-    world: str = _field("substitute", "what answers a controller", choices=("substitute", "physics", "robot"))
+    world: str = _field(
+        "substitute",
+        "what answers a controller, or a model file (.yaml) that physics drives",
+        choices=("substitute", "physics", "robot"),
+        or_file=(".yaml", ".yml"),
+    )
     seed: int = _field(0, "seed of this run", low=0, high=2**32 - 1)
     root_seed: int = _field(0, "seed of the whole study", low=0, high=2**32 - 1)
     population_size: int = _field(400, "controllers in the population", low=1, high=1_000_000)
@@ -59,7 +67,9 @@ class RunSpec:
     min_commands: int = _field(4, "shortest command list that crossover may make", low=1, high=10_000)
     max_commands: int = _field(100, "longest command list that crossover may make", low=1, high=10_000)
     record: str = _field(
-        "evals", "what is kept: one row an evaluation, or paths and generations too", choices=("evals", "full")
+        "evals",
+        "what is kept: one row an evaluation, or paths too, or with generations and probes, which are driven for it",
+        choices=("evals", "paths", "full"),
     )
 
     def __post_init__(self) -> None:
@@ -104,7 +114,7 @@ def checked(name: str, value: Any) -> Any:
     if not fits:
         raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.")
     if wanted is str:
-        if meta["choices"] and value not in meta["choices"]:
+        if meta["choices"] and value not in meta["choices"] and not value.endswith(meta["or_file"] or ("\0",)):
             raise SpecError(unknown_name(name, value, meta["choices"]))
         return value
     low, high = meta["low"], meta["high"]

@@ -28,27 +28,38 @@ class Trainer:
     @classmethod
     def start(cls, robot: Robot, key: Key, spec: RunSpec) -> Trainer:
         """Untrained networks and no patterns."""
-        weights = initial_weights(key, len(robot.networks), robot.hidden)
+        weights = initial_weights(key, len(robot.networks), robot.hidden, robot.input_count)
         return cls(
             robot,
             key,
             spec.training_iterations_per_evaluation,
-            Rprop.start(weights, spec.training_algorithm),
+            Rprop.start(weights, spec.training_algorithm, robot.sigmoid_output),
             TrainingData.empty(INPUTS, len(robot.networks)),
         )
 
     def add(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
-        """Take in what the robot did: measured poses (n, 3) at the end of each command."""
-        targets = self.robot.targets(self.robot.measured_displacements(poses))
-        self.failures += self.data.add(self.robot.inputs(commands), targets, self.key, evaluation)
+        """Take in what the robot did: measured poses (m, columns) of its commands (n, components), m <= n."""
+        moved = self.robot.measured_displacements(poses)
+        self.failures += self.data.add(
+            self.robot.inputs(commands)[:, : len(poses)],
+            self.robot.targets(moved),
+            self.key,
+            evaluation,
+            self.robot.learnable(moved),
+        )
 
     def train(self) -> None:
         """Iterate on all training patterns. A network that is no longer finite begins anew, and is counted."""
         patterns = self.data.training
-        self.rule.train(patterns.inputs, patterns.targets, patterns.count, self.iterations)
-        for net in np.flatnonzero(~np.isfinite(self.rule.weights).all(axis=1)):
+        if self.robot.repeats_inputs:
+            for net, (inputs, targets, counts) in enumerate(patterns.merged()):
+                self.rule.train_one(net, inputs, targets, counts, len(targets), self.iterations)
+        else:
+            self.rule.train(patterns.inputs, patterns.targets, patterns.count, self.iterations)
+        for failed in np.flatnonzero(~np.isfinite(self.rule.weights).all(axis=1)):
             self.failures += 1
-            self.rule.restart(int(net), initial_weights(self.key, len(self.rule.weights), self.robot.hidden)[net])
+            untrained = initial_weights(self.key, len(self.rule.weights), self.robot.hidden, self.robot.input_count)
+            self.rule.restart(int(failed), untrained[failed])
 
     def evolution_weights(self) -> np.ndarray:
         """A copy of the networks for evolution to work on."""
@@ -61,5 +72,6 @@ class Trainer:
     def _error(self, patterns: PatternSet) -> float:
         if patterns.count == 0:
             return float("nan")
-        outputs = predict(self.rule.weights, patterns.inputs[:, : patterns.count])
-        return float(np.mean((outputs.astype(np.float64) - patterns.targets[:, : patterns.count]) ** 2))
+        outputs = predict(self.rule.weights, patterns.inputs[:, : patterns.count], self.robot.sigmoid_output)
+        squared = (outputs.astype(np.float64) - patterns.targets[:, : patterns.count]) ** 2
+        return float(np.mean(squared[patterns.present[:, : patterns.count]]))

@@ -1,14 +1,18 @@
 """The command line as a user meets it: what it prints, where it writes, how it ends."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import bns as package
 from bns.cli import _duration, main
 from bns.errors import BnsError
+from bns.robots.simulator import load_static_simulator
+from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import load_sweep
 from bns.sweep.runner import run_sweep
 
@@ -69,6 +73,22 @@ def test_two_runs_by_hand_of_one_spec_count_once(tmp_path, capsys):
     assert len(package.load(tmp_path, "runs")) == 1
 
 
+def test_a_run_by_hand_is_refused_beside_runs_of_another_simulator(tmp_path, capsys, monkeypatch):
+    assert main(["run", *QUICK, "--results", str(tmp_path)]) == 0
+    before = package.load(tmp_path)
+    static = load_static_simulator("khepera")
+    changed = replace(static, weights=static.weights * np.float32(1.01))
+    monkeypatch.setattr("bns.worlds.substitute.load_static_simulator", lambda _robot: changed)
+    capsys.readouterr()
+    assert main(["run", *QUICK, "--results", str(tmp_path)]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert re.search(rf"made with world {static.digest} .* now one with world {changed.digest}", captured.err)
+    pd.testing.assert_frame_equal(package.load(tmp_path), before)
+    for elsewhere in (["--world", "physics"], ["--task", "complex"]):  # nothing there to be mixed with
+        assert main(["run", *QUICK, *elsewhere, "--results", str(tmp_path)]) == 0
+
+
 def test_physics_world_answers_otherwise_than_the_substitute(tmp_path):
     for world in ("substitute", "physics"):
         assert main(["run", *QUICK, "--world", world, "--results", str(tmp_path)]) == 0
@@ -78,14 +98,14 @@ def test_physics_world_answers_otherwise_than_the_substitute(tmp_path):
 
 def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
     results = tmp_path / "results"
-    plan = bns("sweep", sweep_file, "--dry-run", "--results", results)
-    assert "little: 8 runs, 0 done, 8 to do" in plan.stdout
+    assert main(["sweep", str(sweep_file), "--dry-run", "--results", str(results)]) == 0
+    assert "little: 8 runs, 0 done, 8 to do" in capsys.readouterr().out
     assert not results.exists(), "a dry run writes nothing"
     done = bns("sweep", sweep_file, "--jobs", 2, "--results", results)
     assert done.returncode == 0, done.stderr
     assert "8 runs now, 8 of 8 done" in done.stderr
-    again = bns("sweep", sweep_file, "--jobs", 1, "--results", results)
-    assert "0 runs now, 8 of 8 done" in again.stderr
+    assert main(["sweep", str(sweep_file), "--jobs", "1", "--results", str(results)]) == 0
+    assert "0 runs now, 8 of 8 done" in capsys.readouterr().err
     assert main(["status", "--results", str(results)]) == 0
     assert re.search(r"little\s+circle\s+4\s+4\s+0\s+0", capsys.readouterr().out)
     assert (
@@ -99,7 +119,7 @@ def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
 
 def test_one_and_two_jobs_and_a_resumed_sweep_give_the_same_rows(tmp_path, sweep_file):
     frames = []
-    part = run_sweep(load_sweep(sweep_file), tmp_path / "resumed", limit=3)
+    part = run_sweep(load_sweep(sweep_file), tmp_path / "resumed", limit=3, executor=SerialExecutor())
     assert 0 < part.done < part.total
     assert len(package.load(tmp_path / "resumed", "runs")) == part.done
     for name, jobs in {"one": "1", "two": "2", "resumed": "2"}.items():

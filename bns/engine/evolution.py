@@ -81,9 +81,15 @@ def pick(key: Key, purpose: Purpose, step: int, order: np.ndarray, cdf: np.ndarr
     return int(order[np.searchsorted(cdf, u, side="right")])
 
 
-@inline
-def _winner(order: Any, cdf: Any, word: Any) -> Any:
-    return order[min(np.searchsorted(cdf, word * _UNIT, side="right"), order.size - 1)]
+@exact
+def _winner(order, cdf, word):  # type: ignore[no-untyped-def]  # compiled
+    """As `pick`: the first rank whose share lies above the draw. Halving without a branch, which would be guessed wrongly."""
+    u, at, left = word * _UNIT, 0, cdf.size
+    while left > 1:
+        half = left >> 1
+        at += half * np.int64(cdf[at + half - 1] <= u)
+        left -= half
+    return order[min(at + np.int64(cdf[at] <= u), order.size - 1)]
 
 
 @inline
@@ -115,11 +121,11 @@ def _cross(children, child, lists, lengths, front, back, cut_front, cut_back, sh
 
 
 @fast
-def _mutation_words(slot, individual, count, step, k0, k1, out):  # type: ignore[no-untyped-def]  # compiled
-    """One block of draws a command, for all commands of all children at once, so that the generator vectorises."""
+def _draws(slot, individual, purpose, step, k0, k1, out):  # type: ignore[no-untyped-def]  # compiled
+    """Three words for each (slot, individual) into out (3, n), all at once, so that the generator vectorises."""
     first, second, third = out[0], out[1], out[2]
-    for m in range(count):
-        draws = philox(slot[m], individual[m], step, np.uint32(Purpose.MUTATION), k0, k1)
+    for m in range(slot.size):
+        draws = philox(slot[m], individual[m], step, np.uint32(purpose), k0, k1)
         first[m] = draws[0]
         second[m] = draws[1]
         third[m] = draws[2]
@@ -138,7 +144,7 @@ def _mutate(children, lengths, rate, low, high, span, step, k0, k1):  # type: ig
             slot[m], individual[m] = j, i
             m += 1
     draws = np.empty((3, total), np.uint32)
-    _mutation_words(slot, individual, total, step, k0, k1, draws)
+    _draws(slot, individual, Purpose.MUTATION, step, k0, k1, draws)
     threshold = np.uint64(rate / _UNIT)
     for c in range(COMPONENTS):
         for m in range(total):
@@ -159,16 +165,18 @@ def breed_into(commands, lengths, order, cdf, rate, low, high, span, shortest, s
     best = order[0]
     _copy(lists, best, 0, child_lists, 0, 0, lengths[best] * COMPONENTS)
     child_lengths[0] = lengths[best]
+    slot, pairs = np.zeros(n // 2, np.uint32), np.arange(n // 2).astype(np.uint32)
+    parents, cuts = np.empty((3, n // 2), np.uint32), np.empty((3, n // 2), np.uint32)
+    _draws(slot, pairs, Purpose.PARENTS, step, k0, k1, parents)
+    _draws(slot, pairs, Purpose.CUTS, step, k0, k1, cuts)
     for pair in range(n // 2):
         first = 1 + 2 * pair
-        parents = philox(np.uint32(0), np.uint32(pair), step, np.uint32(Purpose.PARENTS), k0, k1)
-        cuts = philox(np.uint32(0), np.uint32(pair), step, np.uint32(Purpose.CUTS), k0, k1)
-        a, b = _winner(order, cdf, parents[0]), _winner(order, cdf, parents[1])
-        cut_a = _below(cuts[1], min(lengths[a], lengths[b]) + 1)
+        a, b = _winner(order, cdf, parents[0, pair]), _winner(order, cdf, parents[1, pair])
+        cut_a = _below(cuts[1, pair], min(lengths[a], lengths[b]) + 1)
         cut_b = cut_a
-        if cuts[0] * _UNIT >= IDENTICAL_CUT:
-            cut_a = _below(cuts[1], lengths[a] + 1)
-            cut_b = _below(cuts[2], lengths[b] + 1)
+        if cuts[0, pair] * _UNIT >= IDENTICAL_CUT:
+            cut_a = _below(cuts[1, pair], lengths[a] + 1)
+            cut_b = _below(cuts[2, pair], lengths[b] + 1)
         length, kept = _cross(child_lists, first, lists, lengths, a, b, cut_a, cut_b, shortest)
         child_lengths[first] = kept
         hits += length > kept

@@ -6,15 +6,18 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
+from numba.extending import intrinsic
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _WITH_KERNELS = ("engine", "physics", "robots")
 # No "nnan" and "ninf": failed arithmetic must stay visible as NaN.
+_config: Any = numba.config
 _FAST_FLAGS = {"reassoc", "contract", "arcp", "nsz", "afn"}
 
 
@@ -42,16 +45,31 @@ def cache_folder() -> Path:
 
 def _configure() -> None:
     """Left alone where the user has chosen otherwise through numba's environment variables."""
-    config: Any = numba.config
-    if not config.CACHE_DIR:
-        config.CACHE_DIR = str(cache_folder())
+    if not _config.CACHE_DIR:
+        _config.CACHE_DIR = str(cache_folder())
     features = llvm.get_host_cpu_features()
-    if config.CPU_FEATURES is None and features.get("avx512f"):
+    if _config.CPU_FEATURES is None and features.get("avx512f"):
         # LLVM uses half of a 512-bit register unless told otherwise; training is a quarter faster with all of it.
-        config.CPU_FEATURES = features.flatten() + ",-prefer-256-bit"
+        _config.CPU_FEATURES = features.flatten() + ",-prefer-256-bit"
 
 
 _configure()
+
+
+def _mark() -> Path:
+    # One for each text of the kernels, numba and kind of processor: what another has compiled is of no use.
+    return Path(_config.CACHE_DIR) / f"{cache_folder().name}-{numba.__version__}-{llvm.get_host_cpu_name()}"
+
+
+def compiled() -> bool:
+    """Whether all kernels, as they now stand, were compiled on this machine and lie on its disk."""
+    return _mark().exists()
+
+
+def note_compiled() -> None:
+    """To be called when every kernel has been used once."""
+    with suppress(OSError):  # where nothing can be kept, the next process compiles again
+        _mark().touch()
 
 
 def fast(function: Callable[..., Any]) -> Any:
@@ -67,3 +85,15 @@ def exact(function: Callable[..., Any]) -> Any:
 def inline(function: Callable[..., Any]) -> Any:
     """A helper that disappears into the kernel that calls it, and takes its arithmetic rules."""
     return numba.njit(inline="always", error_model="numpy")(function)
+
+
+@intrinsic
+def smaller(_typing, a, b):  # type: ignore[no-untyped-def]  # compiled
+    """The smaller of two numbers, b where one of them is NaN: one instruction, where ``min`` and ``if`` are branches."""
+    return a(a, a), lambda _context, builder, _signature, ab: builder.select(builder.fcmp_ordered("<", *ab), *ab)
+
+
+@intrinsic
+def larger(_typing, a, b):  # type: ignore[no-untyped-def]  # compiled
+    """The larger of two numbers, b where one of them is NaN."""
+    return a(a, a), lambda _context, builder, _signature, ab: builder.select(builder.fcmp_ordered(">", *ab), *ab)

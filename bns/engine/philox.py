@@ -36,6 +36,7 @@ class Purpose(IntEnum):
     WORLD_GENERATION = 10
     PROBE = 11
     PRECOMPUTE = 12
+    ROLLOUT_NOISE = 13
 
 
 @dataclass(frozen=True)

@@ -50,20 +50,29 @@ def hidden_activations(weights: np.ndarray, X: np.ndarray) -> np.ndarray:
     return np.asarray(1.0 / (1.0 + np.exp(-(into @ np.asarray(X, np.float64) + bias[:, None]))))
 
 
-def predict(weights: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """Outputs (networks, n) of networks (networks, W) for inputs X (5, n) (figure 4.3)."""
+def predict(weights: np.ndarray, X: np.ndarray, sigmoid_output: bool = False) -> np.ndarray:
+    """Outputs (networks, n) of networks (networks, W) for inputs X (5, n) (figures 4.3 and 5.6)."""
     outputs = []
     for row in weights:
         _, _, to_output, bias = split_weights(row)
         outputs.append(to_output @ hidden_activations(row, X) + bias)
-    return np.array(outputs)
+    return 1.0 / (1.0 + np.exp(-np.array(outputs))) if sigmoid_output else np.array(outputs)
 
 
-def gradient(weights: np.ndarray, X: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Backpropagation: gradient (W,) of half the summed squared error over X (5, n) and target (n,)."""
+def gradient(
+    weights: np.ndarray,
+    X: np.ndarray,
+    target: np.ndarray,
+    counts: np.ndarray | None = None,
+    sigmoid_output: bool = False,
+) -> np.ndarray:
+    """Backpropagation: gradient (W,) of half the summed squared error over X (5, n) and target (n,), each counts (n,) times."""
     hidden = hidden_activations(weights, X)
-    _, _, to_output, bias = split_weights(weights)
-    error = to_output @ hidden + bias - np.asarray(target, np.float64)
+    _, _, to_output, _ = split_weights(weights)
+    output = predict(weights[None], X, sigmoid_output)[0]
+    error = (output - np.asarray(target, np.float64)) * (1.0 if counts is None else counts)
+    if sigmoid_output:
+        error = error * output * (1.0 - output)
     at_hidden = to_output[:, None] * error * hidden * (1.0 - hidden)
     neurons = np.column_stack([at_hidden @ np.asarray(X, np.float64).T, at_hidden.sum(axis=1), hidden @ error])
     return np.concatenate([neurons.ravel(), [error.sum()]])

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from bns.engine.jit import exact, fast, inline
-from bns.engine.snn import BLOCK, GROUP, PER_NEURON, forward4, hidden_count
+from bns.engine.snn import BLOCK, GROUP, PER_NEURON, forward4, hidden_count, sigmoid
 
 INITIAL_STEP, LARGEST_STEP, SMALLEST_STEP = 0.1, 50.0, 1e-6
 GROW, SHRINK = 1.2, 0.5
 _F = np.float32
 _GROW, _SHRINK, _LARGEST, _SMALLEST, _ZERO = _F(GROW), _F(SHRINK), _F(LARGEST_STEP), _F(SMALLEST_STEP), _F(0)
+_ALL_ALIKE = np.empty(0, np.float32)
 
 
 @dataclass
@@ -29,9 +30,10 @@ class Rprop:
     last_gradient: np.ndarray
     last_change: np.ndarray
     backtrack: bool
+    sigmoid_output: bool = False
 
     @classmethod
-    def start(cls, weights: np.ndarray, algorithm: str) -> Rprop:
+    def start(cls, weights: np.ndarray, algorithm: str, sigmoid_output: bool = False) -> Rprop:
         """Begin with these networks; algorithm is ``rprop+`` or ``irprop-``."""
         weights = weights.astype(np.float32)
         return cls(
@@ -40,24 +42,33 @@ class Rprop:
             np.zeros_like(weights),
             np.zeros_like(weights),
             algorithm == "rprop+",
+            sigmoid_output,
         )
 
     def train(self, X: np.ndarray, targets: np.ndarray, count: int, iterations: int) -> None:
         """Train every network on its row of targets (networks, >= count) for inputs X (5, >= count)."""
+        for net in range(len(self.weights)):
+            self.train_one(net, X, targets[net], _ALL_ALIKE, count, iterations)
+
+    def train_one(
+        self, net: int, X: np.ndarray, target: np.ndarray, counts: np.ndarray, count: int, iterations: int
+    ) -> None:
+        """Train one network; counts (>= count,) float32 says how often each pattern stands for one, empty: once."""
         if count == 0:
             return
-        for net in range(len(self.weights)):
-            train_network(
-                self.weights[net],
-                self.step[net],
-                self.last_gradient[net],
-                self.last_change[net],
-                X,
-                targets[net],
-                count,
-                iterations,
-                self.backtrack,
-            )
+        train_network(
+            self.weights[net],
+            self.step[net],
+            self.last_gradient[net],
+            self.last_change[net],
+            X,
+            target,
+            counts,
+            count,
+            iterations,
+            self.backtrack,
+            self.sigmoid_output,
+        )
 
     def restart(self, net: int, weights: np.ndarray) -> None:
         """Begin one network anew, after its arithmetic has failed."""
@@ -121,7 +132,35 @@ def _residuals(out, target, bias, error):  # type: ignore[no-untyped-def]  # com
 
 
 @fast
-def gradient_into(w, X, target, n, gradient, hidden_out, out, error):  # type: ignore[no-untyped-def]  # compiled
+def _squashed_residuals(out, target, bias, error):  # type: ignore[no-untyped-def]  # compiled
+    """As `_residuals`, through the slope of a sigmoid output."""
+    total = _ZERO
+    for p in range(out.size):
+        y = sigmoid(out[p] + bias)
+        e = (y - target[p]) * (y - y * y)
+        error[p] = e
+        total += e
+    return total
+
+
+@fast
+def _counted(error, counts):  # type: ignore[no-untyped-def]  # compiled
+    total = _ZERO
+    for p in range(error.size):
+        error[p] *= counts[p]
+        total += error[p]
+    return total
+
+
+@fast
+def _errors(out, target, counts, bias, squashed, error):  # type: ignore[no-untyped-def]  # compiled
+    """Derivative of half the squared error by what goes into the output, pattern by pattern, and its sum."""
+    total = _squashed_residuals(out, target, bias, error) if squashed else _residuals(out, target, bias, error)
+    return _counted(error, counts) if counts.size > 0 else total
+
+
+@fast
+def gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squashed):  # type: ignore[no-untyped-def]  # compiled
     """Gradient of half the summed squared error over patterns 0..n, into gradient (W,)."""
     hidden = (w.size - 1) // PER_NEURON
     gradient[:] = _ZERO
@@ -132,7 +171,7 @@ def gradient_into(w, X, target, n, gradient, hidden_out, out, error):  # type: i
         o[:] = _ZERO
         for first in range(0, hidden, GROUP):
             forward4(X, w, first, hidden_out, o, a, b)
-        gradient[w.size - 1] += _residuals(o, target[a:b], w[w.size - 1], e)
+        gradient[w.size - 1] += _errors(o, target[a:b], counts[a:b], w[w.size - 1], squashed, e)
         for first in range(0, hidden, GROUP):
             _backward4(X, w, first, hidden_out, e, gradient, a, b)
 
@@ -157,29 +196,37 @@ def _update(w, step, last_gradient, last_change, gradient, backtrack):  # type: 
 
 
 @exact
-def train_network(w, step, last_gradient, last_change, X, target, n, iterations, backtrack):  # type: ignore[no-untyped-def]  # compiled
-    """Iterate one network in place; all arrays float32, the first four (W,), X (5, >= n), target (>= n,)."""
+def train_network(w, step, last_gradient, last_change, X, target, counts, n, iterations, backtrack, squashed):  # type: ignore[no-untyped-def]  # compiled
+    """Iterate one network in place; all arrays float32, the first four (W,), X (5, >= n), target, counts (>= n,) or empty."""
     hidden_out = np.empty(((w.size - 1) // PER_NEURON, BLOCK), np.float32)
     out = np.empty(BLOCK, np.float32)
     error = np.empty(BLOCK, np.float32)
     gradient = np.empty(w.size, np.float32)
     for _ in range(iterations):
-        gradient_into(w, X, target, n, gradient, hidden_out, out, error)
+        gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squashed)
         _update(w, step, last_gradient, last_change, gradient, backtrack)
 
 
-def gradient(weights: np.ndarray, X: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Gradient (W,) of one network: half the summed squared error over X (5, n) and target (n,)."""
+def gradient(
+    weights: np.ndarray,
+    X: np.ndarray,
+    target: np.ndarray,
+    counts: np.ndarray | None = None,
+    sigmoid_output: bool = False,
+) -> np.ndarray:
+    """Gradient (W,) of one network: half the summed squared error over X (5, n) and target (n,), pattern by counts (n,)."""
     hidden = hidden_count(weights.size)
     result = np.empty(weights.size, np.float32)
     gradient_into(
         weights,
         X,
         target,
+        _ALL_ALIKE if counts is None else counts,
         X.shape[1],
         result,
         np.empty((hidden, BLOCK), np.float32),
         np.empty(BLOCK, np.float32),
         np.empty(BLOCK, np.float32),
+        sigmoid_output,
     )
     return result

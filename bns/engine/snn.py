@@ -1,7 +1,8 @@
 """Simulator neural networks as flat arrays of weights, and the kernel that reads them.
 
-A network has 5 inputs, H sigmoid hidden neurons and one linear output (figure 4.3). Its weights are one float32 row:
-for each hidden neuron the five input weights, its bias and its weight to the output, and at the end the output's bias.
+A network has 5 inputs, H sigmoid hidden neurons and one output, linear (figure 4.3) or a sigmoid itself (figure 5.6). Its
+weights are one float32 row: for each hidden neuron the five input weights, its bias and its weight to the output, and at the
+end the output's bias. Of a network with fewer inputs the others are 0, and so are their weights: training leaves them there.
 H is a multiple of four, because the kernels take four hidden neurons at a time.
 """
 
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.engine.jit import fast, inline
+from bns.engine.jit import fast, inline, larger, smaller
 from bns.engine.philox import Key, Purpose, uniforms
 
 INPUTS = 5
@@ -34,11 +35,14 @@ def hidden_count(weights: int) -> int:
     return (weights - 1) // PER_NEURON
 
 
-def initial_weights(key: Key, networks: int, hidden: int) -> np.ndarray:
-    """Untrained networks: uniform in [-1, 1], shape (networks, weights), float32."""
+def initial_weights(key: Key, networks: int, hidden: int, inputs: int = INPUTS) -> np.ndarray:
+    """Untrained networks: uniform in [-1, 1], shape (networks, weights), float32; 0 for inputs that are not there."""
     count = weight_count(hidden)
     draws = uniforms(key, Purpose.WEIGHTS, 0, networks, -(-count // 4)).reshape(networks, -1)
-    return (2.0 * draws[:, :count] - 1.0).astype(np.float32)
+    weights = (2.0 * draws[:, :count] - 1.0).astype(np.float32)
+    for absent in range(inputs, INPUTS):
+        weights[:, absent:-1:PER_NEURON] = 0
+    return weights
 
 
 @inline
@@ -47,8 +51,7 @@ def sigmoid(x: Any) -> Any:
 
     1/2 + x P(x²)/Q(x²), degree 9 over 6, fitted for the smallest largest error (7e-8) on |x| <= 15.4, where it saturates.
     """
-    x = _F(15.4) if x > _F(15.4) else x
-    x = _F(-15.4) if x < _F(-15.4) else x
+    x = larger(_F(-15.4), smaller(_F(15.4), x))  # type: ignore[call-arg]  # mypy sees the typing context
     s = x * x
     p = _F(-6.237572861e-12) * s + _F(2.846224625e-08)
     p = p * s + _F(4.236714370e-05)
@@ -124,9 +127,24 @@ def predict_into(weights, X, n, out):  # type: ignore[no-untyped-def]  # compile
                 _add4(X, w, first, o, a, b)
 
 
-def predict(weights: np.ndarray, X: np.ndarray) -> np.ndarray:
+@fast
+def _squash(row):  # type: ignore[no-untyped-def]  # compiled
+    for p in range(row.size):
+        row[p] = sigmoid(row[p])
+
+
+@fast
+def squash_into(out, n):  # type: ignore[no-untyped-def]  # compiled
+    """Sigmoid outputs in place of linear ones, in the first n columns of out (networks, >= n)."""
+    for net in range(out.shape[0]):
+        _squash(out[net, :n])
+
+
+def predict(weights: np.ndarray, X: np.ndarray, sigmoid_output: bool = False) -> np.ndarray:
     """Outputs (networks, n) of networks (networks, W) for inputs X (5, n); all float32."""
     n = X.shape[1]
     out = np.empty((weights.shape[0], n), np.float32)
     predict_into(weights, np.ascontiguousarray(X, np.float32), n, out)
+    if sigmoid_output:
+        squash_into(out, n)
     return out

@@ -13,9 +13,13 @@ from numpy.typing import ArrayLike
 from bns.errors import ModelError
 from bns.physics.grid import Grid, step_grid
 from bns.physics.model import Model
+from bns.physics.motion import arcs, body_motion, flow_of
 from bns.physics.scans import flow_along
-from bns.physics.signals import CREEP_M_S, Array, Body, Flow, View, Wheels
+from bns.physics.signals import Array, Stamps, View
 
+_PLACE_ROUNDS = 4
+"""An effect that depends on the place is first driven without it, then again where that led to: each round adds a power of
+the effect's size, and a fourth power of some percent is nothing."""
 _CHUNK = 32  # trials at a time: their signals stay in the cache
 
 
@@ -53,7 +57,10 @@ def simulate(
     for rows in _chunks(len(left)):
         grid = step_grid(left[rows], right[rows], duration[rows], model.dt_s)
         nodes = _integrate(model, grid, poses0[rows])
-        poses[rows] = np.take_along_axis(nodes, grid.ends[:, :, None], axis=1)
+        if any(model.at("clock")):
+            _sample(poses[rows], taken_at(model, np.cumsum(duration[rows], axis=1)), grid.node_s, nodes)
+        else:
+            poses[rows] = np.take_along_axis(nodes, grid.ends[:, :, None], axis=1)
     return poses
 
 
@@ -74,7 +81,7 @@ def track(
     poses = np.empty((*times.shape, 3))
     for rows in _chunks(len(left)):
         grid = step_grid(left[rows], right[rows], duration[rows], model.dt_s)
-        _sample(poses[rows], times[rows], grid.node_s, _integrate(model, grid, poses0[rows]))
+        _sample(poses[rows], taken_at(model, times[rows]), grid.node_s, _integrate(model, grid, poses0[rows]))
     return Track(times, poses)
 
 
@@ -96,39 +103,27 @@ def observe(poses: ArrayLike, normals: ArrayLike | None, model: Model) -> Array:
 
 def _integrate(model: Model, grid: Grid, start: Array) -> Array:
     """Poses at every node, (batch, steps + 1, 3): each step is the arc of its mean velocities."""
-    wheels = Wheels(grid.step_s, grid.left_m_s, grid.right_m_s, model.wheelbase_m)
-    for active in model.at("wheel"):
-        wheels = active.effect.apply(wheels, **active.by_name)
-    body = _body(wheels)
-    for active in model.at("body"):
-        body = active.effect.apply(body, **active.by_name)
-    flow = Flow()
-    for active in model.at("world"):
-        flow = active.effect.apply(flow, **active.by_name)
-    turned = body.yaw_rad_s * grid.step_s
-    heading = np.cumsum(np.concatenate([start[:, 2:], turned], axis=1), axis=1)
-    middle = heading[:, :-1] + turned / 2.0
-    chord = np.sinc(turned / (2.0 * np.pi)) * grid.step_s  # an arc's chord: sin(a/2)/(a/2) of its length
-    cos, sin = np.cos(middle) * chord, np.sin(middle) * chord
-    moving_s = body.moving * grid.step_s
-    x = flow_along(
-        start[:, 0], body.forward_m_s * cos + body.sideways_m_s * sin, moving_s, flow.x_m_s, flow.return_per_s
-    )
-    y = flow_along(
-        start[:, 1], body.forward_m_s * sin - body.sideways_m_s * cos, moving_s, flow.y_m_s, flow.return_per_s
-    )
-    return np.stack([x, y, heading], axis=2)
+    nodes = _nodes(model, grid, start, None)
+    if any(active.effect.needs_place for active in model.effects):
+        for _ in range(_PLACE_ROUNDS):
+            nodes = _nodes(model, grid, start, (nodes[:, 1:] + nodes[:, :-1]) / 2.0)
+    return nodes
 
 
-def _body(wheels: Wheels) -> Body:
-    left, right = wheels.left_m_s, wheels.right_m_s
-    moving = np.minimum(np.maximum(np.abs(left), np.abs(right)) / CREEP_M_S, 1.0)
-    return Body(
-        forward_m_s=(left + right) / 2.0,
-        sideways_m_s=np.zeros_like(left),
-        yaw_rad_s=(right - left) / wheels.wheelbase_m,
-        moving=moving,
-    )
+def _nodes(model: Model, grid: Grid, start: Array, place: Array | None) -> Array:
+    driven = arcs(body_motion(model, grid, place=place), grid.step_s, start[:, 2])
+    flow = flow_of(model)
+    x = flow_along(start[:, 0], driven.east_m, driven.moving_s, flow.x_m_s, flow.return_per_s)
+    y = flow_along(start[:, 1], driven.north_m, driven.moving_s, flow.y_m_s, flow.return_per_s)
+    return np.stack([x, y, driven.heading_rad], axis=2)
+
+
+def taken_at(model: Model, stamped_s: Array) -> Array:
+    """When poses stamped so were really taken: the ``clock`` effects."""
+    stamps = Stamps(stamped_s)
+    for active in model.at("clock"):
+        stamps = active.effect.apply(stamps, **active.by_name)
+    return stamps.t_s
 
 
 def _chunks(trials: int) -> list[slice]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from bns.errors import ModelError, unknown_name
 
-STAGES = ("wheel", "body", "world", "measure")
+STAGES = ("wheel", "body", "world", "clock", "measure")
 """In the order in which they act; `bns.physics.signals` says what each one passes on."""
 
 
@@ -26,13 +26,17 @@ class Parameter:
     plausible: tuple[float, float]
     neutral: float
     text: str
+    column: str = ""
+    """The column of measurements this number goes with: known only where that was logged (battery_v)."""
+    instead_of: str = ""
+    """It stands back where this column was logged."""
 
 
 @dataclass(frozen=True)
 class Effect:
     """One file of `bns.physics.effects`.
 
-    ``apply(signal, **values)`` returns the stage's signal (`Wheels`, `Body`, `Flow`, `View`) with the effect
+    ``apply(signal, **values)`` returns the stage's signal (`Wheels`, `Body`, `Flow`, `Stamps`, `View`) with the effect
     added; its keywords are the parameters' names. ``residuals`` says how measurements depart from a model
     without the effect, ``lookalikes`` which other effects depart in nearly the same way.
     """
@@ -44,6 +48,16 @@ class Effect:
     residuals: str
     lookalikes: tuple[str, ...]
     apply: Callable[..., Any] = field(repr=False)
+    rank: float = 50.0
+    """Place in the chain where effects are put together by the machine: lower ranks act first."""
+
+    needs_place: bool = False
+    """Does it look at `Body.place`?"""
+
+    @property
+    def of_measuring(self) -> bool:
+        """Is it a fault of the measuring, not of the robot?"""
+        return self.stage in {"clock", "measure"}
 
     @property
     def neutral(self) -> dict[str, float]:

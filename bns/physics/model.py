@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -17,16 +17,18 @@ import yaml
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, number
-from bns.physics.effects import effect_named
+from bns.physics.effects import all_effects, effect_in_file, effect_named
+from bns.physics.formula import formula_effect
 
 BASES = ("differential-drive",)
-BASIS = ("measured", "published", "guess")
+BASIS = ("measured", "published", "fitted", "guess")
 """How a value came to be known."""
 
-_TOP = ("base", "wheelbase_m", "dt_s", "jitter", "noise", "effects")
+_TOP = ("base", "wheelbase_m", "dt_s", "jitter", "noise", "effects", "provenance")
 _GROUPS: Mapping[str, tuple[str, ...]] = {"jitter": ("wheel_speed_relative",), "noise": ("position_m", "heading_rad")}
 _WHY = ("basis", "reason")
 _EFFECT_KEYS = ("name", "values", *_WHY)
+_EFFECT_MAY = ("units", "intervals", "term", "on", "file")
 
 LIMITS: Mapping[str, tuple[float, float]] = {
     "wheelbase_m": (1e-3, 10.0),
@@ -46,6 +48,10 @@ class ActiveEffect:
     values: tuple[float, ...]
     basis: str = "guess"
     reason: str = ""
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Parameter name -> 95 % interval, where one is known."""
+    written: Mapping[str, str] = field(default_factory=dict)
+    """How an effect that is not in the catalogue is written down: term and on, or file."""
 
     @property
     def by_name(self) -> dict[str, float]:
@@ -70,13 +76,15 @@ class Model:
     noise_heading_rad: float = 0.0
     base: str = "differential-drive"
     name: str = "unnamed"
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    """How the model came to be: data and their hash, date, error before and after; free text for people."""
 
     def __post_init__(self) -> None:
         if self.base not in BASES:
             raise ModelError(unknown_name("base", self.base, BASES))
-        for field, (low, high) in LIMITS.items():
-            value = number(f"model {self.name}: {field}", getattr(self, field), low, high)
-            object.__setattr__(self, field, value)
+        for name, (low, high) in LIMITS.items():
+            value = number(f"model {self.name}: {name}", getattr(self, name), low, high)
+            object.__setattr__(self, name, value)
         names = [active.effect.name for active in self.effects]
         for name in names:
             if names.count(name) > 1:
@@ -90,8 +98,15 @@ class Model:
 
     def values_of(self, name: str) -> dict[str, float]:
         """The values of an effect; the neutral ones if it is switched off."""
-        found = [active.by_name for active in self.effects if active.effect.name == name]
-        return found[0] if found else effect_named(name).neutral
+        for active in self.effects:
+            if active.effect.name == name:
+                return active.by_name
+        return effect_named(name).neutral
+
+    def with_active(self, effect: Effect, values: tuple[float, ...]) -> Model:
+        """The model with an effect object at these values, listed or not; in its place by rank."""
+        others = tuple(a for a in self.effects if a.effect.name != effect.name)
+        return replace(self, effects=(*others, ActiveEffect(effect, values))).arranged()
 
     def with_effect(self, name: str, basis: str = "guess", reason: str = "", **values: float) -> Model:
         """The model with that effect switched on at these values; in its old place, else last."""
@@ -101,15 +116,31 @@ class Model:
             return replace(self, effects=(*self.effects, active))
         return replace(self, effects=tuple(active if a.effect.name == name else a for a in self.effects))
 
+    def with_values(self, values: Mapping[str, Mapping[str, float]]) -> Model:
+        """The model with other values of effects that are switched on; bounds are the caller's business."""
+        changed = tuple(
+            replace(a, values=tuple(values[a.effect.name][p.name] for p in a.effect.parameters))
+            if a.effect.name in values
+            else a
+            for a in self.effects
+        )
+        return replace(self, effects=changed)
+
+    def arranged(self) -> Model:
+        """The model with its effects in the order in which they act, by their ranks."""
+        return replace(self, effects=tuple(sorted(self.effects, key=lambda a: a.effect.rank)))
+
     def without(self, name: str) -> Model:
         """The model with that effect switched off."""
-        effect_named(name)
+        if all(a.effect.name != name for a in self.effects):
+            effect_named(name)
         return replace(self, effects=tuple(a for a in self.effects if a.effect.name != name))
 
     def canonical_json(self) -> str:
         """All that changes numbers, as JSON with sorted keys; neither the model's name nor the reasons."""
         numbers: dict[str, Any] = {field: getattr(self, field) for field in LIMITS}
-        numbers |= {"base": self.base, "effects": [[a.effect.name, a.by_name] for a in self.effects]}
+        listed = [[a.effect.name, a.by_name, *([dict(a.written)] if a.written else [])] for a in self.effects]
+        numbers |= {"base": self.base, "effects": listed}
         return json.dumps(numbers, sort_keys=True, separators=(",", ":"))
 
     @property
@@ -135,7 +166,7 @@ def load_model(name_or_path: str | Path) -> Model:
             raise ModelError(
                 f"There is no model file {path}. Give the path of a YAML file or one of: {', '.join(model_names())}."
             )
-        return parse_model(path.read_text(encoding="utf-8"), path.stem)
+        return parse_model(path.read_text(encoding="utf-8"), path.stem, path.parent)
     if str(name_or_path) not in model_names():
         known = unknown_name("robot model", str(name_or_path), model_names())
         raise ModelError(f"{known} Or give the path of a YAML file, with .yaml at its end.")
@@ -143,8 +174,8 @@ def load_model(name_or_path: str | Path) -> Model:
     return parse_model(text, str(name_or_path))
 
 
-def parse_model(text: str, name: str) -> Model:
-    """The model in a YAML text; ``name`` is for messages."""
+def parse_model(text: str, name: str, folder: Path | None = None) -> Model:
+    """The model in a YAML text; ``name`` is for messages, effects in Python files are sought from ``folder``."""
     try:
         tree = yaml.safe_load(text)
     except yaml.YAMLError as fault:
@@ -162,16 +193,39 @@ def parse_model(text: str, name: str) -> Model:
         jitter_relative=jitter["wheel_speed_relative"],
         noise_position_m=noise["position_m"],
         noise_heading_rad=noise["heading_rad"],
-        effects=tuple(_effect(name, entry) for entry in listed),
+        effects=tuple(_effect(name, entry, folder or Path()) for entry in listed),
+        provenance=top.get("provenance") or {},
     )
 
 
-def _effect(model: str, entry: Any) -> ActiveEffect:
-    keys = _keys(f"an effect of model {model}", entry, _EFFECT_KEYS, required=_EFFECT_KEYS)
-    effect = effect_named(str(keys["name"]))
+def _effect(model: str, entry: Any, folder: Path) -> ActiveEffect:
+    where = f"an effect of model {model}"
+    keys = _keys(where, entry, (*_EFFECT_KEYS, *_EFFECT_MAY), required=_EFFECT_KEYS)
+    written: dict[str, str] = {str(key): str(keys[key]) for key in ("term", "on", "file") if key in keys}
+    effect = _written_effect(where, str(keys["name"]), written, folder)
     names = tuple(p.name for p in effect.parameters)
     values = _keys(f"values of {effect.name} in model {model}", keys["values"], names)
-    return ActiveEffect(effect, effect.checked(values), *_why(f"{effect.name} in model {model}", keys))
+    intervals = _keys(f"intervals of {effect.name} in model {model}", keys.get("intervals") or {}, names)
+    return ActiveEffect(
+        effect,
+        effect.checked(values),
+        *_why(f"{effect.name} in model {model}", keys),
+        intervals={name: (float(low), float(high)) for name, (low, high) in intervals.items()},
+        written=written,
+    )
+
+
+def _written_effect(where: str, name: str, written: Mapping[str, str], folder: Path) -> Effect:
+    """The effect of that name: from the catalogue, a formula, or a Python file with an ``EFFECT``."""
+    if "file" in written:
+        return effect_in_file(folder / written["file"])
+    if not written:
+        return effect_named(name)
+    if set(written) != {"term", "on"}:
+        raise ModelError(f"{where}, {name}: a formula needs both term and on (term: k * v * abs(w), on: v).")
+    if name in all_effects():
+        raise ModelError(f"{where}: {name} is the name of a listed effect; give the formula another one.")
+    return formula_effect(name, written["term"], written["on"])
 
 
 def _group(model: str, top: Mapping[str, Any], key: str) -> dict[str, Any]:

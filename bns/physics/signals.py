@@ -1,7 +1,7 @@
 """What passes from one stage of the simulation to the next: whole trials at once, never one instant.
 
 wheel: commanded speeds become the speeds of the wheels' surfaces · body: these become velocities of the robot
-· world: the floor and what hangs on the robot add to them · measure: the tracker sees the resulting poses.
+· world: the floor and what hangs on the robot add to them · clock: when the tracker looks · measure: what it then sees.
 
 Arrays are (batch, steps). A value is the mean over its step, so that distances stay exact where a speed
 changes inside a step. Steps of length 0 pad short trials and must do nothing.
@@ -9,7 +9,7 @@ changes inside a step. Steps of length 0 pad short trials and must do nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,20 @@ begins to move, and with it what acts on it only while moving, is thus known to 
 
 
 @dataclass(frozen=True)
+class Conditions:
+    """What else was logged at each step, (batch, steps); None where it was not.
+
+    ``battery_drop_v`` is the voltage below the first one that was logged.
+    """
+
+    session_s: Array | None = None
+    battery_drop_v: Array | None = None
+
+
+NO_CONDITIONS = Conditions()
+
+
+@dataclass(frozen=True)
 class Wheels:
     """Stage ``wheel``: mean speeds of the two wheels' surfaces in m/s, at rest before the first step."""
 
@@ -29,11 +43,22 @@ class Wheels:
     left_m_s: Array
     right_m_s: Array
     wheelbase_m: float
+    conditions: Conditions = NO_CONDITIONS
+
+    @property
+    def session_s(self) -> Array:
+        """Time since the session began; since the trial began where nobody said."""
+        if self.conditions.session_s is not None:
+            return self.conditions.session_s
+        ends: Array = np.cumsum(self.step_s, axis=1)
+        return ends - self.step_s / 2.0
 
 
 @dataclass(frozen=True)
 class Body:
     """Stage ``body``: velocities in the robot's frame; ``moving`` runs from 0 (wheels at rest) to 1.
+
+    ``left_m_s``, ``right_m_s`` and ``session_s`` are for effects to look at: what the wheels do, and when.
 
     ``sideways_m_s`` is positive to the right, ``yaw_rad_s`` counter-clockwise.
     """
@@ -42,6 +67,22 @@ class Body:
     sideways_m_s: Array
     yaw_rad_s: Array
     moving: Array
+    left_m_s: Array
+    right_m_s: Array
+    session_s: Array
+    place: Array | None = None
+    """Where the robot is in each step, (batch, steps, 3): x_m, y_m, heading_rad; None while nobody knows."""
+
+    def with_added(self, velocity: str, values: Array) -> Body:
+        """Something added to the velocity of that name."""
+        return replace(self, **{velocity: getattr(self, velocity) + values})
+
+    def with_drift(self, direction: str, values: Array, heading_rad: Array) -> Body:
+        """Something added to the velocity ``east`` or ``north`` of a robot that heads so."""
+        cos, sin = np.cos(heading_rad), np.sin(heading_rad)
+        forward, right = (cos, sin) if direction == "east" else (sin, -cos)
+        added = self.with_added("forward_m_s", values * forward)
+        return added.with_added("sideways_m_s", values * right)
 
 
 @dataclass(frozen=True)
@@ -54,6 +95,13 @@ class Flow:
     x_m_s: float = 0.0
     y_m_s: float = 0.0
     return_per_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """Stage ``clock``: when the poses were really taken, any shape; begins as the times they are stamped with."""
+
+    t_s: Array
 
 
 @dataclass(frozen=True)

@@ -12,19 +12,56 @@ from bns.tasks import Task
 
 
 class Scores(NamedTuple):
-    """Per controller: fitness (n,), 0 where the arithmetic failed; goals reached (n,); how many failed."""
+    """Per controller: fitness (n,), 0 where the arithmetic failed; goals reached (n,); how many failed; and, where a robot
+    says so, how many of its commands count (n,)."""
 
     fitness: np.ndarray
     goals_reached: np.ndarray
     failures: int
+    used: np.ndarray | None = None
+
+
+class Luck(NamedTuple):
+    """Which draws a noisy evaluation takes."""
+
+    key: Key
+    step: int
+
+
+class Recipe(NamedTuple):
+    """How a static simulator is made where random commands alone do not do: worst patterns are driven again, with variants."""
+
+    random: int
+    """Commands drawn at random, each driven by itself."""
+    worst: int
+    """Worst patterns of each network that are driven again."""
+    variants: int
+    """Further commands near each of them."""
+    evolved_worst: int
+    """Worst commands of controllers evolved on the simulator, driven again likewise."""
+    evolved_variants: int
+    iterations: int
+    """Iterations of the last training; it ends earlier where patterns that are only watched get worse."""
+    noise_sd: tuple[float, ...]
+    """Standard deviations of the substitute world, SI, a network."""
 
 
 class Robot(Protocol):
-    """A robot's commands, their bounds, its networks' inputs and outputs, and its fitness."""
+    """A robot's commands, their bounds, its networks' inputs and outputs, and its fitness.
+
+    Poses are (n, columns) with columns of the robot's own; `pose_columns` names what is kept of them.
+    """
 
     name: str
     networks: tuple[str, ...]
     hidden: int
+    input_count: int
+    """Inputs that the networks have, up to five."""
+    sigmoid_output: bool
+    recipe: Recipe | None
+    """None: the static simulator learns from random controllers, and its noise is that of its residuals."""
+    repeats_inputs: bool
+    """Whether the same inputs come up again and again, so that training gains by taking them together."""
     radii_m: tuple[float, ...]
     bounds: CommandBounds
     command_columns: tuple[str, ...]
@@ -34,6 +71,9 @@ class Robot(Protocol):
 
     def random_controllers(self, key: Key, count: int, length: int) -> Population:
         """Random controllers that all have the same number of commands."""
+
+    def near(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+        """Allowed commands (n, components) as far from these as a mutation can go."""
 
     def inputs(self, commands: np.ndarray) -> np.ndarray:
         """Normalised network inputs (inputs, n) float32 of one controller's commands (n, components)."""
@@ -45,16 +85,47 @@ class Robot(Protocol):
         """The inverse of `displacements`: network targets (networks, n) float32."""
 
     def poses(self, displacements: np.ndarray) -> np.ndarray:
-        """Poses (n, 3) after each displacement, from the start of every task."""
+        """Poses (n, columns) after each displacement, from the start of every task."""
 
     def measured_displacements(self, poses: np.ndarray) -> np.ndarray:
-        """Displacements (n, networks) between measured poses (n, 3), the first from the start."""
+        """Displacements (n, networks) between measured poses, the first from the start."""
 
-    def score(self, population: Population, weights: np.ndarray, task: Task) -> Scores:
-        """Fitness of every controller on simulator networks (networks, W)."""
+    def learnable(self, displacements: np.ndarray) -> np.ndarray:
+        """Which displacements (n, networks) each network may learn from, bool (networks, n)."""
+
+    def start_pose(self) -> np.ndarray:
+        """Pose (1, columns) of a robot that has not moved yet."""
+
+    def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
+        """What is kept of poses, by name with its unit, (n,) each; x_m, y_m and heading_rad always."""
+
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
+        """The commands (m, components) that are driven when this controller is picked."""
+
+    def score(self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None) -> Scores:
+        """Fitness of every controller on simulator networks (networks, W); luck is for robots with noise in evolution."""
+
+    def breed(
+        self,
+        key: Key,
+        parents: Population,
+        order: np.ndarray,
+        cdf: np.ndarray,
+        rate: float,
+        shortest: int,
+        generation: int,
+        children: Population,
+    ) -> int:
+        """The next generation into `children`; how many of them were cut at the longest list allowed."""
+
+    def diversity(self, population: Population, scores: Scores) -> float:
+        """Diversity of a population that was scored."""
 
     def judge(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
-        """Fitness and goals reached of one driven path (n, 3)."""
+        """Fitness and goals reached of one driven path."""
+
+    def succeeded(self, poses: np.ndarray, task: Task) -> bool:
+        """Whether a driven path counts as success."""
 
     def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
         """Whether the path visits all goals in order, for each of `radii_m`."""

@@ -1,24 +1,47 @@
 """Results on disk: the only code that touches result files."""
 
-from bns.store.compact import CompactSummary, bytes_per_run, compact
-from bns.store.files import StoreWarning
-from bns.store.reader import connect, finished, load, query
-from bns.store.record import RunRecord
-from bns.store.schema import SCHEMA_VERSION, SCHEMAS
-from bns.store.writer import Writer, spec_hash
+from __future__ import annotations
 
-__all__ = [
-    "SCHEMAS",
-    "SCHEMA_VERSION",
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bns.store.compaction import CompactSummary, bytes_per_run, compact
+    from bns.store.files import StoreWarning
+    from bns.store.reader import connect, finished, load, query
+    from bns.store.record import RunRecord
+    from bns.store.schema import SCHEMA_VERSION, SCHEMAS
+    from bns.store.writer import Writer, spec_hash
+
+_HOMES = {
+    "compaction": ("CompactSummary", "bytes_per_run", "compact"),
+    "files": ("StoreWarning",),
+    "reader": ("connect", "finished", "load", "query"),
+    "record": ("RunRecord",),
+    "schema": ("SCHEMAS", "SCHEMA_VERSION"),
+    "writer": ("Writer", "spec_hash"),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [  # noqa: RUF022  # as in _HOMES
     "CompactSummary",
-    "RunRecord",
-    "StoreWarning",
-    "Writer",
     "bytes_per_run",
     "compact",
+    "StoreWarning",
     "connect",
     "finished",
     "load",
     "query",
+    "RunRecord",
+    "SCHEMAS",
+    "SCHEMA_VERSION",
+    "Writer",
     "spec_hash",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Imported when it is asked for: a worker hands over records, and must not wait for the readers' libraries."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'bns.store' has no attribute {name!r}")
+    return getattr(import_module(f"bns.store.{_HOME[name]}"), name)

@@ -1,4 +1,4 @@
-"""One writer a sweep: a file lock that the system takes back when its holder dies."""
+"""One writer a sweep, or one a shard of it: file locks that the system takes back when their holder dies."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import filelock
 
 from bns.errors import StoreError
 from bns.store.files import JOURNAL, checked_name, explained, gone, is_same, make_folder
+from bns.store.shared import SharedLock
 
 
 class SweepLockedError(StoreError):
@@ -20,14 +21,16 @@ class SweepLockedError(StoreError):
 
 
 class SweepLock:
-    """The right to write one sweep of ``results``; a context manager.
+    """The right to write one sweep of ``results``, or one ``shard`` of it; a context manager.
 
-    ``journal/<sweep>.lock`` is what is locked; ``<sweep>.lock.json`` says who holds it (pid, host, since).
+    ``journal/<sweep>.lock`` (``<sweep>.shard-<shard>.lock``) is what is locked; ``….lock.json`` says who holds it
+    (pid, host, since).
     """
 
-    def __init__(self, results: Path, sweep: str) -> None:
-        self._sweep = checked_name("sweep", sweep)
-        self._path = results / JOURNAL / f"{sweep}.lock"
+    def __init__(self, results: Path, sweep: str, shard: str = "") -> None:
+        self._sweep, self._shard = checked_name("sweep", sweep), shard
+        name = f"{sweep}.shard-{shard}.lock" if shard else f"{sweep}.lock"
+        self._path = results / JOURNAL / name
         self._holder = self._path.with_name(f"{self._path.name}.json")
         # Not bound to a thread: a sweep may append from another one than it began in.
         self._taken_file: os.stat_result | None = None
@@ -74,15 +77,52 @@ class SweepLock:
         self.release()
 
     def _taken(self) -> str:
-        try:
-            holder = json.loads(self._holder.read_text())
-            who = f"process {holder['pid']} on {holder['host']} since {holder['since']}"
-        except (OSError, ValueError, KeyError, TypeError):
-            who = "a process that has not said yet which it is"
+        what = f"shard {self._shard} of sweep {self._sweep!r}" if self._shard else f"sweep {self._sweep!r}"
         return (
-            f"sweep {self._sweep!r} is being written by {who} (lock {self._path}). Wait until it is "
+            f"{what} is being written by {self._who()} (lock {self._path}). Wait until it is "
             "done or stop it; other sweeps can be written at the same time."
         )
+
+    def _who(self) -> str:
+        if not self._shard and SharedLock(self._path).is_free:
+            return f"shards of it: see {self._path.with_name(f'{self._sweep}.shard-*.lock.json')}"
+        try:
+            holder = json.loads(self._holder.read_text())
+            return f"process {holder['pid']} on {holder['host']} since {holder['since']}"
+        except (OSError, ValueError, KeyError, TypeError):
+            return "a process that has not said yet which it is"
+
+
+class ShardLock:
+    """The right to write one shard while others write theirs, and nobody writes or compacts the whole sweep.
+
+    Where the file system has no locks, as some of clusters, it warns and goes on: a shard touches no file but
+    those that it made itself, so that locks only save work that would be done twice.
+    """
+
+    def __init__(self, results: Path, sweep: str, shard: str) -> None:
+        self._shared = SharedLock(results / JOURNAL / f"{checked_name('sweep', sweep)}.lock")
+        self._whole, self._own = SweepLock(results, sweep), SweepLock(results, sweep, shard)
+
+    def acquire(self) -> None:
+        """Take both locks at once; SweepLockedError naming the process that is in the way otherwise."""
+        if not self._shared.acquire():
+            raise SweepLockedError(self._whole._taken())
+        try:
+            if self._shared.is_supported:
+                self._own.acquire()
+        except BaseException:
+            self._shared.release()
+            raise
+
+    def check(self) -> None:
+        """StoreError if the results were taken away since."""
+        self._own.check()
+
+    def release(self) -> None:
+        """Give both back; without effect if they are not held."""
+        self._own.release()
+        self._shared.release()
 
 
 def _myself() -> dict[str, str | int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ STATUSES = ("ok", "quarantined", "failed")
 """Best first: where a run was tried several times, the best outcome is the one that counts."""
 
 _RUN_DEFAULTS: Mapping[str, Any] = {"error": None, "world_digest": "", "peak_memory_mib": float("nan")}
+_ELSEWHERE = tuple(field.name for field in fields(Provenance))
 _RUN_REQUIRED = ("status", "started_at", "wall_s", "cpu_s", "attempts")
 
 
@@ -26,7 +27,8 @@ class RunRecord:
     """A run that came to an end.
 
     ``run`` holds status (ok, failed, quarantined), started_at (datetime with a zone), wall_s, cpu_s, attempts
-    and, where known, error, world_digest and peak_memory_mib. ``tables`` maps table names to columns of equal
+    and, where known, error, world_digest and peak_memory_mib; with the columns of `Provenance` where the run was
+    carried out by another machine than it is stored by. ``tables`` maps table names to columns of equal
     length without the identity columns; a run that is not ok has none.
     """
 
@@ -48,7 +50,7 @@ def record_tables(record: RunRecord, provenance: Provenance) -> dict[str, pa.Tab
     given = [name for name in RECORDED if name in record.tables]
     tables = {name: table_of(name, record.spec, record.tables[name]) for name in given}
     evaluations = tables["evals"].num_rows if "evals" in tables else 0
-    row = {**run, **provenance.columns(), "spec": record.spec.canonical_json(), "evaluations": evaluations}
+    row = {**provenance.columns(), **run, "spec": record.spec.canonical_json(), "evaluations": evaluations}
     tables["runs"] = table_of("runs", record.spec, {name: [value] for name, value in row.items()})
     return tables
 
@@ -58,6 +60,7 @@ def table_of(name: str, spec: RunSpec, columns: Mapping[str, Any]) -> pa.Table:
     schema = SCHEMAS[name]
     own = [field for field in schema if field.name not in _identity(schema)]
     where = f"table {name} of run {spec.run_id}"
+    columns = _with_empty(own, columns)
     _check_names(where, columns, [field.name for field in own])
     rows = _common_length(where, columns)
     identity = {"run_id": spec.run_id, "robot": spec.robot, **{key: getattr(spec, key) for key in PARAMETERS}}
@@ -67,6 +70,12 @@ def table_of(name: str, spec: RunSpec, columns: Mapping[str, Any]) -> pa.Table:
         if field.name in _identity(schema)
     ]
     return pa.table([*repeated, *(_array(where, field, columns[field.name]) for field in own)], schema=schema)
+
+
+def _with_empty(own: list[pa.Field], columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns that may be empty and are not given, as those of another kind of robot, filled with nothing."""
+    rows = len(next(iter(columns.values()), ()))
+    return {field.name: [None] * rows for field in own if field.nullable} | dict(columns)
 
 
 def _identity(schema: pa.Schema) -> tuple[str, ...]:
@@ -79,7 +88,7 @@ def _checked_run(record: RunRecord) -> dict[str, Any]:
     missing = [name for name in _RUN_REQUIRED if name not in record.run]
     if missing:
         raise StoreError(f"{where} has no {missing[0]!r}; it needs {', '.join(_RUN_REQUIRED)}.")
-    extra = sorted(set(record.run) - set(_RUN_REQUIRED) - set(_RUN_DEFAULTS))
+    extra = sorted(set(record.run) - set(_RUN_REQUIRED) - set(_RUN_DEFAULTS) - set(_ELSEWHERE))
     if extra:
         raise StoreError(f"{where}: {unknown_name('column', extra[0], [*_RUN_REQUIRED, *_RUN_DEFAULTS])}")
     status = record.run["status"]

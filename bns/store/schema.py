@@ -76,7 +76,13 @@ _PATHS = [
     *_fields(pa.int32(), "evaluation"),
     *_fields(pa.string(), "who"),
     *_fields(pa.int32(), "step"),
-    *_fields(pa.float64(), "left_units right_units duration_ms x_m y_m heading_rad snn_x_m snn_y_m snn_heading_rad"),
+    # Commands and markers of one kind of robot are empty for another.
+    *_fields(pa.float64(), "left_units right_units duration_ms", nullable=True),
+    *_fields(pa.float64(), "a_lat_rad a_vert_rad omega_rad alpha_rad repeats", nullable=True),
+    *_fields(pa.float64(), "x_m y_m heading_rad snn_x_m snn_y_m snn_heading_rad"),
+    *_fields(pa.float64(), "yellow_x_m yellow_y_m green_x_m green_y_m", nullable=True),
+    *_fields(pa.float64(), "snn_yellow_x_m snn_yellow_y_m snn_green_x_m snn_green_y_m", nullable=True),
+    *_fields(pa.bool_(), "stable snn_stable", nullable=True),
 ]
 _GENERATIONS = [
     *_fields(pa.int32(), "evaluation generation"),

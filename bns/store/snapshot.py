@@ -62,16 +62,16 @@ def full_snapshot(results: Path) -> Snapshot:
 
 
 def _settled_parts(results: Path, sweep: str | None) -> tuple[dict[str, list[Part]], list[Unreadable]]:
-    # Folds and compactions change the files of several tables one by one, and "runs" with every step that
-    # matters: what was listed belongs together if "runs" is the same before and after.
+    # A fold publishes "runs" last, so that whatever "runs" held before the other tables were listed has its
+    # rows; a compaction removes from "runs" first. Many writers may fold all the time: what they add is left
+    # for the next reader.
     for _ in range(_TRIES):
-        runs = list_files(results, "runs", sweep)
+        runs = set(list_files(results, "runs", sweep))
         listed = {table: find_parts(results, table, sweep) for table in SCHEMAS}
-        if list_files(results, "runs", sweep) == runs:
-            return (
-                {table: found for table, (found, _) in listed.items()},
-                [one for _, unreadable in listed.values() for one in unreadable],
-            )
+        if runs <= set(list_files(results, "runs", sweep)):
+            parts = {table: found for table, (found, _) in listed.items()}
+            parts["runs"] = [part for part in parts["runs"] if part.path in runs]
+            return parts, [one for _, unreadable in listed.values() for one in unreadable]
     raise StoreError(f"{results} changes faster than it can be read. Repeat the command in a moment.")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import uuid
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +14,7 @@ from bns.errors import StoreError
 from bns.store.files import checked_name, gone, publish
 from bns.store.fold import clear_staging, fold_journal, staged
 from bns.store.journal import Frame, Journal, JournalFile, journals
-from bns.store.lock import SweepLock
+from bns.store.lock import ShardLock, SweepLock
 from bns.store.parquet import file_bytes
 from bns.store.provenance import provenance
 from bns.store.record import RunRecord, record_tables
@@ -34,12 +35,22 @@ class Writer:
         sweep_text: the sweep file as YAML, kept in the specs table.
         sweep_runs: how many runs that file describes, if known.
         fold_at: runs in the journal at which they are folded into parquet files.
+        shard: name of the share that this writer has of the sweep; writers of other shares may be at work.
 
-    Entering takes the sweep's lock and folds what a killed writer left; ``recovered`` counts those runs.
+    Entering takes the sweep's lock and folds what a killed writer left; ``recovered`` counts those runs. The
+    writer of a shard takes the shard's lock and leaves alone whatever it did not make: a journal that looks
+    abandoned may be that of another machine.
     """
 
     def __init__(
-        self, results: Path, sweep: str, *, sweep_text: str = "", sweep_runs: int | None = None, fold_at: int = 128
+        self,
+        results: Path,
+        sweep: str,
+        *,
+        sweep_text: str = "",
+        sweep_runs: int | None = None,
+        fold_at: int = 128,
+        shard: str = "",
     ) -> None:
         if fold_at < 1:
             raise StoreError(f"fold_at is {fold_at}; it must be 1 or more runs.")
@@ -47,15 +58,18 @@ class Writer:
         self.sweep = checked_name("sweep", sweep)
         self.recovered = 0
         self._text, self._planned, self._fold_at = sweep_text, sweep_runs, fold_at
-        self._lock = SweepLock(self.results, sweep)
+        self._lock = ShardLock(self.results, sweep, shard) if shard else SweepLock(self.results, sweep)
+        self._is_alone = not shard
         self._journal: Journal | None = None
+        self._unfolded: list[JournalFile] = []
         self._open = False
 
     def __enter__(self) -> Writer:
         self._lock.acquire()
         try:
-            clear_staging(self.results, self.sweep)
-            self.recovered = self.fold()
+            if self._is_alone:
+                clear_staging(self.results, self.sweep)
+                self.recovered = self.fold()
             self._publish_spec()
         except BaseException:
             self._lock.release()
@@ -83,7 +97,7 @@ class Writer:
             self.fold()
 
     def fold(self) -> int:
-        """Publish the runs in this sweep's journals as parquet parts; the number of runs.
+        """Publish the runs in this sweep's (this shard's own) journals as parquet parts; the number of runs.
 
         Raises:
             StoreError: the disk fails, or what was appended is not there any more.
@@ -91,8 +105,11 @@ class Writer:
         own, self._journal = self._journal, None
         if own is not None:
             own.close()
+            self._unfolded.append(own.file)
         # All of them: an earlier fold may have failed on a full disk.
-        folded = {file.id: fold_journal(self.results, file) for file in journals(self.results, self.sweep)}
+        files = journals(self.results, self.sweep) if self._is_alone else self._unfolded
+        folded = {file.id: fold_journal(self.results, file) for file in files}
+        self._unfolded = []
         if own is not None and folded.get(own.file.id, 0) < len(own.run_ids):
             raise gone(
                 own.file.path,
@@ -126,7 +143,8 @@ class Writer:
     def _publish_spec(self) -> None:
         name = spec_hash(self._text)
         place = self.results / "specs" / f"sweep={self.sweep}" / f"spec-{name}.parquet"
-        if not name or place.exists():
+        # Beside others it is written again, with today's date: the latest file is the one that the sweep follows.
+        if not name or (place.exists() and len(list(place.parent.glob("spec-*.parquet"))) == 1):
             return
         made = provenance()
         row = {"spec_hash": [name], "written_at": [datetime.now(UTC)], "text": [self._text], "runs": [self._planned]}
@@ -139,4 +157,5 @@ class Writer:
             bns_version=made.bns_version,
         )
         data = file_bytes("specs", pa.table(row, schema=SCHEMAS["specs"]), metadata)
-        publish(data, staged(self.results, self.sweep, f"spec-{name}"), place)
+        # Shards that start together write the same file: each builds its own and puts it there.
+        publish(data, staged(self.results, self.sweep, f"spec-{name}-{uuid.uuid4().hex}"), place)

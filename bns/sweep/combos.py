@@ -25,6 +25,7 @@ class Parts:
     name: str = ""
     robot: str = ""
     seeds: int = 1
+    first_seed: int = 0
     fixed: dict[str, Any] = field(default_factory=dict)
     grid: dict[str, list[Any]] = field(default_factory=dict)
     zip: dict[str, list[Any]] = field(default_factory=dict)

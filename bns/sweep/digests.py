@@ -26,20 +26,21 @@ class WorldDigests:
             where={"sweep": self._sweep, "status": "ok"},
         )
         for task, world, digest in runs.drop_duplicates().itertuples(index=False):
-            self._compare(task, world, digest)
+            self.compare(task, world, digest)
 
     def check(self, record: RunRecord) -> None:
         """StoreError if there are runs of this sweep, task and world with another digest."""
         spec: RunSpec = record.spec
         if record.run["status"] == "ok":
-            self._compare(spec.task, spec.world, record.run.get("world_digest", ""))
+            self.compare(spec.task, spec.world, record.run.get("world_digest", ""))
 
-    def _compare(self, task: str, world: str, digest: str) -> None:
+    def compare(self, task: str, world: str, digest: str) -> None:
+        """StoreError if the runs of this task and world that are known by now have another digest."""
         former = self._known.setdefault((task, world), digest) if digest else digest
         if former != digest:
             raise StoreError(
                 f"the results of sweep {self._sweep!r} in {self._results} were made with world {former} "
                 f"(task {task}, world {world}), but there is now one with world {digest}: a network or model "
-                "file has changed. They must not be mixed: give another folder with --results, the sweep "
-                "another name, or bring the former files back."
+                "file has changed. They must not be mixed: give another folder with --results, bring the "
+                "former files back or, for a sweep file, change its name."
             )

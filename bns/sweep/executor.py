@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import datetime
 from typing import Protocol, Self
 
 from bns.spec import RunSpec
@@ -11,6 +12,9 @@ from bns.store.record import RunRecord
 from bns.sweep.job import run_job
 
 Job = Callable[[RunSpec], RunRecord]
+
+ATTEMPTS = 3
+"""How often a run is tried whose worker dies, before it is quarantined."""
 
 
 class Executor(Protocol):
@@ -88,6 +92,21 @@ class SerialExecutor:
         if self._running:
             raise _Cancelled
         self._spec = None
+
+
+def without_result(spec: RunSpec, status: str, error: str, started_at: datetime, wall_s: float) -> RunRecord:
+    """The record of a run whose worker gave none. The processor time went with the worker."""
+    return RunRecord(
+        spec,
+        {
+            "status": status,
+            "error": error,
+            "started_at": started_at,
+            "wall_s": wall_s,
+            "cpu_s": float("nan"),
+            "attempts": 1,
+        },
+    )
 
 
 def attempted(record: RunRecord, attempts: int) -> RunRecord:

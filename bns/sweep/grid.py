@@ -1,6 +1,6 @@
 """A sweep file (YAML) read into parameter combinations.
 
-Keys: ``name``, ``robot`` (required); ``seeds`` (how many, 0..N-1; default 1); ``fixed`` (parameter: value);
+Keys: ``name``, ``robot`` (required); ``seeds`` (how many; default 1); ``first_seed`` (default 0); ``fixed`` (parameter: value);
 ``grid`` (parameter: list; the product); ``zip`` (parameter: list; taken in step, multiplied with the grid);
 ``exclude`` (list of mappings; combinations of the product that have all these values are left out);
 ``include`` (list of mappings; further combinations, on top of ``fixed``, added after ``exclude``).
@@ -22,7 +22,7 @@ from bns.sweep.combos import Parts, check_size, combinations
 from bns.sweep.yaml_lines import Located, parse_yaml, read_text
 from bns.tasks import task_names
 
-KEYS = ("name", "robot", "seeds", "fixed", "grid", "zip", "include", "exclude")
+KEYS = ("name", "robot", "seeds", "first_seed", "fixed", "grid", "zip", "include", "exclude")
 PARAMETERS = tuple(name for name in FIELDS if name not in ("robot", "seed"))
 _ELSEWHERE = {
     "robot": "'robot' is a key of the file itself: one robot a sweep.",
@@ -32,6 +32,7 @@ RESERVED = ("by-hand",)
 """Names that no sweep file may have: the store keeps the single runs of ``bns run`` under it."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_SEEDS = int(FIELDS["seed"].metadata["high"]) + 1
 _LONGEST_NAME = 80
 """With what the store adds it must still be the name of a file."""
 
@@ -46,6 +47,12 @@ class Sweep:
     combos: tuple[dict[str, Any], ...]
     text: str
     path: Path
+    first_seed: int = 0
+
+    @property
+    def all_seeds(self) -> range:
+        """The seeds of every combination."""
+        return range(self.first_seed, self.first_seed + self.seeds)
 
     @property
     def total(self) -> int:
@@ -76,7 +83,8 @@ def parse_sweep(text: str, path: Path) -> Sweep:
     combos = combinations(root, parts)
     _check_default_task(root, parts, combos)
     check_size(parts.seeds * len(combos), places["seeds"][1] if "seeds" in places else root)
-    return Sweep(parts.name, parts.robot, parts.seeds, tuple(combos.values()), text, path)
+    _check_seeds(root, parts, places)
+    return Sweep(parts.name, parts.robot, parts.seeds, tuple(combos.values()), text, path, parts.first_seed)
 
 
 def _places(root: Located) -> dict[str, tuple[Located, Located]]:
@@ -115,9 +123,24 @@ def _read_robot(parts: Parts, value: Located) -> None:
 
 def _read_seeds(parts: Parts, value: Located) -> None:
     seeds = value.value()
-    if not isinstance(seeds, int) or isinstance(seeds, bool) or not 1 <= seeds <= 2**32:
-        value.fail(f"seeds is {seeds!r}; it must be a whole number from 1 to {2**32}: how many, from 0 on.")
+    if not isinstance(seeds, int) or isinstance(seeds, bool) or not 1 <= seeds <= _SEEDS:
+        value.fail(f"seeds is {seeds!r}; it must be a whole number from 1 to {_SEEDS}: how many, from first_seed on.")
     parts.seeds = seeds
+
+
+def _read_first_seed(parts: Parts, value: Located) -> None:
+    first = value.value()
+    if not isinstance(first, int) or isinstance(first, bool) or not 0 <= first < _SEEDS:
+        value.fail(f"first_seed is {first!r}; it must be a whole number from 0 to {_SEEDS - 1}.")
+    parts.first_seed = first
+
+
+def _check_seeds(root: Located, parts: Parts, places: Mapping[str, tuple[Located, Located]]) -> None:
+    if parts.first_seed + parts.seeds > _SEEDS:
+        place = places["first_seed"][1] if "first_seed" in places else root
+        place.fail(
+            f"{parts.seeds} seeds from {parts.first_seed} on go beyond the last seed, {_SEEDS - 1}. Begin with a smaller one."
+        )
 
 
 def _read_fixed(parts: Parts, value: Located) -> None:
@@ -152,6 +175,7 @@ _READERS: Mapping[str, Callable[[Parts, Located], None]] = {
     "name": _read_name,
     "robot": _read_robot,
     "seeds": _read_seeds,
+    "first_seed": _read_first_seed,
     "fixed": _read_fixed,
     "grid": _read_grid,
     "zip": _read_zip,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
@@ -39,9 +40,28 @@ def run_job(spec: RunSpec) -> RunRecord:
 @cache
 def warm() -> None:
     """Compile the kernels or load them from disk, once a process, so that no run is charged with it."""
+    from bns.engine.jit import note_compiled  # noqa: PLC0415
     from bns.loop import run  # noqa: PLC0415
 
     run(RunSpec(population_size=4, evaluations=2, generations_per_evaluation=1, training_iterations_per_evaluation=1))
+    note_compiled()
+
+
+def prepare(specs: Iterable[RunSpec]) -> None:
+    """Before workers are started: kernels compiled, once and not by each of them, and all worlds of these runs there.
+
+    Raises:
+        ModelError: a world's file is missing or no such file; the message names the command that makes it.
+    """
+    # Imported here for the reason given above.
+    from bns.engine.jit import compiled  # noqa: PLC0415
+    from bns.robots import load_robot  # noqa: PLC0415
+    from bns.worlds import build_world  # noqa: PLC0415
+
+    for world, robot in sorted({(spec.world, spec.robot) for spec in specs}):
+        build_world(world, load_robot(robot))
+    if not compiled():
+        warm()
 
 
 class _Meter:

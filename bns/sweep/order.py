@@ -12,14 +12,14 @@ from bns.sweep.grid import Sweep
 
 
 def ordered_specs(sweep: Sweep) -> list[RunSpec]:
-    """All runs: seed 0 of every combination, then seed 1, ...; shuffled within a seed, alike on all machines.
+    """All runs: the first seed of every combination, then the second, ...; shuffled within a seed, alike on all machines.
 
     The shuffle keeps neighbours in the grid (equally long runs, one task) apart, which evens out progress
     and estimates. It sorts by a hash, so combinations added later leave the others in their order.
     """
     texts = [(json.dumps(combo, sort_keys=True), combo) for combo in sweep.combos]
     specs = []
-    for seed in range(sweep.seeds):
+    for seed in sweep.all_seeds:
         for _text, combo in sorted(texts, key=lambda pair: _place(sweep.name, seed, pair[0])):
             specs.append(_spec(sweep, combo, seed))
     return specs

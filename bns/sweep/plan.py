@@ -10,12 +10,14 @@ from pathlib import Path
 import pandas as pd
 
 from bns.spec import RunSpec
-from bns.store.compact import bytes_per_run
+from bns.store.compaction import bytes_per_run
 from bns.store.reader import finished, load
 from bns.sweep.executor import Job
 from bns.sweep.grid import Sweep
 from bns.sweep.job import run_job, warm
 from bns.sweep.order import ordered_specs
+from bns.sweep.pace import Pace
+from bns.sweep.shard import Shard
 
 _TRIAL_EVALUATIONS = 20
 _BYTES_PER_EVALUATION = 100
@@ -52,18 +54,20 @@ def plan(
     sweep: Sweep,
     results: Path,
     jobs: int,
+    shard: Shard | None = None,
     *,
     retry_failed: bool = False,
     job: Job = run_job,
     warm_up: Callable[[], object] = warm,
 ) -> Plan:
-    """Count and estimate. Without stored runs of this sweep, one short run is carried out and timed.
+    """Count and estimate, the whole or one ``shard``. Without stored runs of this sweep, one short run is carried out and timed.
 
     Nothing is written. The seconds are wall time with ``jobs`` workers; NaN if the trial run failed.
     """
     known = finished(results, sweep.name)
     had = {run_id for run_id, status in known.items() if status == "ok" or not retry_failed}
-    specs = ordered_specs(sweep)
+    everything = ordered_specs(sweep)
+    specs = everything if shard is None else list(shard.share(everything))
     todo = [spec for spec in specs if spec.run_id not in had] if had else specs
     if not todo:
         return Plan(sweep.name, len(specs), len(specs), 0, 0.0, 0.0, "nothing is left to do")
@@ -108,9 +112,9 @@ def _from_trial(todo: list[RunSpec], job: Job, warm_up: Callable[[], object]) ->
     record = job(trial)
     if record.run["status"] != "ok":
         return math.nan, f"none: a trial run of {trial.canonical_json()} failed with {record.run['error']}"
-    seconds = record.run["wall_s"]
-    basis = f"one trial run of {trial.evaluations} evaluations ({seconds:.2f} s), scaled by work: rough"
-    return math.fsum(work(spec) for spec in todo) * seconds / work(trial), basis
+    basis = f"the parts of one trial run of {trial.evaluations} evaluations ({record.run['wall_s']:.2f} s)"
+    pace = Pace.of(record)
+    return math.fsum(pace.seconds(spec) for spec in todo), basis
 
 
 def _bytes(results: Path, sweep: str, todo: list[RunSpec]) -> float:

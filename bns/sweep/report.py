@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bns.sweep.plan import Plan
 from bns.sweep.progress import in_words
+from bns.sweep.request import Placement
 from bns.sweep.runner import Summary
 from bns.sweep.status import SweepRow
 
@@ -20,12 +21,12 @@ _WHY = {
 }
 
 
-def planned(plan: Plan, jobs: int) -> str:
-    """What a sweep would take."""
+def planned(plan: Plan, place: Placement) -> str:
+    """What a sweep would take, and where it would run."""
     time = "unknown" if math.isnan(plan.seconds_estimate) else in_words(plan.seconds_estimate)
     return (
         f"{plan.sweep}: {plan.total} runs, {plan.done} done, {plan.remaining} to do; about {time} (h:mm:ss) with "
-        f"{jobs} jobs, {plan.bytes_estimate / 2**20:.0f} MiB more on disk (from {plan.basis})"
+        f"{place.where}, {plan.bytes_estimate / 2**20:.0f} MiB more on disk (from {plan.basis})"
     )
 
 
@@ -39,7 +40,9 @@ def summed_up(summary: Summary, results: Path) -> str:
             f"\"SELECT run_id, error FROM runs WHERE sweep = '{summary.sweep}' AND status <> 'ok'\"; "
             "again: --retry-failed)"
         )
-    if summary.stopped_by:
+    if summary.stopped_by == "submitted":
+        text += "; the rest is queued: see squeue --me, and bns status for what is done"
+    elif summary.stopped_by:
         text += f"; stopped: {_WHY[summary.stopped_by]}; the same command goes on from here"
     return text
 
@@ -57,7 +60,7 @@ def status_table(rows: Sequence[SweepRow]) -> str:
             str(row.quarantined),
             str(row.other),
             "-" if math.isnan(row.mean_wall_s) else f"{row.mean_wall_s:.2f}",
-            row.last.strftime("%Y-%m-%d %H:%M:%S"),
+            "-" if row.last is None else row.last.strftime("%Y-%m-%d %H:%M:%S"),
         )
         for row in rows
     ]

@@ -6,6 +6,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from bns.spec import RunSpec
@@ -17,8 +18,9 @@ from bns.sweep.digests import WorldDigests
 from bns.sweep.executor import Executor, Job
 from bns.sweep.grid import Sweep
 from bns.sweep.interrupt import GRACE_S, Interrupts
-from bns.sweep.job import run_job, warm
+from bns.sweep.job import prepare, run_job
 from bns.sweep.order import ordered_specs
+from bns.sweep.shard import Shard
 from bns.sweep.workers import LokyExecutor
 
 _POLL_S = 0.2
@@ -30,12 +32,12 @@ class SweepWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Summary:
-    """Where a sweep stands. ``done``, ``failed``, ``quarantined`` include earlier calls, ``new`` does not.
+    """Where a sweep, or a shard, stands. ``done``, ``failed``, ``quarantined`` include earlier calls, ``new`` does not.
 
     ``new_failed`` is how many of the new ones failed or were quarantined.
 
-    ``stopped_by`` is None (nothing left to do), "budget", "limit", "interrupt" (Ctrl-C) or "terminated"
-    (SIGTERM).
+    ``stopped_by`` is None (nothing left to do), "budget", "limit", "interrupt" (Ctrl-C), "terminated"
+    (SIGTERM) or "submitted" (the rest is queued with a batch system).
     """
 
     sweep: str
@@ -53,7 +55,7 @@ class Summary:
         return self.total - self.done - self.failed - self.quarantined
 
 
-def _silent(_summary: Summary) -> None:
+def silent(_summary: Summary) -> None:
     """Progress that nobody wants to see."""
 
 
@@ -68,8 +70,9 @@ def run_sweep(
     job: Job = run_job,
     executor: Executor | None = None,
     warm_up: Callable[[], object] | None = None,
-    on_progress: Callable[[Summary], None] = _silent,
+    on_progress: Callable[[Summary], None] = silent,
     grace_s: float = GRACE_S,
+    shard: Shard | None = None,
 ) -> Summary:
     """Carry out the runs of a sweep that have no result yet, at most ``limit``.
 
@@ -77,19 +80,23 @@ def run_sweep(
     unless an ``executor`` is given; ``warm_up`` is called once before the first (by default it compiles the
     kernels). ``budget`` can be shared by several calls. After the first SIGINT or SIGTERM, runs in flight may
     finish for ``grace_s`` seconds; the second gives them up. `SweepWarning` if there are results under this
-    sweep's name that it does not describe: those of another file of that name.
+    sweep's name that it does not describe: those of another file of that name. With a ``shard`` only its share is
+    done and counted; other shards may be at work at the same time, on other machines that share the folder.
 
     Raises:
-        StoreError: another process writes this sweep, the disk is full, or the store's runs of this sweep
+        StoreError: another process writes this sweep (this shard), the disk is full, or the store's runs of this sweep
             come from other world files. What was finished before is kept.
     """
-    course = _Course(sweep, Path(results), budget or Budget(), on_progress)
+    course = _Course(sweep, Path(results), budget or Budget(), on_progress, shard)
+    name = shard.name if shard else ""
     with Interrupts(grace_s) as course.interrupts:
         try:
-            with Writer(course.results, sweep.name, sweep_text=sweep.text, sweep_runs=sweep.total) as writer:
+            with Writer(
+                course.results, sweep.name, sweep_text=sweep.text, sweep_runs=sweep.total, shard=name
+            ) as writer:
                 todo = course.plan(retry_failed, limit)
                 if todo and course.budget.allows_another():
-                    (warm_up or (warm if job is run_job else lambda: None))()
+                    (warm_up or (partial(prepare, todo) if job is run_job else lambda: None))()
                     with executor or LokyExecutor(jobs, job) as ready:
                         course.interrupts.arm(ready.cancel)
                         course.carry_out(iter(todo), ready, writer)
@@ -102,9 +109,17 @@ def run_sweep(
 class _Course:
     """One call of ``run_sweep``: counts and the loop."""
 
-    def __init__(self, sweep: Sweep, results: Path, budget: Budget, on_progress: Callable[[Summary], None]) -> None:
+    def __init__(
+        self,
+        sweep: Sweep,
+        results: Path,
+        budget: Budget,
+        on_progress: Callable[[Summary], None],
+        shard: Shard | None,
+    ) -> None:
         self.results, self.budget, self.interrupts = results, budget, Interrupts()
-        self._sweep, self._on_progress = sweep, on_progress
+        self._sweep, self._on_progress, self._shard = sweep, on_progress, shard
+        self._total = sweep.total
         self._digests = WorldDigests(results, sweep.name)
         self._statuses: dict[str, str] = {}
         self._counts: Counter[str] = Counter()
@@ -116,14 +131,17 @@ class _Course:
         if "ok" in known.values():
             self._digests.read()
         skipped = {"ok"} if retry_failed else {"ok", "failed", "quarantined"}
-        todo = []
-        for spec in ordered_specs(self._sweep):
+        everything, todo = ordered_specs(self._sweep), []
+        own = everything if self._shard is None else self._shard.share(everything)
+        self._total = len(own)
+        for spec in own:
             status = known.get(spec.run_id) if known else None
             if status is not None:
                 self._count(spec.run_id, status)
             if status not in skipped:
                 todo.append(spec)
-        self._warn_of_others(len(known) - len(self._statuses))
+        if len(known) > len(self._statuses):
+            self._warn_of_others(len(known.keys() - {spec.run_id for spec in everything}))
         self._wanted = len(todo)
         todo = todo if limit is None else todo[:limit]
         self._todo = len(todo)
@@ -179,7 +197,7 @@ class _Course:
         """The counts now."""
         return Summary(
             self._sweep.name,
-            self._sweep.total,
+            self._total,
             self._counts["ok"],
             self._counts["failed"],
             self._counts["quarantined"],

@@ -17,7 +17,7 @@ from bns.sweep.grid import Sweep, parse_sweep
 
 @dataclass(frozen=True)
 class SweepRow:
-    """One sweep and task. ``total`` is None without a known sweep file; ``last``: when the last run began.
+    """One sweep and task. ``total`` is None without a known sweep file; ``last``: when the last run began, None before any.
 
     Only runs that the newest sweep file of that name describes are done, failed or quarantined; ``other`` are
     all the rest, those of an earlier file or an earlier engine. Without a known file there are none.
@@ -29,7 +29,7 @@ class SweepRow:
     failed: int
     quarantined: int
     total: int | None
-    last: datetime
+    last: datetime | None
     mean_wall_s: float
     other: int = 0
 
@@ -40,28 +40,31 @@ class SweepRow:
 
 
 def sweep_status(results: Path) -> list[SweepRow]:
-    """A row for every sweep and task with results, in alphabetic order; StoreError if there are none at all.
+    """A row for every sweep and task with results or a sweep file, in alphabetic order; StoreError if there is nothing at all.
 
     ``mean_wall_s`` is the mean of the runs that are done, NaN without any.
     """
     runs = load(results, "runs", columns=["sweep", "task", "status", "started_at", "wall_s", "spec"])
     files = _newest_files(load(results, "specs", columns=["sweep", "written_at", "text"]))
-    rows = []
-    for name, of_sweep in runs.groupby("sweep"):
-        file = files.get(str(name))
-        described = pd.Series(True, of_sweep.index) if file is None else _described(file, of_sweep["spec"])
-        totals = None if file is None else file.runs_by_task()
-        for task, group in of_sweep.groupby("task"):
-            total = None if totals is None else totals.get(str(task), 0)
-            rows.append(_row(str(name), str(task), group, described[group.index], total))
-    return rows
+    return [row for name in sorted({*runs["sweep"], *files}) for row in _rows(name, runs[runs["sweep"] == name], files)]
+
+
+def _rows(name: str, runs: pd.DataFrame, files: dict[str, Sweep]) -> list[SweepRow]:
+    """Of one sweep; ``runs``: those of its name."""
+    file = files.get(name)
+    described = pd.Series(True, runs.index) if file is None else _described(file, runs["spec"])
+    totals = {} if file is None else file.runs_by_task()
+    return [
+        _row(name, task, group, described[group.index], None if file is None else totals.get(task, 0))
+        for task in sorted({*runs["task"], *totals})
+        for group in [runs[runs["task"] == task]]
+    ]
 
 
 def _row(sweep: str, task: str, runs: pd.DataFrame, described: pd.Series[bool], total: int | None) -> SweepRow:
     own = runs[described]
     counts = own["status"].value_counts()
     done, failed, quarantined = (int(counts.get(status, 0)) for status in ("ok", "failed", "quarantined"))
-    last: pd.Timestamp = runs["started_at"].max()
     return SweepRow(
         sweep,
         task,
@@ -69,7 +72,7 @@ def _row(sweep: str, task: str, runs: pd.DataFrame, described: pd.Series[bool], 
         failed,
         quarantined,
         total,
-        last.to_pydatetime(),
+        None if runs.empty else runs["started_at"].max().to_pydatetime(),
         float(own.loc[own["status"] == "ok", "wall_s"].mean()),
         len(runs) - len(own),
     )
@@ -78,13 +81,13 @@ def _row(sweep: str, task: str, runs: pd.DataFrame, described: pd.Series[bool], 
 def _described(file: Sweep, specs: pd.Series[str]) -> pd.Series[bool]:
     """Which runs the file describes: combination by combination, for a file may have millions of seeds."""
     combos = {RunSpec(robot=file.robot, **combo).canonical_json() for combo in file.combos}
-    return specs.map(lambda text: _is_one_of(combos, file.seeds, text)).astype(bool)
+    return specs.map(lambda text: _is_one_of(combos, file.all_seeds, text)).astype(bool)
 
 
-def _is_one_of(combos: set[str], seeds: int, text: str) -> bool:
+def _is_one_of(combos: set[str], seeds: range, text: str) -> bool:
     spec = json.loads(text)
     first = json.dumps(spec | {"seed": 0}, sort_keys=True, separators=(",", ":"))
-    return bool(spec["seed"] < seeds) and first in combos
+    return spec["seed"] in seeds and first in combos
 
 
 def _newest_files(specs: pd.DataFrame) -> dict[str, Sweep]:

@@ -22,11 +22,8 @@ from joblib.externals.loky import ProcessPoolExecutor
 
 from bns.spec import RunSpec
 from bns.store.record import RunRecord
-from bns.sweep.executor import Job, attempted
+from bns.sweep.executor import ATTEMPTS, Job, attempted, without_result
 from bns.sweep.job import describe, run_job
-
-ATTEMPTS = 3
-"""How often a run is tried whose worker dies, before it is quarantined."""
 
 _ONE_THREAD = dict.fromkeys(
     (
@@ -40,6 +37,9 @@ _ONE_THREAD = dict.fromkeys(
     ),
     "1",
 )
+LEFT_TO_PARENT = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
+"""Terminals send the first to all of a process group, batch systems the others to all processes of a job."""
+
 _PARENT_CHECK_S = 1.0
 _BEGIN_S = 2.0
 
@@ -54,6 +54,11 @@ class _Slot:
     attempt: int = 0
     started_at: datetime = field(default_factory=lambda: datetime.now(UTC))
     started_s: float = 0.0
+
+    @property
+    def wall_s(self) -> float:
+        """Time since the run was first begun."""
+        return time.perf_counter() - self.started_s
 
 
 class LokyExecutor:
@@ -134,29 +139,14 @@ class LokyExecutor:
             if slot.attempt < ATTEMPTS:
                 self._begin(slot, spec)
                 return None
-            record = self._lost(slot, spec, "quarantined", _death(fault))
+            record = without_result(spec, "quarantined", _death(fault), slot.started_at, slot.wall_s)
         elif fault is not None:
-            record = self._lost(slot, spec, "failed", describe(fault))
+            record = without_result(spec, "failed", describe(fault), slot.started_at, slot.wall_s)
         else:
             record = future.result()
         record = attempted(record, slot.attempt)
         slot.spec, slot.future = None, None
         return record
-
-    def _lost(self, slot: _Slot, spec: RunSpec, status: str, error: str) -> RunRecord:
-        # The processor time went with the worker.
-        wall_s = time.perf_counter() - slot.started_s
-        return RunRecord(
-            spec,
-            {
-                "status": status,
-                "error": error,
-                "started_at": slot.started_at,
-                "wall_s": wall_s,
-                "cpu_s": float("nan"),
-                "attempts": 1,
-            },
-        )
 
 
 def _await_begin(future: Future[RunRecord] | None) -> None:
@@ -175,8 +165,8 @@ def _death(fault: BaseException) -> str:
 
 def start_worker(parent: int) -> None:
     """First thing in a worker: leave signals to the parent, and end when the parent does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    for number in LEFT_TO_PARENT:
+        signal.signal(number, signal.SIG_IGN)
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()

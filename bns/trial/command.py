@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from bns.errors import HardwareError
+from bns.errors import HardwareError, SpecError
 from bns.hardware.emulators.faults import FaultPlan, load_plan
 from bns.hardware.rig import load_rig, shipped_rig
 from bns.robots import load_robot
@@ -28,6 +28,8 @@ def carried_out(options: argparse.Namespace, parameters: Mapping[str, Any]) -> s
 def spec_of(parameters: Mapping[str, Any]) -> RunSpec:
     """The spec; the task is the robot's first where none is given."""
     robot = load_robot(parameters["robot"]).name
+    if parameters["record"] == "full":
+        raise SpecError("record is 'full'; a robot drives no probes and no fittest of a generation: take evals or paths.")
     return RunSpec(**{**parameters, "world": "robot", "task": parameters["task"] or task_names(robot)[0]})
 
 

@@ -70,7 +70,7 @@ class Trial:
         self._weights = self._trainer.evolution_weights()
         self._evolver = Evolver.start(self.robot, self.task, key, spec, self._weights)
         self._recorder = Recorder(self.robot, self.task, self._world, key, spec)
-        self._start = self.robot.poses(np.zeros((1, len(self.robot.networks))))[0]
+        self._start = self.robot.start_pose()[0]
         self._most_rounds, self._rounds = most_rounds, 0
 
     def run(self, driver: Driver, progress: Progress) -> TrialResult:
@@ -79,7 +79,8 @@ class Trial:
         with Rounds(self._round, self._most_rounds) as rounds:
             for number in range(1, self.spec.evaluations + 1):
                 asked = time.perf_counter()
-                picked, weights = self._evolver.pick(number), self._weights
+                weights = self._weights
+                picked = self.robot.plan(self._evolver.pick(number), weights, self.task)
                 idle_s += time.perf_counter() - asked
                 done, count = self._evaluation(number, picked, driver, rounds)
                 driven = time.perf_counter()

@@ -11,8 +11,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
@@ -90,7 +88,7 @@ def carry_out(spec: RunSpec, how: Set, results: Path) -> str:
 
 def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: list, robot: Any, task: Any) -> str:
     trial = Trial(spec, "robot-emulated" if how.emulated else "robot", past, how.most_rounds)
-    start = robot.poses(np.zeros((1, len(robot.networks))))[0]
+    start = robot.start_pose()[0]
     started, wall = datetime.now(UTC), time.perf_counter()
     try:
         with Stopping() as stopping, live_view(spec) as show, staged(how, spec.seed, folder.journal, stopping) as stage:

@@ -15,8 +15,5 @@ class World(Protocol):
     digest: str
     """Changes whenever the world would answer otherwise; stored with every run."""
 
-    repeatable: bool
-    """Whether it answers whatever is asked of it, as often as wanted; a robot only drives what was picked."""
-
     def drive(self, commands: np.ndarray, key: Key, purpose: Purpose, step: int) -> np.ndarray:
-        """Measured poses (n, 3) at the end of each command (n, components); draws come from key, purpose and step."""
+        """Measured poses (m, columns) of commands (n, components); m < n where the drive had to end."""

@@ -1,36 +1,19 @@
-"""The physics world: a model of the robot with effects switched on, integrated at a fine time step."""
+"""The physics world: ``bns/physics/ROBOT_drive.py`` drives a model of the robot of that name."""
 
 from __future__ import annotations
 
-import numpy as np
+from importlib import import_module
+from importlib.util import find_spec
 
-from bns.engine.philox import Key, Purpose, normals
-from bns.physics.differential_drive import observe, simulate
-from bns.physics.model import Model, load_model
+from bns.errors import ModelError
 from bns.robots.base import Robot
-from bns.robots.khepera import START, Khepera
+from bns.worlds.base import World
 
 
-class PhysicsWorld:
-    """Drives a model of two wheels; motor jitter and tracking noise are drawn for every command."""
-
-    repeatable = True
-
-    def __init__(self, robot: Khepera, model: Model) -> None:
-        self._robot = robot
-        self._model = model
-        self.digest = "w" + model.digest[:15]
-
-    def drive(self, commands: np.ndarray, key: Key, purpose: Purpose, step: int) -> np.ndarray:
-        """Tracked poses at the end of each command, headings not wrapped."""
-        left, right, duration = self._robot.wheel_speeds_m_s(commands.astype(np.float64))
-        draws = normals(key, purpose, step, 2, len(commands))
-        driven = simulate(self._model, left[None], right[None], duration[None], start=START, normals=draws[:1, :, :2])
-        return observe(driven, draws[1:, :, :3], self._model)[0]
-
-
-def build(robot: Robot) -> PhysicsWorld:
-    """The robot's own model, as shipped."""
-    if not isinstance(robot, Khepera):
-        raise TypeError(f"no physics world for {robot.name}")
-    return PhysicsWorld(robot, load_model(robot.name))
+def build(robot: Robot, model: str | None = None) -> World:
+    """The robot's own model, as shipped, or the one of a file; ModelError if there is none."""
+    module = f"bns.physics.{robot.name}_drive"
+    if find_spec(module) is None:
+        raise ModelError(f"robot {robot.name} has no physics world; run it with --world substitute.")
+    world: World = import_module(module).build(robot, model) if model else import_module(module).build(robot)
+    return world

@@ -13,8 +13,6 @@ from bns.robots.simulator import load_static_simulator
 class SubstituteWorld:
     """Displacements of the static simulator, disturbed with the standard deviations of its residuals."""
 
-    repeatable = True
-
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._simulator = load_static_simulator(robot.name)
@@ -22,9 +20,10 @@ class SubstituteWorld:
 
     def drive(self, commands: np.ndarray, key: Key, purpose: Purpose, step: int) -> np.ndarray:
         """Poses at the end of each command; one independent draw a command and network."""
-        outputs = predict(self._simulator.weights, self._robot.inputs(commands))
+        outputs = predict(self._simulator.weights, self._robot.inputs(commands), self._robot.sigmoid_output)
         displacements = self._robot.displacements(outputs)
-        noise = normals(key, purpose, step, 1, len(commands))[0, :, : displacements.shape[1]]
+        blocks = -(-displacements.shape[1] // 4)
+        noise = np.hstack(list(normals(key, purpose, step, blocks, len(commands))))[:, : displacements.shape[1]]
         return self._robot.poses(displacements + noise * self._simulator.noise_sd)
 
 

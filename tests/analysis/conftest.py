@@ -9,15 +9,10 @@ import pytest
 from matplotlib.text import Text
 
 TESTS = Path(__file__).parents[1]
-sys.path[:0] = [str(path) for path in (TESTS.parent, TESTS) if str(path) not in sys.path]
+sys.path[:0] = [str(path) for path in (TESTS.parent, TESTS, TESTS / "analysis") if str(path) not in sys.path]
 
-MUTATION = """
-name: mutation
-robot: khepera
-seeds: 5
-fixed: {evaluations: 4, population_size: 8, generations_per_evaluation: 2, training_iterations_per_evaluation: 20}
-grid: {task: [circle, complex], mutation_rate: [0.1, 0.5]}
-"""
+from figure_helpers import MUTATION, carry_out  # noqa: E402  # found on the path set above
+
 PROTOTYPE = """
 name: prototype
 robot: khepera
@@ -33,19 +28,6 @@ seeds: 2
 fixed: {evaluations: 3, population_size: 8}
 grid: {generations_per_evaluation: [1, 3], training_iterations_per_evaluation: [10, 20]}
 """
-
-
-def carry_out(results: Path, text: str, keep: slice = slice(None)) -> None:
-    """Do a sweep (a part of its runs) in this process."""
-    from bns.store import Writer
-    from bns.sweep.grid import parse_sweep
-    from bns.sweep.job import run_job
-    from bns.sweep.order import ordered_specs
-
-    sweep = parse_sweep(text, Path("test.yaml"))
-    with Writer(results, sweep.name, sweep_text=text, sweep_runs=sweep.total) as writer:
-        for spec in list(ordered_specs(sweep))[keep]:
-            writer.append(run_job(spec))
 
 
 @pytest.fixture(scope="session")
@@ -73,3 +55,14 @@ def texts():
         ]
 
     return walk
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory) -> Path:
+    """A made-up study: two tasks, 20 combinations of three parameters, eight seeds, ten evaluations, planted effects."""
+    from study import make_study
+
+    results = tmp_path_factory.mktemp("study")
+    fixed = {"tournament_size": (0.1, 0.5), "population_size": (50, 400), "real_world_selection_size": 0.7}
+    make_study(results, seeds=8, tasks=("circle", "infinity"), evaluations=10, **fixed)
+    return results

@@ -1,14 +1,16 @@
 from __future__ import annotations
 
-import json
+import shutil
 
 import numpy as np
 import pytest
+from statsmodels.stats.proportion import proportion_confint
 from store.synthetic import failed, record
 
 from analysis.__main__ import figures, main
-from analysis.common import Store
 from analysis.intervals import wilson
+from analysis.publish import KINDS, captions
+from analysis.store import Store
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store import Writer, query
@@ -23,16 +25,25 @@ def test_wilson_agrees_with_the_formula_by_hand():
     assert low[0] == pytest.approx((3 + z2 / 2 - np.sqrt(z2 * (2.1 + z2 / 4))) / (10 + z2))
 
 
-def test_all_figures_come_with_their_captions(real_results, tmp_path, capsys):
+def test_wilson_agrees_with_statsmodels_for_every_count_of_thirty():
+    runs = np.repeat([1, 5, 30, 3000], 31)
+    successes = np.minimum(np.tile(np.arange(31), 4), runs)
+    theirs = proportion_confint(successes, runs, method="wilson")
+    assert np.array(wilson(successes, runs)) == pytest.approx(np.array(theirs), abs=1e-12)
+
+
+def test_all_figures_come_with_their_captions_and_numbers(real_results, tmp_path, capsys):
     assert main(["--results", str(real_results), "--out", str(tmp_path)]) == 0
     shown = capsys.readouterr()
     assert shown.err == ""  # no progress off a terminal
-    assert "success-by-mutation.png  (figure 4.7, n = 20 runs)" in shown.out
-    names = {"budget", "paths-infinity", "success-by-diversity", "success-by-mutation"}
-    assert {path.name for path in tmp_path.iterdir()} == {
-        f"{n}.{kind}" for n in names for kind in ("png", "svg", "json")
-    }
-    caption = json.loads((tmp_path / "success-by-mutation.json").read_text())
+    assert "success-by-mutation-khepera.png  (figures 4.7 and 5.23, n = 20 runs)" in shown.out
+    found = {caption["name"]: caption for caption in captions(tmp_path)}
+    for name, caption in found.items():
+        kinds = {path.suffix[1:] for path in tmp_path.glob(f"{name}.*")}
+        wanted = {"json"} if "skipped" in caption else {"csv", "json"} if name.startswith("findings") else {*KINDS}
+        assert kinds == wanted, name
+    assert found["success-by-population"]["skipped"].startswith("no sweep compares population sizes (29 finished runs)")
+    caption = found["success-by-mutation-khepera"]
     assert (caption["n"], caption["sweeps"], caption["missing"]) == (20, ["mutation"], [])
     hashes = query(real_results, "SELECT spec_hash FROM specs WHERE sweep = 'mutation'").spec_hash.tolist()
     assert caption["spec_hashes"] == hashes
@@ -44,8 +55,8 @@ def test_all_figures_come_with_their_captions(real_results, tmp_path, capsys):
 def test_a_figure_drawn_again_has_the_same_bytes(real_results, tmp_path):
     for out in ("one", "two"):
         main(["--results", str(real_results), "--only", "success-by-diversity", "--out", str(tmp_path / out)])
-    made = sorted((tmp_path / "one").iterdir())
-    assert len(made) == 3
+    made = [path for path in sorted((tmp_path / "one").iterdir()) if path.suffix != ".html"]  # which has a date
+    assert len(made) == 4
     assert [path.read_bytes() for path in made] == [(tmp_path / "two" / path.name).read_bytes() for path in made]
 
 
@@ -54,7 +65,7 @@ def test_figures_stand_below_the_results_unless_told(tmp_path):
         for rate in (0.1, 0.5):
             writer.append(record(RunSpec(evaluations=3, mutation_rate=rate)))
     assert main(["--results", str(tmp_path), "--only", "success-by-mutation"]) == 0
-    assert (tmp_path / "figures" / "success-by-mutation.svg").is_file()
+    assert (tmp_path / "figures" / "success-by-mutation-khepera.svg").is_file()
     assert (
         Store(tmp_path).query("SELECT count(*) AS n FROM runs").n[0] == 2
     )  # the store takes them for nothing of its own
@@ -86,11 +97,32 @@ def test_a_figure_without_data_is_skipped_with_one_line(tmp_path, capsys):
         writer.append(failed(RunSpec(mutation_rate=0.5)))
     assert main(["--results", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == len(figures())
-    assert (
-        "success-by-mutation (figure 4.7) skipped: 2 runs failed and none finished; run make sweep-khepera" in lines[-1]
+    assert len(lines) == len(figures()) + 1
+    assert any(
+        line.startswith("success-by-mutation (figures 4.7 and 5.23) skipped: 2 runs failed and none finished; run make")
+        for line in lines
     )
-    assert not (tmp_path / "figures").exists()
+    assert not list((tmp_path / "figures").glob("*.png"))
+    assert "2 runs failed and none finished" in (tmp_path / "figures" / "index.html").read_text()
+
+
+def test_a_figure_that_the_results_no_longer_give_goes_and_what_is_not_ours_stays(tmp_path):
+    out = tmp_path / "figures"
+    with Writer(tmp_path, "grid") as writer:
+        for rate in (0.1, 0.5):
+            writer.append(record(RunSpec(evaluations=3, mutation_rate=rate)))
+    main(["--results", str(tmp_path)])
+    assert (out / "success-by-mutation-khepera.png").exists()
+    for name in ("notes.json", "run-circle-0.png"):
+        (out / name).write_text("{}")
+    shutil.rmtree(tmp_path / "runs")
+    shutil.rmtree(tmp_path / "evals")
+    with Writer(tmp_path, "other") as writer:
+        writer.append(record(RunSpec(evaluations=3)))
+    assert main(["--results", str(tmp_path)]) == 0
+    assert {path.name for path in out.glob("*.png")} == {"run-circle-0.png"}
+    assert (out / "notes.json").read_text() == "{}"
+    assert not (out / "success-by-mutation-khepera.json").exists()
 
 
 def test_a_compaction_under_way_does_not_disturb_a_figure(tmp_path):

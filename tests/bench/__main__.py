@@ -21,6 +21,7 @@ PARTS = {
     "whole_run": "a whole run against the core's peak",
     "two_jobs": "two workers against one, and the sweep's overhead",
     "reading": "reading a study for a figure",
+    "figures": "drawing a whole study",
 }
 
 

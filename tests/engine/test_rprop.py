@@ -12,6 +12,15 @@ from bns.engine.snn import BLOCK, initial_weights, predict
 ALGORITHMS = tuple(reference.UPDATES)
 
 
+@pytest.fixture(autouse=True)
+def _one_thread():
+    """Networks this small only lose by torch's threads, the more so where tests run side by side."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
 def problem(n=150, hidden=20, seed=0):
     """Three untrained networks, inputs (5, n) and smooth targets (3, n)."""
     X = np.random.default_rng(seed).uniform(-1, 1, (5, n)).astype(np.float32)

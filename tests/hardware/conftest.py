@@ -26,7 +26,7 @@ def clock():
 
 @pytest.fixture
 def body():
-    return DifferentialBody(load_model("khepera"), Key.of_run(1, 0, "khepera", "circle"), NORTH)
+    return DifferentialBody(load_model("khepera-world"), Key.of_run(1, 0, "khepera", "circle"), NORTH)
 
 
 @pytest.fixture

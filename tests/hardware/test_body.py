@@ -15,7 +15,7 @@ COMMANDS = np.array([[0.1, 0.2, 1.3], [0.2, 0.05, 0.7], [0.03, 0.03, 2.1]])
 def quiet():
     from dataclasses import replace
 
-    return DifferentialBody(replace(load_model("khepera"), jitter_relative=0.0), Key(1, 2), NORTH)
+    return DifferentialBody(replace(load_model("khepera-world"), jitter_relative=0.0), Key(1, 2), NORTH)
 
 
 def drive(body, begin_s=0.0, look_s=None):
@@ -56,7 +56,7 @@ def test_memory_of_old_orders_is_dropped_only_at_rest():
 
 def test_jitter_is_drawn_by_key():
     def end(key):
-        return drive(DifferentialBody(load_model("khepera"), key, NORTH))[-1]
+        return drive(DifferentialBody(load_model("khepera-world"), key, NORTH))[-1]
 
     np.testing.assert_array_equal(end(Key(1, 2)), end(Key(1, 2)))
     assert not np.array_equal(end(Key(1, 2)), end(Key(2, 2)))

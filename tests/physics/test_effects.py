@@ -12,9 +12,9 @@ from bns.physics.differential_drive import observe, simulate
 from bns.physics.effect import STAGES, number
 from bns.physics.effects import all_effects, effect_named
 from bns.physics.model import Model
-from bns.physics.signals import Body, Flow, View, Wheels
+from bns.physics.signals import Body, Flow, Stamps, View, Wheels
 
-SIGNALS = dict(zip(STAGES, (Wheels, Body, Flow, View), strict=True))
+SIGNALS = dict(zip(STAGES, (Wheels, Body, Flow, Stamps, View), strict=True))
 IDEAL = Model(wheelbase_m=0.0884)
 LEFT = np.array([[0.10, 0.20, -0.05, 0.02], [0.15, 0.0, 0.07, 0.0], [0.2, 0.2, 0.1, 0.15]])
 RIGHT = np.array([[0.20, 0.05, 0.10, 0.02], [0.15, 0.1, -0.07, 0.0], [0.2, 0.1, 0.2, 0.15]])
@@ -88,8 +88,9 @@ def test_apply_returns_the_signal_of_its_stage_and_leaves_its_input(effect):
     arrays = np.full((1, 3), 0.1)
     given = {
         "wheel": Wheels(arrays, arrays, arrays, 0.1),
-        "body": Body(arrays, arrays, arrays, arrays),
+        "body": Body(arrays, arrays, arrays, arrays, arrays, arrays, arrays),
         "world": Flow(),
+        "clock": Stamps(arrays),
         "measure": View(np.full((1, 3), 0.1)),
     }[effect.stage]
     values = plausible_model(effect).values_of(effect.name)

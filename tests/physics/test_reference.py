@@ -56,7 +56,7 @@ def test_each_effect_alone(name):
 
 
 def test_khepera():
-    assert_same_way(load_model("khepera"))
+    assert_same_way(load_model("khepera-world"))
 
 
 WHILE_MOVING = {"yaw-bias", "floor-slope", "tether-pull"}

@@ -130,6 +130,9 @@ def test_a_heading_beyond_bounds_is_failed_arithmetic():
     scores = ROBOT.score(lists(2, 3), constant(ahead=0.1, turn=turn), CIRCLE)
     assert (scores.failures, scores.fitness[1]) == (1, 0)
     assert scores.fitness[0] > 0
+    for commands, fitness in zip((2, 3), scores.fitness, strict=True):
+        poses = ROBOT.poses(np.tile([0.0, 0.1, turn], (commands, 1)))
+        assert ROBOT.judge(poses, CIRCLE)[0] == pytest.approx(fitness, rel=1e-9)
 
 
 @pytest.mark.parametrize("turn", [0.001, 1.0, 2.9, -1.7, 3000.0, -3000.0])

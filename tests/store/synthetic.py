@@ -53,6 +53,11 @@ def columns(table: str, rows: int, random: np.random.Generator) -> dict[str, np.
     return made
 
 
+def _rows_each(table: str) -> int:
+    """Rows an evaluation: one, or one for each controller that is told apart."""
+    return 2 if "who" in SCHEMAS[table].names else 1
+
+
 def run_row(status: str = "ok", **values: Any) -> dict[str, Any]:
     """The runs columns that the caller of the store provides."""
     return {"status": status, "started_at": START, "wall_s": 1.5, "cpu_s": 1.25, "attempts": 1, **values}
@@ -61,9 +66,9 @@ def run_row(status: str = "ok", **values: Any) -> dict[str, Any]:
 def record(spec: RunSpec, tables: tuple[str, ...] = ("evals",), **values: Any) -> RunRecord:
     """A run that went well; its numbers depend on its spec alone."""
     random = np.random.default_rng(int(spec.run_id[1:9], 16))
-    made = {name: columns(name, spec.evaluations, random) for name in tables}
-    for one in made.values():
-        one["evaluation"] = np.arange(1, spec.evaluations + 1)
+    made = {name: columns(name, spec.evaluations * _rows_each(name), random) for name in tables}
+    for name, one in made.items():
+        one["evaluation"] = np.repeat(np.arange(1, spec.evaluations + 1), _rows_each(name))
     return RunRecord(spec, run_row(world_digest="w0", peak_memory_mib=80.0, **values), made)
 
 
@@ -83,13 +88,16 @@ def make_store(
     """A store of ``runs`` runs in folded files, as a finished study leaves it (75,000 runs take a minute)."""
     random, made = np.random.default_rng(seed), list(specs(runs, evaluations))
     for number, start in enumerate(range(0, runs, runs_per_file)):
-        _publish(path, sweep, f"part-j{number:032x}-0", made[start : start + runs_per_file], random)
+        publish_chunk(path, sweep, f"part-j{number:032x}-0", made[start : start + runs_per_file], random)
     return made
 
 
-def _publish(path: Path, sweep: str, part: str, chunk: list[RunSpec], random: np.random.Generator) -> None:
+def publish_chunk(
+    path: Path, sweep: str, part: str, chunk: list[RunSpec], random: np.random.Generator, **own: np.ndarray
+) -> None:
+    """One file a table with the runs of ``chunk``, all of one task; ``own`` are columns of evals that are not random."""
     evaluations = chunk[0].evaluations
-    evals = columns("evals", evaluations * len(chunk), random)
+    evals = columns("evals", evaluations * len(chunk), random) | own
     evals["evaluation"] = np.tile(np.arange(1, evaluations + 1), len(chunk))
     rows = {
         "error": None,

@@ -53,6 +53,11 @@ def short(spec: RunSpec) -> RunRecord:
     return ok(spec, 0.05)
 
 
+def half_second(spec: RunSpec) -> RunRecord:
+    time.sleep(0.5)
+    return ok(spec, 0.5)
+
+
 def slow(spec: RunSpec) -> RunRecord:
     mark(f"begun-{spec.run_id}-{os.getpid()}")
     time.sleep(0.6)

@@ -89,7 +89,7 @@ ERRORS = {
         6,
         "unknown parameter 'mutation_rte'. Did you mean 'mutation_rate'? Valid: ",
     ),
-    "key": ("sed: 2\n", 3, "unknown key 'sed'. Did you mean 'seeds'? Valid: exclude, fixed, grid"),
+    "key": ("sed: 2\n", 3, "unknown key 'sed'. Did you mean 'seeds'? Valid: exclude, first_seed, fixed, grid"),
     "parameter as key": ("mutation_rate: 0.1\n", 3, "it belongs under fixed or grid"),
     "seed": ("fixed: {seed: 3}\n", 3, "write 'seeds: 30'"),
     "robot": ("grid:\n  robot: [khepera]\n", 4, "one robot a sweep"),
@@ -130,6 +130,9 @@ ERRORS = {
     "include unknown": ("include:\n  - {evaluation: 3}\n", 4, "Did you mean 'evaluations'?"),
     "seeds": ("seeds: 0\n", 3, "seeds is 0; it must be a whole number from 1"),
     "seeds true": ("seeds: yes\n", 3, "seeds is True"),
+    "first seed": ("seeds: 1\nfirst_seed: -1\n", 4, "first_seed is -1; it must be a whole number from 0"),
+    "first seed true": ("first_seed: true\n", 3, "first_seed is True"),
+    "last seed": ("first_seed: 4294967290\nseeds: 10\n", 3, "10 seeds from 4294967290 on go beyond the last seed"),
     "anchor": ("base: &b {evaluations: 1}\n", 3, "unknown key 'base'"),
 }
 

@@ -8,13 +8,15 @@ import pytest
 import sweep_jobs
 from sweep_jobs import make_sweep
 
-from bns.errors import StoreError
+from bns.errors import ModelError, StoreError
+from bns.spec import RunSpec
 from bns.store.reader import load
 from bns.store.record import RunRecord
 from bns.store.writer import Writer
 from bns.sweep.budget import Budget
 from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import Sweep
+from bns.sweep.job import prepare
 from bns.sweep.order import ordered_specs
 from bns.sweep.runner import Summary, SweepWarning, run_sweep
 from bns.sweep.workers import LokyExecutor
@@ -22,6 +24,10 @@ from bns.sweep.workers import LokyExecutor
 
 def serial(sweep, results, job=sweep_jobs.ok, **options) -> Summary:
     return run_sweep(sweep, results, job=job, executor=SerialExecutor(job), **options)
+
+
+def fails(world, _robot):
+    raise ModelError(world)
 
 
 def fails_for_seed_0(spec) -> RunRecord:
@@ -176,6 +182,18 @@ def test_kernels_are_warmed_once_and_only_if_there_is_work(tmp_path):
     serial(make_sweep(), tmp_path, warm_up=lambda: calls.append(1))
     serial(make_sweep(), tmp_path, warm_up=lambda: calls.append(1))
     assert calls == [1]
+
+
+def test_kernels_on_the_disk_are_not_compiled_again_but_a_missing_world_is_found(monkeypatch):
+    calls = []
+    monkeypatch.setattr("bns.sweep.job.warm", lambda: calls.append(1))
+    for there in (True, False):
+        monkeypatch.setattr("bns.engine.jit.compiled", lambda there=there: there)
+        prepare([RunSpec()])
+    assert calls == [1]
+    monkeypatch.setattr("bns.worlds.build_world", fails)
+    with pytest.raises(ModelError, match="substitute"):
+        prepare([RunSpec()])
 
 
 def test_real_runs_are_the_same_for_any_number_of_workers(tmp_path):

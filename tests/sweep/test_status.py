@@ -2,16 +2,22 @@
 
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import sweep_jobs
 from sweep_jobs import make_sweep
 
 from bns.errors import StoreError
+from bns.spec import RunSpec
+from bns.store.reader import load
 from bns.store.record import RunRecord
 from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import parse_sweep
+from bns.sweep.job import run_job
+from bns.sweep.pace import Pace
 from bns.sweep.plan import plan, work
 from bns.sweep.progress import SweepProgress, describe_rate
 from bns.sweep.report import status_table, summed_up
@@ -25,6 +31,16 @@ seeds: 2
 fixed: {{evaluations: 3}}
 grid: {{task: [circle, letter-s], population_size: [10, 11, 12]}}
 """
+
+
+def costing(spec, iteration_s, pattern_s, patterns, controller_s, evaluation_s) -> RunRecord:
+    """A run whose parts cost that much."""
+    there = patterns * np.arange(1, spec.evaluations + 1)
+    training = spec.training_iterations_per_evaluation * (iteration_s + pattern_s * there)
+    evolution = np.full(len(there), controller_s * spec.population_size * (spec.generations_per_evaluation + 1))
+    record = sweep_jobs.ok(spec, wall_s=float((training + evolution + evaluation_s).sum()))
+    costs = {"training_patterns": there, "training_cpu_s": training, "evolution_cpu_s": evolution}
+    return replace(record, tables={"evals": record.tables["evals"] | costs})
 
 
 def sweep_of(tmp_path, name: str = "demo"):
@@ -65,6 +81,16 @@ def test_status_of_a_sweep_half_done(tmp_path):
     assert sum(row.remaining for row in sweep_status(tmp_path)) == 7
 
 
+def test_tasks_and_sweeps_that_are_not_begun_are_listed(tmp_path):
+    serial(sweep_of(tmp_path), tmp_path, limit=1)
+    serial(sweep_of(tmp_path, "later"), tmp_path, limit=0)
+    begun, *others = sorted(sweep_status(tmp_path), key=lambda row: row.last is None)
+    assert (begun.sweep, begun.remaining, begun.done + begun.failed) == ("demo", 5, 1)
+    assert {(row.sweep, row.total, row.remaining, row.other) for row in others} == {("demo", 6, 6, 0), ("later", 6, 6, 0)}
+    lines = status_table([begun, *others]).splitlines()
+    assert all(line.split()[2:] == ["0", "6", "0", "0", "0", "-", "-"] for line in lines[2:])
+
+
 def test_runs_of_an_earlier_file_of_that_name_are_counted_apart(tmp_path):
     serial(sweep_of(tmp_path), tmp_path)
     text = "name: demo\nrobot: khepera\nseeds: 1\nfixed: {evaluations: 3}\ngrid: {population_size: [10, 12, 13]}"
@@ -79,6 +105,16 @@ def test_runs_of_an_earlier_file_of_that_name_are_counted_apart(tmp_path):
     lines = [line.split() for line in status_table(rows).splitlines()]
     assert lines[0][:7] == ["sweep", "task", "done", "of", "failed", "quarantined", "other"]
     assert [line[2:7] for line in lines[1:]] == [["1", "3", "1", "0", "4"], ["0", "0", "0", "0", "6"]]
+
+
+@pytest.mark.filterwarnings("ignore::bns.sweep.runner.SweepWarning")  # as they should: the files take turns
+def test_the_file_that_was_used_last_counts_even_if_it_was_used_before(tmp_path):
+    text = "name: demo\nrobot: khepera\nfixed: {evaluations: 3}\ngrid: {population_size: [10, 13]}"
+    first, second = sweep_of(tmp_path), parse_sweep(text, tmp_path / "y.yaml")
+    for file, total in ((first, 6), (second, 2), (first, 6), (second, 2)):
+        serial(file, tmp_path)
+        assert next(row.total for row in sweep_status(tmp_path) if row.task == "circle") == total
+    assert len(load(tmp_path, "specs")) == 2
 
 
 def test_a_longer_file_of_that_name_has_no_others(tmp_path):
@@ -124,16 +160,42 @@ def test_plan_without_results_times_one_short_run(tmp_path):
 
     def trial(spec):
         calls.append(spec)
-        return sweep_jobs.ok(spec, wall_s=0.5)
+        return costing(spec, iteration_s=1e-6, pattern_s=5e-8, patterns=6, controller_s=1e-6, evaluation_s=1e-3)
 
     sweep = make_sweep(combos=1, seeds=4, evaluations=100)
     found = plan(sweep, tmp_path / "none", 2, job=trial, warm_up=lambda: calls.append("warm"))
     assert [calls[0], calls[1].evaluations, len(calls)] == ["warm", 20, 2]
-    assert found.basis.startswith("one trial run of 20 evaluations (0.50 s)")
-    # Five times the evaluations, and more than that in training; four runs by two workers.
-    assert 5 * 0.5 * 2 < found.seconds_estimate < 25 * 0.5 * 2
+    assert found.basis == "the parts of one trial run of 20 evaluations (0.11 s)"
+    # Training on 6, 12, ... 600 patterns, evolution of 10 controllers, the rest; four runs by two workers.
+    assert found.seconds_estimate == pytest.approx(2 * (1000 * (100 * 1e-6 + 30300 * 5e-8) + 100 * (210e-6 + 1e-3)))
     assert found.bytes_estimate == 4 * 100 * 100
     assert not (tmp_path / "none").exists()
+
+
+PARTS = {"iteration_s": 2e-6, "pattern_s": 4e-8, "patterns": 7.0, "controller_s": 5e-7, "evaluation_s": 8e-4}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"evaluations": 100}, {"population_size": 50, "generations_per_evaluation": 500},
+     {"training_iterations_per_evaluation": 0}, {"training_iterations_per_evaluation": 9000, "evaluations": 3}],
+)  # fmt: skip
+def test_pace_of_one_run_foretells_runs_of_any_other_size(changes):
+    other = RunSpec(**changes)
+    wall_s = costing(other, **PARTS).run["wall_s"]
+    assert Pace.of(costing(RunSpec(evaluations=20), **PARTS)).seconds(other) == pytest.approx(wall_s)
+
+
+def test_pace_of_a_run_that_shares_its_core_is_stretched():
+    record = costing(RunSpec(evaluations=20), **PARTS)
+    shared = replace(record, run={**record.run, "wall_s": 3 * record.run["wall_s"]})
+    assert Pace.of(shared).seconds(RunSpec()) == pytest.approx(3 * Pace.of(record).seconds(RunSpec()))
+
+
+@pytest.mark.parametrize("changes", [{"evaluations": 1}, {"training_iterations_per_evaluation": 0}, {"population_size": 1}])
+def test_pace_can_be_taken_of_the_smallest_runs(changes):
+    spec = RunSpec(**{"evaluations": 2, "population_size": 8, **changes})
+    assert 0 < Pace.of(run_job(spec)).seconds(RunSpec()) < 600
 
 
 def test_plan_says_that_the_trial_failed(tmp_path):

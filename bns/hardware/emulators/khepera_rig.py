@@ -28,7 +28,7 @@ class EmulatedKheperaRig:
     def __init__(self, rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> None:
         self._clock = clock
         self._plug_in_at_s: float | None = None
-        self.body = DifferentialBody(load_model("khepera"), Key.of_run(seed, 0, "khepera", "emulated"), START)
+        self.body = DifferentialBody(load_model("khepera-world"), Key.of_run(seed, 0, "khepera", "emulated"), START)
         self.robot = KheperaEmulator(self.body, clock, firmware(*_FIRMWARE), plan.of("khepera"))
         self.robot.cut_line = self._cut
         self._line = PseudoTerminal(self.robot, folder, "khepera")

@@ -27,11 +27,12 @@ EFFECT = Effect(
     name="acceleration-limit",
     stage="wheel",
     parameters=(
-        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.2, 10.0), math.inf, "highest change of a wheel's speed"),
+        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest change of a wheel's speed"),
     ),
     equation="|dw/dt| <= a for each wheel",
     residuals="A start from rest falls short by half the squared speed over a: fast commands lose "
     "more than in proportion, and steps of speed are ramps.",
     lookalikes=("motor-lag", "command-delay"),
     apply=apply,
+    rank=60,
 )

@@ -29,11 +29,12 @@ def _late(speed: Array, step_s: Array, nodes_s: Array, delay_s: float) -> Array:
 EFFECT = Effect(
     name="command-delay",
     stage="wheel",
-    parameters=(Parameter("delay_s", "s", 0.0, 5.0, (0.0, 0.2), 0.0, "time from giving a command to its effect"),),
+    parameters=(Parameter("delay_s", "s", 0.0, 5.0, (0.0, 1.0), 0.0, "time from giving a command to its effect"),),
     equation="u'(t) = u(t - delay), 0 before the first command",
     residuals="Every command drives the end of the one before first: errors follow the change of "
     "speed between commands, and are the same for commands of any duration above the "
     "delay.",
     lookalikes=("motor-lag", "acceleration-limit"),
     apply=apply,
+    rank=70,
 )

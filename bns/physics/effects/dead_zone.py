@@ -22,10 +22,11 @@ def _shrunk(speed: Array, width: float) -> Array:
 EFFECT = Effect(
     name="dead-zone",
     stage="wheel",
-    parameters=(Parameter("width_m_s", "m/s", 0.0, 1.0, (0.0, 0.03), 0.0, "speed lost by a wheel to friction"),),
+    parameters=(Parameter("width_m_s", "m/s", 0.0, 1.0, (0.0, 0.1), 0.0, "speed lost by a wheel to friction"),),
     equation="w = sign(u)·max(|u| - d, 0) for each wheel",
     residuals="Slow commands fall short by a larger share than fast ones, in proportion to their "
     "duration; a very slow wheel stands still.",
     lookalikes=("speed-gain", "motor-lag"),
     apply=apply,
+    rank=40,
 )

@@ -17,11 +17,12 @@ EFFECT = Effect(
     name="floor-slope",
     stage="world",
     parameters=(
-        Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.02, 0.02), 0.0, "drift to the east"),
-        Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.02, 0.02), 0.0, "drift to the north"),
+        Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift to the east"),
+        Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift to the north"),
     ),
     equation="dx/dt += sx, dy/dt += sy while moving",
     residuals="Positions are off in one direction of the room, whatever the heading, in proportion to the time driven.",
     lookalikes=("tether-pull",),
     apply=apply,
+    rank=130,
 )

@@ -21,11 +21,12 @@ EFFECT = Effect(
     name="marker-offset",
     stage="measure",
     parameters=(
-        Parameter("forward_m", "m", -1.0, 1.0, (-0.05, 0.05), 0.0, "marker ahead of the axle's middle"),
-        Parameter("left_m", "m", -1.0, 1.0, (-0.05, 0.05), 0.0, "marker to the left of the axle's middle"),
+        Parameter("forward_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker ahead of the axle's middle"),
+        Parameter("left_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker to the left of the axle's middle"),
     ),
     equation="x' = x + f·cos(theta) - s·sin(theta), y' = y + f·sin(theta) + s·cos(theta)",
     residuals="Turns on the spot move the robot on a circle; straight commands fit.",
     lookalikes=("side-slip", "turn-slip"),
     apply=apply,
+    rank=160,
 )

@@ -21,10 +21,11 @@ def apply(wheels: Wheels, tau_s: float) -> Wheels:
 EFFECT = Effect(
     name="motor-lag",
     stage="wheel",
-    parameters=(Parameter("tau_s", "s", 0.0, 5.0, (0.0, 0.3), 0.0, "time constant of the wheel's speed control"),),
+    parameters=(Parameter("tau_s", "s", 0.0, 5.0, (0.0, 1.0), 0.0, "time constant of the wheel's speed control"),),
     equation="dw/dt = (u - w)/tau for each wheel",
     residuals="The first command falls short by speed times tau, whatever its duration; later "
     "commands keep a rest of the command before, and short ones suffer most.",
     lookalikes=("command-delay", "acceleration-limit", "speed-gain"),
     apply=apply,
+    rank=80,
 )

@@ -18,11 +18,12 @@ EFFECT = Effect(
     stage="wheel",
     parameters=(
         Parameter(
-            "gain", "1", 0.2, 5.0, (0.9, 1.1), 1.0, "driven over commanded speed: true over assumed wheel diameter"
+            "gain", "1", 0.2, 5.0, (0.5, 1.5), 1.0, "driven over commanded speed: true over assumed wheel diameter"
         ),
     ),
     equation="l' = g·l, r' = g·r",
     residuals="Distances and turns are wrong by the same share in every command, whatever its speed and duration.",
     lookalikes=("motor-lag", "dead-zone", "turn-slip"),
     apply=apply,
+    rank=10,
 )

@@ -23,9 +23,10 @@ def apply(wheels: Wheels, max_m_s: float) -> Wheels:
 EFFECT = Effect(
     name="speed-limit",
     stage="wheel",
-    parameters=(Parameter("max_m_s", "m/s", 1e-3, math.inf, (0.1, 2.0), math.inf, "highest speed of a wheel"),),
+    parameters=(Parameter("max_m_s", "m/s", 1e-3, math.inf, (0.02, 5.0), math.inf, "highest speed of a wheel"),),
     equation="w = min(max(u, -limit), limit) for each wheel",
     residuals="Fast commands fall short, slow ones fit; curves of two fast wheels come out straighter.",
     lookalikes=("turn-slip", "acceleration-limit"),
     apply=apply,
+    rank=50,
 )

@@ -22,12 +22,13 @@ EFFECT = Effect(
     name="tether-pull",
     stage="world",
     parameters=(
-        Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.05), 0.0, "velocity per metre from the anchor"),
-        Parameter("anchor_x_m", "m", -100.0, 100.0, (-2.0, 2.0), 0.0, "where the cable is fixed"),
-        Parameter("anchor_y_m", "m", -100.0, 100.0, (-2.0, 2.0), 0.0, "where the cable is fixed"),
+        Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.5), 0.0, "velocity per metre from the anchor"),
+        Parameter("anchor_x_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "where the cable is fixed"),
+        Parameter("anchor_y_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "where the cable is fixed"),
     ),
     equation="dx/dt += k·(ax - x), dy/dt += k·(ay - y) while moving",
     residuals="Positions are off towards one point of the room, more so the farther the robot is from it.",
     lookalikes=("floor-slope",),
     apply=apply,
+    rank=140,
 )

@@ -19,9 +19,10 @@ def apply(body: Body, slip_s: float) -> Body:
 EFFECT = Effect(
     name="turn-slip",
     stage="body",
-    parameters=(Parameter("slip_s", "s/rad", 0.0, 1.0, (0.0, 0.05), 0.0, "share of speed lost per rad/s of turning"),),
+    parameters=(Parameter("slip_s", "s/rad", 0.0, 1.0, (0.0, 0.4), 0.0, "share of speed lost per rad/s of turning"),),
     equation="v' = v·max(1 - k·|omega|, 0)",
     residuals="Arcs are too short the sharper they are, left and right alike; straight commands and headings fit.",
     lookalikes=("speed-gain", "wheelbase", "side-slip"),
     apply=apply,
+    rank=100,
 )

@@ -22,7 +22,7 @@ EFFECT = Effect(
             "1",
             0.2,
             5.0,
-            (0.95, 1.2),
+            (0.7, 1.5),
             1.0,
             "effective over nominal distance of the wheels; soft tyres lie above 1",
         ),
@@ -31,4 +31,5 @@ EFFECT = Effect(
     residuals="Every turn is too small or too large by the same share, left and right alike; straight commands fit.",
     lookalikes=("turn-slip", "wheel-mismatch"),
     apply=apply,
+    rank=90,
 )

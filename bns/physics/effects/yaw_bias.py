@@ -16,9 +16,10 @@ def apply(body: Body, rate_rad_s: float) -> Body:
 EFFECT = Effect(
     name="yaw-bias",
     stage="body",
-    parameters=(Parameter("rate_rad_s", "rad/s", -2.0, 2.0, (-0.1, 0.1), 0.0, "turning rate added, left positive"),),
+    parameters=(Parameter("rate_rad_s", "rad/s", -2.0, 2.0, (-0.5, 0.5), 0.0, "turning rate added, left positive"),),
     equation="omega' = omega + beta while moving",
     residuals="The heading drifts to one side in proportion to the time driven, whatever the speed; also in reverse.",
     lookalikes=("wheel-mismatch",),
     apply=apply,
+    rank=120,
 )

@@ -1,0 +1,124 @@
+"""A dot a combination against the diversity of its populations: what figures 4.11, 4.12 and 5.26 to 5.28 share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.coverage import coverage
+from analysis.drawn import Drawn
+from analysis.outcomes import FEWEST, at_the_end
+from analysis.selection import Selection
+from analysis.store import BEGIN, NoDataError, Store, remembered
+from analysis.words import SHORT, TITLES, counted, each, valued
+from bns.plotting import lettered, note, ordered_styles, panels, style
+
+CROWD = 60
+"""From this many dots a panel on, their intervals are drawn faintly."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel: the rows of one task with columns diversity, y, low and high."""
+
+    title: str
+    rows: pd.DataFrame
+
+
+@remembered
+def combinations(store: Store, chosen: Selection) -> tuple[pd.DataFrame, int]:
+    """Every combination with enough runs at its last evaluation, and how many have fewer.
+
+    Raises:
+        NoDataError: none has enough yet.
+    """
+    found = at_the_end(store, chosen)
+    rows = found[found.runs >= FEWEST]
+    if rows.empty:
+        raise NoDataError(
+            f"no combination has {FEWEST} finished runs yet (the most is {found.runs.max()}); "
+            f"run {BEGIN}, which goes on where it stopped"
+        )
+    return rows, len(found) - len(rows)
+
+
+def cloud(shown: Sequence[Panel], parameter: str, label: str) -> tuple[Figure, Sequence[Axes]]:
+    """Figure of the panels, coloured by ``parameter``, with one legend for all."""
+    values = sorted(set().union(*(panel.rows[parameter] for panel in shown)))
+    looks = dict(zip(values, ordered_styles(len(values)), strict=True))
+    figure, axes = panels(len(shown), 3.0)
+    for number, (panel, ax) in enumerate(zip(shown, axes[:, 0], strict=True)):
+        _dots(ax, panel.rows, parameter, looks)
+        ax.set_title(lettered(number, len(axes), panel.title))
+        ax.set(xlabel="diversity of the population", ylabel=label)
+    _legend(figure, axes[:, 0], parameter, values)
+    return figure, list(axes[:, 0])
+
+
+def _dots(ax: Axes, rows: pd.DataFrame, parameter: str, looks: dict[float, dict[str, str]]) -> None:
+    for value, dots in rows.groupby(parameter):
+        look = {"color": looks[value]["color"], "zorder": 2 + len(looks)}
+        faint = 0.7 if len(rows) < CROWD else 0.2
+        ax.vlines(dots.diversity, dots.low, dots.high, linewidth=1.0, color=look["color"], alpha=faint)
+        ax.plot(
+            dots.diversity,
+            dots.y,
+            marker=looks[value]["marker"],
+            linestyle="none",
+            markeredgecolor="white",
+            markeredgewidth=0.3,
+            label=valued(parameter, value),
+            **look,
+        )
+    if rows.diversity.notna().any() and rows.diversity.max() > 0:
+        ax.set_xlim(0, 1.08 * rows.diversity.max())
+
+
+def _legend(figure: Figure, axes: Sequence[Axes], parameter: str, values: Sequence[float]) -> None:
+    named = {}
+    for ax in axes:
+        named.update(dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True)))
+    labels = [valued(parameter, value) for value in values]
+    figure.legend(
+        [named[label] for label in labels],
+        labels,
+        loc="outside upper center",
+        ncols=len(labels),
+        title=TITLES[parameter],
+        columnspacing=1.0,
+        handletextpad=0.1,
+    )
+
+
+@style()
+def described(
+    store: Store,
+    chosen: Selection,
+    figure: Figure,
+    rows: pd.DataFrame,
+    *,
+    name: str,
+    title: str,
+    what: str,
+    intervals: str,
+    thin: int,
+    see: str = "",
+) -> Drawn:
+    """The figure with its note and caption; ``what`` begins the caption."""
+    said, n = coverage(store, chosen.sweeps, chosen.n), int(rows.runs.sum())
+    thinned = (f"{counted(thin, 'combination')} with fewer than {FEWEST} runs left out",) if thin else ()
+    runs = each(rows.runs.min(), rows.runs.max())
+    note(
+        figure,
+        "; ".join((f"{counted(len(rows), 'dot')} of {runs} each", *said.sentences, *thinned, f"bars: {intervals}")) + ".",
+    )
+    shows = (
+        f"{what}; one dot a task and combination of {', '.join(SHORT.values())} ({runs} each, n = {n:,} runs of "
+        f"{', '.join(chosen.sweeps)})."
+    )
+    missing = (*said.missing, *thinned, *chosen.left_out)
+    return Drawn(f"{name}-{chosen.robot}", title, figure, shows, n, chosen.sweeps, missing, see=see, data=rows)

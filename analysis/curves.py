@@ -1,0 +1,93 @@
+"""Success against evaluations, a curve a value of one parameter: what figures 4.7 to 4.10 and 5.22 to 5.25 share."""
+
+from __future__ import annotations
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from analysis.coverage import coverage
+from analysis.drawn import Drawn
+from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
+from analysis.outcomes import FEWEST, by_value, criterion
+from analysis.selection import Selection, selections
+from analysis.store import Store
+from analysis.words import TITLES, counted, task_title, valued
+from bns.plotting import lettered, note, ordered_styles, panels, style
+
+
+def success_by(store: Store, parameter: str, name: str) -> list[Drawn]:
+    """One figure a robot; NoDataError where no sweep compares values of ``parameter``."""
+    return [_draw(store, chosen, parameter, name) for chosen in selections(store, parameter)]
+
+
+@style()
+def _draw(store: Store, chosen: Selection, parameter: str, name: str) -> Drawn:
+    rows, thin = thick_enough(by_value(store, chosen, parameter))
+    rows = rows.assign(**dict(zip(("low", "high"), wilson(rows.successes, rows.runs), strict=True)))
+    tasks, n = [task for task in chosen.tasks if task in set(rows.task)], chosen.n - thin
+    looks = dict(zip(sorted(rows.value.unique()), ordered_styles(rows.value.nunique()), strict=True))
+    figure, axes = panels(len(tasks), 3.6, rows_each=2, ratios=(3, 1))
+    for number, (task, (ax, below)) in enumerate(zip(tasks, axes, strict=True)):
+        _panel(ax, rows[rows.task == task], looks, parameter)
+        ax.set_title(lettered(number, len(axes), task_title(chosen.robot, task)))
+        below.set_axis_off()
+        below.legend(*ax.get_legend_handles_labels(), loc="upper center", title=TITLES[parameter])
+    axes[0, 0].set_ylabel("successful runs (%)")
+    said, what = coverage(store, chosen.sweeps, n), criterion(store, chosen)
+    too_few = (f"{counted(thin, 'run')} in curves of fewer than {FEWEST} not drawn",) if thin else ()
+    note(figure, "; ".join((f"Success: {what}", *said.sentences, *too_few, f"bands: {INTERVALS}")) + ".")
+    shows = (
+        f"Share of runs whose fittest controller, driven in the world after each evaluation, {what}, by {TITLES[parameter]}; "
+        f"all other parameters pooled. n = {n:,} runs of {', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals "
+        f"({INDEPENDENCE})."
+    )
+    return Drawn(
+        f"{name}-{chosen.robot}",
+        f"Success by {TITLES[parameter]}",
+        figure,
+        shows,
+        n,
+        chosen.sweeps,
+        (*said.missing, *too_few, *chosen.left_out),
+        see=" ".join(filter(None, (_largest_gap(rows[rows.task == task], chosen, parameter) for task in tasks))),
+        data=rows.rename(columns={"value": parameter}),
+    )
+
+
+def thick_enough(rows: pd.DataFrame) -> tuple[pd.DataFrame, int]:
+    """The curves to draw, and how many runs stand in the others."""
+    runs = rows.groupby(["task", "value"]).runs.transform("max")
+    thick = runs >= FEWEST if (runs >= FEWEST).any() else runs > 0
+    left_out = rows[~thick].groupby(["task", "value"]).runs.max().sum()
+    return rows[thick], int(left_out)
+
+
+def _panel(ax: Axes, rows: pd.DataFrame, looks: dict[float, dict[str, str]], parameter: str) -> None:
+    for value, curve in rows.groupby("value"):
+        every = max(1, len(curve) // 6)
+        ax.fill_between(
+            curve.evaluation, 100 * curve.low, 100 * curve.high, color=looks[value]["color"], alpha=0.18, linewidth=0
+        )
+        ax.plot(
+            curve.evaluation,
+            100 * curve.successes / curve.runs,
+            **looks[value],
+            markevery=(every // 2, every),
+            label=f"{valued(parameter, value)} (n = {curve.runs.max():,})",
+        )
+    ax.set(ylim=(-2, 102), xlabel="evaluation in the world", xlim=(0, rows.evaluation.max() + 1))
+    ax.xaxis.set_major_locator(MaxNLocator(6, integer=True, steps=[1, 2, 5, 10]))
+
+
+def _largest_gap(rows: pd.DataFrame, chosen: Selection, parameter: str) -> str:
+    """Where the curves of one task lie furthest apart, in words; "" for a single curve."""
+    shares = (rows.successes / rows.runs).groupby([rows.evaluation, rows.value]).first().unstack()
+    if shares.shape[1] < 2:
+        return ""
+    gaps = shares.max(axis=1) - shares.min(axis=1)
+    at = shares.loc[gaps.idxmax()]
+    return (
+        f"{task_title(chosen.robot, rows.task.iloc[0])}: widest at evaluation {gaps.idxmax()}, "
+        f"{100 * gaps.max():.0f} points between {valued(parameter, at.idxmax())} and {valued(parameter, at.idxmin())}."
+    )

@@ -1,0 +1,74 @@
+"""What the source found (sections 4.6 and 5.9) beside what these results say: agrees, differs, undecided yet."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import pandas as pd
+
+from analysis import checks
+from analysis.coverage import coverage
+from analysis.drawn import Drawn
+from analysis.selection import Selection, selections
+from analysis.source import source
+from analysis.store import NoDataError, Store
+from analysis.verdicts import AGREES, DIFFERS, UNDECIDED, Checked
+from analysis.words import task_number, task_title
+
+NAME = "findings"
+PAPER = "sections 4.6 and 5.9"
+
+
+def draw(store: Store) -> list[Drawn]:
+    found = [(chosen, table) for chosen in selections(store) if not (table := checked(store, chosen)).empty]
+    if not found:
+        raise NoDataError("no finished run is of a robot and task of the source; run make sweep-khepera BUDGET=10m")
+    return [_drawn(store, chosen, table) for chosen, table in found]
+
+
+def checked(store: Store, chosen: Selection) -> pd.DataFrame:
+    """One row a finding and task: the source's words and ours, the verdict, where it stands."""
+    numbers = {task_number(chosen.robot, task): task for task in chosen.tasks}
+    made = []
+    for finding in (one for one in source()["findings"] if one["robot"] == chosen.robot):
+        for number, arguments in _each_task(finding):
+            if number in numbers:
+                result = _check(store, chosen, finding["check"], numbers[number], arguments)
+                title = f"{number}, {task_title(chosen.robot, numbers[number])}"
+                row = {"task": title, "the source": result.claim, "these results": result.ours, "verdict": result.verdict}
+                made.append(row | {"where": finding["where"]})
+    return pd.DataFrame(made)
+
+
+def _each_task(finding: dict[str, Any]) -> list[tuple[int, dict[str, Any]]]:
+    """Task numbers of a finding with the arguments of its check: what depends on the task is a mapping in source.yaml."""
+    given = {name: value for name, value in finding.items() if name not in ("robot", "check", "where", "tasks")}
+    by_task = [name for name, value in given.items() if isinstance(value, dict)]
+    numbers = list(given[by_task[0]]) if by_task else finding["tasks"]
+    return [(n, {name: value[n] if name in by_task else value for name, value in given.items()}) for n in numbers]
+
+
+def _check(store: Store, chosen: Selection, name: str, task: str, arguments: dict[str, Any]) -> Checked:
+    try:
+        result: Checked = getattr(checks, name)(store, chosen, task, **arguments)
+    except NoDataError as reason:
+        said = ", ".join(f"{key} {value}" for key, value in arguments.items())
+        return Checked(f"{name.replace('_', ' ')} {said}".strip(), str(reason).partition(";")[0], UNDECIDED)
+    return result
+
+
+def _drawn(store: Store, chosen: Selection, table: pd.DataFrame) -> Drawn:
+    said, counts = coverage(store, chosen.sweeps, chosen.n), Counter(table.verdict)
+    see = f"{counts[AGREES]} agree, {counts[DIFFERS]} differ, {counts[UNDECIDED]} are undecided"
+    shows = (
+        f"Each finding of the source that a number can be put to, beside the same measure of these results with its 95 % "
+        f"interval (bootstrap over seeds, or Wilson). Agrees: the interval lies within 5, or a fifth of the source's value, of "
+        f"it; differs: it lies outside; undecided: neither yet. Orders agree if they hold in 95 % of the bootstrap samples, and "
+        f"differ if in 5 %. The source's numbers come from 500 combinations and 30 runs each; these from n = {chosen.n:,} runs "
+        f"of {', '.join(chosen.sweeps)}."
+    )
+    return Drawn(
+        f"{NAME}-{chosen.robot}", "What the source found, and these results", None, shows, chosen.n, chosen.sweeps,
+        (*said.missing, *chosen.left_out), see=f"{see}.", data=table, table=table,
+    )  # fmt: skip

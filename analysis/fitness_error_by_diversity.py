@@ -1,0 +1,55 @@
+"""Figures 4.11 (Khepera) and 5.26 (snake): how wrong the networks are about the fittest controller, against diversity."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from analysis.clouds import Panel, cloud, combinations, described
+from analysis.drawn import Drawn
+from analysis.intervals import mean_interval
+from analysis.selection import Selection, selections
+from analysis.store import Store
+from analysis.words import TITLES, task_title
+from bns.plotting import style
+
+NAME = "fitness-error-by-diversity"
+PAPER = "figures 4.11 and 5.26"
+COLOUR = "population_size"
+
+
+def draw(store: Store) -> list[Drawn]:
+    return [_draw(store, chosen) for chosen in selections(store)]
+
+
+@style()
+def _draw(store: Store, chosen: Selection) -> Drawn:
+    rows, thin = combinations(store, chosen)
+    low, high = mean_interval(rows.fitness_error, rows.fitness_error_sd, rows.runs)
+    rows = rows.assign(y=rows.fitness_error, low=np.maximum(low, 0), high=high)
+    tasks = [task for task in chosen.tasks if task in set(rows.task)]
+    shown = [Panel(task_title(chosen.robot, task), rows[rows.task == task]) for task in tasks]
+    figure, axes = cloud(shown, COLOUR, "mean fitness error (1/m)")
+    for ax in axes:
+        ax.set_ylim(bottom=0)
+    what = (
+        "Mean absolute difference between the fitness of the fittest controller in simulation and in the world at the last "
+        f"evaluation, against the mean diversity of the populations then, by {TITLES[COLOUR]}; bars are Student's 95 % "
+        "intervals of the mean"
+    )
+    return described(
+        store, chosen, figure, rows, name=NAME, title="Fitness error against diversity", what=what,
+        intervals="Student's 95 % intervals of the mean", thin=thin, see=_in_words(chosen, rows),
+    )  # fmt: skip
+
+
+def _in_words(chosen: Selection, rows: pd.DataFrame) -> str:
+    """Rank correlation of error and diversity over the combinations of each task."""
+    from scipy.stats import spearmanr  # noqa: PLC0415  # slow to load
+
+    said = []
+    for task, own in rows.dropna(subset=["diversity", "fitness_error"]).groupby("task"):
+        if len(own) > 2 and own.diversity.nunique() > 1 and own.fitness_error.nunique() > 1:
+            rank = spearmanr(own.diversity, own.fitness_error).statistic
+            said.append(f"{task_title(chosen.robot, task)}: rank correlation {rank:+.2f} over {len(own)} combinations.")
+    return " ".join(said)

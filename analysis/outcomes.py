@@ -1,0 +1,76 @@
+"""The evaluations of comparable runs in one small table in memory, which nearly all figures are counted from."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import pandas as pd
+
+from analysis.selection import Selection
+from analysis.store import Store, remembered
+from analysis.words import CELL
+from bns.store.schema import NEAR_CM
+
+NEAR = tuple(f"success_{cm}cm" for cm in NEAR_CM)
+FEWEST = 5
+"""Runs behind a curve or dot; thinner ones jump between 0 and 100 % and are left out."""
+_KEPT = ("success", *NEAR, "diversity", "fitness_error", "fitness_world")
+
+
+def outcomes(store: Store, chosen: Selection) -> str:
+    """Name of a table with a row an evaluation: task, the four parameters, seed, root_seed, evaluation, whether it is the
+    run's last, successes of the fittest controller, diversity, fitness_error, fitness_world."""
+    digest = hashlib.sha256(chosen.sql.encode()).hexdigest()[:12]
+    return store.keep(
+        f"outcomes_{digest}",
+        f"""SELECT task, {", ".join(CELL)}, seed, root_seed, evaluation, evaluation = evaluations AS last,
+        {", ".join(_KEPT)} FROM evals JOIN ({chosen.sql}) AS chosen USING (run_id, sweep)""",
+    )
+
+
+@remembered
+def radii_cm(store: Store, chosen: Selection) -> tuple[int, ...]:
+    """Goal radii that successes of these runs are known at; none where a task has goal regions instead of points."""
+    known = store.query(f"SELECT {', '.join(f'count({name}) AS {name}' for name in NEAR)} FROM {outcomes(store, chosen)}")
+    return tuple(cm for cm, name in zip(NEAR_CM, NEAR, strict=True) if known[name][0])
+
+
+def criterion(store: Store, chosen: Selection) -> str:
+    """What ``success`` means for these runs: ``visits all goals within 7 cm``."""
+    near = radii_cm(store, chosen)
+    return f"visits all goals within {near[0]} cm" if near else "visits all goals"
+
+
+def by_value(store: Store, chosen: Selection, parameter: str) -> pd.DataFrame:
+    """Runs and successes of each task, value of ``parameter`` and evaluation."""
+    return store.query(f"""
+        SELECT task, {parameter} AS value, evaluation, count(success) AS runs, count(*) FILTER (success) AS successes
+        FROM {outcomes(store, chosen)} WHERE success IS NOT NULL GROUP BY ALL ORDER BY ALL""")
+
+
+def at_the_end(store: Store, chosen: Selection) -> pd.DataFrame:
+    """Of each task and combination at its last evaluation: runs, successes, means of diversity, error and fitness."""
+    counts = ", ".join(f"count(*) FILTER ({name}) AS {name}" for name in ("success", *NEAR))
+    return store.query(f"""
+        SELECT task, {", ".join(CELL)}, count(*) AS runs, {counts},
+               {_mean("diversity")}, {_mean("fitness_error")}, {_spread("fitness_error")}, {_mean("fitness_world")}
+        FROM {outcomes(store, chosen)} WHERE last GROUP BY ALL ORDER BY ALL""")
+
+
+def by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str = "true") -> pd.DataFrame:
+    """Runs, successes and summed diversity of each seed and group of ``columns``: what a bootstrap over seeds draws from."""
+    return store.query(f"""
+        SELECT task, {"".join(f"{name}, " for name in columns)}root_seed, seed, count(success) AS runs,
+               count(*) FILTER (success) AS successes, sum(success_20cm::INT) AS successes_20cm,
+               sum(diversity) FILTER (isfinite(diversity)) AS diversity,
+               count(*) FILTER (isfinite(diversity)) AS diversities
+        FROM {outcomes(store, chosen)} WHERE {where} GROUP BY ALL ORDER BY ALL""")
+
+
+def _mean(name: str) -> str:
+    return f"avg({name}) FILTER (isfinite({name})) AS {name}"
+
+
+def _spread(name: str) -> str:
+    return f"stddev_samp({name}) FILTER (isfinite({name})) AS {name}_sd"

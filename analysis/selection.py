@@ -1,0 +1,123 @@
+"""Which runs may stand in one curve: finished ones of sweeps that compare, all at one setting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from analysis.store import BEGIN, NoDataError, Store, among, remembered
+from analysis.words import CELL, TITLES, counted, task_order
+from bns.sweep.confirm import confirmed_name
+
+CONFIRMING = confirmed_name("")
+"""Ending of the sweeps that rerun the best combinations of another on fresh seeds: they confirm, and compare nothing."""
+SETTING = (
+    *("world", "world_digest", "training_algorithm", "evaluations", "min_commands", "max_commands"),
+    *("generations_per_evaluation", "training_iterations_per_evaluation", "engine"),
+)
+"""What must agree before runs of a robot and task are counted together: columns of `RUNS`."""
+RUNS = """(SELECT *, regexp_extract(spec, '"engine_version":([0-9]+)', 1) AS engine FROM runs)"""
+"""The runs with the version of the engine, whose numbers differ from those of another, out of their specs."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Runs of one robot that may be counted together: all finished ones of ``sweeps`` at one setting a task."""
+
+    robot: str
+    tasks: tuple[str, ...]
+    sweeps: tuple[str, ...]
+    setting: str
+    n: int
+    left_out: tuple[str, ...]
+
+    @property
+    def sql(self) -> str:
+        """SELECT of run_id, sweep and number of evaluations. The same run in two sweeps counts once."""
+        return self.of(self.sweeps)
+
+    def of(self, sweeps: Sequence[str]) -> str:
+        """The same of other sweeps, at the same setting."""
+        return (
+            f"SELECT run_id, min(sweep) AS sweep, any_value(evaluations) AS evaluations FROM {RUNS} "
+            f"WHERE status = 'ok' AND {among('sweep', sweeps)} AND ({self.setting}) GROUP BY run_id"
+        )
+
+
+@remembered
+def selections(store: Store, parameter: str | None = None) -> list[Selection]:
+    """One selection a robot, of the sweeps that compare ``parameter`` (by default any of the source's four).
+
+    Raises:
+        NoDataError: there is none; the message says why and what would feed it.
+    """
+    sweeps = comparing(store, parameter)
+    groups = store.query(f"""
+        SELECT robot, task, {", ".join(SETTING)}, count(DISTINCT run_id) AS n FROM {RUNS}
+        WHERE status = 'ok' AND {among("sweep", sweeps)} GROUP BY ALL
+        ORDER BY n DESC, robot, task, {", ".join(SETTING)}""")
+    if groups.empty:
+        raise NoDataError(f"{_why_none(store, sweeps, parameter)}; run {BEGIN}")
+    return [_selection(store, robot, own, sweeps) for robot, own in groups.groupby("robot")]
+
+
+def comparing(store: Store, parameter: str | None = None) -> list[str]:
+    """Sweeps that compare values of ``parameter`` (of any of the four), by their plan or by their runs."""
+    names = CELL if parameter is None else (parameter,)
+    several = " OR ".join(f"count(DISTINCT {name}) > 1" for name in names)
+    rows = store.query(f"SELECT sweep, {several} AS several FROM runs GROUP BY sweep ORDER BY sweep")
+    return [
+        row.sweep
+        for row in rows.itertuples()
+        if not row.sweep.endswith(CONFIRMING)
+        and (row.several or (row.sweep in store.plans and store.plans[row.sweep].varied & {*names}))
+    ]
+
+
+def _selection(store: Store, robot: str, groups: pd.DataFrame, sweeps: Sequence[str]) -> Selection:
+    chosen = groups.drop_duplicates("task")
+    setting = " OR ".join(f"({_equals(row)})" for row in chosen[["robot", "task", *SETTING]].to_dict("records"))
+    left_out = tuple(
+        f"{counted(row.n, 'run')} of {row.task} with {row.evaluations} evaluations, "
+        f"{row.generations_per_evaluation} generations and {row.training_iterations_per_evaluation} "
+        "iterations each, or of another world, engine or other bounds, left out"
+        for row in groups.drop(chosen.index).itertuples()
+    )
+    tasks = tuple(sorted(chosen.task, key=lambda task: task_order(robot, task)))
+    rows = store.query(f"SELECT DISTINCT sweep FROM {RUNS} WHERE {among('sweep', sweeps)} AND status = 'ok' AND ({setting})")
+    own = tuple(sweep for sweep in sweeps if sweep in set(rows.sweep))
+    return Selection(robot, tasks, own, setting, int(chosen.n.sum()), left_out)
+
+
+def _why_none(store: Store, sweeps: Sequence[str], parameter: str | None) -> str:
+    """Why none of ``sweeps``, or of all if there are none to choose from, has a run to count."""
+    among_these = sweeps or store.query("SELECT DISTINCT sweep FROM runs").sweep.tolist()
+    done, failed = finished(store, among_these), failures(store, among_these)
+    if not done:
+        return f"{counted(failed, 'run')} failed and none finished"
+    but = f", {failed:,} failed" if failed else ""
+    what = f"{TITLES[parameter]}s" if parameter else "combinations of parameters"
+    return f"no sweep compares {what} ({counted(done, 'finished run')}{but})"
+
+
+def _equals(values: dict[str, Any]) -> str:
+    return " AND ".join(
+        among(name, [value]) if isinstance(value, str) else f"{name} = {value}" for name, value in values.items()
+    )
+
+
+def finished(store: Store, sweeps: Sequence[str]) -> int:
+    """How many different runs of ``sweeps`` are finished."""
+    rows = store.query(f"SELECT count(DISTINCT run_id) AS n FROM runs WHERE status = 'ok' AND {among('sweep', sweeps)}")
+    return int(rows.n[0])
+
+
+def failures(store: Store, sweeps: Sequence[str]) -> int:
+    """How many runs of ``sweeps`` broke and were not carried out again with success."""
+    return int(
+        store.query(f"""SELECT count(*) AS n FROM (SELECT run_id FROM runs WHERE {among("sweep", sweeps)}
+        GROUP BY run_id HAVING count(*) FILTER (status = 'ok') = 0)""").n[0]
+    )

@@ -1,0 +1,119 @@
+"""The results as the figures see them: one snapshot, asked in SQL, and the plans of its sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property, wraps
+from pathlib import Path
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+import duckdb
+import pandas as pd
+
+from analysis.words import CELL
+from bns import store as results_store
+from bns.errors import BnsError, SpecError, StoreError
+from bns.spec import FIELDS
+from bns.sweep.grid import parse_sweep
+
+BEGIN = "make sweep-khepera BUDGET=10m"
+_TRIES = 5
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class NoDataError(BnsError):
+    """The store has nothing for a figure; the message says what would feed it."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the newest file of a sweep asks for; ``cells`` and ``varied`` are empty if it cannot be read."""
+
+    runs: int
+    cells: int
+    varied: frozenset[str]
+    """Those of the compared parameters that take more than one value."""
+
+
+class Store:
+    """The results in one folder as they are now: all figures of one call show the same runs.
+
+    Raises:
+        StoreError: there is no run at all; the message says what to run.
+    """
+
+    def __init__(self, results: Path | str) -> None:
+        self.results = Path(results)
+        self._tables: dict[str, str] = {}
+        self.memory: dict[tuple[Any, ...], Any] = {}
+        written = any((self.results / name).is_dir() for name in ("runs", "journal"))
+        if not written or not self.query("SELECT count(*) AS n FROM runs").n[0]:
+            raise StoreError(
+                f"there are no runs in {self.results} to draw. Make some with: {BEGIN}; or name "
+                "another folder with --results DIR."
+            )
+
+    def query(self, sql: str) -> pd.DataFrame:
+        """Rows of a SELECT over the tables of the store and those of `keep`."""
+        for _ in range(_TRIES):
+            try:
+                return self._connection.execute(sql).df()
+            except duckdb.IOException as error:  # a compaction has replaced files: the new ones hold the same rows
+                fault = error
+                self.__dict__.pop("_connection", None)
+        raise StoreError(f"cannot read {self.results}: {fault}. Repeat the command in a moment.")
+
+    def keep(self, name: str, sql: str) -> str:
+        """Hold the rows of a SELECT in memory as table ``name``, once for all figures; the name."""
+        if name not in self._tables:
+            self.query(f"CREATE OR REPLACE TABLE {name} AS {sql}")
+            self._tables[name] = sql
+        return name
+
+    @cached_property
+    def _connection(self) -> duckdb.DuckDBPyConnection:
+        connection = results_store.connect(self.results)
+        for name, sql in self._tables.items():
+            connection.execute(f"CREATE TABLE {name} AS {sql}")
+        return connection
+
+    @cached_property
+    def plans(self) -> dict[str, Plan]:
+        """By sweep, what its newest file asks for; sweeps that were written without one are absent."""
+        newest = self.query(
+            "SELECT sweep, arg_max(text, written_at) AS text, arg_max(runs, written_at) AS runs "
+            "FROM specs GROUP BY sweep ORDER BY sweep"
+        )
+        return {row.sweep: _plan(row.text, row.runs) for row in newest.itertuples()}
+
+
+def _plan(text: str, runs: float) -> Plan:
+    try:
+        sweep = parse_sweep(text, Path("the stored sweep file"))
+    except SpecError:  # written for another version of bns: its size is known all the same
+        return Plan(0 if pd.isna(runs) else int(runs), 0, frozenset())
+    varied = {
+        name for name in CELL if len({float(combo.get(name, FIELDS[name].default)) for combo in sweep.combos}) > 1
+    }
+    return Plan(sweep.total, len(sweep.combos), frozenset(varied))
+
+
+def remembered(work: Callable[Concatenate[Store, P], R]) -> Callable[Concatenate[Store, P], R]:
+    """Let what ``work`` finds in a store be found once for all figures; its other arguments must be hashable."""
+
+    @wraps(work)
+    def find(store: Store, *arguments: P.args, **named: P.kwargs) -> R:
+        key = (work, arguments, tuple(sorted(named.items())))
+        if key not in store.memory:
+            store.memory[key] = work(store, *arguments, **named)
+        return store.memory[key]
+
+    return find
+
+
+def among(column: str, values: Iterable[str]) -> str:
+    """SQL: ``column`` is one of ``values``; of none, if there are none."""
+    listed = ", ".join("'" + value.replace("'", "''") + "'" for value in values)
+    return f"{column} IN ({listed})" if listed else "false"

@@ -1,0 +1,38 @@
+"""Figure 5.28: success against diversity of the combinations with the largest population alone."""
+
+from __future__ import annotations
+
+from analysis.clouds import cloud, combinations, described
+from analysis.drawn import Drawn
+from analysis.intervals import INDEPENDENCE, INTERVALS
+from analysis.outcomes import criterion
+from analysis.selection import Selection, selections
+from analysis.store import Store
+from analysis.success_by_diversity import COLOUR, in_words, success_panels
+from analysis.words import TITLES
+from bns.plotting import style
+
+NAME = "success-by-diversity-largest-population"
+PAPER = "figure 5.28"
+
+
+def draw(store: Store) -> list[Drawn]:
+    return [_draw(store, chosen) for chosen in selections(store, "population_size")]
+
+
+@style()
+def _draw(store: Store, chosen: Selection) -> Drawn:
+    found, _ = combinations(store, chosen)
+    largest = found.population_size.max()
+    rows = found[found.population_size == largest]
+    figure, axes = cloud(success_panels(store, chosen, rows), COLOUR, "successful runs (%)")
+    for ax in axes:
+        ax.set_ylim(-2, 102)
+    what = (
+        f"Share of runs whose fittest controller {criterion(store, chosen)} at the last evaluation, against the mean "
+        f"diversity of their populations of {largest} then, by {TITLES[COLOUR]}; bars are 95 % Wilson intervals ({INDEPENDENCE})"
+    )
+    return described(
+        store, chosen, figure, rows, name=NAME, title=f"Success against diversity, population {largest}", what=what,
+        intervals=INTERVALS, thin=0, see=in_words(chosen, rows),
+    )  # fmt: skip

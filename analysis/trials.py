@@ -1,0 +1,145 @@
+"""Tables 4.2 (Khepera) and 5.4 (snake): evaluations until success of the prototype trials, and the minutes they would cost."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+
+from analysis.coverage import coverage
+from analysis.drawn import Drawn
+from analysis.source import trials_of
+from analysis.store import NoDataError, Store
+from analysis.words import counted, task_number, task_order, task_title
+from bns.plotting import BLUE, GREY, RED, note, panels, style
+
+NAME = "trials"
+PAPER = "tables 4.2 and 5.4"
+SWEEPS = "prototype"
+"""Sweeps whose names begin so are the source's trials: its own settings, a few seeds a task."""
+IN_A_ROW = 3
+"""The source's trials went on until the robot was seen to do the task consistently: here, this often in succession."""
+MARKS = {
+    "first_success": ("first success", "success", 1),
+    "consistent": (f"consistent, {IN_A_ROW} in succession", "success", IN_A_ROW),
+    "consistent_10cm": ("consistent, within 10 cm", "success_10cm", IN_A_ROW),
+}
+"""What a trial is measured by: what it is called, the column of successes, how many of them in succession."""
+
+
+def draw(store: Store) -> list[Drawn]:
+    rows = trials(store)
+    if rows.empty:
+        raise NoDataError(f"no finished prototype trial; run bns sweep sweeps/{SWEEPS}.yaml")
+    return [_draw(store, str(robot), own) for robot, own in rows.groupby("robot")]
+
+
+def trials(store: Store) -> pd.DataFrame:
+    """Of each trial the evaluation of each of MARKS, empty where it never came, and driving minutes until the first.
+
+    Of trials with the same seed (of an older engine, say) the newest counts.
+    """
+    rows = store.query(f"""
+        SELECT robot, task, sweep, seed, run_id, evaluation, success, success_10cm, driven_ms
+        FROM evals SEMI JOIN (SELECT run_id, sweep FROM runs WHERE status = 'ok' AND starts_with(sweep, '{SWEEPS}')
+            QUALIFY row_number() OVER (PARTITION BY robot, task, seed ORDER BY started_at DESC, sweep) = 1) USING (run_id, sweep)
+        ORDER BY robot, task, seed, run_id, evaluation""")
+    return pd.DataFrame([_trial(one) for _, one in rows.groupby("run_id", sort=False)])
+
+
+def _trial(rows: pd.DataFrame) -> dict[str, object]:
+    head, driven = rows.iloc[0], np.cumsum(rows.driven_ms.to_numpy()) / 60_000
+    marks = {name: first_in_a_row(rows[column].fillna(False).to_numpy(bool), many) for name, (_, column, many) in MARKS.items()}
+    first = marks["first_success"]
+    return {
+        **{name: head[name] for name in ("robot", "task", "sweep", "seed", "run_id")},
+        "evaluations": len(rows),
+        **{name: math.nan if mark is None else mark for name, mark in marks.items()},
+        "driving_min": math.nan if first is None else float(driven[first - 1]),
+    }
+
+
+def first_in_a_row(success: np.ndarray, many: int) -> int | None:
+    """Number (from 1) of the evaluation that completes the first ``many`` successes in succession; None if there is none."""
+    run = np.convolve(success.astype(int), np.ones(many, int), "valid") == many if len(success) >= many else np.array([])
+    return int(np.argmax(run)) + many if run.any() else None
+
+
+@style()
+def _draw(store: Store, robot: str, rows: pd.DataFrame) -> Drawn:
+    sweeps = tuple(sorted(rows.sweep.unique()))
+    tasks = sorted(rows.task.unique(), key=lambda task: task_order(robot, task))
+    figure, axes = panels(1, 1.9 + 0.7 * len(tasks))
+    _dots(axes[0, 0], robot, rows, tasks)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=1)
+    said, never = coverage(store, sweeps), int(rows.consistent.isna().sum())
+    not_yet = (f"{never} never {IN_A_ROW} in succession",) if never else ()
+    note(figure, "; ".join((*said.sentences, *not_yet, "one mark a trial")) + ".")
+    shows = (
+        f"Evaluations until success of each trial of {', '.join(sweeps)} beside the source's trials on the robot. First: the "
+        f"fittest controller visits all goals. Consistent: in {IN_A_ROW} evaluations in succession (the source judged by eye). "
+        f"Minutes: {_pace(robot)}. Driving: the commands of the controllers that were driven until the first success."
+    )
+    return Drawn(
+        f"{NAME}-{robot}", "Trials until success", figure, shows, len(rows), sweeps, said.missing,
+        see=_in_words(robot, rows, tasks), data=rows, table=_table(robot, rows, tasks),
+    )  # fmt: skip
+
+
+def _dots(ax: Axes, robot: str, rows: pd.DataFrame, tasks: list[str]) -> None:
+    known = [name for name in MARKS if rows[name].notna().any()]
+    looks = dict(zip(MARKS, ({"marker": "o", "mfc": "white"}, {"marker": "o"}, {"marker": "D"}), strict=True))
+    for place, task in enumerate(tasks):
+        lines = [(rows[rows.task == task][name], MARKS[name][0], {"color": BLUE, **looks[name]}) for name in known]
+        theirs = [evaluations for evaluations, _ in trials_of(robot, task_number(robot, task))]
+        lines.append((pd.Series(theirs, dtype=float), "the source's robot, consistent by eye", {"color": RED, "marker": "s"}))
+        for offset, (values, label, look) in zip(np.linspace(-0.3, 0.3, len(lines)), lines, strict=True):
+            ax.plot(values, np.full(len(values), place + offset), ls="none", label=None if place else label, **look)
+        if place:
+            ax.axhline(place - 0.5, color=GREY, linewidth=0.4)
+    ax.set_yticks(range(len(tasks)), [task_title(robot, task) for task in tasks])
+    ax.set(ylim=(len(tasks) - 0.5, -0.5), xlabel="evaluations in the world")
+    ax.set_xlim(left=0)
+    ax.grid(visible=False, axis="y")
+
+
+def seconds_an_evaluation(robot: str) -> tuple[float, float] | None:
+    """Shortest and longest of the source's trials of that robot, s an evaluation; None for a robot it does not have."""
+    paces = [60 * minutes / evaluations for number in range(1, 9) for evaluations, minutes in trials_of(robot, number)]
+    return (min(paces), max(paces)) if paces else None
+
+
+def _pace(robot: str) -> str:
+    pace = seconds_an_evaluation(robot)
+    return f"at the source's {pace[0]:.0f} to {pace[1]:.0f} s an evaluation" if pace else "unknown, the source has no such robot"
+
+
+def _table(robot: str, rows: pd.DataFrame, tasks: list[str]) -> pd.DataFrame:
+    pace, made = seconds_an_evaluation(robot), []
+    for task in tasks:
+        theirs = trials_of(robot, task_number(robot, task))
+        for trial, row in enumerate(rows[rows.task == task].to_dict("records")):
+            ours = {label: _cost(row[name], row["evaluations"], pace) for name, (label, _, _) in MARKS.items()}
+            driving = "–" if math.isnan(row["driving_min"]) else f"{row['driving_min']:.1f} min"
+            source = f"{theirs[trial][0]:.0f} ({theirs[trial][1]:.0f} min)" if trial < len(theirs) else "–"
+            title = task_title(robot, task)
+            made.append({"task": title, "seed": row["seed"], **ours, "driving": driving, "the source's trial": source})
+    return pd.DataFrame(made)
+
+
+def _cost(evaluation: float, of: int, pace: tuple[float, float] | None) -> str:
+    if math.isnan(evaluation):
+        return f"not in {of}"
+    minutes = f" ({evaluation * pace[0] / 60:.0f} to {evaluation * pace[1] / 60:.0f} min)" if pace else ""
+    return f"{evaluation:.0f}{minutes}"
+
+
+def _in_words(robot: str, rows: pd.DataFrame, tasks: list[str]) -> str:
+    said = []
+    for task in tasks:
+        first, many = rows[rows.task == task].first_success.dropna(), counted(int((rows.task == task).sum()), "trial")
+        when = f"after {first.min():.0f} to {first.max():.0f} evaluations" if len(first) else "never"
+        said.append(f"{task_title(robot, task)}: first success {when} ({many})")
+    return "; ".join(said) + "."

@@ -1,0 +1,1 @@
+"""Measurements against a model: compare them, find which physical effect is missing, add it, see the error fall."""

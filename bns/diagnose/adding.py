@@ -1,0 +1,138 @@
+"""A model mended: effects added, all numbers refitted, and written down with their intervals and where they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from bns.diagnose.candidates import fit_with
+from bns.diagnose.fit import Fit
+from bns.diagnose.folds import errors_at_horizons, held_out_steps
+from bns.diagnose.horizons import noise_floor
+from bns.diagnose.intake import Measured
+from bns.diagnose.predictor import Predictor
+from bns.diagnose.search import problem_for
+from bns.errors import ModelError
+from bns.physics.effect import Effect
+from bns.physics.effects import effect_in_file, effect_named
+from bns.physics.formula import formula_effect
+from bns.physics.model import ActiveEffect, Model
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One step of the ladder: the effect that was added ("nominal" for the first), and the held-out error at each horizon (m)."""
+
+    name: str
+    error: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Mended:
+    """The refitted model, the ladder that led to it, and the error that noise alone would show, at each horizon (m)."""
+
+    fit: Fit
+    model: Model
+    ladder: tuple[Rung, ...]
+    floor: Mapping[str, float]
+
+
+def effect_from(text: str, term: str | None = None, on: str | None = None) -> tuple[Effect, dict[str, str]]:
+    """The effect of a name, a Python file, or a formula; and how a model file says so."""
+    if term is not None:
+        return formula_effect(text, term, on or "v"), {"term": term, "on": on or "v"}
+    if text.endswith(".py"):
+        return effect_in_file(Path(text)), {"file": str(Path(text).resolve())}
+    return effect_named(text), {}
+
+
+def add_effects(
+    predictor: Predictor, model: Model, effects: Sequence[tuple[Effect, Mapping[str, str]]], measured: Measured
+) -> Mended:
+    """Add effects one after the other, each fitted with all before it; ModelError if the model has one already."""
+    for effect, _ in effects:
+        if any(a.effect.name == effect.name for a in model.effects):
+            raise ModelError(
+                f"The model {model.name} has {effect.name} already; it is refitted whenever something is added."
+            )
+    problem = problem_for(predictor, model)
+    fit = problem.fit(model)
+    ladder = [Rung("nominal", errors_at_horizons(predictor, held_out_steps(predictor, problem.following, fit.model)))]
+    for effect, written in effects:
+        fit = fit_with(problem, fit, effect)
+        problem = problem_for(predictor, fit.model, problem.following.noise)
+        fit = problem.fit(_written(fit.model, effect.name, written))
+        steps = held_out_steps(predictor, problem.following, fit.model)
+        ladder.append(Rung(effect.name, errors_at_horizons(predictor, steps)))
+    floor = {h: noise_floor(predictor, problem.following.noise, h).get("position_m", np.nan) for h in ladder[0].error}
+    return Mended(fit, _documented(fit, model, measured, ladder), tuple(ladder), floor)
+
+
+def _written(model: Model, name: str, written: Mapping[str, str]) -> Model:
+    return replace(
+        model, effects=tuple(replace(a, written=written) if a.effect.name == name else a for a in model.effects)
+    )
+
+
+def _documented(fit: Fit, before: Model, measured: Measured, ladder: Sequence[Rung]) -> Model:
+    """The fitted model with intervals, reasons and provenance."""
+    reason = f"fitted to {len(measured.tracks)} trials of {measured.path.name} ({measured.digest})"
+    effects = tuple(_with_interval(fit, active, reason) for active in fit.model.effects)
+    provenance = {
+        "begun_from": before.name,
+        "data": measured.path.name,
+        "data_sha256": measured.digest,
+        "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+        "trials": len(measured.tracks),
+        "held_out_position_error_m": {
+            rung.name: {h: round(float(v), 6) for h, v in rung.error.items()} for rung in ladder
+        },
+    }
+    return replace(fit.model, effects=effects, provenance=provenance)
+
+
+def _with_interval(fit: Fit, active: ActiveEffect, reason: str) -> ActiveEffect:
+    intervals = {f.parameter.name: fit.interval(i) for i, f in enumerate(fit.free) if f.effect == active.effect.name}
+    return replace(active, basis="fitted", reason=reason, intervals=intervals)
+
+
+def model_yaml(model: Model) -> str:
+    """A model as the text of a YAML file that `load_model` reads back."""
+    tree: dict[str, Any] = {"base": model.base, "wheelbase_m": model.wheelbase_m, "dt_s": model.dt_s}
+    if model.jitter_relative:
+        tree["jitter"] = {
+            "wheel_speed_relative": model.jitter_relative,
+            "basis": "guess",
+            "reason": "as in the model before",
+        }
+    if model.noise_position_m or model.noise_heading_rad:
+        tree["noise"] = {
+            "position_m": model.noise_position_m,
+            "heading_rad": model.noise_heading_rad,
+            "basis": "guess",
+            "reason": "as in the model before",
+        }
+    tree["effects"] = [_entry(active) for active in model.effects]
+    if model.provenance:
+        tree["provenance"] = dict(model.provenance)
+    return yaml.safe_dump(tree, sort_keys=False, width=120, allow_unicode=True)
+
+
+def _entry(active: ActiveEffect) -> dict[str, Any]:
+    entry: dict[str, Any] = {"name": active.effect.name, **active.written}
+    entry["values"] = {name: _exact(value) for name, value in active.by_name.items()}
+    entry["units"] = {p.name: p.unit for p in active.effect.parameters}
+    if active.intervals:
+        entry["intervals"] = {n: [_exact(low), _exact(high)] for n, (low, high) in active.intervals.items()}
+    return {**entry, "basis": active.basis, "reason": active.reason or "not given"}
+
+
+def _exact(value: float) -> float:
+    """A float that PyYAML writes so that it reads it back as a number."""
+    return float(value)

@@ -1,0 +1,147 @@
+"""A model held against measurements, nothing fitted: how far it is off, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.fit import Fit
+from bns.diagnose.horizons import HORIZONS, Errors, errors_of, noise_floor
+from bns.diagnose.predictor import Predictor
+from bns.diagnose.search import problem_for
+from bns.diagnose.structure import Pattern, patterns
+from bns.diagnose.tracks import Array
+from bns.physics.model import Model
+
+BINS = 8
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A window that was predicted badly: when it began, and how far off its end was."""
+
+    trial: str
+    t_s: float
+    position_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Mean error a second along one variable: centres (bins,), mean and 95 % band (bins,), for one direction."""
+
+    variable: str
+    direction: str
+    centre: Array
+    mean: Array
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What `compare` found. ``floor``: position error (m) of tracking noise alone, at each horizon."""
+
+    model: str
+    trials: int
+    frames: int
+    errors: Mapping[str, Mapping[str, float]]
+    floor: Mapping[str, float]
+    patterns: tuple[Pattern, ...]
+    worst: tuple[Moment, ...]
+    curves: tuple[Curve, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """One object of plain values."""
+        return {
+            "model": self.model,
+            "trials": self.trials,
+            "frames": self.frames,
+            "error": {h: {**e, "noise_floor_m": self.floor[h]} for h, e in self.errors.items()},
+            "patterns": [
+                {"variable": p.variable, "velocity": p.channel, "share": p.share, "p_value": p.evidence.p_value}
+                for p in self.patterns
+            ],
+            "worst": [vars(w) for w in self.worst],
+        }
+
+
+def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
+    """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands."""
+    steps, tracks = predictor.steps(model), predictor.tracks
+    problem = problem_for(predictor, model)
+    errors = {h: errors_of(predictor, steps, h) for h in HORIZONS}
+    # scatter of the drive cannot be told from faults of the model before these are mended: only the camera's noise is sure
+    tracking = problem.following.noise * np.array([1, 1, 0, 0, 0])
+    found = patterns(problem, _as_is(problem, model))
+    return Comparison(
+        model.name,
+        len(tracks),
+        len(tracks.t_s),
+        {h: e.summary(len(tracks)) for h, e in errors.items()},
+        {h: noise_floor(predictor, tracking, h).get("position_m", float("nan")) for h in HORIZONS},
+        tuple(found),
+        tuple(_worst(predictor, errors["1s"])),
+        tuple(_curves(predictor, errors["1s"], found, np.random.default_rng(seed))),
+    )
+
+
+def _as_is(problem: Any, model: Model) -> Fit:
+    """The model with its numbers as they stand."""
+    fit: Fit = problem.fit(model, rounds=0)
+    return fit
+
+
+def _worst(predictor: Predictor, errors: Errors, most: int = 5) -> list[Moment]:
+    """The worst window of each of the worst trials."""
+    tracks, out = predictor.tracks, []
+    order = np.argsort(-errors.position_m)
+    seen: set[int] = set()
+    for i in order:
+        trial = int(errors.trial[i])
+        if trial not in seen:
+            seen.add(trial)
+            out.append(
+                Moment(
+                    tracks.names[trial],
+                    float(tracks.t_s[errors.start[i]]),
+                    float(errors.position_m[i]),
+                    float(errors.heading_rad[i]),
+                )
+            )
+        if len(out) == most:
+            break
+    return out
+
+
+def _curves(predictor: Predictor, errors: Errors, found: list[Pattern], rng: np.random.Generator) -> list[Curve]:
+    """Residuals along the variables that explain most, and bands from a bootstrap over trials."""
+    names = list(dict.fromkeys(p.variable for p in found if p.variable != "place"))[:6]
+    at = predictor.at_frames(errors.start)
+    lasted = np.maximum(predictor.tracks.t_s[errors.end] - predictor.tracks.t_s[errors.start], 1e-9)
+    rates = {
+        "forward, mm/s": 1e3 * errors.forward_m / lasted,
+        "left, mm/s": 1e3 * errors.left_m / lasted,
+        "heading, deg/s": np.degrees(errors.heading_rad) / lasted,
+    }
+    return [_binned(name, way, at[name], rate, errors.trial, rng) for name in names for way, rate in rates.items()]
+
+
+def _binned(name: str, way: str, values: Array, rate: Array, trial: NDArray[np.int64], rng: np.random.Generator) -> Curve:
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    place: NDArray[np.intp] = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
+    bins, trials = max(len(edges) - 1, 1), int(trial.max()) + 1
+    sums, counts = np.zeros((trials, bins)), np.zeros((trials, bins))
+    np.add.at(sums, (trial, place), rate)
+    np.add.at(counts, (trial, place), 1)
+    drawn = rng.multinomial(trials, np.full(trials, 1 / trials), size=400)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means = (drawn @ sums) / (drawn @ counts)
+        mean = sums.sum(axis=0) / counts.sum(axis=0)
+    low, high = np.nanquantile(means, [0.025, 0.975], axis=0)
+    centre = np.array([values[place == b].mean() if (place == b).any() else np.nan for b in range(bins)])
+    return Curve(name, way, centre, mean, low, high)

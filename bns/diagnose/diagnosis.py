@@ -1,0 +1,259 @@
+"""The whole diagnosis: from tracks and a model to a verdict that says how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bns.diagnose.fit import Fit
+from bns.diagnose.folds import errors_at_horizons, held_out_steps
+from bns.diagnose.formula_search import Formula, best_formula
+from bns.diagnose.horizons import HORIZONS, noise_floor
+from bns.diagnose.predictor import Predictor
+from bns.diagnose.rhythm import Rhythm, rhythms
+from bns.diagnose.search import FALSE_ALARM, Candidate, Found, Search
+from bns.diagnose.structure import Pattern, patterns, remaining
+from bns.diagnose.tracks import Tracks
+from bns.physics.effect import Effect
+from bns.physics.effects import all_effects
+from bns.physics.model import Model
+
+VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
+FEWEST_TRIALS = 8
+"""With fewer the signs of whole trials cannot all come out alike by a chance that is small enough."""
+FEW_TRIALS = 40
+_HINT = 5.0
+"""A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict and everything it rests on. ``found`` is None where there was too little to search."""
+
+    verdict: str
+    found: Found | None
+    patterns: tuple[Pattern, ...] = ()
+    rhythm: Rhythm | None = None
+    formula: Formula | None = None
+    error: Mapping[str, Mapping[str, float]] | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the accepted effects, in the order in which they were found."""
+        return self.found.accepted if self.found else ()
+
+    @property
+    def model(self) -> Model | None:
+        """The model refitted with all accepted effects."""
+        return self.found.fit.model if self.found else None
+
+    def as_json(self) -> dict[str, Any]:
+        """One object of plain values, as `bns diagnose --json` prints it."""
+        found = self.found
+        return {
+            "verdict": self.verdict,
+            "effects": list(self.effects),
+            "parameters": numbers_of(found.fit) if found else {},
+            "ties": ties_of(found) if found else [],
+            "explanations": [list(found.accepted), *map(list, found.rivals)] if found else [],
+            "ranking": [_ranked(c) for c in (found.steps[0].ranking if found else ())],
+            "error": self.error or {},
+            "formula": self._formula(),
+            "patterns": [_pattern(p) for p in self.patterns],
+            "notes": list(self.notes),
+        }
+
+    def _formula(self) -> dict[str, Any] | None:
+        if self.formula is None:
+            return None
+        earned = self.formula.evidence
+        return {
+            "on": self.formula.on,
+            "term": self.formula.term,
+            "values": {k: _plain(v) for k, v in self.formula.values.items()},
+            "gain": _plain(earned.gain),
+            "gain_se": _plain(earned.se),
+            "p_value": earned.p_value,
+        }
+
+
+def diagnose(
+    predictor: Predictor,
+    model: Model,
+    *,
+    extra: Mapping[str, Effect] | None = None,
+    tick: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """What the model lacks on these tracks."""
+    reason = too_little(predictor.tracks)
+    if reason:
+        return Diagnosis("insufficient-data", None, notes=(reason,))
+    found = Search(predictor, model, extra, tick).run()
+    tick("what is left")
+    seen = patterns(found.problem, found.fit)
+    left, rhythm = remaining(seen), rhythms(found.problem, found.fit)[0]
+    formula = best_formula(found.problem, found.fit, left) if left else None
+    hint = _hint(found, len(predictor.tracks))
+    verdict = _verdict(found, left, rhythm.loud, hint)
+    tick("errors on trials held out")
+    return Diagnosis(
+        verdict,
+        found,
+        tuple(seen[:12]),
+        rhythm,
+        formula,
+        errors_before_and_after(found),
+        tuple(_notes(found, predictor.tracks, left, rhythm if rhythm.loud else None, formula, hint)),
+    )
+
+
+def too_little(tracks: Tracks) -> str:
+    """Why nothing can be concluded from these tracks; "" if something may."""
+    if len(tracks) < FEWEST_TRIALS:
+        return (
+            f"{len(tracks)} trials: whatever they show could be luck. {FEWEST_TRIALS} trials are the least, "
+            "20 or more find what is large, 60 what is small."
+        )
+    frames = np.diff(tracks.first)
+    if np.median(frames) < 2:
+        return (
+            "Most trials have a single tracked pose; a displacement needs two: log the pose before and after commands."
+        )
+    if not (np.abs(tracks.left_m_s) + np.abs(tracks.right_m_s) * (tracks.duration_s > 0)).any():
+        return "The robot was never told to move; give it commands of different speeds."
+    ends = [tracks.pose[a:b, :2] for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
+    if max(float(np.ptp(p, axis=0).max()) for p in ends if len(p)) < 5e-3:
+        return "The robot never moved by more than 5 mm, whatever it was told: is it tracked, are its motors on?"
+    return ""
+
+
+def _verdict(found: Found, left: Sequence[Pattern], loud: bool, hint: Candidate | None) -> str:
+    if left or loud:
+        return "unlisted"
+    if found.rivals:
+        return "tie"
+    if found.accepted:
+        return "effects"
+    return "insufficient-data" if hint else "none"
+
+
+def _hint(found: Found, trials: int) -> Candidate | None:
+    """The best candidate of a search that accepted nothing, where few trials nearly sufficed."""
+    if found.accepted or trials >= FEW_TRIALS:
+        return None
+    level = FALSE_ALARM / len(found.steps[0].ranking)
+    near = [c for c in found.steps[0].ranking if not c.veto and c.evidence.p_value < _HINT * level and c.evidence.z > 1]
+    return near[0] if near else None
+
+
+def errors_before_and_after(found: Found) -> dict[str, dict[str, float]]:
+    """Held-out position error (m) at every horizon: nominal model, with the accepted effects, and what noise alone would show."""
+    predictor, following = found.problem.predictor, found.problem.following
+    before = errors_at_horizons(predictor, held_out_steps(predictor, following, found.nominal.model))
+    after = errors_at_horizons(predictor, held_out_steps(predictor, following, found.fit.model))
+    return {
+        h: {
+            "before": before[h],
+            "after": after[h],
+            "noise_floor": noise_floor(predictor, following.noise, h).get("position_m", float("nan")),
+        }
+        for h in HORIZONS
+    }
+
+
+def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
+    """{effect: {name: value, se, low, high, unit, at_bound}} of a fitted model."""
+    out: dict[str, dict[str, dict[str, Any]]] = {}
+    for index, number in enumerate(fit.free):
+        p, (low, high) = number.parameter, fit.interval(index)
+        out.setdefault(number.effect, {})[p.name] = {
+            "value": _plain(fit.values[index]),
+            "se": _plain(fit.se(index)),
+            "low": _plain(low),
+            "high": _plain(high),
+            "unit": p.unit,
+            "at_bound": bool(fit.values[index] in {p.low, p.high}),
+        }
+    return out
+
+
+def ties_of(found: Found) -> list[list[str]]:
+    """Groups of names that stand for each other: exchange one of a group for another, and the tracks are explained as well."""
+    groups: list[set[str]] = []
+    for rival in found.rivals:
+        group = set(found.accepted) ^ set(rival)
+        touching = [g for g in groups if g & group]
+        groups = [g for g in groups if g not in touching] + [group.union(*touching)]
+    return [sorted(g) for g in groups]
+
+
+def _ranked(candidate: Candidate) -> dict[str, Any]:
+    earned = candidate.evidence
+    return {
+        "name": candidate.name,
+        "gain": _plain(earned.gain),
+        "gain_se": _plain(earned.se),
+        "p_value": earned.p_value,
+        "parameters": numbers_of(candidate.fit).get(candidate.name, {}),
+        "veto": candidate.veto,
+    }
+
+
+def _pattern(p: Pattern) -> dict[str, Any]:
+    return {
+        "variable": p.variable,
+        "velocity": p.channel,
+        "gain": _plain(p.evidence.gain),
+        "gain_se": _plain(p.evidence.se),
+        "p_value": p.evidence.p_value,
+        "share": _plain(p.share),
+    }
+
+
+def _plain(value: float) -> float | None:
+    """A float that JSON knows."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _notes(
+    found: Found,
+    tracks: Tracks,
+    left: Sequence[Pattern],
+    rhythm: Rhythm | None,
+    formula: Formula | None,
+    hint: Candidate | None,
+) -> Iterable[str]:
+    names = {*found.accepted, *(name for rival in found.rivals for name in rival)}
+    for name in sorted(names & set(all_effects())):
+        if all_effects()[name].of_measuring:
+            yield f"{name} is a fault of the measuring, not of the robot."
+    if "battery-sag" in names and not tracks.start_known and "battery_v" not in tracks.extra:
+        yield "No session_s or battery_v was logged: the session's time is taken as the trials one right after the other."
+    if {"tether-pull", "floor-slope"} <= names:
+        yield "A floor-slope is a tether-pull from far away: drive on both sides of the supposed anchor to tell them apart."
+    if {"command-delay", "clock-offset"} <= names:
+        yield "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
+    for p in left[:4]:
+        yield (
+            f"Left unexplained: {p.channel} along {p.variable}, {p.share:.2%} of the loss on held-out trials "
+            f"(p {'<' if p.evidence.p_value < 1e-4 else '='} {max(p.evidence.p_value, 1e-4):.2g})."
+        )
+    if rhythm is not None:
+        after = f"{rhythm.lag} frames later" if rhythm.scale == "within" else "in the next command"
+        yield (
+            f"What is not foreseen in the direction {rhythm.direction} repeats itself {after} (correlation "
+            f"{rhythm.correlation:+.2f}): something with a rhythm or a drift of its own that no logged variable shows."
+        )
+    if formula is not None:
+        values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
+        yield f"A candidate for it: {formula.on} + {formula.term} with {values}."
+    if hint is not None:
+        more = int(np.ceil(len(tracks) * max((3.2 / max(hint.evidence.z, 0.5)) ** 2 - 1, 0.5)))
+        yield f"{hint.name} may be missing, but {len(tracks)} trials do not settle it; about {more} more would."
+    for c in found.steps[0].ranking:
+        if c.veto and c.evidence.gain > 0.01 * float(found.nominal.losses.mean()):
+            yield f"{c.name} was not considered: {c.veto}."

@@ -1,0 +1,54 @@
+"""Is one model better than another on trials that neither was fitted to? The trial is the unit, and trials are paired."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.diagnose.tracks import Array
+
+FLIPS = 20_000
+_SEED = 20_250_101
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Mean held-out gain a trial (in units of log-likelihood), its standard error, and the chance of such a fit by luck."""
+
+    gain: float
+    se: float
+    p_value: float
+
+    @property
+    def z(self) -> float:
+        """Gain in standard errors."""
+        return self.gain / self.se if self.se > 0 else 0.0
+
+
+def held_out_gain(before: Array, after: Array) -> tuple[float, float]:
+    """Mean paired gain of held-out losses (trials,), and its standard error."""
+    gains = before - after
+    trials = len(gains)
+    mean = float(gains.mean())
+    if not np.isfinite(mean):
+        return float("-inf"), 0.0
+    return mean, float(gains.std(ddof=1) / np.sqrt(trials)) if trials > 1 else float("inf")
+
+
+def sign_flip_p(scores: Array, curvature: Array) -> float:
+    """Chance that trials without the effect pull together as these do.
+
+    ``scores`` (trials, k): each trial's gradient in the k numbers under test. Were nothing there, each trial would be as
+    likely to pull the other way: the statistic g' H^-1 g of the sum g is held against itself with the signs of
+    whole trials drawn by lot. Exact whatever the scatter inside and between trials, heavy tails included.
+    """
+    root = np.linalg.pinv(curvature, hermitian=True)
+    total = scores.sum(axis=0)
+    seen = float(total @ root @ total)
+    if not np.isfinite(seen) or seen <= 0:
+        return 1.0
+    signs = np.random.default_rng(_SEED).choice([-1.0, 1.0], size=(FLIPS, len(scores)))
+    sums = signs @ scores
+    by_luck = np.einsum("fk,kl,fl->f", sums, root, sums)
+    return float((1 + np.count_nonzero(by_luck >= seen * (1 - 1e-9))) / (1 + FLIPS))

@@ -1,0 +1,45 @@
+"""Is the model one of this robot? A model of another one would be blamed on effects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.diagnose.horizons import windows
+from bns.diagnose.predictor import Predictor
+from bns.errors import DataError
+from bns.physics.model import Model
+
+_FACTOR = 1.8
+
+
+def check_same_robot(predictor: Predictor, model: Model) -> None:
+    """DataError if ways or turns are so far off that the data must be another robot's, or in other units."""
+    tracks = predictor.tracks
+    start, end = windows(tracks, "1s")
+    if len(start) < 5:
+        return
+    steps = predictor.steps(model).body
+    turn = np.concatenate([[0.0], np.cumsum(steps[:, 2])])[1:]
+    predicted = turn[end] - turn[start]
+    heading = tracks.pose[end, 2] - tracks.pose[start, 2]
+    # where the model says that the turn is small enough, it can be told from one more round
+    clear = (np.abs(predicted) < 1.2) & (np.abs(predicted) > 0.05)
+    seen = (heading + np.pi) % (2 * np.pi) - np.pi
+    if clear.sum() >= 5 and abs(float((predicted * predicted)[clear].sum())) > 0:
+        ratio = float(np.median(seen[clear] / predicted[clear]))
+        if ratio > _FACTOR or 0 < ratio < 1 / _FACTOR:
+            raise DataError(
+                f"The robot turns {ratio:.2f} times as far as a model with a wheelbase of {model.wheelbase_m:g} m says. "
+                f"Is this its model? A wheelbase of {model.wheelbase_m / ratio:.3g} m would fit: "
+                f"--wheelbase {model.wheelbase_m / ratio:.3g}."
+            )
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])[1:]
+    straight = (np.abs(predicted) < 0.3) & (way[end] - way[start] > 0.02)
+    if straight.sum() >= 5:
+        went = np.hypot(*(tracks.pose[end, :2] - tracks.pose[start, :2]).T)[straight]
+        ratio = float(np.median(went / (way[end] - way[start])[straight]))
+        if ratio > 3 or ratio < 1 / 3:
+            raise DataError(
+                f"The robot goes {ratio:.2g} times as far as commanded. Are the speeds in m/s, "
+                "the positions in m, the times in s? `bns import` turns other units into these."
+            )

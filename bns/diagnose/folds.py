@@ -1,0 +1,45 @@
+"""Errors on trials held out: each fifth of the trials is predicted by a model fitted to the other four."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from bns.diagnose.fit import Problem
+from bns.diagnose.horizons import HORIZONS, Errors, errors_of
+from bns.diagnose.noise import Filter
+from bns.diagnose.predictor import Predictor, Steps
+from bns.diagnose.tracks import Array
+from bns.physics.model import Model
+
+FOLDS = 5
+
+
+def held_out_steps(predictor: Predictor, following: Filter, model: Model) -> Steps:
+    """Steps of every trial under the model's effects, their numbers fitted to the trials of the other folds."""
+    trials = len(predictor.tracks)
+    if not model.effects or trials < 2:
+        return predictor.steps(model)
+    fold = np.arange(trials) % min(FOLDS, trials)
+    body, drift = np.zeros((len(predictor.tracks.t_s), 3)), np.zeros((len(predictor.tracks.t_s), 2))
+    for one in np.unique(fold):
+        problem = Problem(predictor, following, (fold != one).astype(float))
+        steps = predictor.steps(problem.fit(model).model)
+        frames = (fold == one)[predictor.tracks.trial]
+        body[frames], drift[frames] = steps.body[frames], steps.drift_m[frames]
+    return Steps(body, drift)
+
+
+def position_error(errors: Errors) -> float:
+    """Root mean square distance, robust: windows beyond six times the median are marker faults, not the model's."""
+    position: Array = errors.position_m
+    if not len(position):
+        return float("nan")
+    kept = position[position <= 6 * max(float(np.median(position)), 1e-12)]
+    return float(np.sqrt((kept * kept).mean()))
+
+
+def errors_at_horizons(predictor: Predictor, steps: Steps) -> Mapping[str, float]:
+    """`position_error` at every horizon."""
+    return {h: position_error(errors_of(predictor, steps, h)) for h in HORIZONS}

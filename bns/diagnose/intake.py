@@ -1,0 +1,69 @@
+"""Measurements from a file, as checked tracks."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+import yaml
+
+from bns.diagnose.checks import Finding, checked
+from bns.diagnose.importing import applied, mapping_beside
+from bns.diagnose.tracks import Tracks, tracks_of
+from bns.errors import DataError
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A file's tracks, what was odd about it, and its SHA-256 (20 digits), which names it in a model's provenance."""
+
+    path: Path
+    tracks: Tracks
+    findings: tuple[Finding, ...]
+    digest: str
+
+
+def load_measured(path: str | Path, robot: str | None = None) -> Measured:
+    """Read, map (if ``DATA.import.yaml`` lies beside), check.
+
+    ``robot`` chooses the rows of one robot where a ``robot`` column names several. DataError if the file cannot be used.
+    """
+    path = Path(path)
+    table = read_table(path)
+    mapping = mapping_beside(path)
+    if mapping is not None:
+        table = applied(table, mapping)
+    table, findings = checked(_of_one_robot(table, robot))
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()[:20]
+    return Measured(path, tracks_of(table), tuple(findings), digest)
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """A .csv (or .csv.gz) or .parquet file as it is; DataError if there is none or it does not read."""
+    if not path.is_file():
+        raise DataError(f"There is no file {path}. Give a .csv or .parquet file of measurements.")
+    try:
+        if path.name.endswith((".csv", ".csv.gz")):
+            return pd.read_csv(path)
+        if path.suffix == ".parquet":
+            return pd.read_parquet(path)
+    except (ValueError, OSError, yaml.YAMLError) as fault:
+        raise DataError(f"{path} does not read as {path.suffix[1:]}: {fault}.") from fault
+    raise DataError(f"{path} is no .csv or .parquet file; measurements come as one of these.")
+
+
+def _of_one_robot(table: pd.DataFrame, robot: str | None) -> pd.DataFrame:
+    if "robot" not in table.columns:
+        return table
+    names = sorted(str(name) for name in table["robot"].dropna().unique())
+    if robot is None and len(names) > 1:
+        raise DataError(
+            f"The measurements are of {len(names)} robots: {', '.join(names)}. Choose one with --robot {names[0]}."
+        )
+    if robot is None:
+        return table
+    if robot not in names:
+        raise DataError(f"The measurements have no robot {robot!r}; they have {', '.join(names)}.")
+    return table[table["robot"].astype(str) == robot]

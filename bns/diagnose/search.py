@@ -1,0 +1,230 @@
+"""Which effects are missing: forwards while a step earns something on held-out trials, with a look back after each.
+
+Guards: decoys set a bar, the chance of a false alarm is shared out over the whole catalogue, a number at a bound
+or beyond what is plausible is a veto with its reason.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+
+from bns.diagnose.candidates import best_start, fit_with, listed
+from bns.diagnose.evidence import Evidence, held_out_gain
+from bns.diagnose.fit import Fit, Problem
+from bns.diagnose.noise import estimate_noise, filter_for
+from bns.diagnose.predictor import Predictor
+from bns.diagnose.tracks import Array
+from bns.physics.decoys import DECOYS
+from bns.physics.effect import Effect
+from bns.physics.model import Model
+
+T = TypeVar("T")
+
+FALSE_ALARM = 0.05
+"""Chance of any false alarm over the whole catalogue."""
+MIN_GAIN = 0.001
+"""Least gain that counts, as a share of the loss: honest robots vary by fractions of a percent from trial to trial."""
+MIN_Z = 2.5
+"""Least gain that counts, in its standard errors: it must be earned in many trials, not in a few."""
+TIE_Z = 2.0
+"""Two explanations whose held-out losses differ by fewer standard errors than this cannot be told apart."""
+TIE_SHARE = 0.005
+"""... nor those whose difference is a smaller share than this of what either earns."""
+SCREEN = 0.3
+"""An effect is tried in another one's place if its best start alone does this share of the other's work."""
+MOST = 6
+"""Effects that a search accepts at most."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect added to a model: its fit, what it earned on held-out trials, and why it may not be taken."""
+
+    name: str
+    fit: Fit
+    evidence: Evidence
+    veto: str = ""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One round: all candidates, best first, the bar that the decoys set, and what was taken ("" for nothing)."""
+
+    ranking: tuple[Candidate, ...]
+    bar: float
+    taken: str
+
+
+@dataclass(frozen=True)
+class Found:
+    """The end of a search: accepted names in order, their fit, the rounds, and explanations of the same size that fit as well."""
+
+    problem: Problem
+    nominal: Fit
+    fit: Fit
+    accepted: tuple[str, ...]
+    steps: tuple[Step, ...]
+    rivals: tuple[tuple[str, ...], ...] = ()
+    remarks: tuple[str, ...] = field(default=())
+
+
+class Search:
+    """A search for the effects that ``model`` lacks, on the tracks of a predictor."""
+
+    def __init__(
+        self,
+        predictor: Predictor,
+        model: Model,
+        extra: Mapping[str, Effect] | None = None,
+        tick: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self.predictor, self.model, self.tick = predictor, model.arranged(), tick
+        self.jobs = min(os.cpu_count() or 1, 8)
+        self.catalogue = listed(self.model, extra)
+        self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
+        self.level = FALSE_ALARM / max(len(self.catalogue), 1)
+
+    def run(self) -> Found:
+        """Forwards and back until nothing more is earned; then rivals of the same size."""
+        problem, nominal = self._settled(self.model)
+        if nominal.free:
+            problem, nominal = self._settled(nominal.model, problem.following.noise)
+        fit = nominal
+        accepted: tuple[str, ...] = ()
+        steps: list[Step] = []
+        tried: set[frozenset[str]] = set()
+        while len(accepted) < MOST:
+            step = self._round(problem, fit, accepted)
+            steps.append(step)
+            if not step.taken:
+                break
+            accepted = (*accepted, step.taken)
+            chosen = next(c for c in step.ranking if c.name == step.taken)
+            problem, fit = self._settled(chosen.fit.model, problem.following.noise)
+            problem, fit, accepted = self._swapped(problem, fit, accepted)
+            problem, fit, accepted = self._looked_back(problem, fit, accepted)
+            if frozenset(accepted) in tried:
+                break
+            tried.add(frozenset(accepted))
+        rivals = self._rivals(problem, fit, accepted)
+        simplest = min(rivals, key=lambda r: len(r[1].free), default=None)
+        if simplest is not None and len(simplest[1].free) < len(fit.free):
+            rivals = [(accepted, fit), *(r for r in rivals if r is not simplest)]
+            accepted, fit = simplest
+        return Found(problem, problem.fit(self.model), fit, accepted, tuple(steps), tuple(names for names, _ in rivals))
+
+    def _settled(self, model: Model, start: Array | None = None) -> tuple[Problem, Fit]:
+        """Noise and numbers that belong together."""
+        problem = problem_for(self.predictor, model, start)
+        return problem, problem.fit(model)
+
+    def _round(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> Step:
+        left = [effect for name, effect in self.catalogue.items() if name not in accepted]
+        tried = self._all(partial(self._tried, problem, fit), [*DECOYS, *left])
+        bar = max(c.evidence.gain for c in tried[: len(DECOYS)])
+        ranking = sorted(tried[len(DECOYS) :], key=lambda c: -c.evidence.gain)
+        allowed = [c for c in ranking if self._earned(c, fit, bar) and not c.veto]
+        return Step(tuple(ranking), bar, allowed[0].name if allowed else "")
+
+    def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
+        self.tick(effect.name)
+        added = fit_with(problem, fit, effect)
+        return Candidate(effect.name, added, problem.evidence(fit, added), veto_of(added, effect.name))
+
+    def _earned(self, candidate: Candidate, before: Fit, bar: float) -> bool:
+        e = candidate.evidence
+        least = MIN_GAIN * float(before.held_out.mean())
+        return e.p_value < self.level and e.z > MIN_Z and e.gain > max(bar, least)
+
+    def _swapped(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[Problem, Fit, tuple[str, ...]]:
+        """Exchange an accepted effect for another one while that makes the held-out loss smaller."""
+        for _ in range(len(accepted) if len(accepted) > 1 else 0):
+            best, new = fit, accepted
+            for name, other, tried in self._exchanges(problem, fit, accepted):
+                if tried.held_out.sum() < best.held_out.sum() - 0.5 and not veto_of(tried, other):
+                    best, new = tried, tuple(other if a == name else a for a in accepted)
+            if new == accepted:
+                break
+            accepted = new
+            problem, fit = self._settled(best.model, problem.following.noise)
+        return problem, fit, accepted
+
+    def _looked_back(
+        self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
+    ) -> tuple[Problem, Fit, tuple[str, ...]]:
+        """Drop what no longer earns its place."""
+        for name in accepted[:-1]:
+            without = problem.fit(fit.model.without(name))
+            earned = problem.evidence(without, fit)
+            if not self._earned(Candidate(name, fit, earned), without, 0.0):
+                accepted = tuple(a for a in accepted if a != name)
+                problem, fit = self._settled(without.model, problem.following.noise)
+        return problem, fit, accepted
+
+    def _exchanges(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
+        """Every accepted effect exchanged for every other one that might do the same."""
+        if self._exchanged is not None and self._exchanged[0] is problem and self._exchanged[1] == accepted:
+            return self._exchanged[2]
+        found = []
+        for name in accepted:
+            without = problem.fit(fit.model.without(name))
+            others = [effect for other, effect in self.catalogue.items() if other not in accepted]
+            fits = self._all(partial(self._in_place, problem, fit, without), others)
+            found += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
+        self._exchanged = (problem, accepted, found)
+        return found
+
+    def _in_place(self, problem: Problem, fit: Fit, without: Fit, effect: Effect) -> Fit | None:
+        if not self._might_replace(problem, fit, without, effect):
+            return None
+        self.tick(effect.name)
+        return fit_with(problem, without, effect)
+
+    def _all(self, work: Callable[[Effect], T], effects: Sequence[Effect]) -> list[T]:
+        """In threads: the kernels let go of the interpreter. The order of the answers is that of the effects."""
+        with ThreadPoolExecutor(self.jobs) as pool:
+            return list(pool.map(work, effects))
+
+    def _might_replace(self, problem: Problem, fit: Fit, without: Fit, effect: Effect) -> bool:
+        """Would the effect, at its best start, do a fair part of what was taken away? (A cheap look before a fit.)"""
+        worth = without.loss - fit.loss
+        return without.loss - best_start(problem, without.model, effect)[1] > SCREEN * worth
+
+    def _rivals(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[tuple[str, ...], Fit]]:
+        """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one."""
+        rivals: list[tuple[tuple[str, ...], Fit]] = []
+        for name, other, tried in self._exchanges(problem, fit, accepted):
+            without = problem.fit(fit.model.without(name))
+            worth = held_out_gain(without.held_out, fit.held_out)[0]
+            lost, se = held_out_gain(tried.held_out, fit.held_out)
+            alike = lost < TIE_Z * se or lost < TIE_SHARE * worth
+            if alike and not veto_of(tried, other):
+                rivals.append((tuple(other if a == name else a for a in accepted), tried))
+        return rivals
+
+
+def problem_for(predictor: Predictor, model: Model, start: Array | None = None) -> Problem:
+    """The problem of fitting models like this one: its noise is estimated under it."""
+    steps = predictor.steps(model)
+    return Problem(predictor, filter_for(predictor, steps, estimate_noise(predictor, steps, start)))
+
+
+def veto_of(fit: Fit, name: str) -> str:
+    """Why an effect with these numbers cannot be believed; "" if it can."""
+    for index, number in enumerate(fit.free):
+        p = number.parameter
+        if number.effect != name:
+            continue
+        value, (low, high) = float(fit.values[index]), fit.interval(index)
+        if value in {p.low, p.high}:
+            return f"{p.name} is at its bound, {value:g} {p.unit}"
+        if np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
+            return f"{p.name} = {value:g} {p.unit} is outside of what is plausible, {p.plausible[0]:g} to {p.plausible[1]:g}"
+    return ""

@@ -1,0 +1,122 @@
+"""Measurements in arrays: the tracked frames of all trials, and the commands that were in force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from bns.measurements import COMMANDS, POSE, SESSION
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Trials one after the other.
+
+    ``first`` (trials + 1): where each trial's frames begin. ``t_s`` (frames,) since the trial's first row, ``pose`` (frames, 3),
+    all finite. ``left_m_s, right_m_s, duration_s`` (trials, commands): what was in force, back to back from the first
+    row, padded with commands of 0 s. ``extra``: further numeric columns, (frames,) each. ``start_s`` (trials,): time of
+    the session at the first row; ``start_known``: it was logged, not made up from the order of the trials.
+    """
+
+    names: tuple[str, ...]
+    first: NDArray[np.int64]
+    t_s: Array
+    pose: Array
+    left_m_s: Array
+    right_m_s: Array
+    duration_s: Array
+    start_s: Array
+    start_known: bool
+    extra: Mapping[str, Array] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def trial(self) -> NDArray[np.int64]:
+        """The trial of every frame, (frames,)."""
+        return np.repeat(np.arange(len(self)), np.diff(self.first))
+
+    @cached_property
+    def is_first(self) -> NDArray[np.bool_]:
+        """Frames that begin a trial, (frames,)."""
+        found = np.zeros(len(self.t_s), dtype=bool)
+        found[self.first[:-1]] = True
+        return found
+
+    def only(self, chosen: NDArray[np.int64]) -> Tracks:
+        """Some of the trials, in the order of ``chosen``."""
+        frames = np.concatenate([np.arange(self.first[i], self.first[i + 1]) for i in chosen])
+        lengths = np.diff(self.first)[chosen]
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in chosen),
+            first=np.concatenate([[0], np.cumsum(lengths)]),
+            t_s=self.t_s[frames],
+            pose=self.pose[frames],
+            left_m_s=self.left_m_s[chosen],
+            right_m_s=self.right_m_s[chosen],
+            duration_s=self.duration_s[chosen],
+            start_s=self.start_s[chosen],
+            extra={name: values[frames] for name, values in self.extra.items()},
+        )
+
+
+def tracks_of(table: pd.DataFrame) -> Tracks:
+    """The arrays of a table of measurements that has passed the checks; trials in the order in which they come."""
+    groups = [rows for _, rows in table.groupby("trial", sort=False)]
+    commands = [_commands(rows) for rows in groups]
+    seen = [rows[list(POSE)].notna().all(axis=1).to_numpy() for rows in groups]
+    times = [(rows["t_s"] - rows["t_s"].iloc[0]).to_numpy(dtype=float) for rows in groups]
+    frames = [int(mask.sum()) for mask in seen]
+    start, known = _session(table, groups, times)
+    others = [name for name in table.columns if name not in {"trial", "t_s", *COMMANDS, *POSE}]
+    numeric = [name for name in others if pd.api.types.is_numeric_dtype(table[name])]
+    return Tracks(
+        names=tuple(str(rows["trial"].iloc[0]) for rows in groups),
+        first=np.concatenate([[0], np.cumsum(frames)]).astype(np.int64),
+        t_s=np.concatenate([t[mask] for t, mask in zip(times, seen, strict=True)]),
+        pose=np.concatenate([g[list(POSE)].to_numpy(dtype=float)[m] for g, m in zip(groups, seen, strict=True)]),
+        left_m_s=_padded([c[0] for c in commands]),
+        right_m_s=_padded([c[1] for c in commands]),
+        duration_s=_padded([c[2] for c in commands]),
+        start_s=start,
+        start_known=known,
+        extra={
+            name: np.concatenate([g[name].to_numpy(dtype=float)[m] for g, m in zip(groups, seen, strict=True)])
+            for name in numeric
+        },
+    )
+
+
+def _commands(rows: pd.DataFrame) -> tuple[Array, Array, Array]:
+    """Runs of equal commands of one trial: left, right, duration."""
+    t = rows["t_s"].to_numpy(dtype=float)
+    given = np.nan_to_num(rows[list(COMMANDS)].to_numpy(dtype=float))
+    changes = np.flatnonzero(np.any(np.diff(given, axis=0) != 0, axis=1)) + 1
+    begins = np.concatenate([[0], changes])
+    ends = np.append(t[begins[1:]], t[-1])
+    return given[begins, 0], given[begins, 1], ends - t[begins]
+
+
+def _padded(rows: list[Array]) -> Array:
+    out = np.zeros((len(rows), max(map(len, rows))))
+    for row, values in zip(out, rows, strict=True):
+        row[: len(values)] = values
+    return out
+
+
+def _session(table: pd.DataFrame, groups: list[pd.DataFrame], times: list[Array]) -> tuple[Array, bool]:
+    """When each trial began in its session: as logged, else one trial right after the other."""
+    if SESSION in table.columns and table[SESSION].notna().any():
+        first = [float((rows[SESSION] - (rows["t_s"] - rows["t_s"].iloc[0])).median()) for rows in groups]
+        return np.nan_to_num(np.array(first)), True
+    lasted = np.array([t[-1] for t in times])
+    return np.concatenate([[0.0], np.cumsum(lasted)[:-1]]), False

@@ -1,0 +1,166 @@
+"""What a differential drive with effects predicts from frame to frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.predictor import Steps
+from bns.diagnose.tracks import Array, Tracks
+from bns.engine.pose_filter import followed
+from bns.physics.differential_drive import taken_at
+from bns.physics.grid import step_grid
+from bns.physics.model import Model
+from bns.physics.motion import body_motion, flow_of
+from bns.physics.signals import Conditions, View
+
+_TAIL_S = 1.0
+"""The last command is taken to go on this long: poses may be stamped early."""
+
+
+class WheelPredictor:
+    """Drives the commands of tracks once, and answers any model with the displacement between successive frames."""
+
+    def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
+        self.tracks = tracks
+        tail = np.full((len(tracks), 1), _TAIL_S)
+        last = np.maximum((tracks.duration_s > 0).cumsum(axis=1).argmax(axis=1), 0)
+        rows = np.arange(len(tracks))
+        left = np.hstack([tracks.left_m_s, tracks.left_m_s[rows, last][:, None]])
+        right = np.hstack([tracks.right_m_s, tracks.right_m_s[rows, last][:, None]])
+        self.grid = step_grid(left, right, np.hstack([tracks.duration_s, tail]), dt_s)
+        self.conditions = _conditions(tracks, self.grid.node_s)
+        self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
+        zero = np.zeros_like(self.grid.step_s)
+        wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
+        way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[:, 0]
+        self.way_m = self._since_previous(way)
+
+    def steps(self, model: Model) -> Steps:
+        """Displacement of the tracked point since the frame before, in the frame of the robot there."""
+        grid, tracks = self.grid, self.tracks
+        body = body_motion(model, grid, self.conditions, self._place)
+        at = followed(
+            grid.step_s,
+            body.forward_m_s,
+            body.sideways_m_s,
+            body.yaw_rad_s,
+            body.moving,
+            tracks.trial,
+            taken_at(model, tracks.t_s),
+        )
+        view = View(at[:, :3])
+        for active in model.at("measure"):
+            view = active.effect.apply(view, **active.by_name)
+        return Steps(self._in_robot_frame(view.poses), self._drift(model, self._since_previous(at[:, 3])))
+
+    def variables(self) -> dict[str, Array]:
+        """What the robot was told and where it was, at every step of the grid, (trials, steps)."""
+        grid, tracks = self.grid, self.tracks
+        middle = (grid.node_s[:, 1:] + grid.node_s[:, :-1]) / 2
+        changed = (np.diff(grid.left_m_s, axis=1, prepend=0) != 0) | (np.diff(grid.right_m_s, axis=1, prepend=0) != 0)
+        began = np.maximum.accumulate(np.where(changed, grid.node_s[:, :-1], 0.0), axis=1)
+        speed, turn = (grid.left_m_s + grid.right_m_s) / 2, grid.right_m_s - grid.left_m_s
+        way = np.cumsum((np.abs(grid.left_m_s) + np.abs(grid.right_m_s)) / 2 * grid.step_s, axis=1)
+        return {
+            "left_m_s": grid.left_m_s,
+            "right_m_s": grid.right_m_s,
+            "speed_m_s": speed,
+            "wheel_difference_m_s": turn,
+            "previous_speed_m_s": _before(speed, changed),
+            "previous_wheel_difference_m_s": _before(turn, changed),
+            "time_in_command_s": middle - began,
+            "time_in_trial_s": middle,
+            "session_s": tracks.start_s[:, None] + middle,
+            "way_m": way,
+            "left_since_reversal_s": _since_reversal(grid.left_m_s, grid.step_s),
+            "right_since_reversal_s": _since_reversal(grid.right_m_s, grid.step_s),
+            **{name: self._seen_on_grid(name) for name in self._seen()},
+        }
+
+    def at_frames(self, frames: NDArray[np.int64]) -> dict[str, Array]:
+        """`variables` at the times of some frames, (frames,) each."""
+        rows = self.tracks.trial[frames]
+        steps = np.array(
+            [
+                np.searchsorted(self.grid.node_s[r], t + 1e-9, side="right") - 1
+                for r, t in zip(rows, self.tracks.t_s[frames], strict=True)
+            ]
+        ).clip(0, self.grid.step_s.shape[1] - 1)
+        return {name: values[rows, steps] for name, values in self.variables().items()}
+
+    def _seen_on_grid(self, name: str) -> Array:
+        middle, values = (self.grid.node_s[:, 1:] + self.grid.node_s[:, :-1]) / 2, self._seen()[name]
+        return np.stack([_held(self.tracks, values, row, middle[row]) for row in range(len(self.tracks))])
+
+    def _seen(self) -> dict[str, Array]:
+        tracks = self.tracks
+        heading = np.concatenate(
+            [np.unwrap(tracks.pose[a:b, 2]) for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
+        )
+        extra = {k: v for k, v in tracks.extra.items() if np.isfinite(v).sum() > 1 and k != "session_s"}
+        return {"x_m": tracks.pose[:, 0], "y_m": tracks.pose[:, 1], "heading_rad": heading, **extra}
+
+    def _since_previous(self, values: Array) -> Array:
+        change = np.diff(values, axis=0, prepend=values[:1])
+        change[self.tracks.is_first] = 0.0
+        return change
+
+    def _in_robot_frame(self, poses: Array) -> Array:
+        change = self._since_previous(poses)
+        before = np.roll(poses[:, 2], 1)
+        cos, sin = np.cos(before), np.sin(before)
+        forward = cos * change[:, 0] + sin * change[:, 1]
+        left = cos * change[:, 1] - sin * change[:, 0]
+        return np.stack([forward, left, change[:, 2]], axis=1)
+
+    def _drift(self, model: Model, moving_s: Array) -> Array:
+        """What the floor adds in the world's frame, taken where the robot was seen (millimetres do not matter there)."""
+        flow = flow_of(model)
+        if (flow.x_m_s, flow.y_m_s, flow.return_per_s) == (0.0, 0.0, 0.0):
+            return np.zeros((len(moving_s), 2))
+        where = np.roll(self.tracks.pose[:, :2], 1, axis=0)
+        velocity = np.array([flow.x_m_s, flow.y_m_s]) - flow.return_per_s * where
+        out: Array = velocity * moving_s[:, None]
+        return out
+
+
+def _before(values: Array, changed: NDArray[np.bool_]) -> Array:
+    """What was in force before the last change, at every step; 0 before the first."""
+    before = np.pad(values, ((0, 0), (1, 0)))[:, :-1]
+    out = np.zeros_like(values)
+    current = np.zeros(len(values))
+    for k in range(values.shape[1]):
+        current = np.where(changed[:, k], before[:, k], current)
+        out[:, k] = current
+    return out
+
+
+def _since_reversal(speed: Array, step_s: Array) -> Array:
+    """Time since a wheel last changed its direction, at most 1 s, with the sign of its speed; 1 s where it never did."""
+    out, since, sign = np.empty_like(speed), np.ones(len(speed)), np.zeros(len(speed))
+    for k in range(speed.shape[1]):
+        now = np.sign(speed[:, k])
+        since = np.where((now != 0) & (sign != 0) & (now != sign), 0.0, np.minimum(since + step_s[:, k], 1.0))
+        sign = np.where(now != 0, now, sign)
+        out[:, k] = since * np.where(sign == 0, 1.0, sign)
+    return out
+
+
+def _conditions(tracks: Tracks, node_s: Array) -> Conditions:
+    middle = (node_s[:, 1:] + node_s[:, :-1]) / 2
+    volts = tracks.extra.get("battery_v")
+    drop = None
+    if volts is not None and np.isfinite(volts).any():
+        reference = volts[np.isfinite(volts)][0]
+        drop = np.stack([_held(tracks, volts, row, middle[row]) for row in range(len(tracks))]) - reference
+        drop = -drop
+    return Conditions(session_s=tracks.start_s[:, None] + middle, battery_drop_v=drop)
+
+
+def _held(tracks: Tracks, values: Array, trial: int, t_s: Array) -> Array:
+    frames = slice(tracks.first[trial], tracks.first[trial + 1])
+    known = np.isfinite(values[frames])
+    if not known.any():
+        return np.full(len(t_s), np.nanmean(values))
+    return np.interp(t_s, tracks.t_s[frames][known], values[frames][known])

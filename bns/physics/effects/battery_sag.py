@@ -1,0 +1,49 @@
+"""The battery runs down, and the wheels with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Array, Wheels
+
+
+def apply(wheels: Wheels, rate_per_s: float, per_volt: float) -> Wheels:
+    """Both speeds fall by ``rate_per_s`` of themselves a second of the session, and by ``per_volt`` a volt."""
+    kept: Array = 1.0 - rate_per_s * wheels.session_s
+    if wheels.conditions.battery_drop_v is not None:
+        kept = kept - per_volt * wheels.conditions.battery_drop_v
+    return replace(wheels, left_m_s=wheels.left_m_s * kept, right_m_s=wheels.right_m_s * kept)
+
+
+EFFECT = Effect(
+    name="battery-sag",
+    stage="wheel",
+    parameters=(
+        Parameter(
+            "rate_per_s",
+            "1/s",
+            -0.05,
+            0.05,
+            (-2e-3, 2e-3),
+            0.0,
+            "share of speed lost a second of the session",
+            instead_of="battery_v",
+        ),
+        Parameter(
+            "per_volt",
+            "1/V",
+            -2.0,
+            2.0,
+            (-0.5, 0.5),
+            0.0,
+            "share of speed lost a volt below the first one logged",
+            column="battery_v",
+        ),
+    ),
+    equation="u' = u·(1 - rate·session - per_volt·(V0 - V)) for each wheel",
+    residuals="Distances and turns shrink by one share that grows from trial to trial.",
+    lookalikes=("speed-gain",),
+    apply=apply,
+    rank=30,
+)

@@ -1,0 +1,27 @@
+"""The tracker's clock and the robot's do not agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Stamps
+
+
+def apply(stamps: Stamps, offset_s: float) -> Stamps:
+    """A pose stamped t was taken at t - ``offset_s``."""
+    return replace(stamps, t_s=stamps.t_s - offset_s)
+
+
+EFFECT = Effect(
+    name="clock-offset",
+    stage="clock",
+    parameters=(
+        Parameter("offset_s", "s", -5.0, 5.0, (-1.0, 1.0), 0.0, "poses are stamped this much late (negative: early)"),
+    ),
+    equation="pose'(t) = pose(t - offset)",
+    residuals="The whole track is shifted along itself: errors are speed times the offset, and vanish at rest.",
+    lookalikes=("command-delay", "motor-lag"),
+    apply=apply,
+    rank=150,
+)

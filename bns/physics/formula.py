@@ -1,0 +1,145 @@
+"""An effect written as a formula, by people who would rather not write Python: ``term: k * v * abs(w)``, ``on: v``."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from bns.errors import ModelError, unknown_name
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Array, Body
+
+ON: Mapping[str, str] = {"v": "forward_m_s", "s": "sideways_m_s", "w": "yaw_rad_s", "east": "east", "north": "north"}
+"""What a term can be added to: forward, sideways (to the right) and turning velocity, and velocity in the world's frame."""
+VARIABLES: Mapping[str, str] = {
+    "v": "forward velocity, m/s",
+    "w": "turning velocity, rad/s, left positive",
+    "l": "speed of the left wheel, m/s",
+    "r": "speed of the right wheel, m/s",
+    "t": "time since the session began, s",
+    "tau": "time since the trial began, s",
+    "d": "way driven in the trial, m",
+    "x": "position east, m",
+    "y": "position north, m",
+    "heading": "heading, rad",
+    "moving": "1 while a wheel turns, else 0",
+}
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+    "abs": np.abs,
+    "sign": np.sign,
+    "sqrt": np.sqrt,
+    "exp": np.exp,
+    "log": np.log,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tanh": np.tanh,
+    "min": np.minimum,
+    "max": np.maximum,
+}
+_PLACE = {"x", "y", "heading"}
+_ALLOWED = (
+    ast.Expression,
+    ast.BinOp,
+    ast.UnaryOp,
+    ast.Call,
+    ast.Name,
+    ast.Constant,
+    ast.Load,
+    ast.Add,
+    ast.Sub,
+    ast.Mult,
+    ast.Div,
+    ast.Pow,
+    ast.USub,
+    ast.UAdd,
+)
+
+
+def formula_effect(name: str, term: str, on: str) -> Effect:
+    """The effect that adds ``term`` to the velocity ``on``; names that are no variable are its parameters.
+
+    ModelError if the term does not parse, uses anything but arithmetic, `FUNCTIONS` and `VARIABLES`, or has no parameter.
+    """
+    if on not in ON:
+        raise ModelError(f"formula {name}: " + unknown_name("velocity to add to (on)", on, ON))
+    names, code = _parsed(name, term)
+    unknown = sorted(names - set(VARIABLES))
+    if not unknown:
+        raise ModelError(f"formula {name}: {term!r} has no number to fit; multiply it by one, as in k * ({term}).")
+    return Effect(
+        name=name,
+        stage="body",
+        parameters=tuple(
+            Parameter(p, "1", -1e3, 1e3, (-10.0, 10.0), 0.0 if p == unknown[0] else 1.0, "of a formula")
+            for p in unknown
+        ),
+        equation=f"{on}' = {on} + {term}",
+        residuals="as the formula says",
+        lookalikes=(),
+        apply=partial(_apply, name, code, on),
+        rank=116,
+        needs_place=bool(names & _PLACE) or on in {"east", "north"},
+    )
+
+
+def _parsed(name: str, term: str) -> tuple[set[str], Any]:
+    try:
+        tree = ast.parse(term.strip(), mode="eval")
+    except (SyntaxError, ValueError) as fault:
+        raise ModelError(f"formula {name}: {term!r} is no formula: {fault}. Write it as in k * v * abs(w).") from fault
+    called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+    for node in ast.walk(tree):
+        if not isinstance(node, _ALLOWED) or (
+            isinstance(node, ast.Constant) and not isinstance(node.value, int | float)
+        ):
+            raise ModelError(
+                f"formula {name}: {ast.unparse(node)!r} is not allowed; use + - * / **, numbers, names and "
+                f"{', '.join(FUNCTIONS)}."
+            )
+        if isinstance(node, ast.Call) and (not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS):
+            raise ModelError(f"formula {name}: " + unknown_name("function", ast.unparse(node.func), FUNCTIONS))
+    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - called
+    return names, compile(tree, name, "eval")
+
+
+def _apply(name: str, code: Any, on: str, body: Body, **numbers: float) -> Body:
+    if body.place is None and _needs(code, on):
+        return body  # first round of a simulation: nobody knows yet where the robot goes
+    values = {**_values(body), **numbers}
+    with np.errstate(all="ignore"):
+        added = np.asarray(eval(code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
+    added = np.broadcast_to(added, body.forward_m_s.shape) * (body.moving if on in {"east", "north"} else 1.0)
+    if not np.isfinite(added).all():
+        raise ModelError(
+            f"formula {name} is {added[~np.isfinite(added)][0]} somewhere on these trials: a pole, a root or logarithm of "
+            "what is not positive. Write it so that it is finite for every speed, at rest too."
+        )
+    if on not in {"east", "north"}:
+        return body.with_added(ON[on], added)
+    assert body.place is not None
+    return body.with_drift(on, added, body.place[..., 2])
+
+
+def _needs(code: Any, on: str) -> bool:
+    return on in {"east", "north"} or bool(_PLACE & set(code.co_names))
+
+
+def _values(body: Body) -> dict[str, Array]:
+    begin = body.session_s[:, :1]
+    values = {
+        "v": body.forward_m_s,
+        "w": body.yaw_rad_s,
+        "l": body.left_m_s,
+        "r": body.right_m_s,
+        "t": body.session_s,
+        "tau": body.session_s - begin,
+        "d": np.cumsum(np.abs(body.forward_m_s) * np.diff(body.session_s, axis=1, prepend=begin), axis=1),
+        "moving": body.moving,
+    }
+    if body.place is not None:
+        values |= {"x": body.place[..., 0], "y": body.place[..., 1], "heading": body.place[..., 2]}
+    return values

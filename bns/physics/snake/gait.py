@@ -1,0 +1,40 @@
+"""Joint angles of a cycle: equations 5.1 and 5.2."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bns.errors import ModelError
+
+COMMANDS_A_CYCLE = 13
+"""Angle sets of a cycle, t = 0..12: the first and the last are the same (section 5.3.2)."""
+GAMMA_RAD = 2.0 * np.pi / 12.0
+"""Temporal step γ: one period of the sine in a cycle."""
+PARAMETERS = ("a_lat_rad", "a_vert_rad", "omega_rad", "alpha_rad")
+
+
+def cycle_angles(parameters: ArrayLike, joints: int = 12) -> np.ndarray:
+    """Angles (13, joints), rad, of every servo at every command of one cycle.
+
+    ``parameters`` (4,): A_lateral, A_vertical, ω, α. Even joints are lateral: A_lat sin(θ + α); odd ones vertical:
+    A_vert sin θ; θ = ω n + γ t; both offsets are zero. ModelError unless 0 <= A_vert < A_lat <= π/2 (A_lat = 0 is a
+    robot that lies still) and all are finite.
+    """
+    a_lat, a_vert, omega, alpha = _checked(parameters)
+    n = np.arange(joints)
+    theta = omega * n + GAMMA_RAD * np.arange(COMMANDS_A_CYCLE)[:, None]
+    return np.where(n % 2 == 0, a_lat * np.sin(theta + alpha), a_vert * np.sin(theta))
+
+
+def _checked(parameters: ArrayLike) -> np.ndarray:
+    given = np.asarray(parameters, np.float64)
+    if given.shape != (4,) or not np.isfinite(given).all():
+        raise ModelError(f"a cycle is given as {given.tolist()}; give four finite numbers: {', '.join(PARAMETERS)}.")
+    a_lat, a_vert = given[:2]
+    if not (0 <= a_vert < a_lat <= np.pi / 2 + 1e-6 or a_lat == a_vert == 0):
+        raise ModelError(
+            f"the amplitudes are a_lat_rad = {a_lat:g} and a_vert_rad = {a_vert:g}; allowed is "
+            "0 <= a_vert_rad < a_lat_rad <= pi/2 (a body that lifts higher than it bends tips over): lower a_vert_rad."
+        )
+    return given

@@ -1,0 +1,98 @@
+"""What the snake's physics is made of: one number a line of ``parameters.yaml``, with its basis and reason."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from bns.errors import ModelError, unknown_name
+from bns.physics.effect import number
+
+BASIS = ("measured", "published", "guess")
+"""How a value came to be known."""
+
+
+def _within(low: float, high: float) -> Any:
+    return dataclasses.field(metadata={"low": low, "high": high})
+
+
+@dataclass(frozen=True)
+class SnakeParameters:
+    """Body, servos, floor, camera and thresholds, in SI units; `parameters.yaml` says where each value comes from."""
+
+    links: float = _within(4, 40)
+    pitch_m: float = _within(0.01, 1.0)
+    radius_m: float = _within(0.002, 0.2)
+    body_mass_kg: float = _within(0.01, 50.0)
+    tail_mass_kg: float = _within(0.0, 10.0)
+    tether_drag_n: float = _within(0.0, 10.0)
+    marker_gap_m: float = _within(0.01, 10.0)
+    torque_limit_n_m: float = _within(0.01, 100.0)
+    stiffness_n_m_rad: float = _within(0.01, 1000.0)
+    damping_n_m_s_rad: float = _within(0.0, 100.0)
+    armature_kg_m2: float = _within(0.0, 1.0)
+    friction_loss_n_m: float = _within(0.0, 10.0)
+    dead_band_rad: float = _within(0.0, 0.5)
+    resolution_rad: float = _within(0.0, 0.5)
+    delay_s: float = _within(0.0, 1.0)
+    joint_speed_rad_s: float = _within(0.01, 20.0)
+    settle_s: float = _within(0.0, 10.0)
+    floor_friction: float = _within(0.01, 3.0)
+    friction_spread: float = _within(0.0, 0.3)
+    marker_noise_m: float = _within(0.0, 0.1)
+    tipped_rad: float = _within(0.1, 3.2)
+    stalled_s: float = _within(0.0, 10.0)
+    collision_n: float = _within(0.0, 100.0)
+    dt_s: float = _within(1e-5, 0.02)
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = number(f"snake: {field.name}", getattr(self, field.name), **field.metadata)
+            object.__setattr__(self, field.name, value)
+
+    @property
+    def joints(self) -> int:
+        """Servos: one between each two links."""
+        return int(self.links) - 1
+
+    @property
+    def length_m(self) -> float:
+        """Length of the straight body."""
+        return int(self.links) * self.pitch_m
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all numbers, 20 hexadecimal digits."""
+        return hashlib.sha256(json.dumps(dataclasses.asdict(self), sort_keys=True).encode()).hexdigest()[:20]
+
+
+def read_parameters(text: str) -> SnakeParameters:
+    """Parameters of a YAML text; ModelError names an entry that is missing, unknown or without its basis and reason."""
+    content = yaml.safe_load(text)
+    names = [field.name for field in dataclasses.fields(SnakeParameters)]
+    if not isinstance(content, dict):
+        raise ModelError(f"the snake's parameters are no mapping; give {', '.join(names)}.")
+    for name, entry in content.items():
+        if name not in names:
+            raise ModelError(unknown_name("parameter of the snake", name, names))
+        if not isinstance(entry, dict) or set(entry) != {"value", "basis", "reason"}:
+            raise ModelError(f"the snake's {name} is {entry!r}; it needs value, basis and reason.")
+        if entry["basis"] not in BASIS:
+            raise ModelError(unknown_name(f"basis of the snake's {name}", entry["basis"], BASIS))
+    if missing := [name for name in names if name not in content]:
+        raise ModelError(f"the snake's parameters lack {', '.join(missing)}; add them with value, basis and reason.")
+    return SnakeParameters(**{name: content[name]["value"] for name in names})
+
+
+@cache
+def shipped_parameters() -> SnakeParameters:
+    """The parameters that ship in the package."""
+    return read_parameters((Path(str(resources.files(__package__))) / "parameters.yaml").read_text())

@@ -1,0 +1,158 @@
+"""What the loop asks of the snake."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bns.engine.evolution import Population, diversity
+from bns.engine.philox import Key, Purpose, normals
+from bns.engine.snn import predict
+from bns.robots.base import Luck, Recipe, Scores
+from bns.robots.snake import cycles, path
+from bns.robots.snake.rollout import evaluate
+from bns.tasks import Task
+
+NOISE_SD_M = np.array([0.10, 0.05, 0.10, 0.05])
+"""Noise in evolution on Δx and Δy of yellow, then of green (section 5.4.1)."""
+NOISY_EVALUATIONS = 10
+_REACH_M = 1.0
+"""Displacements from -0.5 to 0.5 m lie between outputs 0 and 1: the order of the largest that cycles make."""
+_JOINT_SPEED_RAD_S, _SETTLE_S = 1.5, 0.05
+
+
+class Snake:
+    """Implements `bns.robots.base.Robot`: poses are observations (n, 9) as in `path.walk`."""
+
+    name = "snake"
+    networks = ("dx_yellow", "dy_yellow", "dx_green", "dy_green", "stable")
+    hidden = 100
+    input_count = 4
+    sigmoid_output = True
+    repeats_inputs = True
+    recipe: Recipe | None = Recipe(400, 20, 3, 20, 4, 12_000, (0.08, 0.08, 0.08, 0.08, 0.0))
+    """Section 5.4.1; the noise of the substitute world is 8 cm on every displacement (section 5.8)."""
+    radii_m: tuple[float, ...] = ()
+    bounds = cycles.BOUNDS
+    command_columns = cycles.COLUMNS
+
+    def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
+        """Random cycles, as many as ``capacity`` allows up to ten; all controllers have the same number."""
+        return cycles.random_cycles(key, Purpose.INITIAL_COMMAND, 0, size, min(cycles.CYCLES, capacity))
+
+    def random_controllers(self, key: Key, count: int, length: int) -> Population:
+        """Controllers of `length` random cycles, apart from every population's draws."""
+        return cycles.random_cycles(key, Purpose.PROBE, 0, count, length)
+
+    def near(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+        """Cycles (n, 5), each component moved within its mutation span."""
+        return cycles.near(commands, key, step)
+
+    def inputs(self, commands: np.ndarray) -> np.ndarray:
+        """Inputs (5, n): A_lat, A_vert, ω, α, each from -1 to 1, and one that is not used."""
+        middle, half = (self.bounds.low + self.bounds.high) / 2, (self.bounds.high - self.bounds.low) / 2
+        X = np.zeros((5, len(commands)), np.float32)
+        X[:4] = ((commands - middle) / half)[:, :4].T
+        return X
+
+    def displacements(self, outputs: np.ndarray) -> np.ndarray:
+        """(n, 5): to the right and along, m, of yellow, then of green; last the stability, from 0 to 1."""
+        moved = np.array(outputs.T, np.float64)
+        moved[:, :4] = (moved[:, :4] - 0.5) * _REACH_M
+        return moved
+
+    def targets(self, displacements: np.ndarray) -> np.ndarray:
+        """Network targets (5, n)."""
+        wanted = np.array(displacements, np.float64)
+        wanted[:, :4] = wanted[:, :4] / _REACH_M + 0.5
+        return np.ascontiguousarray(wanted.T, np.float32)
+
+    def learnable(self, displacements: np.ndarray) -> np.ndarray:
+        """Displacements are learned from stable cycles, stability from all (section 5.4.1)."""
+        stable = displacements[:, 4] >= 0.5
+        return np.vstack([np.tile(stable, (4, 1)), np.ones((1, len(stable)), bool)])
+
+    def poses(self, displacements: np.ndarray) -> np.ndarray:
+        """Observations (n, 9) from the start of every task."""
+        return path.walk(displacements)
+
+    def measured_displacements(self, poses: np.ndarray) -> np.ndarray:
+        """What each cycle did between its own begin and end; what the change between cycles did is left out."""
+        return path.unwalk(poses)
+
+    def start_pose(self) -> np.ndarray:
+        """Observation (1, 9) of a robot that has not moved yet."""
+        markers = np.ravel(path.START_M)
+        return np.concatenate([markers, markers, [1.0]])[None]
+
+    def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
+        """Middle and direction of the markers, then the markers, m and rad; whether the cycle was stable."""
+        middle, line = path.middles(poses), poses[:, 6:8] - poses[:, 4:6]
+        named = {"x_m": middle[:, 0], "y_m": middle[:, 1], "heading_rad": np.arctan2(line[:, 1], line[:, 0])}
+        markers = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
+        return named | dict(zip(markers, poses[:, 4:8].T, strict=True)) | {"stable": poses[:, path.STABLE] >= 0.5}
+
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
+        """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2)."""
+        in_full = cycles.in_full(controller)
+        outputs = predict(weights, self.inputs(in_full), self.sigmoid_output)
+        return in_full[: path.judge(self.poses(self.displacements(outputs)), task)[2]]
+
+    def score(self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None) -> Scores:
+        """Mean fitness over ten noisy evaluations, all controllers under the same noise; without luck there is none."""
+        commands = population.commands
+        n, length, _ = commands.shape
+        moves = np.ascontiguousarray(
+            self.displacements(predict(weights, self.inputs(commands.reshape(n * length, -1)), self.sigmoid_output)).T
+        )
+        fitness, reached, used = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int32)
+        half = (task.region_m / 2, task.surface_m[0] / 2, task.surface_m[1] / 2)
+        noise = self._noise(luck, length * cycles.MOST_REPEATS)
+        repeats = np.ascontiguousarray(commands[..., cycles.REPEATS])
+        failures = evaluate(moves, repeats, noise, task.goals_m, *half, fitness, reached, used)
+        return Scores(fitness, reached, int(failures), used)
+
+    @staticmethod
+    def _noise(luck: Luck | None, steps: int) -> np.ndarray:
+        if luck is None:
+            return np.empty((0, steps, 4))
+        return normals(luck.key, Purpose.ROLLOUT_NOISE, luck.step, NOISY_EVALUATIONS, steps) * NOISE_SD_M
+
+    def breed(
+        self,
+        key: Key,
+        parents: Population,
+        order: np.ndarray,
+        cdf: np.ndarray,
+        rate: float,
+        shortest: int,
+        generation: int,
+        children: Population,
+    ) -> int:
+        """Uniform crossover and mutation; the number of cycles does not change, so none is cut."""
+        children.commands[:] = cycles.breed(key, parents, order, cdf, rate, generation)
+        children.lengths[:] = parents.lengths
+        return 0
+
+    def diversity(self, population: Population, scores: Scores) -> float:
+        """Equation 4.1 over the cycles that each controller needs to finish the task in simulation (section 5.9.2)."""
+        used = population.lengths if scores.used is None else scores.used
+        return diversity(Population(population.commands, used), self.bounds)
+
+    def judge(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
+        """Algorithm 3: fitness per metre, goals reached."""
+        return path.judge(poses, task)[:2]
+
+    def succeeded(self, poses: np.ndarray, task: Task) -> bool:
+        """Whether all regions are reached in order."""
+        return path.judge(poses, task)[1] == len(task.goals_m)
+
+    def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
+        """Empty: regions have no radius."""
+        return ()
+
+    def driven_ms(self, commands: np.ndarray) -> float:
+        """Time of the cycles: twelve steps of the joint with the longest way at the constant speed, and the pauses."""
+        largest_step = 2 * math.sin(math.pi / 12) * commands[:, 0]
+        return float(1000 * 12 * (largest_step / _JOINT_SPEED_RAD_S + _SETTLE_S).sum())

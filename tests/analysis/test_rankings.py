@@ -1,0 +1,121 @@
+"""Best and worst combinations: how they are ranked, what is drawn of them, what fresh seeds say."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+from figure_helpers import MUTATION, carry_out, curves, with_evals, written
+
+from analysis import best_combinations, diversity_of_extremes, potential_success
+from analysis.ranking import extremes, in_words, ranking
+from analysis.selection import selections
+from analysis.store import NoDataError, Store
+from analysis.words import CELL
+from bns.spec import RunSpec
+from bns.store import load
+from bns.sweep.confirm import confirmation
+from bns.sweep.grid import parse_sweep
+
+NEAR = {f"success_{cm}cm": False for cm in (7, 10, 14, 20)}
+
+
+def rated(rate: float, seeds: int = 5, sweep_seed: int = 0, good: int = 0, **columns) -> list:
+    """``seeds`` runs of six evaluations at a mutation rate; the first ``good`` succeed."""
+    specs = [RunSpec(seed=sweep_seed + seed, evaluations=6, mutation_rate=rate) for seed in range(seeds)]
+    return [
+        with_evals(spec, **{**NEAR, "success": number < good, "success_7cm": number < good, **columns})
+        for number, spec in enumerate(specs)
+    ]
+
+
+def test_ties_are_broken_at_wider_radii_then_by_fitness_in_the_world(tmp_path):
+    planted = {
+        0.1: {"good": 3},
+        0.2: {"good": 3, "success_10cm": True},
+        0.3: {"good": 4},
+        0.4: {"fitness_world": 0.5},
+        0.5: {"fitness_world": 0.7},
+        0.6: {"success_20cm": True, "fitness_world": 0.0},
+    }
+    written(tmp_path, "grid", [run for rate, columns in planted.items() for run in rated(rate, **columns)])
+    store = Store(tmp_path)
+    rows = ranking(store, selections(store)[0])
+    assert rows.mutation_rate.tolist() == [0.3, 0.2, 0.1, 0.6, 0.5, 0.4]
+    best, worst = extremes(rows, "circle")
+    assert (best.mutation_rate.tolist(), worst.mutation_rate.tolist()) == ([0.3, 0.2, 0.1], [0.6, 0.5, 0.4])
+    assert in_words(rows.iloc[0]) == "population 400, tournament 50 %, mutation 30 %, real-world selection 70 %"
+    with pytest.raises(NoDataError, match="best and worst need two"):
+        extremes(rows.head(1), "circle")
+
+
+def test_diversity_of_the_best_is_what_pandas_computes(study):
+    store = Store(study)
+    best, worst = extremes(ranking(store, selections(store)[0]), "circle")
+    drawn = next(one for one in diversity_of_extremes.draw(store) if one.name.endswith("circle"))
+    evals = load(study, "evals", where={"task": "circle"}).query("evaluation >= 5")
+    for number, cells in enumerate((best, worst)):
+        own = evals.merge(cells[list(CELL)], on=list(CELL))
+        x, y = curves(drawn.figure, number)["their mean"]
+        means = own.groupby("evaluation").diversity.mean()
+        assert list(x) == means.index.tolist() == [5, 6, 7, 8, 9, 10]
+        assert y == pytest.approx(means.to_numpy())
+    assert drawn.n == 160
+    planted_low, planted_high = drawn.data[drawn.data.evaluation == 10].diversity
+    assert planted_low < planted_high  # diversity was planted to follow the mutation rate, success to fall with it
+
+
+def test_potential_success_is_what_pandas_counts(study):
+    store = Store(study)
+    best, _ = extremes(ranking(store, selections(store)[0]), "infinity")
+    drawn = potential_success.draw(store)[0]
+    own = load(study, "evals", where={"task": "infinity"}).merge(best[list(CELL)], on=list(CELL))
+    x, y = curves(drawn.figure)["infinity sign"]
+    assert y == pytest.approx(100 * own.groupby("evaluation").success_20cm.mean().to_numpy(float))
+    half = list(x)[int(np.argmax(y >= 50))]
+    assert f"infinity sign: half of the runs by evaluation {half}." in drawn.see
+
+
+def test_confirmed_shares_are_of_fresh_seeds_alone_and_stand_beside_the_swept(tmp_path):
+    written(tmp_path, "grid", [*rated(0.1, good=5), *rated(0.5, good=1)])
+    fresh = rated(0.1, seeds=8, sweep_seed=100, good=2)
+    written(tmp_path, "grid-confirm", [*rated(0.1, good=5), *fresh])  # five of them picked the winner
+    drawn = best_combinations.draw(Store(tmp_path))[0]
+    first = drawn.data.iloc[0]
+    assert (first.successes, first.runs, first.confirm_successes, first.confirm_runs) == (5, 5, 2, 8)
+    lines = curves(drawn.figure)
+    assert lines["as swept"][0].tolist() == [100, 20]
+    assert lines["confirmed on fresh seeds"][0].tolist() == [25]
+    assert "100 % as swept and 25 % on fresh seeds" in drawn.see
+    assert "8 runs on fresh seeds" in drawn.shows
+    assert not any("confirm" in text for text in drawn.missing)
+
+
+def test_a_confirming_sweep_is_not_pooled_with_what_it_confirms(tmp_path):
+    written(tmp_path, "grid", [*rated(0.1, good=5), *rated(0.5, good=1)])
+    written(tmp_path, "grid-confirm", [*rated(0.1, sweep_seed=100), *rated(0.5, sweep_seed=100)])
+    store = Store(tmp_path)
+    assert selections(store)[0].sweeps == ("grid",)
+    assert ranking(store, selections(store)[0]).runs.tolist() == [5, 5]
+
+
+def test_who_cannot_be_told_from_the_best_is_corrected_for_many_comparisons(tmp_path):
+    rates = [round(0.1 + 0.05 * number, 2) for number in range(8)]
+    runs = [run for rate in rates[1:] for run in rated(rate, seeds=10, good=5)]
+    written(tmp_path, "grid", [*rated(0.1, seeds=10, good=10), *runs])
+    drawn = best_combinations.draw(Store(tmp_path))[0]
+    # Fisher's test of 10 of 10 against 5 of 10 gives 0.033: below 0.05 alone, not among seven.
+    assert "7 of the 7 others cannot be told from it" in drawn.see
+    assert any("bns sweep sweeps/grid.yaml --confirm-top 10" in text for text in drawn.missing)
+
+
+def test_what_the_sweep_command_confirms_is_what_stands_first(real_results, tmp_path):
+    results = tmp_path / "results"
+    shutil.copytree(real_results, results)
+    sweep = parse_sweep(MUTATION, tmp_path / "mutation.yaml")
+    again = confirmation(sweep, results, top=1)
+    carry_out(results, again.text)
+    for drawn in best_combinations.draw(Store(results)):
+        assert drawn.data.confirm_runs.tolist() == [5, 0]
+        assert drawn.n == 15

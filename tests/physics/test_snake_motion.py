@@ -1,0 +1,165 @@
+"""The snake in physics: its gait, where it goes, why a cycle counts as unstable."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bns.engine.philox import Key, Purpose
+from bns.errors import ModelError
+from bns.physics.snake.body import Body
+from bns.physics.snake.gait import cycle_angles
+from bns.physics.snake.parameters import read_parameters, shipped_parameters
+from bns.physics.snake.stability import BLEW_UP, COLLISION, STALLED, TIPPED, mean_roll_rad
+from bns.physics.snake_drive import SnakePhysics
+
+KEY = Key(1, 2)
+SIDEWINDING = [0.6, 0.3, math.pi / 3, 1.5 * math.pi]
+ROLLING = [1.43, 1.26, 3.81, 4.58]
+
+
+@pytest.fixture(scope="module")
+def body():
+    return Body(shipped_parameters())
+
+
+def laid(body):
+    body.lay_straight()
+    return body
+
+
+def sideways_and_along(driven):
+    """Displacement of both markers (2, 2) to the right of, and along, the line from yellow to green."""
+    along = np.subtract(*driven.before_m[::-1])
+    along = along / np.linalg.norm(along)
+    return (driven.after_m - driven.before_m) @ np.array([[along[1], along[0]], [-along[0], along[1]]])
+
+
+def test_angles_are_those_of_the_equations_written_out():
+    a_lat, a_vert, omega, alpha = 1.1, 0.7, 2.3, 0.4
+    angles = cycle_angles([a_lat, a_vert, omega, alpha])
+    for t in range(13):
+        for n in range(12):
+            theta = omega * n + 2 * math.pi / 12 * t
+            expected = a_lat * math.sin(theta + alpha) if n % 2 == 0 else a_vert * math.sin(theta)
+            assert angles[t, n] == pytest.approx(expected, abs=1e-12)
+    np.testing.assert_allclose(angles[0], angles[12], atol=1e-12)
+
+
+@pytest.mark.parametrize("cycle", [[0.5, 0.6, 1, 1], [0.5, 0.5, 1, 1], [1.6, 0.1, 1, 1], [0.5, -0.1, 1, 1]])
+def test_amplitudes_that_break_the_rule_are_refused(cycle):
+    with pytest.raises(ModelError, match=r"a_lat_rad = .* a_vert_rad = .* 0 <= a_vert_rad < a_lat_rad <= pi/2"):
+        cycle_angles(cycle)
+
+
+def test_a_cycle_that_is_not_finite_is_refused():
+    with pytest.raises(ModelError, match="four finite numbers: a_lat_rad, a_vert_rad, omega_rad, alpha_rad"):
+        cycle_angles([0.5, 0.1, np.nan, 1])
+
+
+def test_the_model_has_the_body_that_the_parameters_say(body):
+    p = shipped_parameters()
+    assert body.model.nu == p.joints == 12
+    assert body.model.body_mass.sum() == pytest.approx(p.body_mass_kg + p.tail_mass_kg)
+    body.lay_straight((0.3, 0.0), 0.0)
+    np.testing.assert_allclose(body.markers_m(), [[-0.025, 0.0], [0.625, 0.0]], atol=1e-9)
+    body.lay_straight((0.3, 0.1), math.pi / 2)
+    np.testing.assert_allclose(body.markers_m(), [[0.3, -0.225], [0.3, 0.425]], atol=1e-9)
+
+
+def test_without_amplitudes_it_lies_still(body):
+    driven = laid(body).drive_cycle([0, 0, 1, 1])
+    assert driven.causes == ()
+    assert np.abs(driven.after_m - driven.before_m).max() < 1e-3
+
+
+def test_side_winding_goes_sideways_and_its_mirror_image_the_other_way(body):
+    moved = sideways_and_along(laid(body).drive_cycle(SIDEWINDING))
+    assert (np.abs(moved[:, 0]) > 0.05).all()
+    assert (np.abs(moved[:, 0]) < 0.30).all()
+    assert (np.abs(moved[:, 1]) < 0.05).all()
+    mirrored = sideways_and_along(laid(body).drive_cycle([*SIDEWINDING[:3], math.pi / 2]))
+    np.testing.assert_allclose(mirrored, moved * [-1, 1], atol=2e-3)
+
+
+def test_same_drive_twice_is_the_same(body):
+    first = laid(body).drive_cycle(SIDEWINDING)
+    body.drive_cycle(ROLLING)
+    np.testing.assert_array_equal(laid(body).drive_cycle(SIDEWINDING).after_m, first.after_m)
+
+
+@pytest.mark.parametrize(
+    ("cycle", "causes"),
+    [
+        (SIDEWINDING, ()),
+        (ROLLING, (TIPPED,)),
+        ([1.13, 0.21, 3.3, 1.95], (COLLISION,)),
+        ([1.56, 0.96, 5.96, 2.89], (COLLISION, STALLED)),
+    ],
+)
+def test_causes_of_instability_are_named(body, cycle, causes):
+    assert laid(body).drive_cycle(cycle).causes == causes
+
+
+def test_the_named_posture_is_the_one_the_body_is_in(body):
+    rolls = []
+    laid(body).drive_cycle(ROLLING, lambda _, data: rolls.append(mean_roll_rad(data.xmat[1:].reshape(-1, 3, 3))))
+    assert max(np.abs(rolls)) > shipped_parameters().tipped_rad
+    rolls.clear()
+    laid(body).drive_cycle(SIDEWINDING, lambda _, data: rolls.append(mean_roll_rad(data.xmat[1:].reshape(-1, 3, 3))))
+    assert max(np.abs(rolls)) < 0.7
+
+
+def test_stronger_servos_no_longer_stall():
+    weak = replace(shipped_parameters(), torque_limit_n_m=0.3)
+    assert STALLED in laid(Body(weak)).drive_cycle([1.2, 0.8, 1.0, 1.0]).causes
+    strong = replace(shipped_parameters(), torque_limit_n_m=15.0)
+    assert STALLED not in laid(Body(strong)).drive_cycle([1.2, 0.8, 1.0, 1.0]).causes
+
+
+def test_physics_that_blows_up_is_an_unstable_cycle_and_the_next_drive_is_sound():
+    world = SnakePhysics(shipped_parameters())
+
+    def explode(_, data):
+        if data.time > 0.3:
+            data.qvel[:] = np.nan
+
+    commands = np.array([SIDEWINDING, SIDEWINDING])
+    seen = world.drive(commands, KEY, Purpose.WORLD_EVALUATED, 1, explode)
+    assert seen.shape == (1, 9)
+    assert np.isfinite(seen).all()
+    assert seen[0, 8] == 0
+    assert BLEW_UP in world.causes[0]
+    assert world.drive(commands, KEY, Purpose.WORLD_EVALUATED, 1)[:, 8].tolist() == [1, 1]
+
+
+def test_a_robot_on_its_side_is_not_driven_on():
+    world = SnakePhysics(shipped_parameters())
+    seen = world.drive(np.array([SIDEWINDING, ROLLING, SIDEWINDING]), KEY, Purpose.WORLD_EVALUATED, 1)
+    assert seen[:, 8].tolist() == [1, 0]
+    assert [bool(causes) for causes in world.causes] == [False, True]
+
+
+def test_same_draws_same_drive_and_friction_differs_from_cycle_to_cycle():
+    world, commands = SnakePhysics(shipped_parameters()), np.array([SIDEWINDING] * 2)
+    first = world.drive(commands, KEY, Purpose.WORLD_EVALUATED, 1)
+    np.testing.assert_array_equal(first, world.drive(commands, KEY, Purpose.WORLD_EVALUATED, 1))
+    other = world.drive(commands, KEY, Purpose.WORLD_EVALUATED, 2)
+    assert 1e-4 < np.abs(other - first)[:, 4:8].max() < 0.05
+    np.testing.assert_allclose(first[0, :4], [-0.025, 0.0, 0.625, 0.0], atol=0.1)
+
+
+def test_parameters_say_what_is_wrong_with_them():
+    good = "floor_friction: {value: 0.35, basis: guess, reason: x}"
+    for text, message in (
+        (good, "lack links, pitch_m"),
+        ("friction: {value: 1, basis: guess, reason: x}", "unknown parameter of the snake 'friction'.*Did you mean"),
+        ("floor_friction: 0.3", "floor_friction is 0.3; it needs value, basis and reason"),
+        (good.replace("guess", "hearsay"), "unknown basis of the snake's floor_friction 'hearsay'"),
+    ):
+        with pytest.raises(ModelError, match=message):
+            read_parameters(text)
+    with pytest.raises(ModelError, match=r"floor_friction.*-1"):
+        replace(shipped_parameters(), floor_friction=-1.0)
+    assert replace(shipped_parameters(), floor_friction=0.3).digest != shipped_parameters().digest
