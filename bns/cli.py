@@ -87,6 +87,9 @@ def _parser() -> argparse.ArgumentParser:
         _positive,
         _duration,
     )
+    ill = command("doctor", doctor, "find what is wrong with ports, robot, camera and calibration")
+    ill.add_argument("--robot", default="khepera")
+    ill.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML): its robot and tracker are asked, too")
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
     many.add_argument(
@@ -223,6 +226,13 @@ def track(options: argparse.Namespace) -> int:
 
     print(tracked(options))
     return 0
+
+
+def doctor(options: argparse.Namespace) -> int:
+    """What is fine and what is not; 2 if something is to be mended."""
+    from bns.trial.checkup import checked_up
+
+    return checked_up(options)
 
 
 def sweep(options: argparse.Namespace) -> int:

@@ -13,6 +13,7 @@ from bns.hardware.rig import load_rig, shipped_rig
 from bns.robots import load_robot
 from bns.spec import RunSpec
 from bns.tasks import task_names
+from bns.trial.experiment import drive_commands
 from bns.trial.replay import replayed
 from bns.trial.session import Set, carry_out
 
@@ -22,6 +23,8 @@ def carried_out(options: argparse.Namespace, parameters: Mapping[str, Any]) -> s
     if options.replay is not None:
         return replayed(options.replay, options.results)
     spec, how = spec_of(parameters), how_of(options)
+    if options.commands is not None:
+        return drive_commands(options.commands, how, options.results, spec.seed)
     return carry_out(spec, how, options.results)
 
 

@@ -239,3 +239,35 @@ def test_ten_trials_with_faults_at_random(tmp_path):
     ends = [soak.judged(seed, tmp_path) for seed in range(10)]
     assert set(ends) <= {"done", "paused, gone on with", "stop not confirmed, and shouted", "refused before it moved"}
     assert ends.count("done") >= 2
+
+
+def test_given_commands_are_driven_and_measured(tmp_path, capsys):
+    file = tmp_path / "proposed.csv"
+    file.write_text("trial,left_m_s,right_m_s,duration_s\n1,0.1,0.1,1.0\n1,0.05,0.1,0.5\n2,0.15,0.1,2.0\n")
+    asked = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", "--results", tmp_path]
+    assert call(*asked, "--commands", file) == 0
+    assert "2 trials driven" in capsys.readouterr().out
+    table = pd.read_csv(tmp_path / "trials" / "experiment-proposed-emulated" / "measurements.csv")
+    assert table["trial"].unique().tolist() == [1, 2]
+    first = table[table["trial"] == 1]
+    assert first["y_m"].iloc[-1] - first["y_m"].iloc[0] == pytest.approx(0.13, abs=0.02)
+    assert call(*asked, "--commands", file) == 2
+    assert "already; move it away" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("trial,left_m_s,right_m_s\n1,0.1,0.1\n", "lacks the column duration_s"),
+        ("trial,left_m_s,right_m_s,duration_s\n1,0.1,0.1,1\n1,9,0.1,1\n", "line 3 of"),
+        ("trial,left_m_s,right_m_s,duration_s\n1,0.1,x,1\n", "line 2 of"),
+        ("", "cannot read the commands"),
+    ],
+)
+def test_bad_commands_are_named_before_anything_moves(tmp_path, capsys, text, message):
+    file = tmp_path / "bad.csv"
+    file.write_text(text)
+    asked = ["trial", "--robot", "khepera", "--emulated", "--results", tmp_path, "--commands", file]
+    assert call(*asked) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "trials").exists()

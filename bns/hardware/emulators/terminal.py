@@ -45,6 +45,7 @@ class PseudoTerminal:
             self.cut()
             self._master, self._slave = os.openpty()
             tty.setraw(self._slave)
+            os.set_blocking(self._master, False)  # a host that does not read must not stop the pump
             self.path.unlink(missing_ok=True)
             self.path.symlink_to(os.ttyname(self._slave))
         self._wake()
