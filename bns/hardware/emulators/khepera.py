@@ -136,7 +136,7 @@ class KheperaEmulator:
         volts = max(self._full_v - self._clock.now_s() * 1e-4, 0.0)
         readings = {0: volts, 1: 0.21, 3: 1.05, 4: 27.5, 5: 78.0}
         value = readings.get(which[0], 0.0)
-        return f"v,{int(value)},{round(10000 * (value % 1.0)) % 10000:04d}"
+        return "v,{},{:04d}".format(*divmod(round(10000 * value), 10000))
 
     def _brown_out(self, now_s: float) -> None:
         if now_s >= self._silent_until_s:
