@@ -42,11 +42,14 @@ def best_start(problem: Problem, model: Model, effect: Effect) -> tuple[Model, f
     starts = [model.with_active(effect, values) for values in _starts(effect)]
     losses = [problem.loss(start) for start in starts]
     best = int(np.argmin(losses))
-    stepped = problem.stepped(starts[best], effect.name)
+    stepped = problem.stepped(starts[best])
     return min(((starts[best], losses[best]), stepped), key=lambda found: found[1])
 
 
 def _starts(effect: Effect) -> Iterator[tuple[float, ...]]:
+    if effect.starts:
+        yield from effect.starts
+        return
     grids = [list(_grid(p)) for p in effect.parameters]
     if len(grids) == 2:  # along each axis: the effect of two numbers is nearly the sum of both
         neutral = tuple(effect.neutral.values())
@@ -61,9 +64,6 @@ def _grid(p: Parameter) -> Iterator[float]:
     low, high = p.plausible
     if np.isinf(p.neutral):
         yield from (float(v) for v in np.geomspace(low, high, _LIMITS))
-        return
-    if p.unit == "m" and high - low > 10:  # a place: near, and far on either side
-        yield from (0.02 * low, 0.0, 0.02 * high)
         return
     for end in (low, high):
         yield from (p.neutral + share * (end - p.neutral) for share in _SHARES if end != p.neutral)

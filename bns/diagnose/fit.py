@@ -104,9 +104,9 @@ class Problem:
             if not (p.column and p.column not in columns) and not (p.instead_of and p.instead_of in columns)
         )
 
-    def stepped(self, model: Model, effect: str) -> tuple[Model, float]:
-        """One undamped step of least squares in the numbers of one effect; the model there and its loss."""
-        free = tuple(f for f in self.free(model) if f.effect == effect)
+    def stepped(self, model: Model) -> tuple[Model, float]:
+        """One undamped step of least squares in all numbers; the model there and its loss."""
+        free = self.free(model)
         white = self.white(model)
         curvature, gradient = _normal(self._jacobian(model, free, white), white)
         there = moved_by(model, free, _damped_step(curvature, gradient, 1e-9))

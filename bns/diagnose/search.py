@@ -174,28 +174,31 @@ class Search:
             return self._exchanged[2]
         found = []
         for name in accepted:
-            without = problem.fit(fit.model.without(name))
+            model = fit.model.without(name)
+            loose = problem_for(self.predictor, model)
+            without = loose.fit(model)
             others = [effect for other, effect in self.catalogue.items() if other not in accepted]
-            fits = self._all(partial(self._in_place, problem, fit, without), others)
+            fits = self._all(partial(self._in_place, problem, loose, without, loose.loss(fit.model)), others)
             found += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
         self._exchanged = (problem, accepted, found)
         return found
 
-    def _in_place(self, problem: Problem, fit: Fit, without: Fit, effect: Effect) -> Fit | None:
-        if not self._might_replace(problem, fit, without, effect):
+    def _in_place(self, problem: Problem, loose: Problem, without: Fit, reached: float, effect: Effect) -> Fit | None:
+        """The fit with the effect in the place of one that was taken away; None if it does next to nothing of its work.
+
+        First under the noise of the model without either (``loose``): under the small noise of a good model, one that is far off
+        pulls on nothing. ``reached``: the loss there with what was taken away.
+        """
+        start, loss = best_start(loose, without.model, effect)
+        if without.loss - loss < SCREEN * (without.loss - reached):
             return None
         self.tick(effect.name)
-        return fit_with(problem, without, effect)
+        return problem.fit(loose.fit(start).model)
 
     def _all(self, work: Callable[[Effect], T], effects: Sequence[Effect]) -> list[T]:
         """In threads: the kernels let go of the interpreter. The order of the answers is that of the effects."""
         with ThreadPoolExecutor(self.jobs) as pool:
             return list(pool.map(work, effects))
-
-    def _might_replace(self, problem: Problem, fit: Fit, without: Fit, effect: Effect) -> bool:
-        """Would the effect, at its best start, do a fair part of what was taken away? (A cheap look before a fit.)"""
-        worth = without.loss - fit.loss
-        return without.loss - best_start(problem, without.model, effect)[1] > SCREEN * worth
 
     def _rivals(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[tuple[str, ...], Fit]]:
         """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one."""
@@ -205,7 +208,8 @@ class Search:
             worth = held_out_gain(without.held_out, fit.held_out)[0]
             lost, se = held_out_gain(tried.held_out, fit.held_out)
             alike = lost < TIE_Z * se or lost < TIE_SHARE * worth
-            if alike and not veto_of(tried, other):
+            # at a bound it may be: a tether from ever farther away is a slope
+            if alike and not veto_of(tried, other, bounds=False):
                 rivals.append((tuple(other if a == name else a for a in accepted), tried))
         return rivals
 
@@ -216,14 +220,14 @@ def problem_for(predictor: Predictor, model: Model, start: Array | None = None) 
     return Problem(predictor, filter_for(predictor, steps, estimate_noise(predictor, steps, start)))
 
 
-def veto_of(fit: Fit, name: str) -> str:
-    """Why an effect with these numbers cannot be believed; "" if it can."""
+def veto_of(fit: Fit, name: str, bounds: bool = True) -> str:
+    """Why an effect with these numbers cannot be believed; "" if it can. ``bounds``: do numbers at one count?"""
     for index, number in enumerate(fit.free):
         p = number.parameter
         if number.effect != name:
             continue
         value, (low, high) = float(fit.values[index]), fit.interval(index)
-        if value in {p.low, p.high}:
+        if bounds and value in {p.low, p.high}:
             return f"{p.name} is at its bound, {value:g} {p.unit}"
         if np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
             return f"{p.name} = {value:g} {p.unit} is outside of what is plausible, {p.plausible[0]:g} to {p.plausible[1]:g}"

@@ -51,6 +51,8 @@ class Effect:
     rank: float = 50.0
     """Place in the chain where effects are put together by the machine: lower ranks act first."""
 
+    starts: tuple[tuple[float, ...], ...] = ()
+    """Values from which a fit may begin; empty where any few values along each number do."""
     needs_place: bool = False
     """Does it look at `Body.place`?"""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from bns.physics.effect import Effect, Parameter
@@ -18,6 +19,16 @@ def apply(flow: Flow, pull_per_s: float, anchor_x_m: float, anchor_y_m: float) -
     )
 
 
+def _starts() -> tuple[tuple[float, ...], ...]:
+    """Anchors near and far all round, each pulling a robot at the origin with a few millimetres a second."""
+    return tuple(
+        (speed / far, far * math.cos(eighth * math.pi / 4), far * math.sin(eighth * math.pi / 4))
+        for far in (1.0, 3.0, 10.0, 40.0)
+        for eighth in range(8)
+        for speed in (1e-3, 5e-3)
+    )
+
+
 EFFECT = Effect(
     name="tether-pull",
     stage="world",
@@ -30,5 +41,6 @@ EFFECT = Effect(
     residuals="Positions are off towards one point of the room, more so the farther the robot is from it.",
     lookalikes=("floor-slope",),
     apply=apply,
+    starts=_starts(),
     rank=140,
 )
