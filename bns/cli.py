@@ -172,10 +172,10 @@ def _duration(text: str) -> float:
     return 3600 * hours + 60 * minutes + seconds
 
 
-def _say_if_compiling() -> None:
+def _say_if_compiling(*specs: RunSpec) -> None:
     from bns.engine.jit import compiled
 
-    if sys.stderr.isatty() and not compiled():
+    if sys.stderr.isatty() and not all(compiled(spec.robot, spec.world) for spec in specs):
         print("bns: compiling the kernels, once on this machine (about 20 s)", file=sys.stderr)
 
 
@@ -188,7 +188,7 @@ def run(options: argparse.Namespace) -> int:
     if options.task is None:
         options.task = default_task(load_robot(options.robot).name)
     spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
-    _say_if_compiling()
+    _say_if_compiling(spec)
     print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn, options.render))
     return 0
 
@@ -202,7 +202,8 @@ def sweep(options: argparse.Namespace) -> int:
     from bns.sweep.progress import SweepProgress
     from bns.sweep.report import planned, summed_up
 
-    sweeps = in_turn([load_sweep(file) for file in options.files], options.results, options.confirm_top)
+    files = [load_sweep(file) for file in options.files]
+    sweeps = in_turn(files, options.results, options.confirm_top)
     way = load_executor(options.executor)
     with SweepProgress() as bar:
         request = request_of(options, bar)
@@ -212,7 +213,7 @@ def sweep(options: argparse.Namespace) -> int:
                 estimate = foretell(one, options.results, place.workers, options.shard, retry_failed=options.retry_failed)
                 print(planned(estimate, place))
             return 0
-        _say_if_compiling()
+        _say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files))
         failed = 0
         for one in sweeps:
             summary = way.carry_out(one, request)
