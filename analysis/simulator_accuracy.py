@@ -30,8 +30,8 @@ def draw(store: Store) -> list[Drawn]:
     found = [one for one in map(_shipped, sorted(set(ran) & set(robot_names()))) if "verification" in one.provenance]
     if not found:
         raise NoDataError(
-            "no robot with finished runs has a static simulator that holds its verification patterns; begin with: "
-            "bns run --robot snake"
+            "no robot with finished runs has a static simulator that holds its verification patterns; "
+            "run make sweep-snake, or: bns run --robot snake"
         )
     return [_draw(simulator) for simulator in found]
 
