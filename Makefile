@@ -12,7 +12,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench hidden-effects precompute soak-dask clean sweep-snake
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench hidden-effects precompute soak-dask clean sweep-snake soak
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-14s %s\n", $$1, $$2}'
@@ -58,6 +58,9 @@ bench: setup ## speed, as ratios against named peers measured in the same run
 
 hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")
+
+soak: setup ## 200 emulated trials with faults at random: how they end
+	$(BIN)/python -m tests.hardware.soak 200
 
 soak-dask: setup ## twenty minutes of a sweep on Dask whose workers are killed: what it costs, and that no run is lost
 	$(BIN)/python tests/sweep/soak_dask.py

@@ -17,6 +17,7 @@ from bns.cluster_options import add_cluster_options, request_of
 from bns.errors import BnsError, SpecError
 from bns.measuring import add_commands
 from bns.spec import FIELDS, RunSpec, checked, field_type
+from bns.trial.options import add_looking_options, add_trial_options
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
 _INTERRUPTED, _TERMINATED = 130, 143
@@ -78,6 +79,17 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument(
         "--render", type=Path, metavar="FILE", help="show the fittest controller move, where the world can: .mp4 or .png"
     )
+    _add_spec_options(taken := command("trial", trial, "carry out a run on a robot, or on its emulator"), without=("world",))
+    add_trial_options(taken, _positive)
+    add_looking_options(
+        command("calibrate", calibrate, "calibrate a camera with a ChArUco board"),
+        command("track", track, "show what the tracker of a rig sees"),
+        _positive,
+        _duration,
+    )
+    ill = command("doctor", doctor, "find what is wrong with ports, robot, camera and calibration")
+    ill.add_argument("--robot", default="khepera")
+    ill.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML): its robot and tracker are asked, too")
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
     many.add_argument(
@@ -128,9 +140,11 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_spec_options(parser: argparse.ArgumentParser) -> None:
+def _add_spec_options(parser: argparse.ArgumentParser, without: tuple[str, ...] = ()) -> None:
     """One option a parameter, named and explained as in `RunSpec`."""
     for name, field in FIELDS.items():
+        if name in without:
+            continue
         allowed = field.metadata["choices"]
         text = field.metadata["help"] + (f": {', '.join(allowed)}" if allowed else "")
         parser.add_argument(
@@ -191,6 +205,38 @@ def run(options: argparse.Namespace) -> int:
     _say_if_compiling(spec)
     print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn, options.render))
     return 0
+
+
+def trial(options: argparse.Namespace) -> int:
+    """A run whose world is a robot; codes 0 done, 2 bad input, 3 paused, 4 a robot that may still be moving."""
+    from bns.trial.command import carried_out
+
+    _say_if_compiling()
+    print(carried_out(options, {name: getattr(options, name) for name in FIELDS if name != "world"}))
+    return 0
+
+
+def calibrate(options: argparse.Namespace) -> int:
+    """Print the board, or find the lens and the floor of a camera."""
+    from bns.trial.looking import calibrated
+
+    print(calibrated(options))
+    return 0
+
+
+def track(options: argparse.Namespace) -> int:
+    """Poses, one a line, and annotated frames."""
+    from bns.trial.looking import tracked
+
+    print(tracked(options))
+    return 0
+
+
+def doctor(options: argparse.Namespace) -> int:
+    """What is fine and what is not; 2 if something is to be mended."""
+    from bns.trial.checkup import checked_up
+
+    return checked_up(options)
 
 
 def sweep(options: argparse.Namespace) -> int:

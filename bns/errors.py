@@ -24,6 +24,22 @@ class ModelError(BnsError):
     """A robot model, network file or table of measurements that cannot be used."""
 
 
+class HardwareError(BnsError):
+    """A port, robot, camera, calibration or plan of a trial that cannot be used; nothing has moved."""
+
+
+class TrialPausedError(BnsError):
+    """A trial that stopped with the robot confirmed still, and can be gone on with."""
+
+    exit_code = 3
+
+
+class StopNotConfirmedError(BnsError):
+    """A robot that may still be moving."""
+
+    exit_code = 4
+
+
 class ClusterError(BnsError):
     """Other machines that cannot be used as asked: a scheduler, its workers, a batch system."""
 

@@ -44,11 +44,13 @@ class Recorder:
 
     def __init__(self, robot: Robot, task: Task, world: World, key: Key, spec: RunSpec) -> None:
         self._robot, self._task, self._world, self._key = robot, task, world, key
+        self._once = not getattr(world, "repeatable", True)
         self._full, self._with_paths = spec.record == "full", spec.record in {"paths", "full"}
         self._evals, self._paths, self._generations, self._probe_rows = (_Columns() for _ in range(4))
         self.last_poses = self.last_simulated = robot.start_pose()[:0]
         self._ever: dict[str, bool | None] = {}
         self._evaluated: dict[str, Any] = {}
+        self._path = (np.empty((0, 0)), self.last_poses, self.last_poses)
         if self._full:
             self._probes = robot.random_controllers(key, PROBES, PROBE_COMMANDS)
             self._probe_world = [
@@ -70,8 +72,9 @@ class Recorder:
             "commands": len(poses),
             "driven_ms": self._robot.driven_ms(controller[: len(poses)]),
         } | self._successes("evaluated_success", poses)
+        self._path = (controller, poses, simulated)
         if self._with_paths:
-            self._add_path(evaluation, "evaluated", controller, poses, simulated)
+            self._add_path(evaluation, "evaluated", *self._path)
         return poses
 
     def record(
@@ -84,10 +87,10 @@ class Recorder:
         evolution_cpu_s: float,
     ) -> dict[str, Any]:
         """Measure the fittest controller in the world and add this evaluation's row."""
-        fittest = self._robot.plan(evolver.fittest(), weights, self._task)
-        poses = self._drive(fittest, Purpose.WORLD_FITTEST, evaluation)
+        fittest, poses, simulated = self._fittest(evaluation, evolver, weights)
         in_world, goals = self._robot.judge(poses, self._task)
-        self.last_poses, self.last_simulated = poses, self._simulated(fittest, weights)
+        in_simulation = self._evaluated["evaluated_fitness_simulation"] if self._once else evolver.best_fitness
+        self.last_poses, self.last_simulated = poses, simulated
         successes = self._successes("success", poses)
         for name, value in successes.items():
             # None stays None: where there is no distance to a goal, nothing has ever come within one.
@@ -100,8 +103,8 @@ class Recorder:
         return self._evals.add(
             evaluation=evaluation,
             diversity=evolver.diversity(),
-            fitness_error=abs(evolver.best_fitness - in_world),
-            fitness_simulation=evolver.best_fitness,
+            fitness_error=abs(in_simulation - in_world),
+            fitness_simulation=in_simulation,
             fitness_world=in_world,
             best_fitness=evolver.best_fitness,
             mean_fitness=evolver.mean_fitness,
@@ -143,6 +146,16 @@ class Recorder:
         within = self._robot.successes(poses, self._task) or (None,) * len(RADII_CM)
         by_radius = {f"{prefix}_{cm}cm": ok for cm, ok in zip(RADII_CM, within, strict=True)}
         return {prefix: self._robot.succeeded(poses, self._task)} | by_radius
+
+    def _fittest(
+        self, evaluation: int, evolver: Evolver, weights: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Controller, path in the world and in simulation. A robot drives only what was picked: that one stands in."""
+        if self._once:
+            return self._path
+        fittest = self._robot.plan(evolver.fittest(), weights, self._task)
+        poses = self._drive(fittest, Purpose.WORLD_FITTEST, evaluation)
+        return fittest, poses, self._simulated(fittest, weights)
 
     def _record_full(self, evaluation: int, evolver: Evolver, weights: np.ndarray) -> None:
         for generation in evolver.history:

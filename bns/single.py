@@ -52,18 +52,7 @@ def run_by_hand(
     with live_view(spec) as show:
         result = run(spec, show, world)
     wall_s = time.perf_counter() - wall
-    row = {
-        "status": "ok",
-        "error": None,
-        "world_digest": result.world_digest,
-        "started_at": started,
-        "wall_s": wall_s,
-        "cpu_s": time.process_time() - cpu,
-        "peak_memory_mib": memory.peak_mib(),
-        "attempts": 1,
-    }
-    with _patient_writer(results, sweep) as writer:
-        writer.append(RunRecord(spec, row, result.tables))
+    keep_run(spec, result, results, sweep, started, wall_s, time.process_time() - cpu)
     if save_snn is not None:
         save_simulator(
             StaticSimulator(
@@ -98,6 +87,30 @@ def _check_world(spec: RunSpec, results: Path, sweep: str, digest: str) -> None:
         digests = WorldDigests(results, sweep)
         digests.read()
         digests.compare(spec.task, spec.world, digest)
+
+
+def keep_run(
+    spec: RunSpec,
+    result: RunResult,
+    results: Path,
+    sweep: str,
+    started: datetime,
+    wall_s: float,
+    cpu_s: float = float("nan"),
+) -> None:
+    """Put a run that ended well into the store."""
+    row = {
+        "status": "ok",
+        "error": None,
+        "world_digest": result.world_digest,
+        "started_at": started,
+        "wall_s": wall_s,
+        "cpu_s": cpu_s,
+        "peak_memory_mib": memory.peak_mib(),
+        "attempts": 1,
+    }
+    with _patient_writer(results, sweep) as writer:
+        writer.append(RunRecord(spec, row, result.tables))
 
 
 @contextmanager

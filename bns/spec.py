@@ -47,7 +47,7 @@ class RunSpec:
     world: str = _field(
         "substitute",
         "what answers a controller, or a model file (.yaml) that physics drives",
-        choices=("substitute", "physics"),
+        choices=("substitute", "physics", "robot"),
         or_file=(".yaml", ".yml"),
     )
     seed: int = _field(0, "seed of this run", low=0, high=2**32 - 1)

@@ -4,15 +4,18 @@ import numpy as np
 import pytest
 
 from bns.engine.philox import Key, Purpose
+from bns.errors import SpecError
 from bns.robots import load_robot
 from bns.robots.simulator import load_static_simulator
 from bns.spec import FIELDS
 from bns.worlds import build_world
+from bns.worlds.robot import RobotWorld, in_task_frame
 
+SIMULATED = [name for name in FIELDS["world"].metadata["choices"] if name != "robot"]
 KEY = Key.of_run(1, 0, "khepera", "circle")
 
 
-@pytest.fixture(params=FIELDS["world"].metadata["choices"])
+@pytest.fixture(params=SIMULATED)
 def world(request):
     return build_world(request.param, load_robot("khepera"))
 
@@ -55,7 +58,7 @@ def test_straight_drive_goes_north(world):
 
 def test_worlds_agree_on_the_mean_and_have_other_digests(commands):
     robot = load_robot("khepera")
-    worlds = [build_world(name, robot) for name in FIELDS["world"].metadata["choices"]]
+    worlds = [build_world(name, robot) for name in SIMULATED]
     means = [
         np.mean([w.drive(commands, KEY, Purpose.WORLD_EVALUATED, s)[0] for s in range(300)], axis=0) for w in worlds
     ]
@@ -72,3 +75,28 @@ def test_shipped_simulator_says_how_accurate_it_is_and_where_it_comes_from():
         assert made["accuracy"][name]["r2"] > 0.99
         assert abs(made["accuracy"][name]["slope"] - 1) < 0.02
     assert (simulator.noise_sd > 0).all()
+
+
+def test_a_robot_is_driven_by_a_trial_only():
+    with pytest.raises(SpecError, match="Drive it with: bns trial --robot khepera"):
+        build_world("robot", load_robot("khepera"))
+
+
+def test_what_a_robot_did_is_judged_as_if_it_had_begun_at_the_start():
+    path = np.array([[0.3, -0.1, 0.4], [0.5, 0.1, 1.0], [0.2, 0.4, 7.5]])
+    moved = in_task_frame(path, np.array([0.0, 0.0, np.pi / 2]))
+    robot = load_robot("khepera")
+    step = robot.measured_displacements(moved)
+    turn = np.pi / 2 - 0.4
+    assert moved[:, 2] == pytest.approx(path[1:, 2] + turn)
+    assert np.hypot(*step[0, :2]) == pytest.approx(np.hypot(0.2, 0.2))
+    np.testing.assert_allclose(in_task_frame(np.vstack([[0.0, 0.0, np.pi / 2], moved]), path[0]), path[1:], atol=1e-12)
+
+
+def test_a_robot_answers_only_what_it_has_driven():
+    world = RobotWorld("r")
+    world.answered(np.zeros((3, 3)))
+    assert world.drive(np.zeros((3, 3)), KEY, Purpose.WORLD_EVALUATED, 1).shape == (3, 3)
+    for purpose, count in ((Purpose.WORLD_FITTEST, 3), (Purpose.WORLD_EVALUATED, 4)):
+        with pytest.raises(SpecError, match="it drives what is picked, once"):
+            world.drive(np.zeros((count, 3)), KEY, purpose, 1)

@@ -12,6 +12,7 @@ import dask
 from distributed import Client, Future, LocalCluster
 
 from bns.errors import ClusterError
+from bns.sweep.dask_job import LeavesSignals
 from bns.sweep.executor import ATTEMPTS
 
 PATIENCE_S = 600.0
@@ -115,6 +116,8 @@ class DaskLink:
     def _connect(self, timeout_s: float) -> None:
         self._client = Client(self.address, timeout=timeout_s, set_as_default=False)
         self._client.subscribe_topic("all", self._note)
+        if self._cluster is not None:
+            self._client.register_plugin(LeavesSignals())
 
     def _try_again(self) -> None:
         try:

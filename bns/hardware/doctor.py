@@ -1,0 +1,126 @@
+"""What is wrong with a set-up, found without moving anything, and the next thing to try."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from serial.tools.list_ports import comports
+
+from bns.errors import HardwareError
+from bns.hardware.clock import Clock
+from bns.hardware.journal import Journal
+from bns.hardware.khepera import BAUD, KheperaIII, RobotLostError, check_battery
+from bns.hardware.rig import Rig
+from bns.hardware.serial_link import SerialLink
+from bns.hardware.tracking.calibration import WORST_RMS_PX, load_calibration
+from bns.hardware.tracking.kinds import open_tracker
+
+_SLOW_LATENCY_MS = 1
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at: fine or not, what was found, and what to try if it is not."""
+
+    fine: bool
+    what: str
+    next_step: str = ""
+
+    def __str__(self) -> str:
+        return f"{'ok  ' if self.fine else 'BAD '} {self.what}" + (f"\n     try: {self.next_step}" if self.next_step else "")
+
+
+def examine(rig: Rig | None, clock: Clock, devices: Path = Path("/dev")) -> Iterator[Finding]:
+    """Ports, permissions, adapters and cameras; with a rig, also its robot and its tracker."""
+    yield from ports(devices)
+    yield from cameras(devices)
+    if rig is not None:
+        yield from _asked(lambda: robot_of(rig, clock), "the robot")
+        yield from _asked(lambda: tracker_of(rig, clock), "the tracker")
+
+
+def ports(devices: Path) -> Iterator[Finding]:
+    """Serial ports, whether they may be used, and how long their adapters hold bytes back."""
+    found = sorted({p.device for p in comports()} | {str(p) for p in devices.glob("rfcomm*")})
+    if not found:
+        yield Finding(False, "no serial port", "plug the adapter in; a Khepera: sudo rfcomm bind 0 ADDRESS")
+    for port in found:
+        yield may_use(Path(port), "dialout")
+        latency = Path("/sys/class/tty") / Path(port).name / "device" / "latency_timer"
+        if latency.exists():
+            yield latency_of(port, int(latency.read_text()))
+
+
+def latency_of(port: str, milliseconds: int) -> Finding:
+    """Whether an FTDI adapter holds answers back: with 16 ms, a round of twelve servos takes a fifth of a second."""
+    if milliseconds <= _SLOW_LATENCY_MS:
+        return Finding(True, f"{port}: latency timer {milliseconds} ms")
+    place = f"/sys/class/tty/{Path(port).name}/device/latency_timer"
+    return Finding(False, f"{port}: latency timer {milliseconds} ms", f"echo 1 | sudo tee {place}")
+
+
+def may_use(path: Path, group: str) -> Finding:
+    """Whether a device file may be read and written."""
+    if os.access(path, os.R_OK | os.W_OK):
+        return Finding(True, f"{path} may be used")
+    mode = stat.filemode(path.stat().st_mode)
+    return Finding(False, f"no permission to use {path} ({mode})", f"sudo usermod -aG {group} $USER, then log in again")
+
+
+def cameras(devices: Path) -> Iterator[Finding]:
+    """Camera devices."""
+    found = sorted(devices.glob("video*"))
+    if not found:
+        yield Finding(True, "no camera at this computer (a stream's address can be used as well)")
+    for camera in found:
+        yield may_use(camera, "video")
+
+
+def robot_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
+    """Firmware, speeds and battery of a Khepera at the rig's port."""
+    if rig.robot != "khepera":
+        yield Finding(True, f"the robot {rig.robot} is examined when its driver opens it")
+        return
+    journal = Journal(None, clock)
+    link = SerialLink(rig.port, BAUD, clock, journal)
+    try:
+        robot = KheperaIII(link, clock, journal)
+        made = robot.firmware
+        yield Finding(True, f"Khepera III, firmware {made.version}.{made.revision}: {made.units_per_m_s:.0f} units per m/s")
+        volts = robot.battery_v()
+        check_battery(volts)
+        yield Finding(True, f"battery {volts:.2f} V")
+        still = max(abs(v) for v in robot.speed_m_s())
+        yield Finding(still < 0.005, f"wheels at {still:.3f} m/s", "" if still < 0.005 else "bns trial stops it when it opens it")
+        nearer = "bring it nearer" if robot.retries else ""
+        yield Finding(not robot.retries, f"{robot.retries} questions had to be asked again", nearer)
+    except RobotLostError as error:
+        raise HardwareError(f"the robot stopped answering: {error}. Bring it nearer, charge it.") from error
+    finally:
+        link.close()
+
+
+def tracker_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
+    """Calibration of the tracker's camera, and whether it opens."""
+    if "calibration" in rig.tracker:
+        found = load_calibration(Path(rig.tracker["calibration"]))
+        good = found.rms_px <= WORST_RMS_PX
+        yield Finding(good, f"calibration of {found.camera}: RMS {found.rms_px:.2f} pixels", "" if good else "bns calibrate")
+    tracker = open_tracker(rig.tracker, clock)
+    try:
+        yield Finding(True, f"tracker {rig.tracker['kind']} opens; bns track shows what it sees")
+    finally:
+        tracker.close()
+
+
+def _asked(examination: Callable[[], Iterator[Finding]], what: str) -> Iterator[Finding]:
+    """Findings of an examination; a fault that ends it is one of them."""
+    try:
+        yield from examination()
+    except HardwareError as error:
+        text = str(error)
+        yield Finding(False, f"{what}: {text}", "what the line above says" if "Try" not in text else "")

@@ -1,0 +1,241 @@
+"""A chain of AX-12 servos over the Dynamixel SDK: every answer's result and error byte is looked at, every write is confirmed."""
+
+from __future__ import annotations
+
+import math
+import termios
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from dynamixel_sdk import COMM_SUCCESS, GroupSyncWrite, PacketHandler, PortHandler
+
+from bns.errors import HardwareError
+from bns.hardware.ax12_table import CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
+from bns.hardware.clock import Clock
+from bns.hardware.journal import Journal
+from bns.hardware.stop import Stop
+
+BAUD = 1_000_000
+ATTEMPTS = 6
+_AX12 = 12
+_BETWEEN_S = 0.02
+_GOAL = REGISTERS["goal_position"]
+
+
+class ServoError(Exception):
+    """A servo that does not answer, or answers with an alarm."""
+
+
+class ClockedPort(PortHandler):
+    """The SDK's port, with time-outs on the trial's clock."""
+
+    def __init__(self, port: str, clock: Clock) -> None:
+        super().__init__(port)
+        self._clock = clock
+        self._silent: Callable[[], bool] = lambda: False
+        self._late: Callable[[], bool] = lambda: False
+
+    def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802  # the SDK's name
+        """As the SDK has it: the time of the bytes, twice the adapter's latency, and a little."""
+        super().setPacketTimeout(packet_length)
+        self._late = self._clock.in_vain(self.packet_timeout / 1000.0)
+
+    def clearPort(self) -> None:  # noqa: N802  # the SDK's name
+        """Throw away what came too late; the SDK's own only waits until everything is sent."""
+        self.ser.reset_input_buffer()
+        self._silent = self._clock.in_vain(math.inf)  # from before the question on: an answer can be quick
+
+    def isPacketTimeout(self) -> bool:  # noqa: N802  # the SDK's name
+        """Whether to give up."""
+        late = self._late()
+        if self._silent() and not late:
+            self._clock.waited(self.packet_timeout / 1000.0)
+        return late or self._silent()
+
+
+@dataclass(frozen=True)
+class Health:
+    """What a servo says of itself; load is a share of the highest torque, with the sign of its direction."""
+
+    position_rad: float
+    load: float
+    voltage_v: float
+    temperature_c: float
+
+
+@dataclass(frozen=True)
+class ServoLimits:
+    """What a servo must keep while it works; `torque` is the share of the highest that it is given."""
+
+    temperature_c: float = 65.0
+    low_v: float = 9.0
+    high_v: float = 13.0
+    load: float = 0.95
+    torque: float = 0.8
+
+
+class Ax12Chain:
+    """Driver of servos `ids` in the order of the joints. Opening checks that each is there, once, and an AX-12."""
+
+    def __init__(self, port: str, ids: Sequence[int], clock: Clock, journal: Journal, limits: ServoLimits | None = None) -> None:
+        self.ids, self._clock, self._journal = tuple(ids), clock, journal
+        self.limits = limits or ServoLimits()
+        self.retries = 0
+        self._limits_of: dict[int, tuple[int, int]] = {}
+        self._port, self._packets = ClockedPort(port, clock), PacketHandler(1.0)
+        try:
+            opened = self._port.setBaudRate(BAUD)
+        except (OSError, ValueError) as error:  # the SDK lets pyserial's faults through
+            raise HardwareError(f"{port} cannot be opened: {error}. Is the adapter plugged in? Try: bns doctor") from error
+        if not opened:
+            raise HardwareError(f"{port} cannot be set to {BAUD} baud; another adapter may be needed.")
+        self._check()
+
+    def _check(self) -> None:
+        wrong = [text for number in self.ids if (text := self._what_is_wrong(number))]
+        if wrong:
+            self.close()
+            raise HardwareError("; ".join(wrong) + ". Check cables, power and ids (bns doctor lists who answers).")
+
+    def _what_is_wrong(self, number: int) -> str:
+        try:
+            model = self.read(number, "model_number")
+        except ServoError as error:
+            if "corrupt" in str(error):
+                return f"servo {number}: answers are garbled; two servos may have this id ({error})"
+            return f"servo {number} is missing ({error})"
+        return "" if model == _AX12 else f"servo {number} is a model {model}, not an AX-12 ({_AX12})"
+
+    def read(self, number: int, name: str, alarms: bool = False) -> int:
+        """A register; ServoError if the servo does not answer or reports an alarm (which `alarms` lets pass)."""
+        register = REGISTERS[name]
+        call = self._packets.read1ByteTxRx if register.size == 1 else self._packets.read2ByteTxRx
+        return int(self._checked(number, f"read {name}", lambda: call(self._port, number, register.address), alarms))
+
+    def write(self, number: int, name: str, value: int, alarms: bool = False) -> None:
+        """Write a register and take the servo's confirmation."""
+        register = REGISTERS[name]
+        call = self._packets.write1ByteTxRx if register.size == 1 else self._packets.write2ByteTxRx
+        self._checked(
+            number, f"write {name} {value}", lambda: (0, *call(self._port, number, register.address, value)), alarms
+        )
+
+    def _checked(self, number: int, what: str, call: Callable[[], tuple[int, int, int]], alarms: bool) -> int:
+        """Value of a call that answers (value, result, error byte); asked again when nothing or nonsense comes."""
+        problem = ""
+        for attempt in range(ATTEMPTS):
+            self.retries += attempt > 0
+            try:
+                value, result, bits = call()
+            except IndexError:  # the SDK reads past the end of a status packet that is too short
+                value, result, bits = 0, -3001, 0
+                problem = "corrupt status packet"
+            except (OSError, termios.error) as error:
+                raise ServoError(f"the port is gone ({error})") from error
+            finally:
+                self._port.is_using = False  # an exchange broken off leaves it set, and every later call fails
+            self._journal.note("servo", id=number, what=what, result=result, error=bits, value=value)
+            if result == COMM_SUCCESS:
+                if bits and not alarms:
+                    raise ServoError(f"servo {number}: {', '.join(errors_in(bits))}")
+                return value
+            problem = problem or str(self._packets.getTxRxResult(result))
+        raise ServoError(f"servo {number}: {what}: {problem}; asked {ATTEMPTS} times")
+
+    def close(self) -> None:
+        """Give the port free."""
+        self._port.closePort()
+
+    def arm(self) -> None:
+        """Torque on without a jerk: the goal is where the joint is, and the torque grows in steps to its limit."""
+        for number in self.ids:
+            here = self.read(number, "present_position")
+            self.write(number, "torque_limit", 0)
+            self.write(number, "goal_position", here)
+            self.write(number, "moving_speed", 1)
+        for share in (0.25, 0.5, 0.75, 1.0):
+            for number in self.ids:
+                self.write(number, "torque_limit", round(1023 * self.limits.torque * share))
+                self.write(number, "torque_enable", 1)
+            self._clock.sleep(0.05)
+
+    def move(self, angles_rad: Sequence[float], speeds_rad_s: Sequence[float]) -> list[float]:
+        """Set goals and speeds of all joints at once; the angles really sent, after clipping, once all confirmed them.
+
+        A speed of 0 would be as fast as the servo can: the slowest speed is sent instead.
+        """
+        sent = [self._goal(number, angle) for number, angle in zip(self.ids, angles_rad, strict=True)]
+        together = GroupSyncWrite(self._port, self._packets, _GOAL.address, 4)
+        for number, goal, speed in zip(self.ids, sent, speeds_rad_s, strict=True):
+            steps = max(1, min(1023, round(abs(speed) / RAD_S_PER_STEP)))
+            together.addParam(number, [*goal.to_bytes(2, "little"), *steps.to_bytes(2, "little")])
+        for _ in range(ATTEMPTS):
+            self._port.is_using = False
+            together.txPacket()
+            heard = [self.read(number, "goal_position") for number in self.ids]  # nobody answers a sync write
+            if heard == sent:
+                return [(goal - CENTRE) * RAD_PER_STEP for goal in sent]
+        raise ServoError(f"goals {sent} were sent and {heard} read back, {ATTEMPTS} times")
+
+    def _goal(self, number: int, angle_rad: float) -> int:
+        if not math.isfinite(angle_rad):
+            raise ServoError(f"servo {number}: the angle is {angle_rad}")
+        low, high = self._angle_limits(number)
+        return max(low, min(high, CENTRE + round(angle_rad / RAD_PER_STEP)))
+
+    def _angle_limits(self, number: int) -> tuple[int, int]:
+        if number not in self._limits_of:
+            self._limits_of[number] = self.read(number, "cw_angle_limit"), self.read(number, "ccw_angle_limit")
+        return self._limits_of[number]
+
+    def health(self) -> Mapping[int, Health]:
+        """What every servo says; ServoError if one is beyond its limits."""
+        found = {number: self._health(number) for number in self.ids}
+        for number, h in found.items():
+            low, high = self.limits.low_v, self.limits.high_v
+            if h.temperature_c > self.limits.temperature_c:
+                limit_c = self.limits.temperature_c
+                raise ServoError(f"servo {number} is at {h.temperature_c:.0f} °C; let it cool below {limit_c:g}")
+            if not low <= h.voltage_v <= high:
+                raise ServoError(f"servo {number} has {h.voltage_v:.1f} V, not {low:g} to {high:g}; see to the supply")
+            if abs(h.load) > self.limits.load:
+                raise ServoError(f"servo {number} is loaded with {abs(h.load):.0%} of its torque; is it stuck?")
+        return found
+
+    def _health(self, number: int) -> Health:
+        load = self.read(number, "present_load")
+        return Health(
+            (self.read(number, "present_position") - CENTRE) * RAD_PER_STEP,
+            (load & 1023) / 1023 * (-1 if load & 1024 else 1),
+            self.read(number, "present_voltage") / 10,
+            float(self.read(number, "present_temperature")),
+        )
+
+    def recover(self, number: int) -> None:
+        """After an overload shutdown, when its cause is gone: the torque limit is written again, and no alarm may be left."""
+        self.write(number, "torque_limit", round(1023 * self.limits.torque), alarms=True)
+        self.read(number, "present_position")
+
+    def stop(self, patience_s: float = 5.0) -> Stop:
+        """Torque off, confirmed by every servo: torque reads 0 and nothing moves. Never raises."""
+        began_s, silent = self._clock.now_s(), dict.fromkeys(self.ids, "not asked")
+        acknowledged_s = None
+        while silent:
+            for number in tuple(silent):
+                try:
+                    self.write(number, "torque_enable", 0, alarms=True)
+                    if any(self.read(number, name, alarms=True) for name in ("torque_enable", "moving")):
+                        silent[number] = f"servo {number} still moves"
+                    else:
+                        del silent[number]
+                except ServoError as error:
+                    silent[number] = str(error)
+            if not silent:
+                acknowledged_s = self._clock.now_s() - began_s
+            elif self._clock.now_s() - began_s > patience_s:
+                break
+            else:
+                self._clock.sleep(_BETWEEN_S)
+        stop = Stop(not silent, self._clock.now_s() - began_s, acknowledged_s, "; ".join(silent.values()))
+        self._journal.note("stop", confirmed=stop.confirmed, seconds=stop.seconds, problem=stop.problem)
+        return stop

@@ -1,0 +1,1 @@
+"""What stands in for hardware: the bytes of a device, with state, time and faults. Drivers never know."""

@@ -1,0 +1,107 @@
+"""A pseudo-terminal with an emulated device at its far end: what opens the near end cannot tell it from a serial port."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import threading
+import tty
+from pathlib import Path
+from typing import Protocol, Self
+
+
+class Device(Protocol):
+    """The far end of a serial line."""
+
+    def receive(self, data: bytes) -> bytes:
+        """Take bytes in, give the bytes that answer (none: silence)."""
+
+    def written(self) -> None:
+        """The answer is on the line."""
+
+
+class PseudoTerminal:
+    """Pumps bytes between a port and a device, in a thread of its own, while it is open.
+
+    The near end is kept open here as well: drivers close and reopen ports (`setBaudRate` does), and the line must outlive that.
+    `path` is a link that follows the line when it is cut and plugged in again.
+    """
+
+    def __init__(self, device: Device, folder: Path, name: str) -> None:
+        self.path = folder / name
+        self._device = device
+        self._wake_read, self._wake_write = os.pipe()
+        self._lock = threading.RLock()
+        self._master = self._slave = -1
+        self._open = True
+        self.plug_in()
+        self._thread = threading.Thread(target=self._pump, name=f"emulated {name}", daemon=True)
+        self._thread.start()
+
+    def plug_in(self) -> None:
+        """A new line in the place of the one that was cut."""
+        with self._lock:
+            self.cut()
+            self._master, self._slave = os.openpty()
+            tty.setraw(self._slave)
+            os.set_blocking(self._master, False)  # a host that does not read must not stop the pump
+            self.path.unlink(missing_ok=True)
+            self.path.symlink_to(os.ttyname(self._slave))
+        self._wake()
+
+    def cut(self) -> None:
+        """The line goes dead, as when a Bluetooth link breaks; the device knows nothing of it."""
+        with self._lock:
+            if self._master < 0:
+                return
+            self.path.unlink(missing_ok=True)
+            os.close(self._master)
+            os.close(self._slave)
+            self._master = self._slave = -1
+
+    def close(self) -> None:
+        """End the pump and give everything free."""
+        self._open = False
+        self._wake()
+        self._thread.join(timeout=5)
+        self.cut()
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def _wake(self) -> None:
+        os.write(self._wake_write, b"w")
+
+    def _pump(self) -> None:
+        while self._open:
+            with self._lock:
+                line = self._master
+            for ready in self._ready(line):
+                if ready == self._wake_read:
+                    os.read(self._wake_read, 64)
+                else:
+                    self._serve(line)
+
+    def _ready(self, line: int) -> list[int]:
+        watched = [self._wake_read] + ([line] if line >= 0 else [])
+        try:
+            return select.select(watched, [], [], 0.2)[0]
+        except (OSError, ValueError):  # the line was cut meanwhile
+            return []
+
+    def _serve(self, line: int) -> None:
+        try:
+            data = os.read(line, 4096)
+        except OSError:
+            return
+        answer = self._device.receive(data)
+        with self._lock, contextlib.suppress(OSError):
+            if answer and line == self._master:
+                os.write(line, answer)
+                self._device.written()

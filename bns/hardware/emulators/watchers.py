@@ -1,0 +1,78 @@
+"""Emulated trackers' devices, one for each kind of tracker: a Wii remote's pipe, or a camera with its calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.emulators.camera import CameraEmulator
+from bns.hardware.emulators.faults import Faults
+from bns.hardware.emulators.scene import Patch, Scene, disc, tag
+from bns.hardware.emulators.wii import WiiEmulator
+from bns.hardware.tracking.calibration import Calibration
+from bns.hardware.tracking.lens import Lens, looking_down
+from bns.hardware.tracking.wii import overhead
+
+Pose = Callable[[float], np.ndarray]
+YELLOW_BGR, GREEN_BGR = (30, 210, 240), (60, 180, 40)
+
+
+class Device(Protocol):
+    """What can be taken away again."""
+
+    def close(self) -> None:
+        """Take it away."""
+
+
+def emulated_lens() -> Lens:
+    """A wide camera 2 m above the floor, a little tilted, with the distortion of its price."""
+    matrix = np.array([[700.0, 0.0, 640.0], [0.0, 700.0, 360.0], [0.0, 0.0, 1.0]])
+    return looking_down(matrix, np.array([-0.25, 0.08, 0.001, -0.0005, 0.0]), (1280, 720), 2.0, 0.05)
+
+
+def emulated_tracker(
+    settings: Mapping[str, Any], folder: Path, pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
+) -> tuple[dict[str, Any], Device]:
+    """An emulated device for these tracker settings; the settings with its address, and the device."""
+    if settings["kind"] == "wii":
+        path = folder / "wiimote"
+        return {**settings, "device": str(path)}, WiiEmulator(path, pose, overhead(settings), clock, faults, seed)
+    lens, place = emulated_lens(), folder / "camera.json"
+    Calibration(lens, 0.0, 0, "the emulated camera").save(place)
+    camera = CameraEmulator(_film(lens, settings, pose, clock, faults, seed))
+    return {**settings, "camera": camera.address, "calibration": str(place)}, camera
+
+
+def _film(
+    lens: Lens, settings: Mapping[str, Any], pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
+) -> Callable[[], np.ndarray | None]:
+    scene, draw = Scene(lens, seed=seed), np.random.default_rng([seed, 11])
+    last: list[np.ndarray] = []
+
+    def render() -> np.ndarray | None:
+        now_s = clock.now_s()
+        if faults.strikes("stuck-marker", now_s):
+            return last[0].copy() if last else None
+        patches = [] if faults.strikes("lost-marker", now_s) else worn(settings, pose(now_s))
+        if faults.strikes("reflection", now_s):
+            patches.append(disc(YELLOW_BGR, 0.04, draw.uniform(-0.5, 0.5), draw.uniform(-0.5, 0.5), 0.0))
+        last[:] = [scene.frame(patches)]
+        return last[0]
+
+    return render
+
+
+def worn(settings: Mapping[str, Any], pose: np.ndarray) -> list[Patch]:
+    """The markers that a robot at `pose` (3,) wears for this tracker."""
+    x_m, y_m, heading_rad = (float(v) for v in pose)
+    height_m = float(settings["height_m"])
+    if settings["kind"] == "aruco":
+        return [tag(int(settings.get("number", 0)), float(settings["side_m"]), x_m, y_m, heading_rad, height_m)]
+    half = float(settings.get("distance_m", 0.1)) / 2 * np.array([np.cos(heading_rad), np.sin(heading_rad)])
+    diameter_m = float(settings["diameter_m"])
+    ends = ((YELLOW_BGR, -half), (GREEN_BGR, half))
+    return [disc(colour, diameter_m, x_m + dx, y_m + dy, height_m) for colour, (dx, dy) in ends]

@@ -1,0 +1,90 @@
+"""Everything sent, received and seen in a trial, one JSON line each, with time stamps; a trial goes on from it, or is replayed.
+
+`t_s` is the trial's clock, `wall_s` the computer's (seconds since 1970). A line that a kill cut in two is dropped when the
+file is opened again; evaluations are synced to the disk before the next one begins.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Self, TextIO
+
+from bns.errors import HardwareError
+from bns.hardware.clock import Clock
+
+
+class Journal:
+    """An open journal; events are appended. Without a path nothing is kept."""
+
+    def __init__(self, path: Path | None, clock: Clock) -> None:
+        self._clock = clock
+        self._file: TextIO | None = None
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _drop_torn_line(path)
+            self._file = path.open("a", encoding="utf-8")
+
+    def note(self, kind: str, **what: Any) -> None:
+        """Append one event."""
+        if self._file is not None:
+            event = {"t_s": round(self._clock.now_s(), 6), "wall_s": round(time.time(), 6), "kind": kind, **what}
+            self._file.write(json.dumps(event, separators=(",", ":")) + "\n")
+
+    def sync(self) -> None:
+        """What was noted so far survives a loss of power."""
+        if self._file is not None:
+            self._file.flush()
+            os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        """Sync and close."""
+        self.sync()
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+
+def events(path: Path, *kinds: str) -> Iterator[dict[str, Any]]:
+    """Events of a journal, all or of some kinds, in order; HardwareError if it is none.
+
+    A last line without an end is passed over: it was being written when the computer stopped.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise HardwareError(f"cannot read the journal {path}: {error}. Name the journal.jsonl of a trial.") from error
+    whole = text[: text.rfind("\n") + 1]
+    for number, line in enumerate(whole.splitlines(), 1):
+        event = _parsed(path, number, line)
+        if not kinds or event["kind"] in kinds:
+            yield event
+
+
+def _parsed(path: Path, number: int, line: str) -> dict[str, Any]:
+    try:
+        event = json.loads(line)
+        event["kind"], event["t_s"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise HardwareError(
+            f"line {number} of {path} is no event of a trial: {line[:60]!r}. Name the journal.jsonl of a trial, unedited."
+        ) from error
+    return dict(event)
+
+
+def _drop_torn_line(path: Path) -> None:
+    if not path.exists():
+        return
+    data = path.read_bytes()
+    end = data.rfind(b"\n") + 1
+    if end < len(data):
+        os.truncate(path, end)

@@ -1,0 +1,140 @@
+"""Khepera III over its ASCII protocol: speeds, encoders, battery, and a stop that is confirmed by reading back.
+
+The robot has no watchdog: its last speed goes on when the link dies. So every speed is acknowledged, and `stop` returns only
+with what the robot itself said about its wheels.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Protocol
+
+from bns.errors import HardwareError
+from bns.hardware.clock import Clock
+from bns.hardware.journal import Journal
+from bns.hardware.serial_link import NoReplyError
+from bns.hardware.stop import Stop
+
+BAUD = 115200
+ATTEMPTS = 4
+"""How often a question is asked before the robot counts as lost."""
+STILL_M_S = 0.005
+"""A wheel slower than this stands still: three quanta of the speed reading, and less than half a millimetre to coast."""
+_READINGS = 2
+"""The protocol has no checksum: one reading can be garbled into a zero, two in a row hardly."""
+HIGHEST_UNITS = 43_000
+"""End of the range that the firmware regulates."""
+_FLAT_V = 6.0
+
+
+class Exchange(Protocol):
+    """What the driver asks of a link."""
+
+    def exchange(self, request: bytes) -> bytes:
+        """The line that answers; NoReplyError if none does."""
+
+
+@dataclass(frozen=True)
+class Firmware:
+    """What differs between firmwares: units of speed for one metre per second, metres for one encoder pulse."""
+
+    version: int
+    revision: int
+    units_per_m_s: float
+    m_per_pulse: float
+
+
+def firmware(version: int, revision: int) -> Firmware:
+    """Scales of a firmware, by its answer to `B`."""
+    if version < 3:
+        return Firmware(version, revision, 144_010.0, 0.1288 / 2764)
+    return Firmware(version, revision, 218_720.0, 0.03068e-3)
+
+
+class RobotLostError(Exception):
+    """The robot does not answer any more."""
+
+
+class KheperaIII:
+    """Driver. Opening asks for the firmware and the battery and makes sure that the wheels stand still."""
+
+    def __init__(self, link: Exchange, clock: Clock, journal: Journal) -> None:
+        self._link, self._clock, self._journal = link, clock, journal
+        self.retries = 0
+        self.firmware = self._identified()
+
+    def _identified(self) -> Firmware:
+        try:
+            return firmware(*(int(n) for n in self._ask(b"B", r"b,(\d+),(\d+)")))
+        except RobotLostError as error:
+            raise HardwareError(
+                f"no Khepera III answers ({error}). Is it switched on, paired (PIN 0000), and the port at {BAUD} baud?"
+            ) from error
+
+    def set_speed_m_s(self, left: float, right: float) -> tuple[float, float]:
+        """Set the speeds of the wheels' surfaces, m/s; what was really sent, after clipping and rounding."""
+        scale = self.firmware.units_per_m_s
+        units = [max(-HIGHEST_UNITS, min(HIGHEST_UNITS, round(v * scale))) for v in (left, right)]
+        self._ask(b"D,l%d,l%d" % tuple(units), "d")
+        return units[0] / scale, units[1] / scale
+
+    def speed_m_s(self) -> tuple[float, float]:
+        """Speeds of the wheels' surfaces as the robot measures them, m/s."""
+        left, right = self._ask(b"E", r"e,(-?\d+),(-?\d+)")
+        return int(left) / self.firmware.units_per_m_s, int(right) / self.firmware.units_per_m_s
+
+    def encoders_m(self) -> tuple[float, float]:
+        """Way of the wheels' surfaces since the counters were last set, m."""
+        left, right = self._ask(b"R", r"r,(-?\d+),(-?\d+)")
+        return int(left) * self.firmware.m_per_pulse, int(right) * self.firmware.m_per_pulse
+
+    def battery_v(self) -> float:
+        """Voltage of the battery."""
+        whole, fraction = self._ask(b"V,0", r"v,(\d+),(\d+)")
+        return float(f"{whole}.{fraction:0>4}")
+
+    def stop(self, patience_s: float = 5.0) -> Stop:
+        """Set both speeds to zero until the robot acknowledges it and reads back still wheels; what came of it."""
+        began_s, acknowledged_s, problem, still = self._clock.now_s(), None, "the wheels still turn", 0
+        while True:
+            try:
+                if acknowledged_s is None:
+                    self._once(b"D,l0,l0", "d")
+                    acknowledged_s = self._clock.now_s() - began_s
+                left, right = (int(v) / self.firmware.units_per_m_s for v in self._once(b"E", r"e,(-?\d+),(-?\d+)"))
+                still = still + 1 if max(abs(left), abs(right)) <= STILL_M_S else 0
+                if still == _READINGS:
+                    return self._stopped(Stop(True, self._clock.now_s() - began_s, acknowledged_s))
+            except NoReplyError as error:
+                problem, acknowledged_s, still = str(error), None, 0
+            if self._clock.now_s() - began_s > patience_s:
+                return self._stopped(Stop(False, self._clock.now_s() - began_s, acknowledged_s, problem))
+
+    def _stopped(self, stop: Stop) -> Stop:
+        self._journal.note("stop", confirmed=stop.confirmed, seconds=stop.seconds, problem=stop.problem)
+        return stop
+
+    def _ask(self, command: bytes, answer: str) -> tuple[str, ...]:
+        """The groups of the robot's answer; asked again when nothing or nonsense comes back."""
+        problem = ""
+        for attempt in range(ATTEMPTS):
+            self.retries += attempt > 0
+            try:
+                return self._once(command, answer)
+            except NoReplyError as error:
+                problem = str(error)
+        raise RobotLostError(f"{problem}; asked {ATTEMPTS} times")
+
+    def _once(self, command: bytes, answer: str) -> tuple[str, ...]:
+        line = self._link.exchange(command + b"\n").decode("latin-1")
+        match = re.fullmatch(answer, line)
+        if match is None:
+            raise NoReplyError(f"the answer to {command.decode()} was {line!r}")
+        return match.groups()
+
+
+def check_battery(volts: float) -> None:
+    """HardwareError if the battery is too low to begin with."""
+    if volts < _FLAT_V:
+        raise HardwareError(f"the battery is at {volts:.1f} V; charge it above {_FLAT_V:g} V first.")

@@ -1,0 +1,113 @@
+"""A rig: which robot stands at which port, what sees it, and where it may go. One YAML file for each laboratory set-up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from bns.errors import HardwareError, unknown_name
+from bns.hardware.safety import Limits, Surface
+
+_KEYS = ("robot", "port", "surface_m", "tracker", "lost_s", "late_s", "placed_within_m", "driver")
+_NEEDED = ("robot", "port", "surface_m", "tracker")
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A set-up. `tracker` has a `kind` and that kind's own settings, `driver` the settings of the robot's driver.
+
+    A robot further than `placed_within_m` from its start is put back before it drives.
+    """
+
+    robot: str
+    port: str
+    tracker: Mapping[str, Any]
+    limits: Limits
+    placed_within_m: float = 0.1
+    driver: Mapping[str, Any] = field(default_factory=dict)
+
+    def check_task(self, goals_m: np.ndarray) -> None:
+        """HardwareError if a goal lies off the surface."""
+        for x_m, y_m in goals_m:
+            if not self.limits.surface.holds(x_m, y_m):
+                raise HardwareError(
+                    f"the task has a goal at ({x_m:.2f}, {y_m:.2f}) m, off the surface "
+                    f"{surface_text(self.limits.surface)}; take a smaller task or change surface_m in the rig."
+                )
+
+
+def surface_text(surface: Surface) -> str:
+    """The surface in words."""
+    return f"x {surface.x_low_m:g} to {surface.x_high_m:g} m, y {surface.y_low_m:g} to {surface.y_high_m:g} m"
+
+
+def shipped_rig(robot: str) -> Rig:
+    """The example rig of a robot, which `--emulated` uses."""
+    place = resources.files("bns.hardware") / "rigs"
+    names = sorted(f.name.removesuffix(".yaml") for f in place.iterdir() if f.name.endswith(".yaml"))
+    if robot not in names:
+        raise HardwareError(unknown_name("robot with a rig", robot, names))
+    return parse_rig((place / f"{robot}.yaml").read_text(encoding="utf-8"), f"the shipped rig of {robot}")
+
+
+def load_rig(path: Path, robot: str) -> Rig:
+    """A rig from a file; HardwareError names what is wrong, or that it is another robot's."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise HardwareError(f"cannot read the rig {path}: {error}. docs/trials.md shows how to write one.") from error
+    rig = parse_rig(text, str(path))
+    if rig.robot != robot:
+        raise HardwareError(f"{path} is a rig for {rig.robot}, and the trial is for {robot}; name the other with --robot.")
+    return rig
+
+
+def parse_rig(text: str, where: str) -> Rig:
+    """The rig in a YAML text; `where` is for messages."""
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise HardwareError(f"{where} is not YAML: {error}") from error
+    if not isinstance(content, dict):
+        raise HardwareError(f"{where} is no rig; it needs {', '.join(_NEEDED)}.")
+    unknown = [key for key in content if key not in _KEYS]
+    if unknown:
+        raise HardwareError(f"{where}: {unknown_name('key', unknown[0], _KEYS)}")
+    missing = [key for key in _NEEDED if key not in content]
+    if missing:
+        raise HardwareError(f"{where} lacks {', '.join(missing)}; it needs {', '.join(_NEEDED)}.")
+    return _rig(content, where)
+
+
+def _rig(content: Mapping[str, Any], where: str) -> Rig:
+    tracker = content["tracker"]
+    if not isinstance(tracker, dict) or "kind" not in tracker:
+        raise HardwareError(f"{where}: tracker is {tracker!r}; it needs a kind (wii, aruco or colour) and its settings.")
+    numbers = {name: _positive(where, name, content[name]) for name in ("lost_s", "late_s") if name in content}
+    limits = Limits(_surface(where, content["surface_m"]), **numbers)
+    near_m = _positive(where, "placed_within_m", content.get("placed_within_m", 0.1))
+    return Rig(str(content["robot"]), str(content["port"]), tracker, limits, near_m, content.get("driver") or {})
+
+
+def _surface(where: str, given: Any) -> Surface:
+    try:
+        (x_low, x_high), (y_low, y_high) = given["x"], given["y"]
+        surface = Surface(*(float(v) for v in (x_low, x_high, y_low, y_high)))
+    except (TypeError, KeyError, ValueError) as error:
+        raise HardwareError(f"{where}: surface_m is {given!r}; write {{x: [-0.9, 0.9], y: [-0.7, 0.7]}}, metres.") from error
+    if not (surface.x_low_m < surface.x_high_m and surface.y_low_m < surface.y_high_m):
+        raise HardwareError(f"{where}: surface_m is {given!r}; the first number of x and of y must be the smaller one.")
+    return surface
+
+
+def _positive(where: str, name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+        raise HardwareError(f"{where}: {name} is {value!r}; it must be a number above 0.")
+    return float(value)

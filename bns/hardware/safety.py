@@ -1,0 +1,125 @@
+"""When a drive must end, and that it ends with a robot that was seen to stand still."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any, Self
+
+from bns.errors import StopNotConfirmedError, TrialPausedError
+from bns.hardware.clock import Clock
+from bns.hardware.stop import Stop
+from bns.hardware.tracking.sight import Sight
+
+CUT_THE_POWER = "THE ROBOT MAY STILL BE MOVING: CUT THE POWER NOW."
+
+
+class DriveEnded(Exception):  # noqa: N818  # no error: the robot is stopped, what it did until then counts
+    """The drive is over before its commands are; the message says why. The trial goes on."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The part of the floor that the robot may be on, m, in the world frame."""
+
+    x_low_m: float
+    x_high_m: float
+    y_low_m: float
+    y_high_m: float
+
+    def holds(self, x_m: float, y_m: float) -> bool:
+        """Whether a point lies on it."""
+        return self.x_low_m <= x_m <= self.x_high_m and self.y_low_m <= y_m <= self.y_high_m
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a drive must keep: the surface, how long the robot may be out of sight, how late a look may come."""
+
+    surface: Surface
+    lost_s: float = 0.5
+    late_s: float = 1.0
+
+
+class Watch:
+    """Judges every look at a driving robot; raises what ends the drive."""
+
+    def __init__(self, limits: Limits, clock: Clock, stopping: Stopping) -> None:
+        self._limits, self._clock, self._stopping = limits, clock, stopping
+        self.begin()
+
+    def begin(self) -> None:
+        """A drive begins: the robot has just been seen."""
+        self._seen_s = self._looked_s = self._clock.now_s()
+
+    def check(self, sight: Sight | None) -> None:
+        """DriveEnded or TrialPausedError if the drive must not go on."""
+        now_s = self._clock.now_s()
+        self._stopping.check()
+        late_s, self._looked_s = now_s - self._looked_s, now_s
+        if late_s > self._limits.late_s:
+            raise TrialPausedError(f"the computer was too busy to look at the robot for {late_s:.1f} s; end other programs.")
+        if sight is not None:
+            self._seen_s = max(self._seen_s, sight.t_s)
+            x_m, y_m = float(sight.pose[0]), float(sight.pose[1])
+            if not self._limits.surface.holds(x_m, y_m):
+                raise DriveEnded(f"the robot left the surface at ({x_m:.2f}, {y_m:.2f}) m")
+        if now_s - self._seen_s > self._limits.lost_s:
+            raise DriveEnded(f"the tracker has not seen the robot for {now_s - self._seen_s:.1f} s")
+
+
+class Stopping:
+    """Ctrl-C and SIGTERM, noted while it is open and acted on at the next look; the robot is stopped before anything else ends.
+
+    In a thread other than the main one no signal arrives and nothing is taken over; `request` works from anywhere.
+    """
+
+    def __init__(self) -> None:
+        self.reason: str | None = None
+        self._former: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            self._former = {n: signal.signal(n, self._handle) for n in (signal.SIGINT, signal.SIGTERM)}
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        for number, handler in self._former.items():
+            signal.signal(number, handler)
+
+    def request(self, reason: str) -> None:
+        """Stop at the next look."""
+        self.reason = self.reason or reason
+
+    def check(self) -> None:
+        """TrialPausedError if a stop was asked for."""
+        if self.reason is not None:
+            raise TrialPausedError(self.reason)
+
+    def _handle(self, number: int, _frame: FrameType | None) -> None:
+        self.request("interrupted" if number == signal.SIGINT else "terminated")
+
+
+class StopsAtTheEnd:
+    """Whatever happens inside, the robot is stopped when it is left, and StopNotConfirmedError raised if it may still move.
+
+    The fault inside stays attached as the cause. `stop` must never raise.
+    """
+
+    def __init__(self, stop: Callable[[], Stop]) -> None:
+        self._stop = stop
+        self.last: Stop | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, _kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> None:
+        self.last = self._stop()
+        if not self.last.confirmed:
+            why = f" It was being stopped because {error}." if error is not None else ""
+            raise StopNotConfirmedError(
+                f"{CUT_THE_POWER} It did not confirm a stop for {self.last.seconds:.1f} s: {self.last.problem}.{why}"
+            ) from error

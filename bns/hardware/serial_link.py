@@ -1,0 +1,104 @@
+"""A serial port that is asked and answers, line by line, over pyserial."""
+
+from __future__ import annotations
+
+import errno
+import os
+import termios
+from collections.abc import Callable
+from pathlib import Path
+
+import serial
+from serial.tools.list_ports import comports
+
+from bns.errors import HardwareError
+from bns.hardware.clock import Clock
+from bns.hardware.journal import Journal
+
+_LONGEST_LINE = 256
+_SLICE_S = 0.01
+
+
+class NoReplyError(Exception):
+    """Nothing came back in time, or the port is gone; the driver decides what that means."""
+
+
+class SerialLink:
+    """Asks with a line, takes the line that comes back. One exchange at a time.
+
+    A port that vanishes (a Bluetooth link that breaks) is opened again at the next exchange.
+    """
+
+    def __init__(self, port: str, baud: int, clock: Clock, journal: Journal, timeout_s: float = 0.1) -> None:
+        self.port, self._baud, self._clock, self._journal = port, baud, clock, journal
+        self._timeout_s = timeout_s
+        self._serial: serial.Serial | None = None
+        self._serial = open_port(port, baud)
+
+    def exchange(self, request: bytes) -> bytes:
+        """Send `request`, return the line that answers without its end; NoReplyError if none does."""
+        began_s = self._clock.now_s()
+        try:
+            if self._serial is None:
+                self._serial = open_port(self.port, self._baud)
+            self._serial.reset_input_buffer()  # an answer that came too late belongs to no question
+            self._journal.note("sent", data=request.decode("latin-1"))
+            in_vain = self._clock.in_vain(self._timeout_s)
+            self._serial.write(request)
+            line = self._line(in_vain)
+        except (serial.SerialException, OSError, termios.error, HardwareError) as error:
+            self._lose(error)
+            self._wait_out(began_s)
+            raise NoReplyError(f"the port {self.port} is gone ({error})") from error
+        self._journal.note("received", data=line.decode("latin-1"))
+        late = self._clock.now_s() - began_s > self._timeout_s + _SLICE_S
+        if late or not line.endswith(b"\n"):
+            self._wait_out(began_s)
+            raise NoReplyError(f"no answer to {request!r} within {self._timeout_s:g} s")
+        return line.strip(b"\r\n")
+
+    def _line(self, in_vain: Callable[[], bool]) -> bytes:
+        assert self._serial is not None
+        line = bytes(self._serial.read_until(b"\n", _LONGEST_LINE))
+        while not line.endswith(b"\n") and len(line) < _LONGEST_LINE and not in_vain():
+            line += self._serial.read_until(b"\n", _LONGEST_LINE)
+        return line
+
+    def _wait_out(self, began_s: float) -> None:
+        self._clock.waited(began_s + self._timeout_s - self._clock.now_s())
+
+    def _lose(self, error: Exception) -> None:
+        self._journal.note("link-lost", port=self.port, error=str(error))
+        self.close()
+
+    def close(self) -> None:
+        """Give the port free."""
+        if self._serial is not None:
+            port, self._serial = self._serial, None
+            port.close()
+
+
+def open_port(port: str, baud: int) -> serial.Serial:
+    """An open port; HardwareError says why there is none and what to try."""
+    if not Path(port).exists():
+        raise HardwareError(f"there is no port {port}. {_ports_there_are()} Try: bns doctor")
+    try:
+        return serial.Serial(port, baud, timeout=_SLICE_S, write_timeout=1.0, exclusive=True)
+    except serial.SerialException as error:
+        raise HardwareError(_why_not(port, error)) from error
+
+
+def _why_not(port: str, error: serial.SerialException) -> str:
+    if error.errno == errno.EACCES or not os.access(port, os.R_OK | os.W_OK):
+        return (
+            f"no permission to use {port}. Add yourself to the group that owns it (often dialout: "
+            "sudo usermod -aG dialout $USER), log in again."
+        )
+    if error.errno in {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}:
+        return f"{port} is in use by another program (ModemManager, a terminal, another trial). End that one first."
+    return f"{port} cannot be opened: {error}. Is it a serial port, and is the robot paired? Try: bns doctor"
+
+
+def _ports_there_are() -> str:
+    found = sorted(p.device for p in comports()) + sorted(str(p) for p in Path("/dev").glob("rfcomm*"))
+    return f"Ports there are: {', '.join(found)}." if found else "No serial port was found; is it plugged in or paired?"

@@ -1,0 +1,60 @@
+"""ArUco markers: one printed square on the robot tells its pose by itself, whatever the light's colour."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from bns.hardware.clock import Clock
+from bns.hardware.tracking.calibration import load_calibration
+from bns.hardware.tracking.camera import Camera, Frame, FrameTracker, open_camera
+from bns.hardware.tracking.kinds import taken
+from bns.hardware.tracking.lens import Lens
+from bns.hardware.tracking.rigid import fit
+from bns.hardware.tracking.sight import Sight
+
+_WORST_SHARE = 0.1
+"""A marker whose corners do not form a square of its size, to this share of its side, is none."""
+
+
+class ArucoDetector:
+    """Finds marker `number` of side `side_m` at `height_m` above the floor; its top edge is ahead."""
+
+    def __init__(self, lens: Lens, number: int, side_m: float, height_m: float) -> None:
+        self._lens, self._number, self._side_m, self._height_m = lens, number, side_m, height_m
+        words = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+        settings = cv2.aruco.DetectorParameters()
+        settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        self._detector = cv2.aruco.ArucoDetector(words, settings)
+        half = side_m / 2
+        self._corners_m = np.array([[-half, half], [half, half], [half, -half], [-half, -half]])
+
+    def find(self, frame: Frame) -> Sight | None:
+        """The pose, or None: the marker is not there, is there twice, or is not of its size."""
+        found, numbers, _ = self._detector.detectMarkers(frame.picture)
+        own = [] if numbers is None else [c for c, n in zip(found, numbers.ravel(), strict=True) if n == self._number]
+        if len(own) != 1:
+            return None
+        seen = self._lens.on_plane(own[0].reshape(4, 2), self._height_m)
+        pose, rms = fit(self._corners_m, seen)
+        if not rms <= _WORST_SHARE * self._side_m:
+            return None
+        return Sight(frame.t_s, pose, rms, {f"corner{i}": corner for i, corner in enumerate(seen)})
+
+
+def detector(settings: Mapping[str, Any]) -> ArucoDetector:
+    """The detector that a rig describes."""
+    taken("aruco", settings, ("camera", "calibration", "side_m", "height_m"), ("number",))
+    lens = load_calibration(Path(settings["calibration"])).lens
+    return ArucoDetector(lens, int(settings.get("number", 0)), float(settings["side_m"]), float(settings["height_m"]))
+
+
+def open_tracker(settings: Mapping[str, Any], clock: Clock) -> FrameTracker:
+    """The tracker of a rig."""
+    find = detector(settings)
+    camera: Camera = open_camera(settings, clock)
+    return FrameTracker(camera, find.find)

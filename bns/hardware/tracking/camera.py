@@ -1,0 +1,129 @@
+"""Frames of a camera: a thread keeps the newest one, because what OpenCV hands out may have waited in a buffer."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+
+from bns.errors import HardwareError
+from bns.hardware.clock import Clock
+from bns.hardware.tracking.calibration import check_size, load_calibration
+from bns.hardware.tracking.sight import Sight
+
+_FIRST_FRAME_S = 10.0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture (height, width, 3), BGR, and when it arrived."""
+
+    t_s: float
+    picture: np.ndarray
+
+
+class Camera(Protocol):
+    """Gives frames."""
+
+    def newest(self) -> Frame | None:
+        """The newest frame; None if none has come yet or the camera is gone."""
+
+    def close(self) -> None:
+        """Let the camera go."""
+
+
+class StreamCamera:
+    """Any camera or stream that `cv2.VideoCapture` opens: a number, a device file, an address."""
+
+    def __init__(self, source: str, clock: Clock) -> None:
+        self._clock, self._source = clock, source
+        self._capture = cv2.VideoCapture(int(source)) if source.isdecimal() else cv2.VideoCapture(source)
+        if not self._capture.isOpened():
+            raise HardwareError(
+                f"the camera {source} cannot be opened. Is it plugged in, used by another program, are you in the group video? "
+                "Try: bns doctor"
+            )
+        self._frame: Frame | None = None
+        self._arrived, self._open = threading.Event(), True
+        self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
+        self._thread.start()
+        if not self._arrived.wait(_FIRST_FRAME_S):
+            self.close()
+            raise HardwareError(f"the camera {source} is open but gives no picture; plug it in anew.")
+
+    def newest(self) -> Frame | None:
+        """The frame that arrived last."""
+        return self._frame
+
+    def close(self) -> None:
+        """End the thread, let the camera go."""
+        self._open = False
+        self._thread.join(timeout=5)
+        self._capture.release()
+
+    def _read(self) -> None:
+        while self._open:
+            good, picture = self._capture.read()
+            if not good:  # unplugged: the last frame must not be taken for a new one
+                self._frame = None
+                return
+            self._frame = Frame(self._clock.now_s(), picture)
+            self._arrived.set()
+
+
+class FrameTracker:
+    """Implements `Tracker` over a camera and a detector; each frame is looked at once."""
+
+    def __init__(self, camera: Camera, find: Callable[[Frame], Sight | None]) -> None:
+        self.camera, self._find = camera, find
+        self._last: tuple[float, Sight | None] = (-1.0, None)
+
+    def look(self) -> Sight | None:
+        """What the newest frame shows."""
+        frame = self.camera.newest()
+        if frame is None:
+            return None
+        if frame.t_s != self._last[0]:
+            self._last = (frame.t_s, self._find(frame))
+        return self._last[1]
+
+    def close(self) -> None:
+        """Let the camera go."""
+        self.camera.close()
+
+
+def open_camera(settings: Mapping[str, Any], clock: Clock) -> StreamCamera:
+    """The camera of a rig, if its frames are those that the rig's calibration was made for."""
+    calibration = load_calibration(Path(settings["calibration"]))
+    camera = StreamCamera(str(settings["camera"]), clock)
+    frame = camera.newest()
+    try:
+        if frame is not None:
+            check_size(calibration, frame.picture)
+    except HardwareError:
+        camera.close()
+        raise
+    return camera
+
+
+def annotated(frame: Frame, sight: Sight | None, px_of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """The picture with what was found drawn in; `px_of` takes floor points (n, 2) to pixels."""
+    picture = frame.picture.copy()
+    if sight is None:
+        cv2.putText(picture, "lost", (12, 32), cv2.FONT_HERSHEY_SIMPLEX, 1.0, (0, 0, 255), 2, cv2.LINE_AA)
+        return picture
+    x_m, y_m, heading_rad = sight.pose
+    ahead = np.array([[x_m, y_m], [x_m + 0.15 * np.cos(heading_rad), y_m + 0.15 * np.sin(heading_rad)]])
+    tail, tip = (tuple(np.rint(p).astype(int).tolist()) for p in px_of(ahead))
+    cv2.arrowedLine(picture, tail, tip, (255, 0, 255), 2, cv2.LINE_AA)
+    for point in px_of(np.array(list(sight.points.values())).reshape(-1, 2)):
+        cv2.circle(picture, tuple(np.rint(point).astype(int).tolist()), 4, (255, 0, 0), 2, cv2.LINE_AA)
+    text = f"x {x_m:.3f} m  y {y_m:.3f} m  heading {np.degrees(heading_rad):.1f} deg"
+    cv2.rectangle(picture, (0, 0), (560, 40), (255, 255, 255), -1)
+    cv2.putText(picture, text, (12, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (0, 0, 0), 1, cv2.LINE_AA)
+    return picture

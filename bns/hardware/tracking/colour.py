@@ -1,0 +1,114 @@
+"""Two round markers of different colours, yellow and green unless told otherwise: their positions, and a heading between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from bns.errors import HardwareError
+from bns.hardware.clock import Clock
+from bns.hardware.tracking.calibration import load_calibration
+from bns.hardware.tracking.camera import Frame, FrameTracker, open_camera
+from bns.hardware.tracking.kinds import taken
+from bns.hardware.tracking.lens import Lens
+from bns.hardware.tracking.sight import Sight
+
+YELLOW, GREEN = (20, 38), (50, 85)
+"""Hues as OpenCV counts them, 0 to 179."""
+_HUE_GAP = 5
+_SATURATION, _VALUE = 110, 60
+_ROUND = 0.75
+_AREA_SHARE = (0.4, 2.0)
+_DISTANCE_SHARE = 0.2
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Two markers: hues (low, high) of each, diameter, height above the floor and, if fixed (0: not), their distance, m."""
+
+    diameter_m: float
+    height_m: float
+    distance_m: float = 0.0
+    yellow: tuple[int, int] = YELLOW
+    green: tuple[int, int] = GREEN
+
+    def __post_init__(self) -> None:
+        low, high = sorted([self.yellow, self.green])
+        if high[0] - low[1] < _HUE_GAP:
+            raise HardwareError(
+                f"the marker colours are too close: hues {low} and {high} leave {high[0] - low[1]} between them; at least "
+                f"{_HUE_GAP} of 180 are needed. Take markers of other colours, or narrow the ranges in the rig."
+            )
+
+
+class ColourDetector:
+    """Finds both markers in a frame. Gates on area, roundness and distance: what fails is not seen."""
+
+    def __init__(self, lens: Lens, markers: Markers) -> None:
+        self._lens, self._markers = lens, markers
+
+    def find(self, frame: Frame) -> Sight | None:
+        """Pose: the middle between the markers, heading from yellow to green; `points` has both. None if one is not seen."""
+        hsv = cv2.cvtColor(cv2.GaussianBlur(frame.picture, (0, 0), 1.0), cv2.COLOR_BGR2HSV)
+        yellow, green = (self._marker(frame.picture, hsv, hue) for hue in (self._markers.yellow, self._markers.green))
+        if yellow is None or green is None:
+            return None
+        between = green - yellow
+        distance_m, wanted_m = float(np.hypot(*between)), self._markers.distance_m
+        if wanted_m and abs(distance_m - wanted_m) > _DISTANCE_SHARE * wanted_m:
+            return None
+        pose = np.array([*(yellow + green) / 2, np.arctan2(between[1], between[0])])
+        residual_m = abs(distance_m - wanted_m) if wanted_m else 0.0
+        return Sight(frame.t_s, pose, residual_m, {"yellow": yellow, "green": green})
+
+    def _marker(self, picture: np.ndarray, hsv: np.ndarray, hue: tuple[int, int]) -> np.ndarray | None:
+        """Where the one marker of this colour is (2,), m; None if there is none, or more than one."""
+        mask = cv2.inRange(hsv, np.array([hue[0], _SATURATION, _VALUE]), np.array([hue[1], 255, 255]))
+        outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        good = [outline for outline in outlines if self._is_marker(outline)]
+        if len(good) != 1:
+            return None
+        middle = _centroid(good[0], picture, hsv)
+        found: np.ndarray = self._lens.on_plane(middle[None], self._markers.height_m)[0]
+        return found if np.isfinite(found).all() else None
+
+    def _is_marker(self, outline: np.ndarray) -> bool:
+        area, around = cv2.contourArea(outline), cv2.arcLength(outline, True)
+        if area < 12 or len(outline) < 5:
+            return False
+        edge_m = self._lens.on_plane(outline.reshape(-1, 2).astype(np.float64), self._markers.height_m)
+        area_m2 = float(cv2.contourArea(edge_m.astype(np.float32)))
+        wanted_m2 = np.pi / 4 * self._markers.diameter_m**2
+        low, high = (share * wanted_m2 for share in _AREA_SHARE)
+        return bool(low <= area_m2 <= high and 4 * np.pi * area / around**2 >= _ROUND)
+
+
+def _centroid(outline: np.ndarray, picture: np.ndarray, hsv: np.ndarray) -> np.ndarray:
+    """Middle of a blob, weighted by saturation: edge pixels count by how much of the marker they hold."""
+    x, y, width, height = cv2.boundingRect(outline)
+    rows = slice(max(y - 2, 0), min(y + height + 2, picture.shape[0]))
+    columns = slice(max(x - 2, 0), min(x + width + 2, picture.shape[1]))
+    weight = np.clip(hsv[rows, columns, 1].astype(np.float64) - 60.0, 0.0, None)
+    down, across = np.mgrid[rows, columns]
+    return np.array([(across * weight).sum(), (down * weight).sum()]) / weight.sum()
+
+
+def detector(settings: Mapping[str, Any]) -> ColourDetector:
+    """The detector that a rig describes."""
+    optional = ("distance_m", "yellow", "green")
+    taken("colour", settings, ("camera", "calibration", "diameter_m", "height_m"), optional)
+    lens = load_calibration(Path(settings["calibration"])).lens
+    hues = {name: tuple(int(h) for h in settings[name]) for name in ("yellow", "green") if name in settings}
+    sizes = {name: float(settings[name]) for name in ("diameter_m", "height_m", "distance_m") if name in settings}
+    return ColourDetector(lens, Markers(**sizes, **hues))  # type: ignore[arg-type]  # two hues each
+
+
+def open_tracker(settings: Mapping[str, Any], clock: Clock) -> FrameTracker:
+    """The tracker of a rig."""
+    find = detector(settings)
+    return FrameTracker(open_camera(settings, clock), find.find)

@@ -1,0 +1,1 @@
+"""Trials: a run whose world is a robot."""

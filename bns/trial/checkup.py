@@ -1,0 +1,20 @@
+"""What `bns doctor` was asked for."""
+
+from __future__ import annotations
+
+import argparse
+
+from bns.hardware.clock import RealClock
+from bns.hardware.doctor import examine
+from bns.hardware.rig import load_rig
+
+
+def checked_up(options: argparse.Namespace) -> int:
+    """Print the findings; 0 if all is fine, else 2."""
+    rig = None if options.rig is None else load_rig(options.rig, options.robot)
+    bad = 0
+    for finding in examine(rig, RealClock()):
+        print(finding, flush=True)
+        bad += not finding.fine
+    print("all fine" if not bad else f"{bad} to be mended")
+    return 2 if bad else 0

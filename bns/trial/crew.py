@@ -1,0 +1,110 @@
+"""Robot, operator and journal brought together: one evaluation after the other, whatever happens in between."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bns.errors import TrialPausedError
+from bns.hardware.clock import Clock
+from bns.hardware.journal import Journal
+from bns.hardware.platform import Driven, Platform
+from bns.hardware.rig import Rig
+from bns.trial.loop import Evaluation
+from bns.trial.operator import Operator
+
+_MOST_VOID = 3
+"""So many drives without a single finished command, one after the other, and the trial pauses."""
+
+
+class Crew:
+    """Implements `bns.trial.loop.Driver`. `start` (3,) is where the task begins."""
+
+    def __init__(
+        self, platform: Platform, operator: Operator, rig: Rig, start: np.ndarray, clock: Clock, journal: Journal
+    ) -> None:
+        self._platform, self._operator, self._rig, self._start = platform, operator, rig, start
+        self._clock, self._journal = clock, journal
+        self._began_s = clock.now_s()
+        self._first = True
+        self.placing_s = 0.0
+        self.readings: dict[str, float] = {}
+        self.stops_s: list[float] = []
+        self.ends: list[str] = []
+
+    def evaluate(self, number: int, controller: np.ndarray) -> Evaluation:
+        """Drive a controller until there is an evaluation to keep."""
+        void = 0
+        while True:
+            self._ready(void)
+            driven = self._drive(number, controller)
+            if not len(driven.commands):
+                void += 1
+                self._journal.note("discarded", evaluation=number, why=driven.ended)
+                if void == _MOST_VOID:
+                    raise TrialPausedError(f"{void} drives in a row ended before a command was over: {driven.ended}")
+                continue
+            answer = self._asked(number, controller, driven)
+            if answer == "next":
+                return Evaluation(controller, driven.commands, driven.poses)
+            self._journal.note("discarded", evaluation=number, why=answer)
+
+    def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
+        """Note it, durably."""
+        fitness = {name: row[name] for name in ("evaluated_fitness_world", "evaluated_goals_reached")}
+        self._journal.note("evaluated", evaluation=number, rounds=rounds, **fitness)
+        self._journal.sync()
+
+    def _drive(self, number: int, controller: np.ndarray) -> Driven:
+        self.readings = self._platform.readings()
+        session_s = self._clock.now_s() - self._began_s
+        driven = self._platform.drive(controller)
+        self.stops_s.append(driven.stop.seconds)
+        if driven.ended:
+            self.ends.append(driven.ended)
+        self._journal.note(
+            "driven",
+            evaluation=number,
+            picked=controller.tolist(),
+            commands=driven.commands.tolist(),
+            poses=driven.poses.tolist(),
+            rows=driven.rows,
+            ended=driven.ended,
+            session_s=session_s,
+            readings=self.readings,
+        )
+        self._journal.sync()
+        return driven
+
+    def _asked(self, number: int, controller: np.ndarray, driven: Driven) -> str:
+        began = time.perf_counter()
+        part = f"{len(driven.commands)} of {len(controller)} commands" + (f" ({driven.ended})" if driven.ended else "")
+        answer = self._operator.accept(f"evaluation {number}: {part} in {driven.seconds:.0f} s")
+        self.placing_s += time.perf_counter() - began
+        return answer
+
+    def _ready(self, void: int) -> None:
+        """See that the robot stands near enough to its start."""
+        began = time.perf_counter()
+        for _ in range(_MOST_VOID):
+            why = self._misplaced(void)
+            if why is None:
+                break
+            self._journal.note("placing", why=why)
+            self._operator.place(self._start, why)
+            void, self._first = 0, False
+        else:
+            raise TrialPausedError(f"the robot could not be brought to its start: {self._misplaced(0)}")
+        self.placing_s += time.perf_counter() - began
+
+    def _misplaced(self, void: int) -> str | None:
+        pose = self._platform.pose()
+        if pose is None:
+            return "The tracker does not see the robot"
+        off_m = float(np.hypot(*(pose[:2] - self._start[:2])))
+        if off_m > self._rig.placed_within_m:
+            return f"The robot stands {100 * off_m:.0f} cm from its start"
+        return "The drive came to nothing" if void else None

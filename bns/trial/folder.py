@@ -1,0 +1,104 @@
+"""The folder of a trial: its journal, spec and measurements, and what of it can be gone on with."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from filelock import FileLock, Timeout
+
+from bns.errors import HardwareError
+from bns.hardware.journal import events
+from bns.measurements import write_measurements
+from bns.spec import RunSpec
+from bns.trial.loop import Evaluation
+
+JOURNAL, MEASUREMENTS = "journal.jsonl", "measurements.csv"
+
+
+class TrialFolder:
+    """`results/trials/NAME`, locked while it is used."""
+
+    def __init__(self, results: Path, spec: RunSpec, emulated: bool) -> None:
+        name = f"{spec.robot}-{spec.task}-{spec.seed}-{spec.run_id}" + ("-emulated" if emulated else "")
+        self.path, self.spec = results / "trials" / name, spec
+        self._lock = FileLock(self.path.with_suffix(".lock"))
+
+    @property
+    def journal(self) -> Path:
+        """Path of the journal."""
+        return self.path / JOURNAL
+
+    def open(self, resume: bool) -> list[Evaluation]:
+        """Lock it; the evaluations it holds. HardwareError if it was begun and is not to be resumed, or the reverse."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            self._lock.acquire(timeout=0)
+        except Timeout as error:
+            raise HardwareError(f"this trial is being driven by another process ({self.path}); wait for it.") from error
+        if self.journal.exists() and not resume:
+            raise HardwareError(
+                f"this trial was begun before, in {self.path}. Go on with --resume, or begin another with --seed "
+                f"{self.spec.seed + 1}; to do this one afresh, move its folder away."
+            )
+        if resume and not self.journal.exists():
+            raise HardwareError(f"there is nothing to go on with: no journal in {self.path}. Begin without --resume.")
+        return past_evaluations(self.journal) if resume else []
+
+    def close(self) -> None:
+        """Unlock it."""
+        self._lock.release()
+
+    def write_measurements(self) -> int:
+        """Write the table of all drives in the journal; how many rows."""
+        table = measured(self.journal)
+        if len(table):
+            write_measurements(table, self.path / MEASUREMENTS)
+        return len(table)
+
+
+def spec_of(journal: Path) -> RunSpec:
+    """The spec that a journal was driven with."""
+    for event in events(journal, "trial"):
+        given = {name: value for name, value in event["spec"].items() if name != "engine_version"}
+        return RunSpec(**given)
+    raise HardwareError(f"{journal} does not say which run it is of; name the journal.jsonl of a trial.")
+
+
+def past_evaluations(journal: Path) -> list[Evaluation]:
+    """Evaluations of a journal in order. One that was driven again counts as driven last, up to the first that is missing."""
+    driven: dict[int, dict] = {}
+    rounds: dict[int, int] = {}
+    for event in events(journal, "driven", "evaluated", "discarded"):
+        number = event["evaluation"]
+        rounds.pop(number, None)
+        if event["kind"] == "driven":
+            driven[number] = event
+        elif event["kind"] == "discarded":
+            driven.pop(number, None)
+        else:
+            rounds[number] = event["rounds"]
+    found: list[Evaluation] = []
+    while len(found) + 1 in driven:
+        event, number = driven[len(found) + 1], len(found) + 1
+        picked, commands = (np.asarray(event[name], np.float32) for name in ("picked", "commands"))
+        found.append(Evaluation(picked, commands, np.asarray(event["poses"], np.float64), rounds.get(number)))
+    return found
+
+
+def measured(journal: Path) -> pd.DataFrame:
+    """The measurements of every drive in a journal, discarded ones too; `trial` counts the drives."""
+    tables = []
+    for number, event in enumerate(events(journal, "driven"), 1):
+        table = pd.DataFrame(event["rows"])
+        table.insert(0, "trial", number)
+        table["evaluation"], table["session_s"] = event["evaluation"], event["session_s"] + table["t_s"]
+        tables.append(table.assign(**event["readings"]))
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+
+
+def spec_event(spec: RunSpec) -> dict:
+    """What the first line of a journal holds."""
+    return dict(json.loads(spec.canonical_json()))

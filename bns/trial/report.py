@@ -1,0 +1,48 @@
+"""A trial in words: a row of the source's tables 4.2 and 5.4, and how well robot and computer kept up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bns.recorder import RADII_CM
+from bns.spec import RunSpec
+from bns.trial.crew import Crew
+from bns.trial.loop import TrialResult
+
+
+def report(spec: RunSpec, result: TrialResult, crew: Crew, wall_s: float, how: Any, folder: Path, figure: Path) -> str:
+    """Lines for the terminal."""
+    evals = result.run.tables["evals"]
+    firsts = [f"{cm} cm {_first(evals[f'evaluated_success_{cm}cm'])}" for cm in RADII_CM]
+    driven_min = float(np.sum(evals["driven_ms"])) / 60_000.0
+    what = f"emulated, at {how.speed:g} times its speed" if how.emulated else "robot"
+    return "\n".join(
+        [
+            f"trial {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {what}",
+            f"{spec.evaluations} evaluations, {driven_min:.1f} min of driving, {wall_s:.0f} s by the clock on the wall",
+            "all goals reached, within " + "; ".join(firsts),
+            f"the robot waited for computations {result.waited_share:.1%} of the time; {result.rounds} rounds of training and "
+            "evolution went on while it drove",
+            _stops(crew.stops_s),
+            *([f"drives that ended early: {len(crew.ends)}, the last because {crew.ends[-1]}"] if crew.ends else []),
+            f"measurements and journal: {folder}",
+            f"path: {figure}",
+        ]
+    )
+
+
+def _stops(seconds: list[float]) -> str:
+    if not seconds:
+        return "nothing was driven in this session"
+    return f"stops: {len(seconds)} confirmed, {_ms(float(np.median(seconds)))} at the median, {_ms(max(seconds))} at most"
+
+
+def _ms(seconds: float) -> str:
+    return f"{1000 * seconds:.0f} ms"
+
+
+def _first(success: np.ndarray) -> str:
+    return f"first at evaluation {int(np.argmax(success)) + 1}, {success.mean():.0%} of them" if success.any() else "never"

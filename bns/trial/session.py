@@ -1,0 +1,122 @@
+"""A trial from its first check to its last figure."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from bns.errors import HardwareError
+from bns.hardware.clock import Clock, EmulatedClock, RealClock
+from bns.hardware.emulators.faults import FaultPlan
+from bns.hardware.journal import Journal
+from bns.hardware.platform import Emulation, Platform, platform_module
+from bns.hardware.rig import Rig
+from bns.hardware.safety import Stopping, StopsAtTheEnd
+from bns.plotting import path_figure
+from bns.robots import load_robot
+from bns.single import keep_run, live_view
+from bns.spec import RunSpec
+from bns.tasks import load_task
+from bns.trial.crew import Crew
+from bns.trial.folder import TrialFolder, spec_event
+from bns.trial.loop import Trial, TrialResult
+from bns.trial.operator import AtTheTerminal, EmulatedHands, Nobody, Operator
+from bns.trial.report import report
+
+SWEEP, SWEEP_EMULATED = "trials", "trials-emulated"
+MOST_ROUNDS = 50
+
+
+@dataclass(frozen=True)
+class Set:
+    """How a trial is carried out: on which rig, emulated at which speed with which faults, with somebody to ask or not."""
+
+    rig: Rig
+    emulated: bool = False
+    speed: float = 1.0
+    plan: FaultPlan = field(default_factory=FaultPlan)
+    yes: bool = False
+    resume: bool = False
+    most_rounds: int = MOST_ROUNDS
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Everything that a trial or an experiment drives with, opened and checked."""
+
+    platform: Platform
+    operator: Operator
+    clock: Clock
+    journal: Journal
+
+
+@contextmanager
+def staged(how: Set, seed: int, journal: Path | None, stopping: Stopping) -> Iterator[Stage]:
+    """Open clock, emulation, journal and platform; at the end, however it comes, the robot is stopped, seen to stand, let go."""
+    clock: Clock = EmulatedClock(how.speed) if how.emulated else RealClock()
+    with ExitStack() as stack:
+        log = stack.enter_context(Journal(journal, clock))
+        module, rig, hands = platform_module(how.rig.robot), how.rig, None
+        if how.emulated:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bns-rig-")))
+            emulation: Emulation = module.emulate(rig, folder, clock, how.plan, seed)
+            stack.callback(emulation.close)
+            rig, hands = emulation.rig, EmulatedHands(emulation, seed)
+        platform: Platform = module.open_platform(rig, clock, log, stopping)
+        stack.callback(platform.close)
+        stack.enter_context(StopsAtTheEnd(platform.stop))
+        yield Stage(platform, hands or (Nobody() if how.yes else AtTheTerminal()), clock, log)
+
+
+def carry_out(spec: RunSpec, how: Set, results: Path) -> str:
+    """Carry out a trial, store it, draw its path; the report in words. TrialPausedError, StopNotConfirmedError, HardwareError."""
+    robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
+    how.rig.check_task(task.goals_m)
+    folder = TrialFolder(results, spec, how.emulated)
+    past = folder.open(how.resume)
+    try:
+        return _driven(spec, how, results, folder, past, robot, task)
+    finally:
+        folder.close()
+
+
+def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: list, robot: Any, task: Any) -> str:
+    trial = Trial(spec, "robot-emulated" if how.emulated else "robot", past, how.most_rounds)
+    start = robot.start_pose()[0]
+    started, wall = datetime.now(UTC), time.perf_counter()
+    try:
+        with Stopping() as stopping, live_view(spec) as show, staged(how, spec.seed, folder.journal, stopping) as stage:
+            stage.journal.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
+            stage.journal.sync()
+            crew = Crew(stage.platform, stage.operator, how.rig, start, stage.clock, stage.journal)
+            result = trial.run(crew, show)
+            stage.journal.note("complete", evaluations=spec.evaluations)
+    except HardwareError:
+        if not past:  # nothing has moved: the next attempt is no resumption
+            _forget_if_empty(folder)
+        raise
+    except BaseException:
+        folder.write_measurements()
+        raise
+    folder.write_measurements()
+    return _kept(spec, how, results, folder, result, robot, task, started, time.perf_counter() - wall, crew)
+
+
+def _forget_if_empty(folder: TrialFolder) -> None:
+    if folder.journal.exists() and '"kind":"trial"' not in folder.journal.read_text(encoding="utf-8"):
+        folder.journal.unlink()
+
+
+def _kept(
+    spec: RunSpec, how: Set, results: Path, folder: TrialFolder, result: TrialResult, robot: Any, task: Any,
+    started: datetime, wall_s: float, crew: Crew,
+) -> str:  # fmt: skip
+    keep_run(spec, result.run, results, SWEEP_EMULATED if how.emulated else SWEEP, started, wall_s)
+    figure = path_figure(spec, task, robot, result.run, folder.path / "path")
+    return report(spec, result, crew, wall_s, how, folder.path, figure)

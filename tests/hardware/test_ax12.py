@@ -1,0 +1,238 @@
+"""The servo chain: the real SDK over a pseudo-terminal, and bytes of the manual."""
+
+import numpy as np
+import pytest
+
+from bns.errors import HardwareError
+from bns.hardware.ax12_table import RAD_PER_STEP, REGISTERS
+from bns.hardware.dynamixel import Ax12Chain, ServoError
+from bns.hardware.emulators.ax12 import Bus, Servo, packet
+from bns.hardware.emulators.faults import Fault, Faults
+from bns.hardware.emulators.terminal import PseudoTerminal
+from bns.hardware.journal import Journal
+
+IDS = (1, 2, 3)
+
+
+@pytest.fixture
+def chain(tmp_path, clock):
+    """chain(*faults, numbers, asked, **registers) -> driver, bus, line."""
+    opened = []
+
+    def build(*faults, numbers=IDS, asked=IDS, **registers):
+        struck = Faults(tuple(faults), 1, "bus")
+        bus = Bus([Servo(n, clock, struck, **registers) for n in numbers], clock, struck)
+        line = PseudoTerminal(bus, tmp_path, f"bus{len(opened)}")
+        opened.append(line)
+        driver = Ax12Chain(str(line.path), asked, clock, Journal(None, clock))
+        opened.append(driver)
+        return driver, bus, line
+
+    yield build
+    for each in reversed(opened):
+        each.close()
+
+
+def answered(clock, data, **registers):
+    return Bus([Servo(1, clock, Faults(), **registers)], clock).receive(bytes.fromhex(data)).hex(" ").upper()
+
+
+@pytest.mark.parametrize(
+    ("sent", "back"),
+    [
+        ("FF FF 01 02 01 FB", "FF FF 01 02 00 FC"),  # ping
+        ("FF FF 01 04 02 2B 01 CC", "FF FF 01 03 00 20 DB"),  # temperature, 32 degrees
+        ("FF FF 01 02 01 00", "FF FF 01 02 10 EC"),  # wrong checksum
+        ("FF FF 01 02 09 F3", "FF FF 01 02 40 BC"),  # no such instruction
+        ("FF FF 01 05 03 1E FF 0F CA", "FF FF 01 02 08 F4"),  # goal 4095: out of range
+        ("FF FF 02 02 01 FA", ""),  # nobody has this id
+        ("FF FF 01 02", ""),  # not all of a packet
+        ("00 12 FF FF 01 02 01 FB", "FF FF 01 02 00 FC"),  # noise before the header
+    ],
+)
+def test_golden_packets(clock, sent, back):
+    servo = Servo(1, clock, Faults(), present_temperature=32)
+    servo._alarms = lambda _now: setattr(servo, "alarm", 0)
+    assert Bus([servo], clock).receive(bytes.fromhex(sent)).hex(" ").upper() == back
+
+
+def test_defaults_are_the_manual_s(clock):
+    servo = Servo(1, clock, Faults())
+    assert bytes(servo.table[:24]).hex(" ") == (
+        "0c 00 18 01 01 fa 00 00 ff 03 00 46 3c 8c ff 03 02 24 24 00 00 00 00 00"
+    )
+    assert packet(0xFE, 1).hex() == "fffffe0201fe"
+
+
+def test_registered_writes_wait_for_action(clock):
+    servo = Servo(1, clock, Faults())
+    bus = Bus([servo], clock)
+    bus.receive(packet(1, 4, bytes([30, 0, 1])))
+    assert servo.get("goal_position") == 512
+    assert servo.get("registered") == 1
+    bus.receive(packet(0xFE, 5))
+    assert servo.get("goal_position") == 256
+
+
+@pytest.mark.parametrize(("level", "answers"), [(0, [True, False, False]), (1, [True, True, False]), (2, [True] * 3)])
+def test_status_return_level(clock, level, answers):
+    bus = Bus([Servo(1, clock, Faults(), status_return=level)], clock)
+    asked = [packet(1, 1), packet(1, 2, bytes([36, 2])), packet(1, 3, bytes([25, 1]))]
+    assert [bool(bus.receive(a)) for a in asked] == answers
+
+
+def test_opening_finds_every_servo(chain):
+    driver, *_ = chain()
+    assert [driver.read(n, "id") for n in IDS] == list(IDS)
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        ({"asked": (1, 2, 3, 4)}, r"servo 4 is missing .*bns doctor"),
+        ({"numbers": (1, 2, 2, 3)}, r"servo 2: answers are garbled; two servos may have this id|servo 2 is missing"),
+        ({"model_number": 18}, r"servo 1 is a model 18, not an AX-12"),
+    ],
+)
+def test_chains_that_cannot_be_used(chain, build, message):
+    with pytest.raises(HardwareError, match=message):
+        chain(**build)
+
+
+def test_no_such_port(clock):
+    with pytest.raises(HardwareError, match=r"/dev/nowhere cannot be opened.*bns doctor"):
+        Ax12Chain("/dev/nowhere", IDS, clock, Journal(None, clock))
+
+
+def test_arming_does_not_jerk(chain):
+    driver, bus, _ = chain(present_position=700)
+    driver.arm()
+    for servo in bus.servos:
+        assert servo.get("torque_enable") == 1
+        assert servo.get("goal_position") == servo.get("present_position") == 700
+        assert servo.get("torque_limit") == round(0.8 * 1023)
+
+
+def test_moving_takes_its_time_and_says_what_was_sent(chain, clock):
+    driver, bus, _ = chain()
+    driver.arm()
+    sent = driver.move([0.5, -0.5, 9.0], [1.0, 1.0, 1.0])
+    assert sent[:2] == pytest.approx([0.5, -0.5], abs=RAD_PER_STEP)
+    assert sent[2] == pytest.approx(511 * RAD_PER_STEP)
+    clock.sleep(0.25)
+    assert driver.health()[1].position_rad == pytest.approx(0.25, abs=0.05)
+    clock.sleep(0.5)
+    assert driver.health()[1].position_rad == pytest.approx(0.5, abs=0.01)
+    assert [s.get("moving_speed") for s in bus.servos] == [86, 86, 86]
+
+
+def test_a_speed_of_nothing_is_slow_not_full_speed(chain):
+    driver, bus, _ = chain()
+    driver.move([0.1] * 3, [0.0] * 3)
+    assert {s.get("moving_speed") for s in bus.servos} == {1}
+
+
+def test_angle_limits_are_kept(chain):
+    driver, bus, _ = chain(cw_angle_limit=400, ccw_angle_limit=600)
+    assert driver.move([2.0, -2.0, 0.0], [1.0] * 3) == pytest.approx(np.array([88, -112, 0]) * RAD_PER_STEP)
+    assert [s.get("goal_position") for s in bus.servos] == [600, 400, 512]
+    with pytest.raises(ServoError, match="the angle is nan"):
+        driver.move([float("nan"), 0, 0], [1.0] * 3)
+
+
+def test_lost_and_garbled_answers_are_asked_for_again(chain, clock):
+    driver, *_ = chain(Fault("lost-reply", rate=0.06), Fault("corrupt-reply", rate=0.06))
+    driver.arm()
+    for angle in (0.1, 0.2, 0.3):
+        driver.move([angle] * 3, [1.0] * 3)
+    assert driver.retries > 0
+
+
+def test_the_port_is_usable_after_an_exchange_broke_off(chain):
+    driver, *_ = chain()
+    driver._port.is_using = True
+    with pytest.raises(ServoError, match=r"Port is in use|asked"):
+        driver.read(9, "id")
+    assert driver.read(1, "id") == 1
+
+
+def test_an_overload_latches_until_the_torque_limit_is_written(chain, clock):
+    driver, bus, _ = chain(Fault("overload", at_s=1.0, for_s=1.0, servo=2))
+    driver.arm()
+    clock.sleep(1.0)
+    with pytest.raises(ServoError, match="servo 2: overload"):
+        driver.health()
+    assert bus.servos[1].get("torque_limit") == 0
+    clock.sleep(2.0)
+    with pytest.raises(ServoError, match="servo 2: overload"):  # the cause is gone, the alarm is not
+        driver.health()
+    driver.recover(2)
+    driver.health()
+    assert bus.servos[1].get("torque_limit") > 0
+
+
+@pytest.mark.parametrize(
+    ("fault", "registers", "message"),
+    [
+        ([Fault("overheat", at_s=0.5, for_s=9, servo=3)], {}, "servo 3: overheated"),
+        ([], {"present_voltage": 80}, "servo 1 has 8.0 V, not 9 to 13"),
+        ([], {"present_voltage": 50}, "servo 1: voltage out of its limits"),
+    ],
+)
+def test_limits_are_watched(chain, clock, fault, registers, message):
+    if registers.get("present_voltage") == 50:
+        with pytest.raises(HardwareError, match=message):
+            chain(*fault, **registers)
+        return
+    driver, *_ = chain(*fault, **registers)
+    clock.sleep(1.0)
+    with pytest.raises(ServoError, match=message):
+        driver.health()
+
+
+def test_a_stuck_joint_is_noticed(chain, clock):
+    driver, *_ = chain()
+    driver.arm()
+    driver.limits = driver.limits.__class__(load=0.3)
+    driver.move([1.5] * 3, [0.1] * 3)
+    clock.sleep(0.1)
+    with pytest.raises(ServoError, match="of its torque; is it stuck"):
+        driver.health()
+
+
+def test_stop_is_confirmed_by_every_servo(chain, clock):
+    driver, bus, _ = chain()
+    driver.arm()
+    driver.move([1.0] * 3, [1.0] * 3)
+    clock.sleep(0.2)
+    stop = driver.stop()
+    assert stop.confirmed
+    assert stop.seconds <= 0.2
+    assert not any(s.get("torque_enable") for s in bus.servos)
+    before = [s.get("present_position") for s in bus.servos]
+    clock.sleep(2.0)
+    bus.receive(packet(1, 1))
+    assert [s.get("present_position") for s in bus.servos] == before
+
+
+def test_a_silent_servo_leaves_the_stop_unconfirmed(chain, clock):
+    driver, *_ = chain(Fault("silent-servo", at_s=1.0, for_s=1e9, servo=2))
+    driver.arm()
+    clock.sleep(1.0)
+    stop = driver.stop(patience_s=0.5)
+    assert not stop.confirmed
+    assert "servo 2" in stop.problem
+    assert "servo 1" not in stop.problem
+
+
+def test_stop_on_a_dead_line_does_not_raise(chain):
+    driver, _, line = chain()
+    line.cut()
+    stop = driver.stop(patience_s=0.5)
+    assert not stop.confirmed
+    assert stop.problem
+
+
+def test_the_table_does_not_overlap():
+    taken = [r.address + i for r in REGISTERS.values() for i in range(r.size)]
+    assert len(taken) == len(set(taken))

@@ -1,0 +1,69 @@
+"""The emulated body is the physics world's, however its orders come."""
+
+import numpy as np
+import pytest
+
+from bns.engine.philox import Key
+from bns.hardware.emulators.body import DifferentialBody
+from bns.physics.differential_drive import simulate
+from bns.physics.model import load_model
+
+NORTH = (0.0, 0.0, np.pi / 2)
+COMMANDS = np.array([[0.1, 0.2, 1.3], [0.2, 0.05, 0.7], [0.03, 0.03, 2.1]])
+
+
+def quiet():
+    from dataclasses import replace
+
+    return DifferentialBody(replace(load_model("khepera-world"), jitter_relative=0.0), Key(1, 2), NORTH)
+
+
+def drive(body, begin_s=0.0, look_s=None):
+    now_s, poses = begin_s, []
+    for left, right, duration in COMMANDS:
+        body.order(left, right, now_s)
+        if look_s:
+            [body.pose(now_s + t) for t in np.arange(0, duration, look_s)]
+        now_s += duration
+        poses.append(body.pose(now_s))
+    return np.array(poses)
+
+
+@pytest.mark.parametrize("look_s", [None, 0.03])
+def test_poses_are_those_of_the_physics_model(look_s):
+    body = quiet()
+    expected = simulate(body.model, *COMMANDS.T[:, None, :], start=NORTH)[0]
+    np.testing.assert_allclose(drive(body, look_s=look_s), expected, atol=2e-4)
+
+
+def test_after_a_rest_a_drive_is_the_same_from_another_place():
+    body = quiet()
+    first = drive(body)
+    body.order(0.0, 0.0, 5.0)
+    body.put_down(NORTH, 20.0)
+    np.testing.assert_allclose(drive(body, begin_s=20.0), first, atol=1e-9)
+
+
+def test_memory_of_old_orders_is_dropped_only_at_rest():
+    body = quiet()
+    body.order(0.1, 0.1, 0.0)
+    body.order(0.0, 0.0, 1.0)
+    rolled = body.pose(1.5)
+    body.order(0.1, 0.1, 10.0)
+    assert rolled[1] < body.pose(10.0)[1] + 1e-4
+    assert body.pose(11.0)[1] - body.pose(10.0)[1] == pytest.approx(0.09, abs=0.005)
+
+
+def test_jitter_is_drawn_by_key():
+    def end(key):
+        return drive(DifferentialBody(load_model("khepera-world"), key, NORTH))[-1]
+
+    np.testing.assert_array_equal(end(Key(1, 2)), end(Key(1, 2)))
+    assert not np.array_equal(end(Key(1, 2)), end(Key(2, 2)))
+
+
+def test_wheel_speeds_come_from_the_motion():
+    body = quiet()
+    body.order(0.1, 0.2, 0.0)
+    assert body.wheel_speeds_m_s(1.5) == pytest.approx((0.1, 0.2), abs=0.004)
+    assert body.wheel_speeds_m_s(0.0) == pytest.approx((0.0, 0.0), abs=0.001)
