@@ -25,10 +25,14 @@ SOURCE_STABILITY = {"stable": 0.94, "unstable": 0.58}
 """Shares of stable and unstable verification cycles that the source's network got right."""
 
 
-def draw(_: Store) -> list[Drawn]:
-    found = [simulator for simulator in map(_shipped, robot_names()) if "verification" in simulator.provenance]
+def draw(store: Store) -> list[Drawn]:
+    ran = store.query("SELECT DISTINCT robot FROM runs WHERE status = 'ok' ORDER BY 1").robot
+    found = [one for one in map(_shipped, sorted(set(ran) & set(robot_names()))) if "verification" in one.provenance]
     if not found:
-        raise NoDataError("no static simulator holds its verification patterns; make one: bns precompute --robot snake")
+        raise NoDataError(
+            "no robot with finished runs has a static simulator that holds its verification patterns; "
+            "run make sweep-snake, or: bns run --robot snake"
+        )
     return [_draw(simulator) for simulator in found]
 
 

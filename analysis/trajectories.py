@@ -27,7 +27,7 @@ _MARGIN_M = 0.1
 def draw(store: Store) -> list[Drawn]:
     tables = sorted((store.results / "validation").glob("*.parquet"))
     if not tables:
-        raise NoDataError("no controllers were validated; run: bns validate --robot snake")
+        raise NoDataError("no controllers were validated; run bns validate --robot snake")
     return [_draw(path) for path in tables]
 
 

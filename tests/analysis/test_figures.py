@@ -203,7 +203,7 @@ def test_a_store_of_one_combination_or_of_failures_alone_says_what_would_feed_a_
     written(tmp_path / "same", "same", [record(RunSpec(seed=seed, evaluations=4)) for seed in range(6)])
     written(tmp_path / "bad", "bad", [failed(spec) for spec in specs(2)])
     for folder in ("same", "bad"):
-        with pytest.raises(NoDataError, match=r"run (make sweep|bns sweep)"):
+        with pytest.raises(NoDataError, match=r"run (make sweep|bns sweep|bns validate)"):
             module.draw(Store(tmp_path / folder))
 
 
