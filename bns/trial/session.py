@@ -71,7 +71,7 @@ def staged(how: Set, seed: int, journal: Path | None, stopping: Stopping) -> Ite
         platform: Platform = module.open_platform(rig, clock, log, stopping)
         stack.callback(platform.close)
         stack.enter_context(StopsAtTheEnd(platform.stop))
-        yield Stage(platform, hands or (Nobody() if how.yes else AtTheTerminal()), clock, log)
+        yield Stage(platform, hands or (Nobody() if how.yes else AtTheTerminal(stopping.ask)), clock, log)
 
 
 def carry_out(spec: RunSpec, how: Set, results: Path) -> str:
