@@ -18,7 +18,7 @@ FLOORS = (
     {"physics"},
     {"hardware"},
     {"worlds"},
-    {"evolver", "trainer", "recorder", "loop", "precompute", "refinement"},
+    {"evolver", "trainer", "recorder", "loop", "precompute", "refinement", "validation"},
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "single", "watch"},

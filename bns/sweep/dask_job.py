@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import replace
 from datetime import UTC, datetime
 from time import perf_counter
+
+from distributed import Worker, WorkerPlugin
 
 from bns.errors import ClusterError
 from bns.spec import RunSpec
@@ -12,6 +15,7 @@ from bns.store.provenance import provenance
 from bns.store.record import RunRecord
 from bns.sweep.executor import Job, without_result
 from bns.sweep.job import describe
+from bns.sweep.workers import LEFT_TO_PARENT
 
 
 def carry_out(job: Job, spec: RunSpec, run_id: str) -> RunRecord:
@@ -32,3 +36,14 @@ def _whatever_happens(job: Job, spec: RunSpec) -> RunRecord:
         return job(spec)
     except BaseException as fault:  # SystemExit too, which would end the worker
         return without_result(spec, "failed", describe(fault), started_at, perf_counter() - began)
+
+
+class LeavesSignals(WorkerPlugin):
+    """Makes a worker of this machine's own cluster ignore Ctrl-C and its like: the process that sweeps decides."""
+
+    name = "bns-leaves-signals"
+
+    def setup(self, worker: Worker) -> None:
+        """Called in every worker that begins."""
+        for number in LEFT_TO_PARENT:
+            signal.signal(number, signal.SIG_IGN)

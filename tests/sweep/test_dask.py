@@ -1,6 +1,7 @@
 """Dask: real scheduler and worker processes on this machine, some of which die."""
 
 import os
+import signal
 import sys
 import time
 import types
@@ -17,10 +18,12 @@ from dask_cluster import Cluster
 
 from bns.errors import ClusterError
 from bns.store import load
+from bns.sweep.dask_job import LeavesSignals
 from bns.sweep.dask_workers import DaskExecutor, DaskWarning
 from bns.sweep.executor import SerialExecutor
 from bns.sweep.order import ordered_specs
 from bns.sweep.runner import run_sweep
+from bns.sweep.workers import LEFT_TO_PARENT
 
 
 @pytest.fixture(scope="module")
@@ -91,14 +94,14 @@ def test_runs_in_flight_are_given_up_at_once(cluster, tmp_path):
 
 def test_no_scheduler_is_explained():
     with pytest.raises(ClusterError, match=r"no Dask scheduler answers at tcp://127.0.0.1:9"):
-        DaskExecutor("tcp://127.0.0.1:9").__enter__()
+        DaskExecutor("tcp://127.0.0.1:9", patience_s=2).__enter__()
     with pytest.raises(ClusterError, match=r"no Dask scheduler answers at nonsense"):
         DaskExecutor("nonsense:x:y").__enter__()
 
 
 def test_scheduler_without_workers_is_explained():
     with Cluster(0) as empty, pytest.raises(ClusterError, match=r"no worker has joined.*dask worker tcp://"):
-        DaskExecutor(empty.address, patience_s=3).__enter__()
+        DaskExecutor(empty.address, patience_s=10).__enter__()
 
 
 def test_killed_scheduler_is_waited_for_and_the_sweep_goes_on(tmp_path, marks):
@@ -130,3 +133,15 @@ def test_own_cluster_quarantines_the_run_that_kills_its_workers(tmp_path, marks,
     assert lost["attempts"].tolist() == [3]
     assert "died in each of 3 attempts" in lost["error"][0]
     assert time.monotonic() - began < 200
+
+
+def test_workers_of_its_own_leave_ctrl_c_to_the_process_that_sweeps():
+    former = {number: signal.getsignal(number) for number in LEFT_TO_PARENT}
+    try:
+        LeavesSignals().setup(None)
+        for number in LEFT_TO_PARENT:
+            os.kill(os.getpid(), number)  # would end this process
+        time.sleep(0.05)
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)

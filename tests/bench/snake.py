@@ -1,0 +1,74 @@
+"""The snake: a physics cycle, and a whole run at the source's settings against what the core could do."""
+
+from __future__ import annotations
+
+import time
+from statistics import median
+
+import numpy as np
+
+from bns.engine.patterns import TRAINING_SHARE
+from bns.engine.philox import Key
+from bns.loop import run
+from bns.physics.snake.body import Body
+from bns.physics.snake.parameters import shipped_parameters
+from bns.robots.snake import ROBOT
+from bns.robots.snake.cycles import COLUMNS, CYCLES
+from bns.robots.snake.robot import NOISY_EVALUATIONS
+from bns.spec import RunSpec
+from tests.bench.clock import one_core
+from tests.bench.line import Line, at_most
+from tests.bench.whole_run import BACKWARD_OPS, FORWARD, peak_flops
+
+STEP_OPS = 40
+"""Of one cycle of one rollout: the markers' frame, four products and sums each way, bounds, region."""
+MEAN_REPEATS = 2.5
+_TINY = RunSpec(robot="snake", task="two-regions", population_size=4, evaluations=2, generations_per_evaluation=1)
+
+
+def measure(quick: bool) -> list[Line]:
+    """Processor seconds: a machine that others use as well does not lengthen them by waiting."""
+    return [_cycle(10 if quick else 100), _whole(1 if quick else 3)]
+
+
+def _cycle(count: int) -> Line:
+    body = Body(shipped_parameters())
+    cycles = ROBOT.random_controllers(Key(0, 0), count, 1).commands[:, 0, :4].astype(np.float64)
+    with one_core():
+        began, driven_s = time.process_time(), 0.0
+        for cycle in cycles:
+            body.lay_straight()
+            driven_s += body.drive_cycle(cycle).duration_s
+        taken = time.process_time() - began
+    note = f"{count / taken:.1f} cycles a second, {driven_s / taken:.0f} times as fast as the robot"
+    return at_most("snake: a random cycle in physics, one core", taken / count, 0.25, "s", note=note)
+
+
+def _whole(seeds: int) -> Line:
+    run(_TINY)
+    taken, floors = [], []
+    with one_core():
+        for seed in range(seeds):
+            spec = RunSpec(robot="snake", task="two-regions", seed=seed, record="paths")
+            began = time.process_time()
+            tables = run(spec).tables
+            taken.append(time.process_time() - began)
+            floors.append(operations(spec, tables["paths"]) / peak_flops())
+    middle = int(np.argsort(taken)[len(taken) // 2])
+    note = "floor: operations at this core's peak in matrix products; " + ", ".join(f"{one:.1f} s" for one in taken)
+    return at_most("snake: a run, two regions, population 400, 100 evaluations", median(taken), 40, "s", floors[middle], note)
+
+
+def operations(spec: RunSpec, paths: dict[str, np.ndarray]) -> float:
+    """Of training on the distinct cycles driven so far, of predictions for every generation and of its noisy rollouts."""
+    learned = paths["who"] == "evaluated"
+    commands = np.column_stack([paths[name] for name in COLUMNS[:4]])
+    seen = [
+        len(np.unique(commands[learned & (paths["step"] > 0) & (paths["evaluation"] <= e)], axis=0))
+        for e in range(1, spec.evaluations + 1)
+    ]
+    neurons = len(ROBOT.networks) * ROBOT.hidden
+    training = TRAINING_SHARE * sum(seen) * spec.training_iterations_per_evaluation * neurons * (FORWARD + BACKWARD_OPS)
+    controllers = spec.population_size * spec.evaluations * (spec.generations_per_evaluation + 1)
+    rollouts = controllers * CYCLES * MEAN_REPEATS * (NOISY_EVALUATIONS + 1) * STEP_OPS
+    return training + controllers * CYCLES * neurons * FORWARD + rollouts

@@ -1,0 +1,113 @@
+"""The commands as a user types them: models that come back, figures, refusals with exit code 2."""
+
+import json
+
+import pandas as pd
+import pytest
+
+from bns.cli import main
+from bns.measurements import write_measurements
+from bns.physics.model import load_model
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    path = tmp_path_factory.mktemp("measured") / "m.parquet"
+    write_measurements(measured(hidden(turn_slip={"slip_s": 0.12}), trials=12, seed=2), path)
+    return path
+
+
+def test_compare_says_how_far_and_where(data, tmp_path, capsys):
+    assert main(["compare", str(data), "--model", "khepera", "--json", "--figures", str(tmp_path)]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["trials"] == 12
+    assert answer["error"]["command"]["position_m"] > answer["error"]["command"]["noise_floor_m"]
+    assert len(answer["worst"]) == 5
+    assert (tmp_path / "comparison.png").stat().st_size > 10_000
+
+
+def test_added_effects_lower_the_error_and_the_model_comes_back(data, tmp_path, capsys):
+    new = tmp_path / "new.yaml"
+    assert main(["add", "turn-slip", "--model", "khepera", "--data", str(data), "-o", str(new)]) == 0
+    out = capsys.readouterr().out
+    assert "nominal" in out
+    assert "+ turn-slip" in out
+    model = load_model(new)
+    low, high = model.effects[0].intervals["slip_s"]
+    assert low < 0.12 < high
+    errors = model.provenance["held_out_position_error_m"]
+    assert errors["turn-slip"]["command"] < errors["nominal"]["command"]
+    assert model.effects[0].basis == "fitted"
+    assert main(["add", "turn-slip", "--model", str(new), "--data", str(data), "-o", str(tmp_path / "x.yaml")]) == 2
+    assert "has turn-slip already" in capsys.readouterr().err
+
+
+def test_a_formula_is_added_and_comes_back(data, tmp_path):
+    new = tmp_path / "formula.yaml"
+    arguments = ["add", "mine", "--term", "k * v * abs(w)", "--on", "v", "--model", "khepera"]
+    assert main([*arguments, "--data", str(data), "-o", str(new)]) == 0
+    model = load_model(new)
+    assert model.effects[0].written == {"term": "k * v * abs(w)", "on": "v"}
+    assert model.values_of("mine")["k"] == pytest.approx(-0.12, abs=0.03)
+
+
+def test_an_effect_of_ones_own_is_a_file(data, tmp_path):
+    mine = tmp_path / "drag.py"
+    mine.write_text(
+        "from dataclasses import replace\nfrom bns.physics.effect import Effect, Parameter\n"
+        "def apply(body, k):\n    return replace(body, forward_m_s=body.forward_m_s * (1 - k * abs(body.yaw_rad_s)))\n"
+        "EFFECT = Effect('my-drag', 'body', (Parameter('k', 's', -1.0, 1.0, (-0.5, 0.5), 0.0, 'drag'),), 'v(1-k|w|)', "
+        "'arcs too short', (), apply)\n"
+    )
+    new = tmp_path / "own.yaml"
+    assert main(["add", str(mine), "--model", "khepera", "--data", str(data), "-o", str(new)]) == 0
+    assert load_model(new).values_of("my-drag")["k"] == pytest.approx(0.12, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--model", "kepera"], "Did you mean 'khepera'"),
+        (["--model", "differential-drive"], "needs its wheelbase: --wheelbase METRES"),
+        (["--model", "differential-drive", "--wheelbase", "0.3"], r"A wheelbase of 0.0\d+ m would fit"),
+        (["--model", "gone.yaml"], "no model file gone.yaml"),
+    ],
+)
+def test_models_that_do_not_fit_are_refused(data, arguments, message, capsys):
+    import re
+
+    assert main(["diagnose", str(data), *arguments]) == 2
+    assert re.search(message, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    ("term", "message"),
+    [
+        ("k * v *", "is no formula"),
+        ("k * exec(v)", "unknown function 'exec'"),
+        ("k * v.real", "is not allowed"),
+        ("v * w", "has no number to fit"),
+        ("k / w", "a pole"),
+        ("k * log(v - 1)", "a pole, a root or logarithm"),
+    ],
+)
+def test_formulas_that_cannot_be_are_refused(data, tmp_path, term, message, capsys):
+    new = tmp_path / "new.yaml"
+    assert main(["add", "mine", "--term", term, "--model", "khepera", "--data", str(data), "-o", str(new)]) == 2
+    assert message in capsys.readouterr().err
+    assert not new.exists()
+
+
+def test_data_that_cannot_be_read_are_refused(tmp_path, capsys):
+    assert main(["compare", str(tmp_path / "gone.csv"), "--model", "khepera"]) == 2
+    (tmp_path / "bad.parquet").write_text("no parquet")
+    assert main(["compare", str(tmp_path / "bad.parquet"), "--model", "khepera"]) == 2
+    table = measured(NOMINAL, trials=2).assign(robot=lambda t: t.trial.map({0: "ada", 1: "bob"}))
+    write_measurements(table, tmp_path / "two.csv")
+    assert main(["compare", str(tmp_path / "two.csv"), "--model", "khepera"]) == 2
+    err = capsys.readouterr().err
+    assert "There is no file" in err
+    assert "does not read as parquet" in err
+    assert "of 2 robots: ada, bob. Choose one with --robot ada" in err
+    assert pd.read_csv(tmp_path / "two.csv")["robot"].nunique() == 2

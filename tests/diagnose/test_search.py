@@ -1,0 +1,88 @@
+"""Verdicts on small worlds, end to end."""
+
+import numpy as np
+import pytest
+
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.wheels import WheelPredictor
+from bns.physics.decoys import DECOYS
+from bns.physics.formula import formula_effect
+from bns.physics.model import ActiveEffect
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def diagnosed(model, **how):
+    return diagnose(WheelPredictor(tracks_of(measured(model, **{"trials": 20, "seed": 11} | how))), NOMINAL)
+
+
+def test_nothing_is_found_where_nothing_is_hidden():
+    found = diagnosed(NOMINAL)
+    assert (found.verdict, found.effects) == ("none", ())
+    assert found.error["1s"]["before"] == found.error["1s"]["after"]
+
+
+def test_one_effect_is_named_with_its_size():
+    answer = diagnosed(hidden(wheelbase={"factor": 1.05})).as_json()
+    assert (answer["verdict"], answer["effects"], answer["ties"]) == ("effects", ["wheelbase"], [])
+    factor = answer["parameters"]["wheelbase"]["factor"]
+    assert factor["low"] < 1.05 < factor["high"]
+    assert not factor["at_bound"]
+    assert answer["ranking"][0]["name"] == "wheelbase"
+    assert answer["error"]["command"]["after"] < 0.8 * answer["error"]["command"]["before"]
+
+
+def test_a_late_command_ties_with_a_late_clock():
+    answer = diagnosed(hidden(command_delay={"delay_s": 0.08})).as_json()
+    assert answer["verdict"] == "tie"
+    assert answer["ties"] == [["clock-offset", "command-delay"]]
+    assert sorted(map(tuple, answer["explanations"])) == [("clock-offset",), ("command-delay",)]
+    assert any("look the same from outside" in note for note in answer["notes"])
+
+
+def test_an_early_clock_is_no_late_command():
+    answer = diagnosed(hidden(clock_offset={"offset_s": -0.08})).as_json()
+    assert (answer["verdict"], answer["effects"]) == ("effects", ["clock-offset"])
+    assert "clock-offset is a fault of the measuring, not of the robot." in answer["notes"]
+
+
+def test_what_no_list_holds_is_called_so_and_a_formula_offered():
+    rough = formula_effect("rough", "k * v * exp(-tau / 3)", "v")
+    model = NOMINAL.with_active(rough, (-0.12,))
+    answer = diagnosed(model).as_json()
+    assert answer["verdict"] == "unlisted"
+    assert answer["patterns"][0]["variable"] in {"time_in_trial_s", "way_m"}
+    assert answer["formula"]["on"] == "v"
+    assert answer["formula"]["gain"] > 0
+
+
+def test_a_model_that_has_the_effect_already_lacks_nothing():
+    table = measured(hidden(wheelbase={"factor": 1.05}), trials=20, seed=11)
+    model = NOMINAL.with_effect("wheelbase", factor=1.0)
+    found = diagnose(WheelPredictor(tracks_of(table)), model)
+    assert found.verdict == "none"
+    assert found.as_json()["parameters"]["wheelbase"]["factor"]["value"] == pytest.approx(1.05, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t[t.trial == 0], r"^1 trials: whatever"),
+        (lambda t: t.groupby("trial").head(1), "single tracked pose"),
+        (lambda t: t.assign(left_m_s=0.0, right_m_s=0.0), "never told to move"),
+        (lambda t: t.assign(x_m=0.1, y_m=0.2), "never moved by more than 5 mm"),
+    ],
+)
+def test_too_little_is_said_to_be_so(change, message):
+    found = diagnose(WheelPredictor(tracks_of(change(measured(NOMINAL, trials=12)))), NOMINAL)
+    assert found.verdict == "insufficient-data"
+    assert np.any([__import__("re").search(message, note) for note in found.notes])
+
+
+def test_decoys_move_the_robot_but_mean_nothing():
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=4)))
+    still = predictor.steps(NOMINAL).body
+    for decoy in DECOYS:
+        model = NOMINAL.with_active(decoy, (0.1,))
+        assert isinstance(model.effects[0], ActiveEffect)
+        assert np.abs(predictor.steps(model).body - still).max() > 1e-5

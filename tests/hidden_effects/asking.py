@@ -1,0 +1,99 @@
+"""Ask the product through its command line, in workers of their own; what was answered once is not asked again."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import json
+import tempfile
+import time
+import traceback
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from tests.hidden_effects.acceptable import acceptable
+from tests.hidden_effects.world import World, write
+
+Record = dict[str, Any]
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+"""Set before workers are started: worlds are asked side by side, one core each."""
+
+
+def answers(
+    worlds: Sequence[World], folder: Path, jobs: int, fresh: bool, options: Sequence[str] = ()
+) -> Iterator[tuple[World, Record]]:
+    """(world, record) as they come; records of worlds that have not changed are read from `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    left = []
+    for world in worlds:
+        kept = None if fresh else _kept(world, folder)
+        if kept is None:
+            left.append(world)
+        else:
+            yield world, kept
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        asked = {pool.submit(ask, world, list(options)): world for world in left}
+        try:
+            for done in as_completed(asked):
+                world, record = asked[done], done.result()
+                _keep(world, folder, record)
+                yield world, record
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def ask(world: World, options: Sequence[str] = ()) -> Record:
+    """One world: {answer, seconds, exit, error}. `answer` is None where there is no JSON object to be read."""
+    with tempfile.TemporaryDirectory() as folder:
+        data = write(world, Path(folder), acceptable(world))
+        began = time.perf_counter()
+        status, out, fault = _call(["diagnose", str(data), *world.nominal.arguments, "--json", *options])
+        seconds = time.perf_counter() - began
+    try:
+        given = json.loads(out)
+    except ValueError:
+        given, fault = None, fault or f"no JSON on stdout: {out[-300:]!r}"
+    return {"answer": given, "seconds_s": seconds, "exit": status, "error": fault}
+
+
+def _call(arguments: list[str]) -> tuple[int, str, str]:
+    """(exit code, stdout, what went wrong) of the command line, in this process."""
+    from bns.cli import main
+
+    out, told = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(told):
+        try:
+            status = main(arguments)
+        except SystemExit as end:
+            status = end.code if isinstance(end.code, int) else 1
+        except Exception:  # a traceback is an answer, and a wrong one
+            return 1, out.getvalue(), traceback.format_exc()
+    return int(status or 0), out.getvalue(), told.getvalue()[-2000:] if status else ""
+
+
+def _digest(world: World) -> str:
+    return hashlib.sha256(json.dumps(world.truth(), sort_keys=True, default=str).encode()).hexdigest()[:16]
+
+
+def _path(world: World, folder: Path) -> Path:
+    return folder / f"{world.name}-seed-{world.seed}.json"
+
+
+def _kept(world: World, folder: Path) -> Record | None:
+    path = _path(world, folder)
+    if not path.is_file():
+        return None
+    record: Record = json.loads(path.read_text())
+    return record if record["world"] == _digest(world) else None
+
+
+def _keep(world: World, folder: Path, record: Record) -> None:
+    record["world"] = _digest(world)
+    path = _path(world, folder)
+    draft = path.with_suffix(".part")
+    draft.write_text(json.dumps(record | {"truth": world.truth()}, indent=1) + "\n")
+    draft.replace(path)

@@ -1,0 +1,197 @@
+"""Effects that no list holds: the right answer to each is that something unlisted is going on.
+
+Chosen so that no set of listed effects gives the same poses. (One dead wheel, say, is dead-zone with yaw-bias as long as
+both wheels turn forward; its worlds therefore reverse and spin.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from tests.hidden_effects.cause import Body, Cause, Moment
+
+
+@dataclass
+class StickyPatch(Cause):
+    """A round patch of floor on which the robot is slower."""
+
+    x_m: float
+    y_m: float
+    radius_m: float
+    loss: float
+    depends_on_pose = True
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        share = 1 - self.loss * (np.hypot(x - self.x_m, y - self.y_m) < self.radius_m)
+        return body._replace(forward=body.forward * share, turn=body.turn * share)
+
+
+@dataclass
+class Eccentricity(Cause):
+    """The left wheel's axle is not in its middle: its speed goes up and down with every turn of the wheel."""
+
+    share: float
+    radius_m: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        phase = moment.rng.uniform(0, 2 * np.pi, (len(wheels), 1))
+        angle = phase + np.cumsum(wheels[..., 0], axis=1) * moment.step_s / self.radius_m
+        return wheels * np.stack([1 + self.share * np.cos(angle), np.ones_like(angle)], axis=-1)
+
+
+@dataclass
+class QuadraticGain(Cause):
+    """Speed rises faster than its command."""
+
+    share: float
+    fastest_m_s: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        return wheels * (1 + self.share * np.abs(wheels) / self.fastest_m_s)
+
+
+@dataclass
+class LeftTurnSlip(Cause):
+    """Turning costs forward speed in left turns alone."""
+
+    slip_s: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        return body._replace(forward=body.forward * (1 - self.slip_s * np.maximum(body.turn, 0.0)))
+
+
+@dataclass
+class WarmUp(Cause):
+    """Slow at the beginning of each trial."""
+
+    loss: float
+    time_s: float
+
+    def demand(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        return wheels * (1 - self.loss * np.exp(-np.maximum(moment.trial_s, 0.0) / self.time_s))[:, None]
+
+
+@dataclass
+class Backlash(Cause):
+    """A wheel that reverses has to take up a gap before it drives."""
+
+    gap_m: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        out = np.zeros_like(wheels)
+        tooth = np.full_like(wheels[:, 0], self.gap_m)  # where in the gap the motor's tooth is: 0 or gap_m drives
+        for i in range(wheels.shape[1]):
+            motor = tooth + wheels[:, i] * moment.step_s
+            tooth = np.clip(motor, 0.0, self.gap_m)
+            out[:, i] = (motor - tooth) / moment.step_s
+        return out
+
+
+@dataclass
+class LeftDeadZone(Cause):
+    """The left wheel alone loses the first part of its command."""
+
+    width_m_s: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        left = np.sign(wheels[..., 0]) * np.maximum(np.abs(wheels[..., 0]) - self.width_m_s, 0.0)
+        return np.stack([left, wheels[..., 1]], axis=-1)
+
+
+@dataclass
+class HeadingWalk(Cause):
+    """The turn wanders about what was commanded, slowly and at random."""
+
+    spread_rad_s: float
+    time_s: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        decay = np.exp(-moment.step_s / self.time_s)
+        kicks = moment.rng.normal(0, self.spread_rad_s * np.sqrt(1 - decay**2), body.turn.shape)
+        kicks[:, 0] = moment.rng.normal(0, self.spread_rad_s, len(kicks))
+        return body._replace(turn=body.turn + body.moving * lfilter([1], [1, -decay], kicks, axis=1))
+
+
+@dataclass
+class SessionDrag(Cause):
+    """Slower in the middle of the session, and as fast as ever at its end."""
+
+    loss: float
+    middle_s: float
+    width_s: float
+
+    def demand(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        away = (moment.session_s + moment.trial_s - self.middle_s) / self.width_s
+        return wheels * (1 - self.loss * np.exp(-(away**2)))[..., None]
+
+
+@dataclass
+class Whirl(Cause):
+    """A field that pushes round a point, weaker further off: no tether, which pulls towards it."""
+
+    x_m: float
+    y_m: float
+    speed_m_s: float
+    reach_m: float
+    depends_on_pose = True
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        east, north = x - self.x_m, y - self.y_m
+        push = body.moving * self.speed_m_s * 2 * self.reach_m / (self.reach_m**2 + east**2 + north**2)
+        return body._replace(east=body.east - push * north, north=body.north + push * east)
+
+
+@dataclass
+class CarpetNap(Cause):
+    """The nap of the carpet: slower against it, faster along it."""
+
+    share: float
+    along_rad: float
+    depends_on_pose = True
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        return body._replace(forward=body.forward * (1 + self.share * np.cos(heading - self.along_rad)))
+
+
+@dataclass
+class Seam(Cause):
+    """A seam of the floor along a line turns a robot that crosses it to the left."""
+
+    x_m: float
+    width_m: float
+    turn_rad_m: float
+    depends_on_pose = True
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        bump = self.turn_rad_m * np.exp(-(((x - self.x_m) / self.width_m) ** 2))
+        return body._replace(turn=body.turn + bump * np.abs(body.forward))
+
+
+@dataclass
+class ReverseLoss(Cause):
+    """Wheels are slower backward."""
+
+    loss: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        return np.where(wheels < 0, wheels * (1 - self.loss), wheels)
+
+
+UNLISTED: dict[str, type[Cause]] = {
+    "sticky-patch": StickyPatch,
+    "eccentricity": Eccentricity,
+    "quadratic-gain": QuadraticGain,
+    "left-turn-slip": LeftTurnSlip,
+    "warm-up": WarmUp,
+    "backlash": Backlash,
+    "left-dead-zone": LeftDeadZone,
+    "heading-walk": HeadingWalk,
+    "session-drag": SessionDrag,
+    "whirl": Whirl,
+    "carpet-nap": CarpetNap,
+    "seam": Seam,
+    "reverse-loss": ReverseLoss,
+}

@@ -1,0 +1,65 @@
+"""Trajectory trials: every drive is counted, and what became of it is what happened."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns import validation
+from bns.robots import load_robot
+from bns.robots.snake import path
+from bns.tasks import load_task
+from bns.worlds import build_world
+
+ROBOT, TASK = load_robot("snake"), load_task("snake", "two-regions")
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    for name, value in (("TRIALS", 2), ("ROUND", 2), ("MOST_ROUNDS", 2)):
+        monkeypatch.setattr(validation, name, value)
+
+
+def path_to(*points, stable=1.0):
+    poses = np.repeat(ROBOT.start_pose(), len(points), axis=0)
+    for row, point in zip(poses, points, strict=True):
+        row[4:8] += np.tile(np.subtract(point, [0.3, 0.0]), 2)
+    poses[:, path.STABLE] = stable
+    return poses
+
+
+@pytest.mark.parametrize(
+    ("poses", "planned", "became"),
+    [
+        (path_to([0.3, 0.3], [0.3, -0.3]), 2, "all goals"),
+        (path_to([0.3, 0.3], [0.3, 0.3]), 2, "missed a goal"),
+        (path_to([0.3, 0.3], [0.3, -0.3], stable=0.0), 2, "unstable cycle"),
+        (path_to([0.3, 0.3], [0.3, -0.3]), 5, "rolled over"),
+        (path_to([0.3, 0.95], [0.3, 0.3], stable=0.0), 5, "left the surface"),
+    ],
+)
+def test_outcome_is_the_first_that_applies(poses, planned, became):
+    assert validation.outcome(ROBOT, TASK, poses, planned) == became
+
+
+def test_every_trial_is_driven_three_times_and_kept(quick, tmp_path):
+    world = build_world("substitute", ROBOT)
+    table = validation.validate(ROBOT, TASK, world)
+    drives = table.drop_duplicates(["trial", "repeat"])
+    assert [(one.trial, one.repeat) for one in drives.itertuples()] == [(t, r) for t in (1, 2) for r in (-1, 1, 2, 3)]
+    assert (drives[drives.repeat == -1].final_error_m == 0).all()
+    assert (drives[drives.repeat > 0].final_error_m > 0).all()
+    assert set(table.outcome) <= set(validation.OUTCOMES)
+    assert (drives.generations <= 4).all()
+    pd.testing.assert_frame_equal(validation.validate(ROBOT, TASK, world), table)
+    place = validation.table_path(tmp_path, "snake", TASK.name)
+    validation.write_table(table, place)
+    pd.testing.assert_frame_equal(pd.read_parquet(place), table)
+    assert [one.name for one in place.parent.iterdir()] == [place.name]
+    assert validation.describe(table).count("trial") == 2
+
+
+def test_the_mean_error_at_the_end_is_that_of_the_same_step(quick):
+    table = validation.validate(ROBOT, TASK, build_world("substitute", ROBOT))
+    one = table[(table.trial == 1) & (table.repeat == 2)].iloc[-1]
+    same = table[(table.trial == 1) & (table.repeat == -1) & (table.step == one.step)].iloc[0]
+    assert one.final_error_m == pytest.approx(np.hypot(one.x_m - same.x_m, one.y_m - same.y_m))
