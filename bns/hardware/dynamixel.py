@@ -218,24 +218,23 @@ class Ax12Chain:
 
     def stop(self, patience_s: float = 5.0) -> Stop:
         """Torque off, confirmed by every servo: torque reads 0 and nothing moves. Never raises."""
-        began_s, silent = self._clock.now_s(), dict.fromkeys(self.ids, "not asked")
-        acknowledged_s = None
-        while silent:
-            for number in tuple(silent):
-                try:
-                    self.write(number, "torque_enable", 0, alarms=True)
-                    if any(self.read(number, name, alarms=True) for name in ("torque_enable", "moving")):
-                        silent[number] = f"servo {number} still moves"
-                    else:
-                        del silent[number]
-                except ServoError as error:
-                    silent[number] = str(error)
-            if not silent:
-                acknowledged_s = self._clock.now_s() - began_s
-            elif self._clock.now_s() - began_s > patience_s:
-                break
-            else:
-                self._clock.sleep(_BETWEEN_S)
-        stop = Stop(not silent, self._clock.now_s() - began_s, acknowledged_s, "; ".join(silent.values()))
+        began_s, open_ = self._clock.now_s(), self._not_stopped(self.ids)
+        while open_ and self._clock.now_s() - began_s <= patience_s:
+            self._clock.sleep(_BETWEEN_S)
+            open_ = self._not_stopped(tuple(open_))
+        lasted_s = self._clock.now_s() - began_s
+        stop = Stop(not open_, lasted_s, None if open_ else lasted_s, "; ".join(open_.values()))
         self._journal.note("stop", confirmed=stop.confirmed, seconds=stop.seconds, problem=stop.problem)
         return stop
+
+    def _not_stopped(self, ids: Sequence[int]) -> dict[int, str]:
+        """Take the torque off these servos; those that did not confirm it, and why."""
+        found = {}
+        for number in ids:
+            try:
+                self.write(number, "torque_enable", 0, alarms=True)
+                if any(self.read(number, name, alarms=True) for name in ("torque_enable", "moving")):
+                    found[number] = f"servo {number} still moves"
+            except ServoError as error:
+                found[number] = str(error)
+        return found

@@ -32,7 +32,7 @@ class Journal:
         """Append one event."""
         if self._file is not None:
             event = {"t_s": round(self._clock.now_s(), 6), "wall_s": round(time.time(), 6), "kind": kind, **what}
-            self._file.write(json.dumps(event, separators=(",", ":")) + "\n")
+            self._file.write(json.dumps(event, separators=(",", ":"), allow_nan=False) + "\n")
 
     def sync(self) -> None:
         """What was noted so far survives a loss of power."""

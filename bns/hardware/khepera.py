@@ -96,20 +96,24 @@ class KheperaIII:
 
     def stop(self, patience_s: float = 5.0) -> Stop:
         """Set both speeds to zero until the robot acknowledges it and reads back still wheels; what came of it."""
-        began_s, acknowledged_s, problem, still = self._clock.now_s(), None, "the wheels still turn", 0
+        began_s, acknowledged_s, still = self._clock.now_s(), None, 0
         while True:
             try:
                 if acknowledged_s is None:
                     self._once(b"D,l0,l0", "d")
                     acknowledged_s = self._clock.now_s() - began_s
-                left, right = (int(v) / self.firmware.units_per_m_s for v in self._once(b"E", r"e,(-?\d+),(-?\d+)"))
-                still = still + 1 if max(abs(left), abs(right)) <= STILL_M_S else 0
-                if still == _READINGS:
-                    return self._stopped(Stop(True, self._clock.now_s() - began_s, acknowledged_s))
+                still, problem = (still + 1 if self._stands() else 0), "the wheels still turn"
             except NoReplyError as error:
                 problem, acknowledged_s, still = str(error), None, 0
-            if self._clock.now_s() - began_s > patience_s:
-                return self._stopped(Stop(False, self._clock.now_s() - began_s, acknowledged_s, problem))
+            lasted_s = self._clock.now_s() - began_s
+            if still == _READINGS:
+                return self._stopped(Stop(True, lasted_s, acknowledged_s))
+            if lasted_s > patience_s:
+                return self._stopped(Stop(False, lasted_s, acknowledged_s, problem))
+
+    def _stands(self) -> bool:
+        speeds = (int(v) / self.firmware.units_per_m_s for v in self._once(b"E", r"e,(-?\d+),(-?\d+)"))
+        return max(abs(v) for v in speeds) <= STILL_M_S
 
     def _stopped(self, stop: Stop) -> Stop:
         self._journal.note("stop", confirmed=stop.confirmed, seconds=stop.seconds, problem=stop.problem)

@@ -79,6 +79,7 @@ class Stopping:
 
     def __init__(self) -> None:
         self.reason: str | None = None
+        self._asking = False
         self._former: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
@@ -99,8 +100,18 @@ class Stopping:
         if self.reason is not None:
             raise TrialPausedError(self.reason)
 
+    def ask(self, question: str) -> str:
+        """`input`, which Ctrl-C ends at once: while somebody is asked, the robot stands."""
+        self._asking = True
+        try:
+            return input(question)
+        finally:
+            self._asking = False
+
     def _handle(self, number: int, _frame: FrameType | None) -> None:
         self.request("interrupted" if number == signal.SIGINT else "terminated")
+        if self._asking:
+            raise KeyboardInterrupt
 
 
 class StopsAtTheEnd:

@@ -50,4 +50,6 @@ def how_of(options: argparse.Namespace) -> Set:
             raise HardwareError(f"--{name} is for --emulated; a real robot has its own.")
     rig = shipped_rig(options.robot) if options.rig is None else load_rig(options.rig, options.robot)
     plan = FaultPlan() if options.faults is None else load_plan(options.faults)
-    return Set(rig, options.emulated, options.speed, plan, options.yes, options.resume, options.most_rounds)
+    return Set(
+        rig, options.emulated, options.speed, plan, options.yes, options.resume, options.most_rounds, options.until_success
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -71,7 +72,7 @@ class Crew:
             picked=controller.tolist(),
             commands=driven.commands.tolist(),
             poses=driven.poses.tolist(),
-            rows=driven.rows,
+            rows=[{name: None if math.isnan(v) else v for name, v in row.items()} for row in driven.rows],
             ended=driven.ended,
             session_s=session_s,
             readings=self.readings,

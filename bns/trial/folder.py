@@ -92,7 +92,7 @@ def measured(journal: Path) -> pd.DataFrame:
     """The measurements of every drive in a journal, discarded ones too; `trial` counts the drives."""
     tables = []
     for number, event in enumerate(events(journal, "driven"), 1):
-        table = pd.DataFrame(event["rows"])
+        table = pd.DataFrame(event["rows"]).astype(float)
         table.insert(0, "trial", number)
         table["evaluation"], table["session_s"] = event["evaluation"], event["session_s"] + table["t_s"]
         tables.append(table.assign(**event["readings"]))

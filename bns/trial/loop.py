@@ -59,10 +59,15 @@ class TrialResult:
 
 
 class Trial:
-    """One trial; `past` are evaluations driven before, `most_rounds` bounds what goes on during one drive."""
+    """One trial; `past` are evaluations driven before, `most_rounds` bounds what goes on during one drive.
 
-    def __init__(self, spec: RunSpec, digest: str, past: list[Evaluation], most_rounds: int) -> None:
-        self.spec, self._past = spec, past
+    With `until_success` it ends when so many controllers in a row have succeeded on the robot.
+    """
+
+    def __init__(
+        self, spec: RunSpec, digest: str, past: list[Evaluation], most_rounds: int, until_success: int | None = None
+    ) -> None:
+        self.spec, self._past, self._until_success = spec, past, until_success
         self.robot, self.task = load_robot(spec.robot), load_task(spec.robot, spec.task)
         key = Key.of_run(spec.seed, spec.root_seed, spec.robot, spec.task)
         self._world = RobotWorld(digest)
@@ -75,7 +80,7 @@ class Trial:
 
     def run(self, driver: Driver, progress: Progress) -> TrialResult:
         """All evaluations, those of the past first."""
-        began, idle_s = time.perf_counter(), 0.0
+        began, idle_s, in_a_row = time.perf_counter(), 0.0, 0
         with Rounds(self._round, self._most_rounds) as rounds:
             for number in range(1, self.spec.evaluations + 1):
                 asked = time.perf_counter()
@@ -88,6 +93,9 @@ class Trial:
                 driver.evaluated(number, count, row)
                 progress(row)
                 idle_s += time.perf_counter() - driven
+                in_a_row = in_a_row + 1 if row["evaluated_success"] else 0
+                if in_a_row == self._until_success:
+                    break
             share = (rounds.waited_s + idle_s) / (time.perf_counter() - began)
         return TrialResult(self._result(), share, self._rounds)
 

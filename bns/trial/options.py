@@ -25,6 +25,9 @@ def add_trial_options(parser: argparse.ArgumentParser, positive: Convert) -> Non
     parser.add_argument(
         "--most-rounds", type=positive, default=50, metavar="N", help="of training and evolution while one controller drives"
     )
+    parser.add_argument(
+        "--until-success", type=positive, metavar="N", help="end when N driven controllers in a row have reached all goals"
+    )
     parser.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
 
 

@@ -22,7 +22,7 @@ def report(spec: RunSpec, result: TrialResult, crew: Crew, wall_s: float, how: A
     return "\n".join(
         [
             f"trial {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {what}",
-            f"{spec.evaluations} evaluations, {driven_min:.1f} min of driving, {wall_s:.0f} s by the clock on the wall",
+            f"{len(evals['evaluation'])} evaluations, {driven_min:.1f} min of driving, {wall_s:.0f} s by the clock on the wall",
             "all goals reached, within " + "; ".join(firsts),
             f"the robot waited for computations {result.waited_share:.1%} of the time; {result.rounds} rounds of training and "
             "evolution went on while it drove",

@@ -44,6 +44,7 @@ class Set:
     yes: bool = False
     resume: bool = False
     most_rounds: int = MOST_ROUNDS
+    until_success: int | None = None
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def staged(how: Set, seed: int, journal: Path | None, stopping: Stopping) -> Ite
         platform: Platform = module.open_platform(rig, clock, log, stopping)
         stack.callback(platform.close)
         stack.enter_context(StopsAtTheEnd(platform.stop))
-        yield Stage(platform, hands or (Nobody() if how.yes else AtTheTerminal()), clock, log)
+        yield Stage(platform, hands or (Nobody() if how.yes else AtTheTerminal(stopping.ask)), clock, log)
 
 
 def carry_out(spec: RunSpec, how: Set, results: Path) -> str:
@@ -87,7 +88,7 @@ def carry_out(spec: RunSpec, how: Set, results: Path) -> str:
 
 
 def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: list, robot: Any, task: Any) -> str:
-    trial = Trial(spec, "robot-emulated" if how.emulated else "robot", past, how.most_rounds)
+    trial = Trial(spec, "robot-emulated" if how.emulated else "robot", past, how.most_rounds, how.until_success)
     start = robot.start_pose()[0]
     started, wall = datetime.now(UTC), time.perf_counter()
     try:
@@ -96,7 +97,7 @@ def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: l
             stage.journal.sync()
             crew = Crew(stage.platform, stage.operator, how.rig, start, stage.clock, stage.journal)
             result = trial.run(crew, show)
-            stage.journal.note("complete", evaluations=spec.evaluations)
+            stage.journal.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
             _forget_if_empty(folder)

@@ -271,3 +271,24 @@ def test_bad_commands_are_named_before_anything_moves(tmp_path, capsys, text, me
     assert call(*asked) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "trials").exists()
+
+
+def test_a_trial_can_end_with_success(tmp_path, monkeypatch, capsys):
+    worth = iter([False, True, False, True, True, True])
+    monkeypatch.setattr("bns.recorder.Recorder.drive_evaluated", _succeeding(worth))
+    assert call(*TRIAL, "--evaluations", 9, "--until-success", 2, "--results", tmp_path) == 0
+    assert "5 evaluations" in capsys.readouterr().out
+    assert evaluated(tmp_path, "trials-emulated")["evaluated_success"].tolist() == [False, True, False, True, True]
+
+
+def _succeeding(worth):
+    from bns.recorder import Recorder
+
+    real = Recorder.drive_evaluated
+
+    def drive(self, *arguments):
+        poses = real(self, *arguments)
+        self._evaluated["evaluated_success"] = next(worth)
+        return poses
+
+    return drive

@@ -1,0 +1,131 @@
+"""A servo chain behind an Arduino: the same calls as `Ax12Chain`, over framed and checksummed packets of our own."""
+
+from __future__ import annotations
+
+import termios
+from collections.abc import Sequence
+
+from bns.errors import HardwareError
+from bns.hardware.ax12_table import CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
+from bns.hardware.bridge_frames import (
+    ANSWER,
+    ARM,
+    GOAL,
+    HELLO,
+    MOVE,
+    SERVO,
+    STATE,
+    STOP,
+    VERSION,
+    Frame,
+    decoded,
+    encoded,
+)
+from bns.hardware.clock import Clock
+from bns.hardware.dynamixel import Health, ServoError
+from bns.hardware.journal import Journal
+from bns.hardware.serial_link import open_port
+from bns.hardware.stop import Stop
+
+BAUD = 115200
+ATTEMPTS = 6
+_TIMEOUT_S = 0.15
+_BETWEEN_S = 0.02
+
+
+class BridgeChain:
+    """Driver of `count` servos behind a bridge. Opening checks the bridge's version and how many servos it has found."""
+
+    def __init__(self, port: str, count: int, clock: Clock, journal: Journal) -> None:
+        self._clock, self._journal, self.count = clock, journal, count
+        self._sequence, self.retries = 0, 0
+        self._serial = open_port(port, BAUD)
+        try:
+            version, found = self._ask(HELLO, b"", 2)
+        except ServoError as error:
+            self.close()
+            raise HardwareError(f"no bridge answers at {port} ({error}). Is its sketch loaded, is it powered?") from error
+        if version != VERSION or found != count:
+            self.close()
+            raise HardwareError(
+                f"the bridge speaks version {version} and has found {found} servos; version {VERSION} and {count} servos are "
+                "needed. Load the sketch of this bns; check cables and ids."
+            )
+
+    def close(self) -> None:
+        """Give the port free."""
+        self._serial.close()
+
+    def arm(self, torque: float = 0.8) -> None:
+        """Torque on where the joints are, grown in steps by the bridge up to the share `torque`."""
+        self._ask(ARM, bytes([round(100 * torque)]), 0)
+
+    def move(self, angles_rad: Sequence[float], speeds_rad_s: Sequence[float]) -> list[float]:
+        """Set goals and speeds; the angles that the bridge has set, after clipping."""
+        goals = [max(0, min(1023, CENTRE + round(angle / RAD_PER_STEP))) for angle in angles_rad]
+        steps = [max(1, min(1023, round(abs(speed) / RAD_S_PER_STEP))) for speed in speeds_rad_s]
+        payload = b"".join(GOAL.pack(g, s) for g, s in zip(goals, steps, strict=True))
+        answer = self._ask(MOVE, payload, len(payload))
+        return [(goal - CENTRE) * RAD_PER_STEP for goal, _ in GOAL.iter_unpack(answer)]
+
+    def health(self) -> dict[int, Health]:
+        """What every servo says, by its place from 1; ServoError if one reports an alarm."""
+        found = {}
+        for place, (position, load, celsius, decivolts, bits) in enumerate(SERVO.iter_unpack(self._state()), 1):
+            if bits:
+                raise ServoError(f"servo {place}: {', '.join(errors_in(bits))}")
+            share = (load & 1023) / 1023 * (-1 if load & 1024 else 1)
+            found[place] = Health((position - CENTRE) * RAD_PER_STEP, share, decivolts / 10, float(celsius))
+        return found
+
+    def stop(self, patience_s: float = 5.0) -> Stop:
+        """Torque off; confirmed when the bridge has read back that every servo is off and still. Never raises."""
+        began_s, problem = self._clock.now_s(), ""
+        while True:
+            try:
+                moving = int.from_bytes(self._ask(STOP, b"", 2), "little")
+                problem = f"servos {[i + 1 for i in range(16) if moving >> i & 1]} did not stop"
+                if not moving:
+                    return self._stopped(Stop(True, self._clock.now_s() - began_s, self._clock.now_s() - began_s))
+            except ServoError as error:
+                problem = str(error)
+            if self._clock.now_s() - began_s > patience_s:
+                return self._stopped(Stop(False, self._clock.now_s() - began_s, None, problem))
+            self._clock.sleep(_BETWEEN_S)
+
+    def _state(self) -> bytes:
+        return self._ask(STATE, b"", self.count * SERVO.size)
+
+    def _stopped(self, stop: Stop) -> Stop:
+        self._journal.note("stop", confirmed=stop.confirmed, seconds=stop.seconds, problem=stop.problem)
+        return stop
+
+    def _ask(self, kind: int, payload: bytes, size: int) -> bytes:
+        """Payload of the answer, of that size; asked again when nothing or something else comes."""
+        problem = ""
+        for attempt in range(ATTEMPTS):
+            self.retries += attempt > 0
+            self._sequence = (self._sequence + 1) % 256
+            try:
+                answer = self._once(Frame(kind, self._sequence, payload))
+            except (OSError, termios.error) as error:
+                raise ServoError(f"the port is gone ({error})") from error
+            if answer is not None and answer.kind == kind | ANSWER and len(answer.payload) == size:
+                return answer.payload
+            problem = "no answer" if answer is None else f"the answer was {answer}"
+        raise ServoError(f"bridge: {problem}; asked {ATTEMPTS} times")
+
+    def _once(self, frame: Frame) -> Frame | None:
+        self._serial.reset_input_buffer()
+        in_vain = self._clock.in_vain(_TIMEOUT_S)
+        self._journal.note("sent", data=encoded(frame).hex())
+        self._serial.write(encoded(frame))
+        data, answer = b"", None
+        while answer is None or answer.sequence != frame.sequence:  # an answer to an older question is passed over
+            data += self._serial.read(max(1, self._serial.in_waiting))
+            answer, data = decoded(data)
+            if answer is None and in_vain():
+                self._clock.waited(_TIMEOUT_S)
+                return None
+        self._journal.note("received", data=encoded(answer).hex())
+        return answer

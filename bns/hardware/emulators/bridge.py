@@ -1,0 +1,115 @@
+"""An Arduino bridge at the level of bytes, in front of emulated servos; with its watchdog."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+from bns.hardware.bridge_frames import (
+    ANSWER,
+    ARM,
+    GOAL,
+    HELLO,
+    MOVE,
+    REFUSED,
+    SERVO,
+    STATE,
+    STOP,
+    VERSION,
+    WATCHDOG_S,
+    Frame,
+    decoded,
+    encoded,
+)
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.emulators.ax12 import Servo
+from bns.hardware.emulators.faults import Faults
+
+_LATENCY_S = 0.004
+
+
+class BridgeEmulator:
+    """The device at the far end of a line."""
+
+    def __init__(self, servos: Sequence[Servo], clock: EmulatedClock, faults: Faults | None = None) -> None:
+        self.servos, self._clock, self._faults = list(servos), clock, faults or Faults()
+        self._buffer, self._heard_s = b"", clock.now_s()
+        self._lock = threading.Lock()
+        self._answers: dict[int, Callable[[bytes], bytes | None]] = {
+            HELLO: lambda _p: bytes([VERSION, len(self.servos)]),
+            ARM: self._arm,
+            MOVE: self._move,
+            STATE: lambda _p: b"".join(self._state(s) for s in self.servos),
+            STOP: lambda _p: self._stop().to_bytes(2, "little"),
+        }
+        clock.listeners.append(self.moved_on)
+
+    def moved_on(self, now_s: float) -> None:
+        """Called by the clock: the watchdog."""
+        if now_s - self._heard_s > WATCHDOG_S and any(s.get("torque_enable") for s in self.servos):
+            self._stop()
+
+    def close(self) -> None:
+        """Take it away."""
+        self._clock.listeners.remove(self.moved_on)
+
+    def written(self) -> None:
+        """The answer is on the line."""
+
+    def receive(self, data: bytes) -> bytes:
+        """Bytes in, bytes out."""
+        with self._lock:
+            frame, self._buffer = decoded(self._buffer + data)
+            if frame is None:
+                return self._nothing()
+            now_s = self._heard_s = self._clock.now_s()
+            if self._faults.strikes("lost-request", now_s):
+                return self._nothing()
+            for servo in self.servos:
+                servo.update()
+            payload = self._answers.get(frame.kind, lambda _p: None)(frame.payload)
+            self._clock.sleep(_LATENCY_S)
+            if self._faults.strikes("lost-reply", now_s):
+                return self._nothing()
+            kind = REFUSED if payload is None else frame.kind
+            return encoded(Frame(kind | ANSWER, frame.sequence, payload or b""))
+
+    def _nothing(self) -> bytes:
+        self._clock.fell_silent()
+        return b""
+
+    def _arm(self, payload: bytes) -> bytes | None:
+        if len(payload) != 1 or payload[0] > 100:
+            return None
+        for servo in self.servos:
+            servo.put("goal_position", servo.get("present_position"))
+            servo.put("torque_limit", 1023 * payload[0] // 100)
+            servo.put("torque_enable", 1)
+        return b""
+
+    def _move(self, payload: bytes) -> bytes | None:
+        if len(payload) != GOAL.size * len(self.servos):
+            return None
+        done = b""
+        for servo, (goal, speed) in zip(self.servos, GOAL.iter_unpack(payload), strict=True):
+            kept = max(servo.get("cw_angle_limit"), min(servo.get("ccw_angle_limit"), goal))
+            servo.write(30, GOAL.pack(kept, max(1, speed)))
+            done += GOAL.pack(kept, max(1, speed))
+        return done
+
+    @staticmethod
+    def _state(servo: Servo) -> bytes:
+        names = ("present_position", "present_load", "present_temperature", "present_voltage")
+        return SERVO.pack(*(servo.get(name) for name in names), servo.errors())
+
+    def _stop(self) -> int:
+        """Torque off; bits of the servos that are not off, or silent."""
+        left = 0
+        for place, servo in enumerate(self.servos):
+            if self._faults.strikes("silent-servo", self._clock.now_s(), servo.get("id")):
+                left |= 1 << place
+                continue
+            servo.put("torque_enable", 0)
+            servo.update()
+            left |= servo.get("moving") << place
+        return left

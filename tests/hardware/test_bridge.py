@@ -1,0 +1,125 @@
+"""The Arduino bridge: frames as documented, the driver against an emulated bridge."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bns.errors import HardwareError
+from bns.hardware.bridge import BridgeChain
+from bns.hardware.bridge_frames import WATCHDOG_S, Frame, crc16, decoded, encoded
+from bns.hardware.dynamixel import ServoError
+from bns.hardware.emulators.ax12 import Servo
+from bns.hardware.emulators.bridge import BridgeEmulator
+from bns.hardware.emulators.faults import Fault, Faults
+from bns.hardware.emulators.terminal import PseudoTerminal
+from bns.hardware.journal import Journal
+
+
+@pytest.fixture
+def bridge(tmp_path, clock):
+    """bridge(*faults) -> driver, emulator."""
+    opened = []
+
+    def build(*faults, count=3, asked=3, **registers):
+        struck = Faults(tuple(faults), 1, "bridge")
+        emulator = BridgeEmulator([Servo(n + 1, clock, struck, **registers) for n in range(count)], clock, struck)
+        line = PseudoTerminal(emulator, tmp_path, f"bridge{len(opened)}")
+        opened.extend([emulator, line])
+        driver = BridgeChain(str(line.path), asked, clock, Journal(None, clock))
+        opened.append(driver)
+        return driver, emulator
+
+    yield build
+    for each in reversed(opened):
+        each.close()
+
+
+def test_golden_frames():
+    assert crc16(b"123456789") == 0x29B1  # the check value of CRC-16/CCITT-FALSE
+    assert encoded(Frame(1, 7, b"")).hex() == "a5000107" + crc16(b"\x00\x01\x07").to_bytes(2, "little").hex()
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(max_size=40), st.binary(max_size=30).filter(lambda b: b"\xa5" not in b), st.integers(0, 255))
+def test_frames_are_found_among_noise(payload, noise, sequence):
+    frame = Frame(3, sequence, payload)
+    assert decoded(noise + encoded(frame) + b"rest") == (frame, b"rest")
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(min_size=1, max_size=20), st.data())
+def test_a_changed_bit_is_noticed(payload, data):
+    clean = bytearray(encoded(Frame(3, 1, payload)))
+    place = data.draw(st.integers(2, len(clean) - 1))  # not start and length: those make another frame
+    clean[place] ^= 1 << data.draw(st.integers(0, 7))
+    assert decoded(bytes(clean))[0] is None
+
+
+def test_half_a_frame_waits_for_the_rest():
+    whole = encoded(Frame(4, 2, b"abc"))
+    found, left = decoded(whole[:5])
+    assert found is None
+    assert decoded(left + whole[5:])[0] == Frame(4, 2, b"abc")
+    with pytest.raises(ValueError, match="does not fit into a frame"):
+        encoded(Frame(1, 1, bytes(256)))
+
+
+def test_moving_through_the_bridge(bridge, clock):
+    driver, emulator = bridge(ccw_angle_limit=600)
+    driver.arm(0.5)
+    assert driver.move([0.2, -0.2, 2.0], [1.0, 1.0, 0.0]) == pytest.approx([0.2, -0.2, 0.45], abs=0.006)
+    assert [s.get("moving_speed") for s in emulator.servos] == [86, 86, 1]
+    for _ in range(3):
+        clock.sleep(0.1)
+        driver.health()
+    assert driver.health()[1].position_rad == pytest.approx(0.2, abs=0.01)
+    assert emulator.servos[0].get("torque_limit") == 511
+
+
+def test_lost_frames_are_sent_again(bridge):
+    driver, _ = bridge(Fault("lost-reply", rate=0.1), Fault("lost-request", rate=0.1))
+    for _ in range(20):
+        driver.health()
+    assert driver.retries > 0
+
+
+def test_the_watchdog_takes_the_torque_off(bridge, clock):
+    driver, emulator = bridge()
+    driver.arm()
+    clock.sleep(0.9 * WATCHDOG_S)
+    assert all(s.get("torque_enable") for s in emulator.servos)
+    clock.sleep(0.2 * WATCHDOG_S)
+    assert not any(s.get("torque_enable") for s in emulator.servos)
+
+
+def test_stop_is_read_back(bridge):
+    driver, emulator = bridge()
+    driver.arm()
+    driver.move([1.0] * 3, [1.0] * 3)
+    assert driver.stop().confirmed
+    assert not any(s.get("torque_enable") for s in emulator.servos)
+
+
+def test_a_silent_servo_is_not_stopped(bridge):
+    driver, _ = bridge(Fault("silent-servo", at_s=0.0, for_s=1e9, servo=2))
+    stop = driver.stop(patience_s=0.5)
+    assert not stop.confirmed
+    assert "servos [2] did not stop" in stop.problem
+
+
+def test_alarms_are_errors(bridge, clock):
+    driver, _ = bridge(Fault("overload", at_s=0.5, for_s=1.0, servo=3))
+    clock.sleep(0.6)
+    with pytest.raises(ServoError, match="servo 3: overload"):
+        driver.health()
+
+
+def test_other_bridges_are_refused(bridge):
+    with pytest.raises(HardwareError, match="has found 2 servos; version 1 and 3 servos are needed"):
+        bridge(count=2)
+
+
+def test_nonsense_is_refused_by_the_bridge(bridge):
+    driver, _ = bridge()
+    with pytest.raises(ServoError, match="asked 6 times"):
+        driver.move([0.0], [1.0])

@@ -1,0 +1,148 @@
+"""What ends a drive, who is asked, and what must be confirmed."""
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from bns.errors import StopNotConfirmedError, TrialPausedError
+from bns.hardware.safety import DriveEnded, Limits, Stopping, StopsAtTheEnd, Surface, Watch
+from bns.hardware.stop import Stop
+from bns.hardware.tracking.sight import Sight, unwrapped
+from bns.trial.background import Rounds
+from bns.trial.operator import AtTheTerminal, Nobody
+
+LIMITS = Limits(Surface(-1, 1, -0.5, 0.5), lost_s=0.5, late_s=1.0)
+
+
+def sight(clock, x=0.0, y=0.0):
+    return Sight(clock.now_s(), np.array([x, y, 0.0]))
+
+
+def test_a_watch_lets_a_drive_go_on(clock):
+    watch = Watch(LIMITS, clock, Stopping())
+    for _ in range(20):
+        clock.sleep(0.1)
+        watch.check(sight(clock, 0.9, -0.4))
+
+
+@pytest.mark.parametrize(("x", "y"), [(1.01, 0.0), (0.0, -0.51)])
+def test_leaving_the_surface_ends_it(clock, x, y):
+    with pytest.raises(DriveEnded, match="left the surface"):
+        Watch(LIMITS, clock, Stopping()).check(sight(clock, x, y))
+
+
+def test_out_of_sight_for_too_long_ends_it(clock):
+    watch, old = Watch(LIMITS, clock, Stopping()), sight(clock)
+    for seen in (None, old, None):
+        clock.sleep(0.15)
+        watch.check(seen)
+    clock.sleep(0.15)
+    with pytest.raises(DriveEnded, match=r"not seen the robot for 0\.6 s"):
+        watch.check(old)  # an old sight is no new one
+
+
+def test_a_computer_that_is_too_busy_pauses_the_trial(clock):
+    watch = Watch(LIMITS, clock, Stopping())
+    clock.sleep(1.2)
+    with pytest.raises(TrialPausedError, match="too busy to look"):
+        watch.check(sight(clock))
+
+
+@pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")])
+def test_signals_are_noted_and_handlers_put_back(clock, number, word):
+    before = signal.getsignal(number)
+    with Stopping() as stopping:
+        stopping.check()
+        os.kill(os.getpid(), number)
+        with pytest.raises(TrialPausedError, match=word):
+            Watch(LIMITS, clock, stopping).check(sight(clock))
+    assert signal.getsignal(number) == before
+
+
+def test_ctrl_c_ends_a_question_at_once(monkeypatch):
+    def slow(_question):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(5)
+
+    monkeypatch.setattr("builtins.input", slow)
+    began = time.monotonic()
+    with Stopping() as stopping, pytest.raises(TrialPausedError, match="paused by the operator"):
+        AtTheTerminal(stopping.ask).accept("evaluation 1")
+    assert time.monotonic() - began < 4
+
+
+@pytest.mark.parametrize("fault", [None, RuntimeError("broken"), KeyboardInterrupt()])
+def test_a_stop_not_confirmed_is_louder_than_any_fault(fault):
+    def inside():
+        with StopsAtTheEnd(lambda: Stop(False, 5.0, None, "the port is gone")):
+            if fault is not None:
+                raise fault
+
+    with pytest.raises(StopNotConfirmedError, match=r"CUT THE POWER NOW.*5\.0 s: the port is gone") as caught:
+        inside()
+    assert caught.value.__cause__ is fault
+
+
+def test_a_confirmed_stop_lets_the_fault_through():
+    stops = []
+
+    def stop():
+        stops.append(1)
+        return Stop(True, 0.1, 0.02)
+
+    with pytest.raises(RuntimeError, match="broken"), StopsAtTheEnd(stop):
+        raise RuntimeError("broken")
+    with StopsAtTheEnd(stop) as guard:
+        pass
+    assert len(stops) == 2
+    assert guard.last.confirmed
+
+
+def test_the_operator_is_asked_until_the_answer_makes_sense(capsys):
+    answers = iter(["x", "r"])
+    assert AtTheTerminal(lambda _q: next(answers)).accept("evaluation 1") == "repeat"
+    assert "'x' is none of" in capsys.readouterr().err
+    assert AtTheTerminal(lambda _q: "").accept("") == "next"
+    assert AtTheTerminal(lambda _q: "s").accept("") == "skip"
+    with pytest.raises(TrialPausedError, match="paused by the operator"):
+        AtTheTerminal(lambda _q: "p").place(np.zeros(3), "why")
+
+
+def test_with_nobody_there_a_misplaced_robot_pauses_the_trial():
+    with pytest.raises(TrialPausedError, match=r"stands 30 cm away, and with --yes nobody .*--resume"):
+        Nobody().place(np.zeros(3), "The robot stands 30 cm away")
+    assert Nobody().accept("") == "next"
+
+
+def test_headings_go_on_over_the_turn():
+    assert unwrapped(-3.1, 3.1) == pytest.approx(2 * np.pi - 3.1)
+    assert unwrapped(0.1, 12.5) == pytest.approx(0.1 + 4 * np.pi)
+
+
+def test_rounds_go_on_while_driving_and_end_whole():
+    count = [0]
+
+    def work():
+        time.sleep(0.01)
+        count[0] += 1
+
+    with Rounds(work, most=1000) as rounds:
+        done = rounds.while_driving(lambda: time.sleep(0.2))
+        assert done == count[0] > 3
+        assert rounds.while_driving(lambda: None) == 1
+    with Rounds(work, most=2) as rounds:
+        assert rounds.while_driving(lambda: time.sleep(0.2)) == 2
+
+
+def test_a_fault_in_training_waits_for_the_drive():
+    driven = []
+
+    def broken():
+        raise ValueError("training broke")
+
+    with Rounds(broken, most=3) as rounds, pytest.raises(ValueError, match="training broke"):
+        rounds.while_driving(lambda: driven.append(time.sleep(0.05)))
+    assert driven
