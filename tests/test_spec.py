@@ -41,7 +41,7 @@ def test_whole_numbers_and_shares_are_taken_as_their_own_type():
         ("mutation_rate", 30, r"from 0 to 1\. For 30 percent write 0\.3"),
         ("mutation_rate", float("nan"), r"mutation_rate is nan"),
         ("mutation_rate", "high", r"mutation_rate is 'high'; it must be a number from 0 to 1"),
-        ("world", "physic", r"unknown world 'physic'\. Did you mean 'physics'\? Valid: physics, substitute"),
+        ("world", "physic", r"unknown world 'physic'\. Did you mean 'physics'\? Valid: physics, robot, substitute"),
         ("mutation_rte", 0.1, r"unknown parameter 'mutation_rte'\. Did you mean 'mutation_rate'\?"),
         ("evaluations", -1, r"evaluations is -1"),
     ],
