@@ -75,6 +75,7 @@ def _parser() -> argparse.ArgumentParser:
 
     one = command("run", run, "carry out one run and draw its path")
     _add_spec_options(one)
+    one.add_argument("--measurements", type=Path, metavar="FILE", help="also write what was driven as a table (.csv, .parquet)")
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
     one.add_argument(
         "--render", type=Path, metavar="FILE", help="show the fittest controller move, where the world can: .mp4 or .png"
@@ -203,7 +204,7 @@ def run(options: argparse.Namespace) -> int:
         options.task = default_task(load_robot(options.robot).name)
     spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
     _say_if_compiling(spec)
-    print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn, options.render))
+    print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn, options.render, options.measurements))
     return 0
 
 

@@ -43,6 +43,14 @@ def trial_table(trial: int, commands: ArrayLike, poses: ArrayLike) -> pd.DataFra
     return table
 
 
+def check_table_name(path: Path) -> None:
+    """ModelError unless a table can be written there."""
+    if path.suffix not in {".csv", ".parquet"}:
+        raise ModelError(f"Measurements cannot be written to {path}; let the name end in .csv or .parquet.")
+    if not path.parent.is_dir():
+        raise ModelError(f"There is no folder {path.parent} to write {path.name} into; make it first.")
+
+
 def write_measurements(table: pd.DataFrame, path: str | Path) -> None:
     """Write a table as .csv or .parquet; a reader never meets half a file.
 
@@ -54,8 +62,7 @@ def write_measurements(table: pd.DataFrame, path: str | Path) -> None:
         raise ModelError(
             f"A table of measurements for {path} lacks {', '.join(missing)}; it needs {', '.join(COLUMNS)}."
         )
-    if path.suffix not in {".csv", ".parquet"}:
-        raise ModelError(f"Measurements cannot be written to {path}; let the name end in .csv or .parquet.")
+    check_table_name(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
     if path.suffix == ".csv":
         table.to_csv(unfinished, index=False)

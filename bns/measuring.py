@@ -51,7 +51,12 @@ def add_commands(command: Adder) -> None:
         one.add_argument("--json", action="store_true", help="one JSON object on stdout")
         one.add_argument("--findings", action="store_true", help="list everything odd in the data")
     for one in (held, found, more):
-        one.add_argument("--model", required=True, metavar="M", help="khepera, differential-drive, or a YAML file")
+        one.add_argument(
+            "--model",
+            required=True,
+            metavar="M",
+            help="khepera, differential-drive, a YAML file; networks (.safetensors) for compare",
+        )
         one.add_argument(
             "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"
         )
@@ -93,7 +98,7 @@ def compare(options: argparse.Namespace) -> int:
     from bns.diagnose.figures import comparison_figure
     from bns.diagnose.words import comparison_text
 
-    measured, predictor, model = _ready(options)
+    measured, predictor, model = _ready(options, networks=True)
     with _ticking("comparing"):
         result = hold(predictor, model)
     if options.json:
@@ -141,18 +146,25 @@ def add(options: argparse.Namespace) -> int:
     return 0
 
 
-def _ready(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model]:
+def _ready(options: argparse.Namespace, networks: bool = False) -> tuple[Measured, WheelPredictor, Model]:
     """Data, predictor and model of the options; what is odd about the data goes to stderr."""
     from bns.diagnose.fitting_robot import check_same_robot
     from bns.diagnose.intake import load_measured
+    from bns.diagnose.networks import NetworkPredictor
     from bns.diagnose.wheels import WheelPredictor
     from bns.diagnose.words import findings_text
+    from bns.physics.model import Model
 
-    model = _model(options)
+    of_networks = options.model.endswith(".safetensors")
+    if of_networks and not networks:
+        raise ModelError(f"{options.model} holds networks, which have no effects: they can be compared, not diagnosed.")
+    model = Model(wheelbase_m=1.0, name=options.model) if of_networks else _model(options)
     measured = load_measured(options.data, options.robot)
     if measured.findings:
         most = len(measured.findings) if getattr(options, "findings", False) else 5
         print(findings_text(measured.findings, most), file=sys.stderr)
+    if of_networks:
+        return measured, NetworkPredictor(measured.tracks, Path(options.model)), model
     predictor = WheelPredictor(measured.tracks)
     check_same_robot(predictor, model)
     return measured, predictor, model

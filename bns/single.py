@@ -18,6 +18,7 @@ from rich.table import Table
 
 from bns.errors import ModelError
 from bns.loop import RunResult, run
+from bns.measurements import check_table_name
 from bns.plotting import path_figure
 from bns.recorder import RADII_CM
 from bns.robots import load_robot
@@ -31,12 +32,18 @@ from bns.sweep import memory
 from bns.sweep.digests import WorldDigests
 from bns.tasks import load_task
 from bns.worlds import build_world
+from bns.worlds.logged import LoggedWorld
 
 _PATIENCE_S = 60.0
 
 
 def run_by_hand(
-    spec: RunSpec, results: Path, sweep: str, save_snn: Path | None = None, render: Path | None = None
+    spec: RunSpec,
+    results: Path,
+    sweep: str,
+    save_snn: Path | None = None,
+    render: Path | None = None,
+    measurements: Path | None = None,
 ) -> str:
     """Carry out a run with a live view, store it, draw the path of its fittest controller; the report in words."""
     robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
@@ -45,6 +52,9 @@ def run_by_hand(
     if save_snn is not None:
         check_writable(save_snn)
     world = build_world(spec.world, robot)
+    if measurements is not None:
+        check_table_name(measurements)
+        world = logged = LoggedWorld(world, robot)
     with _patient_writer(results, sweep):  # what does not fit is better found before the run than after it
         _check_world(spec, results, sweep, world.digest)
     started, wall, cpu = datetime.now(UTC), time.perf_counter(), time.process_time()
@@ -53,6 +63,8 @@ def run_by_hand(
         result = run(spec, show, world)
     wall_s = time.perf_counter() - wall
     keep_run(spec, result, results, sweep, started, wall_s, time.process_time() - cpu)
+    if measurements is not None:
+        logged.write(measurements)
     if save_snn is not None:
         save_simulator(
             StaticSimulator(

@@ -138,10 +138,12 @@ def _binned(name: str, way: str, values: Array, rate: Array, trial: NDArray[np.i
     sums, counts = np.zeros((trials, bins)), np.zeros((trials, bins))
     np.add.at(sums, (trial, place), rate)
     np.add.at(counts, (trial, place), 1)
+    filled = counts.sum(axis=0) > 0
+    sums, counts = sums[:, filled], counts[:, filled]
     drawn = rng.multinomial(trials, np.full(trials, 1 / trials), size=400)
     with np.errstate(invalid="ignore", divide="ignore"):
         means = (drawn @ sums) / (drawn @ counts)
         mean = sums.sum(axis=0) / counts.sum(axis=0)
     low, high = np.nanquantile(means, [0.025, 0.975], axis=0)
-    centre = np.array([values[place == b].mean() if (place == b).any() else np.nan for b in range(bins)])
+    centre = np.array([values[place == b].mean() if (place == b).any() else np.nan for b in np.flatnonzero(filled)])
     return Curve(name, way, centre, mean, low, high)

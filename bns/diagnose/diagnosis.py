@@ -14,7 +14,7 @@ from bns.diagnose.formula_search import Formula, best_formula
 from bns.diagnose.horizons import HORIZONS, noise_floor
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.rhythm import Rhythm, rhythms
-from bns.diagnose.search import FALSE_ALARM, Candidate, Found, Search
+from bns.diagnose.search import FALSE_ALARM, MIN_GAIN, Candidate, Found, Search
 from bns.diagnose.structure import Pattern, patterns, remaining
 from bns.diagnose.tracks import Tracks
 from bns.physics.effect import Effect
@@ -25,7 +25,7 @@ VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
 FEWEST_TRIALS = 8
 """With fewer the signs of whole trials cannot all come out alike by a chance that is small enough."""
 FEW_TRIALS = 40
-_HINT = 5.0
+_HINT = 3.0
 """A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
 
 
@@ -145,8 +145,13 @@ def _hint(found: Found, trials: int) -> Candidate | None:
     """The best candidate of a search that accepted nothing, where few trials nearly sufficed."""
     if found.accepted or trials >= FEW_TRIALS:
         return None
-    level = FALSE_ALARM / len(found.steps[0].ranking)
-    near = [c for c in found.steps[0].ranking if not c.veto and c.evidence.p_value < _HINT * level and c.evidence.z > 1]
+    step, least = found.steps[0], MIN_GAIN * float(found.nominal.losses.mean())
+    level = _HINT * FALSE_ALARM / len(step.ranking)
+    near = [
+        c
+        for c in step.ranking
+        if not c.veto and c.evidence.p_value < level and c.evidence.z > 2 and c.evidence.gain > max(step.bar, least)
+    ]
     return near[0] if near else None
 
 

@@ -93,7 +93,7 @@ def _comparison(c: Comparison) -> Iterator[str]:
                 f"  {horizon:10}{1e3 * e['position_m']:8.2f} ±{1e3 * e['position_se_m']:4.2f}{1e3 * e['forward_m']:10.2f}"
                 f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{1e3 * c.floor[horizon]:10.2f}{e['windows']:9.0f}"
             )
-    yield "  (noise: what tracking noise alone would show; the drive's own scatter comes on top)"
+    yield "  (noise: at most what tracking noise alone would show; the drive's own scatter comes on top)"
     yield "\nwhere it fails: what a free curve along each variable would explain, on trials held out:"
     yield f"  {'variable':30}{'velocity':16}{'share of loss':>14}{'p':>10}"
     for p in c.patterns[:_SHOWN]:

@@ -111,3 +111,29 @@ def test_data_that_cannot_be_read_are_refused(tmp_path, capsys):
     assert "does not read as parquet" in err
     assert "of 2 robots: ada, bob. Choose one with --robot ada" in err
     assert pd.read_csv(tmp_path / "two.csv")["robot"].nunique() == 2
+
+
+def test_a_run_leaves_measurements_that_its_own_networks_are_held_against(tmp_path, capsys):
+    """From a run in the physics world to a comparison of its networks and of the drawing with it."""
+    table, nets = tmp_path / "run.parquet", tmp_path / "nets.safetensors"
+    small = ["--population-size", "20", "--evaluations", "12", "--generations-per-evaluation", "2"]
+    run = ["run", "--world", "physics", *small, "--results", str(tmp_path / "r")]
+    assert main([*run, "--measurements", str(table), "--save-snn", str(nets)]) == 0
+    assert pd.read_parquet(table)["trial"].nunique() == 12
+    capsys.readouterr()
+    assert main(["compare", str(table), "--model", str(nets), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["trials"] == 12
+    ends = len(pd.read_parquet(table)) - 12
+    # a command that repeats the one before cannot be told from a longer one
+    assert 0.7 * ends <= answer["error"]["command"]["windows"] <= ends
+    assert main(["diagnose", str(table), "--model", str(nets)]) == 2
+    assert "can be compared, not diagnosed" in capsys.readouterr().err
+
+
+def test_a_table_that_could_not_be_written_is_refused_before_the_run(tmp_path, capsys):
+    assert main(["run", "--measurements", str(tmp_path / "gone" / "m.csv"), "--results", str(tmp_path / "r")]) == 2
+    assert "make it first" in capsys.readouterr().err
+    assert main(["run", "--robot", "snake", "--measurements", "m.csv", "--results", str(tmp_path / "r")]) == 2
+    assert "snake has no wheels" in capsys.readouterr().err
+    assert not (tmp_path / "r").exists()
