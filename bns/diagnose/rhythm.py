@@ -18,7 +18,7 @@ from bns.diagnose.tracks import Array
 
 LAGS = (3, 5, 8, 12, 18)
 """Frames. Not shorter: neighbours share errors of the camera and of its clock."""
-LEAST_WITHIN, LEAST_BETWEEN, LEAST_Z = 0.10, 0.20, 4.5
+LEAST_WITHIN, LEAST_BETWEEN, LEAST_Z = 0.10, 0.28, 4.5
 """Smaller correlations, or less certain ones, are those of honest robots."""
 _CLIP = 4.0
 _DIRECTIONS = ("forward", "left", "heading")

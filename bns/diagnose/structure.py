@@ -30,7 +30,7 @@ PENALTIES = (1.0, 30.0)
 """How strongly curves are drawn to zero, in expected squares of the standardised curve; the better one counts."""
 CHANCE = 0.02
 """Chance of any false alarm over all variables and channels."""
-LEAST = 0.001
+LEAST = 0.0015
 """Least gain that counts, as a share of the loss."""
 
 

@@ -9,7 +9,7 @@ from bns.diagnose.predictor import Steps
 from bns.diagnose.tracks import Array, Tracks
 from bns.engine.pose_filter import followed
 from bns.physics.differential_drive import taken_at
-from bns.physics.grid import step_grid
+from bns.physics.grid import Grid
 from bns.physics.model import Model
 from bns.physics.motion import body_motion, flow_of
 from bns.physics.signals import Conditions, View
@@ -23,12 +23,7 @@ class WheelPredictor:
 
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
         self.tracks = tracks
-        tail = np.full((len(tracks), 1), _TAIL_S)
-        last = np.maximum((tracks.duration_s > 0).cumsum(axis=1).argmax(axis=1), 0)
-        rows = np.arange(len(tracks))
-        left = np.hstack([tracks.left_m_s, tracks.left_m_s[rows, last][:, None]])
-        right = np.hstack([tracks.right_m_s, tracks.right_m_s[rows, last][:, None]])
-        self.grid = step_grid(left, right, np.hstack([tracks.duration_s, tail]), dt_s)
+        self.grid = _grid_of(tracks, dt_s)
         self.conditions = _conditions(tracks, self.grid.node_s)
         self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
         zero = np.zeros_like(self.grid.step_s)
@@ -123,6 +118,31 @@ class WheelPredictor:
         velocity = np.array([flow.x_m_s, flow.y_m_s]) - flow.return_per_s * where
         out: Array = velocity * moving_s[:, None]
         return out
+
+
+def _grid_of(tracks: Tracks, dt_s: float) -> Grid:
+    """Steps of at most ``dt_s`` that end wherever a command or a frame does: a pose inside a step would lie on a chord."""
+    nodes, lefts, rights = [], [], []
+    for trial in range(len(tracks)):
+        frames = tracks.t_s[tracks.first[trial] : tracks.first[trial + 1]]
+        ends = np.cumsum(tracks.duration_s[trial])
+        marks = np.unique(
+            np.concatenate([[0.0], ends, frames[frames >= 0], [max(ends[-1], *frames[-1:]) + _TAIL_S]]).round(9)
+        )
+        counts = np.maximum(np.ceil(np.diff(marks) / dt_s - 1e-9).astype(np.int64), 1)
+        inner = np.concatenate([[0.0], np.repeat(np.diff(marks) / counts, counts)])
+        node = marks[0] + np.cumsum(inner)
+        lasting = np.flatnonzero(tracks.duration_s[trial] > 0)
+        middle = (node[1:] + node[:-1]) / 2
+        command = np.searchsorted(ends[lasting], middle).clip(max=max(len(lasting) - 1, 0))
+        which = lasting[command] if len(lasting) else np.zeros(len(middle), dtype=np.int64)
+        nodes.append(node)
+        lefts.append(tracks.left_m_s[trial][which])
+        rights.append(tracks.right_m_s[trial][which])
+    width = max(map(len, nodes))
+    node_s = np.stack([np.pad(node, (0, width - len(node)), mode="edge") for node in nodes])
+    left, right = (np.stack([np.pad(v, (0, width - 1 - len(v))) for v in values]) for values in (lefts, rights))
+    return Grid(np.diff(node_s, axis=1), node_s, left, right, np.zeros((len(nodes), 0), dtype=np.int64))
 
 
 def _before(values: Array, changed: NDArray[np.bool_]) -> Array:
