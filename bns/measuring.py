@@ -148,7 +148,7 @@ def add(options: argparse.Namespace) -> int:
 
 def _ready(options: argparse.Namespace, networks: bool = False) -> tuple[Measured, WheelPredictor, Model]:
     """Data, predictor and model of the options; what is odd about the data goes to stderr."""
-    from bns.diagnose.fitting_robot import check_same_robot
+    from bns.diagnose.fitting_robot import check_named_robot, check_same_robot
     from bns.diagnose.intake import load_measured
     from bns.diagnose.networks import NetworkPredictor
     from bns.diagnose.wheels import WheelPredictor
@@ -166,6 +166,7 @@ def _ready(options: argparse.Namespace, networks: bool = False) -> tuple[Measure
     if of_networks:
         return measured, NetworkPredictor(measured.tracks, Path(options.model)), model
     predictor = WheelPredictor(measured.tracks)
+    check_named_robot(measured.robot, model)
     check_same_robot(predictor, model)
     return measured, predictor, model
 

@@ -15,6 +15,7 @@ from bns.diagnose.predictor import Predictor
 from bns.diagnose.search import problem_for
 from bns.diagnose.structure import Pattern, patterns
 from bns.diagnose.tracks import Array
+from bns.errors import DataError
 from bns.physics.model import Model
 
 BINS = 8
@@ -73,6 +74,8 @@ class Comparison:
 def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
     """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands."""
     steps, tracks = predictor.steps(model), predictor.tracks
+    if not (np.diff(tracks.first) > 1).any():
+        raise DataError("No trial has two tracked poses, and a displacement needs two: log the pose before and after commands.")
     problem = problem_for(predictor, model)
     errors = {h: errors_of(predictor, steps, h) for h in HORIZONS}
     # scatter of the drive cannot be told from faults of the model before these are mended: only the camera's noise is sure

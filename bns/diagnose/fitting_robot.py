@@ -8,8 +8,18 @@ from bns.diagnose.horizons import windows
 from bns.diagnose.predictor import Predictor
 from bns.errors import DataError
 from bns.physics.model import Model
+from bns.robots import robot_names
 
 _FACTOR = 1.8
+
+
+def check_named_robot(robot: str, model: Model) -> None:
+    """DataError if the data name another robot than the one the model is of."""
+    name = model.name.removesuffix("-world")
+    if robot and robot != name and {robot, name} <= set(robot_names()):
+        raise DataError(
+            f"The measurements are of the robot {robot}, the model {model.name} is of {name}; give a model of {robot}."
+        )
 
 
 def check_same_robot(predictor: Predictor, model: Model) -> None:
@@ -38,6 +48,10 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
     if straight.sum() >= 5:
         went = np.hypot(*(tracks.pose[end, :2] - tracks.pose[start, :2]).T)[straight]
         ratio = float(np.median(went / (way[end] - way[start])[straight]))
+        if ratio < 0.03:
+            raise DataError(
+                "The robot hardly moves although it is told to: is it tracked, are its motors on, are these its commands?"
+            )
         if ratio > 3 or ratio < 1 / 3:
             raise DataError(
                 f"The robot goes {ratio:.2g} times as far as commanded. Are the speeds in m/s, "

@@ -23,6 +23,8 @@ class Measured:
     tracks: Tracks
     findings: tuple[Finding, ...]
     digest: str
+    robot: str = ""
+    """What a column ``robot`` says; "" where there is none."""
 
 
 def load_measured(path: str | Path, robot: str | None = None) -> Measured:
@@ -35,9 +37,11 @@ def load_measured(path: str | Path, robot: str | None = None) -> Measured:
     mapping = mapping_beside(path)
     if mapping is not None:
         table = applied(table, mapping)
-    table, findings = checked(_of_one_robot(table, robot))
+    table = _of_one_robot(table, robot)
+    of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
+    table, findings = checked(table)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()[:20]
-    return Measured(path, tracks_of(table), tuple(findings), digest)
+    return Measured(path, tracks_of(table), tuple(findings), digest, of)
 
 
 def read_table(path: Path) -> pd.DataFrame:

@@ -137,3 +137,17 @@ def test_a_table_that_could_not_be_written_is_refused_before_the_run(tmp_path, c
     assert main(["run", "--robot", "snake", "--measurements", "m.csv", "--results", str(tmp_path / "r")]) == 2
     assert "snake has no wheels" in capsys.readouterr().err
     assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t.groupby("trial").head(1), "No trial has two tracked poses"),
+        (lambda t: t.assign(x_m=0.1, y_m=0.1, heading_rad=0.0), "hardly moves although it is told to"),
+        (lambda t: t.assign(robot="snake"), "are of the robot snake, the model khepera is of khepera"),
+    ],
+)
+def test_comparisons_that_make_no_sense_are_refused(tmp_path, change, message, capsys):
+    write_measurements(change(measured(NOMINAL, trials=10)), tmp_path / "m.csv")
+    assert main(["compare", str(tmp_path / "m.csv"), "--model", "khepera"]) == 2
+    assert message in capsys.readouterr().err
