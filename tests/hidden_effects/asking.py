@@ -50,17 +50,17 @@ def answers(
 
 
 def ask(world: World, options: Sequence[str] = ()) -> Record:
-    """One world: {answer, seconds, exit, error}. `answer` is None where there is no JSON object to be read."""
+    """One world: {answer, seconds_s, cpu_s, exit, error}. `answer` is None where there is no JSON object to be read."""
     with tempfile.TemporaryDirectory() as folder:
         data = write(world, Path(folder), acceptable(world))
-        began = time.perf_counter()
+        began, worked = time.perf_counter(), time.process_time()
         status, out, fault = _call(["diagnose", str(data), *world.nominal.arguments, "--json", *options])
-        seconds = time.perf_counter() - began
+        seconds, cpu = time.perf_counter() - began, time.process_time() - worked
     try:
         given = json.loads(out)
     except ValueError:
         given, fault = None, fault or f"no JSON on stdout: {out[-300:]!r}"
-    return {"answer": given, "seconds_s": seconds, "exit": status, "error": fault}
+    return {"answer": given, "seconds_s": seconds, "cpu_s": cpu, "exit": status, "error": fault}
 
 
 def _call(arguments: list[str]) -> tuple[int, str, str]:
