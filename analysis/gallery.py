@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ def write_page(out: Path, refresh_s: int | None = None) -> Path:
 
 def page(found: list[dict[str, Any]], out: Path, refresh_s: int | None = None) -> str:
     """The whole page as HTML, with its one style sheet inside: it works from the file system and can be mailed."""
-    drawn = sorted((one for one in found if "skipped" not in one), key=_place)
+    drawn = _told_apart(sorted((one for one in found if "skipped" not in one), key=_place))
     skipped = [one for one in found if "skipped" in one]
     reload = f'<meta http-equiv="refresh" content="{refresh_s}">' if refresh_s else ""
     sections = "\n".join(_section(one, out) for one in drawn)
@@ -59,6 +60,15 @@ def _place(caption: dict[str, Any]) -> tuple[Any, ...]:
     return (not caption["name"].startswith(FIRST), place(caption["paper"]), caption["name"])
 
 
+def _told_apart(drawn: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The captions with different titles: figures of several robots are told apart by the ends of their names."""
+    several = Counter(one["title"] for one in drawn)
+    return [
+        one | {"title": f"{one['title']}, {one['name'].rpartition('-')[2]}"} if several[one["title"]] > 1 else one
+        for one in drawn
+    ]
+
+
 def _summary(drawn: list[dict[str, Any]], refresh_s: int | None) -> str:
     sweeps = sorted({sweep for one in drawn for sweep in one["sweeps"]})
     again = f" This page reloads every {refresh_s} seconds." if refresh_s else ""
@@ -69,20 +79,16 @@ def _summary(drawn: list[dict[str, Any]], refresh_s: int | None) -> str:
 
 def _contents(drawn: list[dict[str, Any]]) -> str:
     items = "\n".join(
-        f'<li><a href="#{one["name"]}">{_text(_heading(one))}</a> <span class="paper">{_text(one["paper"])}</span></li>'
+        f'<li><a href="#{one["name"]}">{_text(one["title"])}</a> <span class="paper">{_text(one["paper"])}</span></li>'
         for one in drawn
     )
     return f"<nav><ol>\n{items}\n</ol></nav>" if drawn else ""
 
 
-def _heading(caption: dict[str, Any]) -> str:
-    return str(caption.get("title") or caption["name"])
-
-
 def _section(one: dict[str, Any], out: Path) -> str:
     parts = [
         f'<section id="{one["name"]}">',
-        f'<h2>{_text(_heading(one))} <span class="paper">{_text(one["paper"])}</span></h2>',
+        f'<h2>{_text(one["title"])} <span class="paper">{_text(one["paper"])}</span></h2>',
         f'<p class="see">{_text(one["see"])}</p>' if one["see"] else "",
         _picture(one, out),
         _table(one["table"]),
@@ -101,7 +107,7 @@ def _picture(one: dict[str, Any], out: Path) -> str:
     width_in = PAGE_IN if _is_wide(out / name) else COLUMN_IN
     # A little larger than in print: a screen is read from further away.
     width = round(1.25 * width_in * PIXELS_IN)
-    return f'<div class="picture"><img src="{name}" width="{width}" alt="{_text(_heading(one))}: {_text(one["shows"])}"></div>'
+    return f'<div class="picture"><img src="{name}" width="{width}" alt="{_text(one["title"])}: {_text(one["shows"])}"></div>'
 
 
 def _is_wide(svg: Path) -> bool:

@@ -24,7 +24,8 @@ SHOWN = 30
 
 def draw(store: Store) -> list[Drawn]:
     runs = store.query("""SELECT DISTINCT robot, task, sweep, seed, run_id, evaluations,
-        generations_per_evaluation AS generations FROM runs SEMI JOIN probes USING (run_id, sweep)
+        generations_per_evaluation AS generations
+        FROM runs SEMI JOIN probes USING (run_id, sweep) SEMI JOIN generations USING (run_id, sweep)
         WHERE status = 'ok' AND generations_per_evaluation > 0""")
     if runs.empty:
         raise NoDataError(

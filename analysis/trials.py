@@ -18,7 +18,7 @@ from bns.plotting import BLUE, GREY, RED, note, panels, style
 NAME = "trials"
 PAPER = "tables 4.2 and 5.4"
 SWEEPS = "prototype"
-"""Sweeps whose names begin so are the source's trials: its own settings, a few seeds a task."""
+"""Sweeps of this name, or whose names end in it (robot-prototype), are the source's trials: its own settings, a few seeds."""
 IN_A_ROW = 3
 """The source's trials went on until the robot was seen to do the task consistently: here, this often in succession."""
 MARKS = {
@@ -43,7 +43,7 @@ def trials(store: Store) -> pd.DataFrame:
     """
     rows = store.query(f"""
         SELECT robot, task, sweep, seed, run_id, evaluation, success, success_10cm, driven_ms
-        FROM evals SEMI JOIN (SELECT run_id, sweep FROM runs WHERE status = 'ok' AND starts_with(sweep, '{SWEEPS}')
+        FROM evals SEMI JOIN (SELECT run_id, sweep FROM runs WHERE status = 'ok' AND regexp_matches(sweep, '(^|-){SWEEPS}$')
             QUALIFY row_number() OVER (PARTITION BY robot, task, seed ORDER BY started_at DESC, sweep) = 1) USING (run_id, sweep)
         ORDER BY robot, task, seed, run_id, evaluation""")
     return pd.DataFrame([_trial(one) for _, one in rows.groupby("run_id", sort=False)])

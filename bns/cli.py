@@ -111,10 +111,13 @@ def _parser() -> argparse.ArgumentParser:
     look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
     add_commands(command)
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
+    planned = command("validate", validate, "evolve controllers on the static simulator, drive each three times in physics")
+    planned.add_argument("--robot", default="snake")
+    planned.add_argument("--task", help="(default: the last of that robot's study)")
     ready = command("precompute", precompute, "train the static simulator of a robot and write it")
     ready.add_argument("--robot", default="khepera")
     ready.add_argument("-o", "--output", type=Path, metavar="FILE", help="where (default: into the package)")
-    for with_results in (one, many, costs, status_, ask, small):
+    for with_results in (one, many, planned, costs, status_, ask, small):
         with_results.add_argument(
             "--results",
             type=Path,
@@ -169,22 +172,23 @@ def _duration(text: str) -> float:
     return 3600 * hours + 60 * minutes + seconds
 
 
-def _say_if_compiling() -> None:
+def _say_if_compiling(*specs: RunSpec) -> None:
     from bns.engine.jit import compiled
 
-    if sys.stderr.isatty() and not compiled():
+    if sys.stderr.isatty() and not all(compiled(spec.robot, spec.world) for spec in specs):
         print("bns: compiling the kernels, once on this machine (about 20 s)", file=sys.stderr)
 
 
 def run(options: argparse.Namespace) -> int:
     """One run by hand: live view, rows in the store, figure of the path."""
+    from bns.robots import load_robot
     from bns.single import run_by_hand
     from bns.tasks import default_task
 
     if options.task is None:
-        options.task = default_task(options.robot)
+        options.task = default_task(load_robot(options.robot).name)
     spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
-    _say_if_compiling()
+    _say_if_compiling(spec)
     print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn, options.render))
     return 0
 
@@ -198,7 +202,8 @@ def sweep(options: argparse.Namespace) -> int:
     from bns.sweep.progress import SweepProgress
     from bns.sweep.report import planned, summed_up
 
-    sweeps = in_turn([load_sweep(file) for file in options.files], options.results, options.confirm_top)
+    files = [load_sweep(file) for file in options.files]
+    sweeps = in_turn(files, options.results, options.confirm_top)
     way = load_executor(options.executor)
     with SweepProgress() as bar:
         request = request_of(options, bar)
@@ -208,7 +213,7 @@ def sweep(options: argparse.Namespace) -> int:
                 estimate = foretell(one, options.results, place.workers, options.shard, retry_failed=options.retry_failed)
                 print(planned(estimate, place))
             return 0
-        _say_if_compiling()
+        _say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files))
         failed = 0
         for one in sweeps:
             summary = way.carry_out(one, request)
@@ -268,6 +273,25 @@ def compact(options: argparse.Namespace) -> int:
     from bns.store import compact as merge
 
     print(merge(options.results))
+    return 0
+
+
+def validate(options: argparse.Namespace) -> int:
+    """Twelve trials of trajectory planning, and what became of each."""
+    from bns.robots import load_robot
+    from bns.single import counting
+    from bns.tasks import load_task, task_names
+    from bns.validation import describe, table_path, write_table
+    from bns.validation import validate as trials
+    from bns.worlds import build_world
+
+    robot = load_robot(options.robot)
+    name = options.task or max(task_names(robot.name), key=lambda one: load_task(robot.name, one).source)
+    task, path = load_task(robot.name, name), table_path(options.results, robot.name, name)
+    with counting(f"trials of {robot.name} on {task.title}") as progress:
+        table = trials(robot, task, build_world("physics", robot), progress)
+    write_table(table, path)
+    print(f"{describe(table)}\nwritten to {path}")
     return 0
 
 

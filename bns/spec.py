@@ -27,8 +27,11 @@ def _field(
     low: float | None = None,
     high: float | None = None,
     choices: tuple[str, ...] | None = None,
+    or_file: tuple[str, ...] = (),
 ) -> Any:
-    return dataclasses.field(default=default, metadata={"help": text, "low": low, "high": high, "choices": choices})
+    """``or_file``: endings of file names that may stand instead of one of the choices."""
+    bounds = {"low": low, "high": high, "choices": choices, "or_file": or_file}
+    return dataclasses.field(default=default, metadata={"help": text, **bounds})
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,12 @@ class RunSpec:
 
     robot: str = _field("khepera", "robot")
     task: str = _field("circle", "goal task of that robot")
-    world: str = _field("substitute", "what answers a controller", choices=("substitute", "physics"))
+    world: str = _field(
+        "substitute",
+        "what answers a controller, or a model file (.yaml) that physics drives",
+        choices=("substitute", "physics"),
+        or_file=(".yaml", ".yml"),
+    )
     seed: int = _field(0, "seed of this run", low=0, high=2**32 - 1)
     root_seed: int = _field(0, "seed of the whole study", low=0, high=2**32 - 1)
     population_size: int = _field(400, "controllers in the population", low=1, high=1_000_000)
@@ -106,7 +114,7 @@ def checked(name: str, value: Any) -> Any:
     if not fits:
         raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.")
     if wanted is str:
-        if meta["choices"] and value not in meta["choices"]:
+        if meta["choices"] and value not in meta["choices"] and not value.endswith(meta["or_file"] or ("\0",)):
             raise SpecError(unknown_name(name, value, meta["choices"]))
         return value
     low, high = meta["low"], meta["high"]

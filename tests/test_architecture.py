@@ -17,7 +17,7 @@ FLOORS = (
     {"robots"},
     {"physics"},
     {"worlds"},
-    {"evolver", "trainer", "recorder", "loop", "precompute", "refinement"},
+    {"evolver", "trainer", "recorder", "loop", "precompute", "refinement", "validation"},
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "single", "watch"},

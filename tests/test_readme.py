@@ -56,6 +56,6 @@ def test_make_targets_and_files_named_there_exist():
 def test_shipped_sweeps_can_be_read_and_are_named_after_their_file(file):
     sweep = load_sweep(file)
     assert sweep.name == file.stem
-    assert sweep.total == {"khepera": 45_000, "khepera-small": 480, "prototype": 9, "budget": 720}[file.stem]
+    assert sweep.total == {"khepera": 45_000, "khepera-small": 480, "prototype": 9, "budget": 240}[file.stem]
     if sweep.total < 1000:
         assert len({spec.run_id for spec in ordered_specs(sweep)}) == sweep.total

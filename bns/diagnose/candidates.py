@@ -12,7 +12,7 @@ from bns.physics.effect import Effect, Parameter
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
 
-_SHARES = (0.01, 0.1)
+_SHARES = (0.01, 0.05, 0.2)
 """Starts of an ordinary number: these shares of the way from neutral to either end of what is plausible."""
 NOTHING = 5e-3
 """A gain of fewer trials' losses than this, over all trials, is not worth a fit: what counts is a hundred times that."""

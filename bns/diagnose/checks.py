@@ -20,6 +20,8 @@ _JUMP_RAD = 0.35
 _JUMP_ROUNDS = 6
 _NEAR_S = 0.4
 _LONG_STEP_S = 30.0
+_DEGREES_AT_LEAST = 150.0
+"""Radians a metre: a wheelbase of under a centimetre, or degrees."""
 
 
 @dataclass(frozen=True)
@@ -174,18 +176,25 @@ def _units(table: pd.DataFrame) -> None:
             raise DataError(
                 f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {unit}; they must be metres."
             )
-    if len(ways) and np.abs(ways[:, 2]).sum() > 1:
-        turn = _ratio(np.abs(ways[:, 2]), np.abs(ways[:, 3]))
-        same = float(
-            (ways[:, 2] * ways[:, 3]).sum() / np.sqrt((ways[:, 2] ** 2).sum() * (ways[:, 3] ** 2).sum() + 1e-300)
-        )
-        if turn * 0.1 > 12:  # wheel differences are turned into angles with a base of 0.1 m: only the size matters
-            raise DataError("Headings turn some sixty times as far as the wheels can: heading_rad looks like degrees.")
+    if _turns_as_degrees(table):
+        raise DataError("Headings turn far more than the wheels can make them: heading_rad looks like degrees.")
+    if len(ways) and np.abs(ways[:, 2]).sum() > 0.3:
+        same = float(ways[:, 2] @ ways[:, 3] / np.sqrt((ways[:, 2] @ ways[:, 2]) * (ways[:, 3] @ ways[:, 3]) + 1e-300))
         if same < -0.5:
             raise DataError(
                 "The robot turns against the wheels: heading_rad must run counter-clockwise, "
                 "or left_m_s and right_m_s are exchanged."
             )
+
+
+def _turns_as_degrees(table: pd.DataFrame) -> bool:
+    """Typical change of heading from row to row over that of the wheels' way: one over the wheelbase, in radians."""
+    span = table["t_s"].diff().where(table["trial"].eq(table["trial"].shift()))
+    commanded = ((table[COMMANDS[1]] - table[COMMANDS[0]]).shift() * span).abs()
+    seen = table["heading_rad"].diff().abs().where(commanded > 0)
+    wide = commanded > commanded[commanded > 0].quantile(0.5)
+    ratio = float((seen[wide] / commanded[wide]).median())
+    return ratio > _DEGREES_AT_LEAST
 
 
 def _ratio(commanded: np.ndarray, seen: np.ndarray) -> float:

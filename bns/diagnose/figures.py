@@ -40,8 +40,8 @@ def comparison_figure(c: Comparison, path: Path) -> Path:
         if curve.variable in variables:
             _draw_curve(axes[variables.index(curve.variable)][ways.index(curve.direction)], curve)
     for column, way in enumerate(ways):
-        axes[0][column].set_title(f"measured − predicted, {way}")
-    figure.suptitle(f"Where {c.model} fails, 1 s ahead ({c.trials} trials; bands: 95 %, bootstrap over trials)")
+        axes[0][column].set_title(way)
+    figure.suptitle(f"Measured − predicted by {c.model}, 1 s ahead ({c.trials} trials; bands: 95 %, bootstrap over trials)")
     return save(figure, path)[0]
 
 
@@ -68,6 +68,7 @@ def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12) -> Path:
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     axes.set_yticks(range(len(shown)), [c.name for c in shown])
     axes.set_xscale("symlog", linthresh=1.0)
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("gain in log-likelihood a trial, on trials held out")
     axes.set_title(f"verdict: {d.verdict}" + (f" ({', '.join(d.effects)})" if d.effects else ""))
     axes.legend(loc="lower right")
@@ -86,6 +87,8 @@ def ladder_figure(m: Mended, path: Path) -> Path:
         axes.plot([0, len(values) - 1], [1e3 * m.floor[horizon]] * 2, color=colour, linestyle=":", linewidth=1)
     axes.set_xticks(range(len(names)), names)
     axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("{x:g}")
     axes.set_ylabel("position error on trials held out (mm)")
     axes.legend(title="horizon (dotted: noise floor)", loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.set_title("Error ladder")

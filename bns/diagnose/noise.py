@@ -71,6 +71,6 @@ def estimate_noise(predictor: Predictor, steps: Steps, start: Array | None = Non
         return (total if np.isfinite(total) else 1e300) + 1e3 * float(((logs - inside) ** 2).sum())
 
     first = np.log(_GUESS if start is None else start)
-    simplex = np.vstack([first, first + (0.7 if start is None else 0.3) * np.eye(len(first))])
-    options = {"initial_simplex": simplex, "xatol": 0.05, "fatol": 0.5, "maxfev": 300 if start is None else 120}
+    simplex = np.vstack([first, first + 0.7 * np.eye(len(first))])
+    options = {"initial_simplex": simplex, "xatol": 0.05, "fatol": 0.5, "maxfev": 300}
     return np.exp(np.clip(minimize(surprise, first, method="Nelder-Mead", options=options).x, low, high))

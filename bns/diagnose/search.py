@@ -37,7 +37,7 @@ TIE_Z = 2.0
 """Two explanations whose held-out losses differ by fewer standard errors than this cannot be told apart."""
 TIE_SHARE = 0.005
 """... nor those whose difference is a smaller share than this of what either earns."""
-SCREEN = 0.3
+SCREEN = 0.15
 """An effect is tried in another one's place if its best start alone does this share of the other's work."""
 MOST = 6
 """Effects that a search accepts at most."""

@@ -56,20 +56,20 @@ def _configure() -> None:
 _configure()
 
 
-def _mark() -> Path:
+def _mark(robot: str, world: str) -> Path:
     # One for each text of the kernels, numba and kind of processor: what another has compiled is of no use.
-    return Path(_config.CACHE_DIR) / f"{cache_folder().name}-{numba.__version__}-{llvm.get_host_cpu_name()}"
+    return Path(_config.CACHE_DIR) / f"{cache_folder().name}-{robot}-{world}-{numba.__version__}-{llvm.get_host_cpu_name()}"
 
 
-def compiled() -> bool:
-    """Whether all kernels, as they now stand, were compiled on this machine and lie on its disk."""
-    return _mark().exists()
+def compiled(robot: str, world: str) -> bool:
+    """Whether the kernels of this robot in this world, as they now stand, were compiled on this machine and lie on its disk."""
+    return _mark(robot, world).exists()
 
 
-def note_compiled() -> None:
-    """To be called when every kernel has been used once."""
+def note_compiled(robot: str, world: str) -> None:
+    """To be called when every kernel that this robot needs in this world has been used once."""
     with suppress(OSError):  # where nothing can be kept, the next process compiles again
-        _mark().touch()
+        _mark(robot, world).touch()
 
 
 def fast(function: Callable[..., Any]) -> Any:

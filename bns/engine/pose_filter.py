@@ -124,7 +124,7 @@ def filter_gains(
         gain[k, 2, 1] = p02 * i01 + p12 * i11 + p22 * i12
         gain[k, 2, 2] = p02 * i02 + p12 * i12 + p22 * i22
         p00, p01, p02 = r - r * r * i00, -r * r * i01, -r * rh * i02
-        p11, p12, p22 = r - r * r * i11, -r * r * i12, rh - rh * rh * i22
+        p11, p12, p22 = r - r * r * i11, -r * rh * i12, rh - rh * rh * i22
     return gain, whiten, logdet
 
 

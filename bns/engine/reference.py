@@ -212,3 +212,38 @@ def diversity(population: Population, bounds: CommandBounds) -> float:
     controllers = [population.controller(i).astype(np.float64) / spread for i in range(len(population))]
     mean = [np.mean([one[j] for one in controllers if len(one) > j], axis=0) for j in range(max(map(len, controllers)))]
     return float(np.mean([sum(np.abs(c - m).sum() for c, m in zip(one, mean, strict=False)) for one in controllers]))
+
+
+def innovations(
+    body: np.ndarray, drift_m: np.ndarray, pose: np.ndarray, is_first: np.ndarray, way_m: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Twin of `pose_filter`: the extended Kalman filter with matrices in the world's frame, gains from its own state.
+
+    Whitened by the symmetric root: each frame's squared length is that of any other root.
+    """
+    white, logdet = np.zeros((len(pose), 3)), np.zeros(len(pose))
+    seen = np.diag([noise[0] ** 2, noise[0] ** 2, noise[1] ** 2])
+    state, spread = np.zeros(3), np.zeros((3, 3))
+    for k in range(len(pose)):
+        if is_first[k]:
+            state, spread = pose[k].copy(), seen.copy()
+            continue
+        cos, sin = np.cos(state[2]), np.sin(state[2])
+        moved = np.array([cos * body[k, 0] - sin * body[k, 1], sin * body[k, 0] + cos * body[k, 1]])
+        change = np.eye(3)
+        change[:2, 2] = -moved[1], moved[0]
+        state = state + np.append(moved + drift_m[k], body[k, 2])
+        cos, sin = np.cos(state[2]), np.sin(state[2])
+        turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+        drive = turn @ np.diag(noise[2:] ** 2 * way_m[k]) @ turn.T
+        spread = change @ spread @ change.T + drive
+        total = spread + seen
+        off = pose[k] - state
+        off[2] = np.angle(np.exp(1j * off[2]))
+        values, vectors = np.linalg.eigh(total)
+        white[k] = vectors @ ((vectors.T @ off) / np.sqrt(values))
+        logdet[k] = np.log(values).sum() / 2
+        gain = spread @ np.linalg.inv(total)
+        state = state + gain @ off
+        spread = (np.eye(3) - gain) @ spread
+    return white, logdet

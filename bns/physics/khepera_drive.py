@@ -27,8 +27,8 @@ class KheperaPhysics:
         return observe(driven, draws[1:, :, :3], self._model)[0]
 
 
-def build(robot: Robot) -> KheperaPhysics:
-    """The model of the robot's world, as shipped."""
+def build(robot: Robot, model: str | None = None) -> KheperaPhysics:
+    """The model of the robot's world, as shipped, or the one of a file."""
     if not isinstance(robot, Khepera):
         raise TypeError(f"no physics world for {robot.name}")
-    return KheperaPhysics(robot, load_model(f"{robot.name}-world"))
+    return KheperaPhysics(robot, load_model(model or f"{robot.name}-world"))

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bns.engine.philox import Key, Purpose, normals
+from bns.errors import ModelError
 from bns.physics.snake.body import Body, Driven, OnStep
-from bns.physics.snake.parameters import SnakeParameters, shipped_parameters
+from bns.physics.snake.parameters import SnakeParameters, read_parameters, shipped_parameters
 from bns.physics.snake.stability import BLEW_UP, TIPPED
 from bns.robots.base import Robot
 
@@ -80,6 +81,12 @@ class SnakePhysics:
         return np.concatenate([before, after, [float(not driven.causes)]])
 
 
-def build(robot: Robot) -> SnakePhysics:
-    """The model as shipped."""
-    return SnakePhysics(shipped_parameters())
+def build(robot: Robot, model: str | None = None) -> SnakePhysics:
+    """The model as shipped, or with the parameters of a file; ModelError if that cannot be read."""
+    if model is None:
+        return SnakePhysics(shipped_parameters())
+    try:
+        text = Path(model).read_text(encoding="utf-8")
+    except OSError as error:
+        raise ModelError(f"cannot read {model}: {error.strerror}; give a file like bns/physics/snake/parameters.yaml.") from error
+    return SnakePhysics(read_parameters(text))

@@ -17,7 +17,7 @@ from bns.sweep.executor import ATTEMPTS
 PATIENCE_S = 600.0
 """How long a sweep waits for a scheduler that went away, or for the first worker."""
 
-_TRY_S = 5.0
+_FIRST_S, _TRY_S = 30.0, 5.0
 _CLOSE_S = 10.0
 _LOOK_S = 2.0
 
@@ -42,7 +42,7 @@ class DaskLink:
             self._cluster = _own_cluster(self._workers)
             self.address = self._cluster.scheduler_address
         try:
-            self._connect()
+            self._connect(min(_FIRST_S, self._patience_s))
         except (OSError, ValueError) as error:
             raise ClusterError(
                 f"no Dask scheduler answers at {self.address}: {error}. Start one with 'dask scheduler' and give the "
@@ -112,19 +112,20 @@ class DaskLink:
             self._cluster.close(timeout=_CLOSE_S)
         self._client = self._cluster = None
 
-    def _connect(self) -> None:
-        self._client = Client(self.address, timeout=_TRY_S, set_as_default=False)
-        self._client.subscribe_topic("all", self._note_deaths)
+    def _connect(self, timeout_s: float) -> None:
+        self._client = Client(self.address, timeout=timeout_s, set_as_default=False)
+        self._client.subscribe_topic("all", self._note)
 
     def _try_again(self) -> None:
         try:
-            self._connect()
+            self._connect(_TRY_S)
         except OSError:
             time.sleep(1.0)
 
-    def _note_deaths(self, event: tuple[float, Mapping[str, Any]]) -> None:
-        if event[1].get("action") == "remove-worker":
+    def _note(self, event: tuple[float, Mapping[str, Any]]) -> None:
+        if event[1].get("action") in {"add-worker", "remove-worker"}:
             self.deaths.update(event[1].get("processing-tasks", ()))
+            self._looked_at = float("-inf")
 
 
 def _own_cluster(workers: int) -> LocalCluster:

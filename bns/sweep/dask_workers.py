@@ -108,7 +108,8 @@ class DaskExecutor:
         self._cancelled = True  # no more: a signal handler must not touch locks that this thread may hold
 
     def _begin(self, flight: _Flight) -> None:
-        key = f"{flight.spec.run_id}-{uuid.uuid4().hex}"
+        # One prefix for all: from it the scheduler knows how long a run takes, and gives queued ones to idle workers.
+        key = f"bns_run-{uuid.uuid4().hex}"
         flight.keys.append(key)
         run_id = flight.spec.run_id
         flight.future = self._link.submit(carry_out, self._job, flight.spec, run_id, key=key)

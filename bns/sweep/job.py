@@ -28,7 +28,7 @@ def run_job(spec: RunSpec) -> RunRecord:
         # Imported here: the parent of a sweep has no need of the kernels and their libraries.
         from bns.loop import run  # noqa: PLC0415
 
-        warm()
+        warm(spec.robot, spec.world)
         meter = _Meter()
         result = run(spec)
         tables, row = result.tables, {"status": "ok", "error": None, "world_digest": result.world_digest}
@@ -38,13 +38,24 @@ def run_job(spec: RunSpec) -> RunRecord:
 
 
 @cache
-def warm() -> None:
-    """Compile the kernels or load them from disk, once a process, so that no run is charged with it."""
+def warm(robot: str = "khepera", world: str = "substitute") -> None:
+    """Compile the robot's kernels or load them from disk, once a process, so that no run is charged with it."""
     from bns.engine.jit import note_compiled  # noqa: PLC0415
     from bns.loop import run  # noqa: PLC0415
+    from bns.tasks import default_task  # noqa: PLC0415
 
-    run(RunSpec(population_size=4, evaluations=2, generations_per_evaluation=1, training_iterations_per_evaluation=1))
-    note_compiled()
+    run(
+        RunSpec(
+            robot=robot,
+            task=default_task(robot),
+            world=world,
+            population_size=4,
+            evaluations=2,
+            generations_per_evaluation=1,
+            training_iterations_per_evaluation=1,
+        )
+    )
+    note_compiled(robot, world)
 
 
 def prepare(specs: Iterable[RunSpec]) -> None:
@@ -60,8 +71,8 @@ def prepare(specs: Iterable[RunSpec]) -> None:
 
     for world, robot in sorted({(spec.world, spec.robot) for spec in specs}):
         build_world(world, load_robot(robot))
-    if not compiled():
-        warm()
+        if not compiled(robot, world):
+            warm(robot, world)
 
 
 class _Meter:

@@ -14,7 +14,7 @@ from bns.store.compaction import bytes_per_run
 from bns.store.reader import finished, load
 from bns.sweep.executor import Job
 from bns.sweep.grid import Sweep
-from bns.sweep.job import run_job, warm
+from bns.sweep.job import run_job
 from bns.sweep.order import ordered_specs
 from bns.sweep.pace import Pace
 from bns.sweep.shard import Shard
@@ -58,7 +58,7 @@ def plan(
     *,
     retry_failed: bool = False,
     job: Job = run_job,
-    warm_up: Callable[[], object] = warm,
+    warm_up: Callable[[], object] | None = None,
 ) -> Plan:
     """Count and estimate, the whole or one ``shard``. Without stored runs of this sweep, one short run is carried out and timed.
 
@@ -105,10 +105,11 @@ def _from_store(results: Path, sweep: str, todo: list[RunSpec]) -> tuple[float, 
     return math.fsum(work(spec) * pace.get(spec.population_size, overall) for spec in todo), basis
 
 
-def _from_trial(todo: list[RunSpec], job: Job, warm_up: Callable[[], object]) -> tuple[float, str]:
+def _from_trial(todo: list[RunSpec], job: Job, warm_up: Callable[[], object] | None) -> tuple[float, str]:
     middle = sorted(todo, key=work)[len(todo) // 2]
     trial = replace(middle, evaluations=min(middle.evaluations, _TRIAL_EVALUATIONS))
-    warm_up()
+    if warm_up is not None:
+        warm_up()
     record = job(trial)
     if record.run["status"] != "ok":
         return math.nan, f"none: a trial run of {trial.canonical_json()} failed with {record.run['error']}"

@@ -134,5 +134,7 @@ def test_a_compaction_under_way_does_not_disturb_a_figure(tmp_path):
                 writer.append(record(RunSpec(seed=half, evaluations=3, mutation_rate=rate)))
     store = Store(tmp_path)
     before = store.query("SELECT count(*) AS n FROM evals").n[0]
+    store.keep("kept", "SELECT run_id, evaluation FROM evals WHERE evaluation > 1")
     assert compact(tmp_path).files_after < 4
     assert store.query("SELECT count(*) AS n FROM evals").n[0] == before == 12
+    assert store.query("SELECT count(*) AS n FROM kept").n[0] == 8

@@ -83,3 +83,12 @@ def test_what_was_not_drawn_stands_with_its_reason_and_strange_letters_do_no_har
     text = page([{"name": "a<b", "paper": "figure 9.9", "skipped": "1 < 2 & 'so'"}], tmp_path)
     assert "a&lt;b" in text
     assert "1 &lt; 2 &amp; &#x27;so&#x27;" in text
+
+
+def test_figures_of_two_robots_are_told_apart(tmp_path):
+    one = {
+        "name": "success-first", "title": "Success", "paper": "figure 4.7", "shows": "", "see": "", "n": 1, "missing": [],
+        "sweeps": ["a"], "files": [], "table": None, "spec_hashes": [], "bns_versions": ["1"], "git": [],
+    }  # fmt: skip
+    text = page([one, one | {"name": "success-second"}, one | {"name": "other", "title": "Other"}], tmp_path)
+    assert re.findall(r"<h2>(.*?) <span", text) == ["Other", "Success, first", "Success, second"]

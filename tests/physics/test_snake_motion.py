@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from bns.physics.snake.body import Body
 from bns.physics.snake.gait import cycle_angles
 from bns.physics.snake.parameters import read_parameters, shipped_parameters
 from bns.physics.snake.stability import BLEW_UP, COLLISION, STALLED, TIPPED, mean_roll_rad
-from bns.physics.snake_drive import SnakePhysics
+from bns.physics.snake_drive import SnakePhysics, build
+from bns.robots import load_robot
 
 KEY = Key(1, 2)
 SIDEWINDING = [0.6, 0.3, math.pi / 3, 1.5 * math.pi]
@@ -148,6 +150,17 @@ def test_same_draws_same_drive_and_friction_differs_from_cycle_to_cycle():
     other = world.drive(commands, KEY, Purpose.WORLD_EVALUATED, 2)
     assert 1e-4 < np.abs(other - first)[:, 4:8].max() < 0.05
     np.testing.assert_allclose(first[0, :4], [-0.025, 0.0, 0.625, 0.0], atol=0.1)
+
+
+def test_a_file_of_parameters_makes_another_world(tmp_path):
+    robot, text = load_robot("snake"), (resources.files("bns.physics.snake") / "parameters.yaml").read_text()
+    (tmp_path / "ice.yaml").write_text(text.replace("{value: 0.35,", "{value: 0.05,"))
+    (tmp_path / "half.yaml").write_text(text[: len(text) // 2].rsplit("\n", 1)[0])
+    assert build(robot, str(tmp_path / "ice.yaml")).digest != build(robot).digest
+    with pytest.raises(ModelError, match="lack .*floor_friction"):
+        build(robot, str(tmp_path / "half.yaml"))
+    with pytest.raises(ModelError, match=r"cannot read .*none\.yaml: No such file"):
+        build(robot, str(tmp_path / "none.yaml"))
 
 
 def test_parameters_say_what_is_wrong_with_them():

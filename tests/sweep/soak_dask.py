@@ -109,12 +109,14 @@ def stretch(
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--minutes", type=float, default=10.0, help="with kills; half as long before and after")
+    parser.add_argument("--minutes", type=float, default=10.0, help="with kills")
+    parser.add_argument("--undisturbed", type=float, metavar="MINUTES", help="before, and again after")
     parser.add_argument("--every", type=float, default=60.0, help="seconds between kills")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, Cluster(2) as cluster:
         sweep = parse_sweep(TEXT, Path("soak.yaml"))
-        verdict = soak(cluster, Path(folder), sweep, 30 * options.minutes, 60 * options.minutes, options.every)
+        undisturbed_s = 60 * (options.undisturbed or options.minutes / 2)
+        verdict = soak(cluster, Path(folder), sweep, undisturbed_s, 60 * options.minutes, options.every)
     print(json.dumps(asdict(verdict)))
     return 0 if verdict.is_clean and verdict.kills and verdict.kept_time >= WANTED else 1
 

@@ -91,14 +91,14 @@ def test_runs_in_flight_are_given_up_at_once(cluster, tmp_path):
 
 def test_no_scheduler_is_explained():
     with pytest.raises(ClusterError, match=r"no Dask scheduler answers at tcp://127.0.0.1:9"):
-        DaskExecutor("tcp://127.0.0.1:9").__enter__()
+        DaskExecutor("tcp://127.0.0.1:9", patience_s=2).__enter__()
     with pytest.raises(ClusterError, match=r"no Dask scheduler answers at nonsense"):
         DaskExecutor("nonsense:x:y").__enter__()
 
 
 def test_scheduler_without_workers_is_explained():
     with Cluster(0) as empty, pytest.raises(ClusterError, match=r"no worker has joined.*dask worker tcp://"):
-        DaskExecutor(empty.address, patience_s=3).__enter__()
+        DaskExecutor(empty.address, patience_s=10).__enter__()
 
 
 def test_killed_scheduler_is_waited_for_and_the_sweep_goes_on(tmp_path, marks):

@@ -186,11 +186,10 @@ def test_kernels_are_warmed_once_and_only_if_there_is_work(tmp_path):
 
 def test_kernels_on_the_disk_are_not_compiled_again_but_a_missing_world_is_found(monkeypatch):
     calls = []
-    monkeypatch.setattr("bns.sweep.job.warm", lambda: calls.append(1))
-    for there in (True, False):
-        monkeypatch.setattr("bns.engine.jit.compiled", lambda there=there: there)
-        prepare([RunSpec()])
-    assert calls == [1]
+    monkeypatch.setattr("bns.sweep.job.warm", lambda *what: calls.append(what))
+    monkeypatch.setattr("bns.engine.jit.compiled", lambda _robot, world: world == "substitute")
+    prepare([RunSpec(), RunSpec(world="physics"), RunSpec(seed=1, world="physics")])
+    assert calls == [("khepera", "physics")]
     monkeypatch.setattr("bns.worlds.build_world", fails)
     with pytest.raises(ModelError, match="substitute"):
         prepare([RunSpec()])

@@ -17,8 +17,8 @@ from bns.tasks import Task
 NOISE_SD_M = np.array([0.10, 0.05, 0.10, 0.05])
 """Noise in evolution on Δx and Δy of yellow, then of green (section 5.4.1)."""
 NOISY_EVALUATIONS = 10
-_REACH_M = 1.0
-"""Displacements from -0.5 to 0.5 m lie between outputs 0 and 1: the order of the largest that cycles make."""
+_REACH_M = 2.0
+"""Displacements from -1 to 1 m lie between outputs 0 and 1: the order of the largest that cycles make."""
 _JOINT_SPEED_RAD_S, _SETTLE_S = 1.5, 0.05
 
 

@@ -1,0 +1,95 @@
+"""Data that are odd are named, with trial and row; data that would mislead are refused."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.diagnose.checks import checked
+from bns.diagnose.tracks import tracks_of
+from bns.errors import DataError
+from tests.diagnose.worlds import NOMINAL, measured
+
+
+@pytest.fixture(scope="module")
+def table():
+    return measured(NOMINAL, trials=3)
+
+
+def test_good_data_pass_as_they_are(table):
+    usable, findings = checked(table)
+    assert findings == []
+    pd.testing.assert_frame_equal(usable, table.reset_index(drop=True), check_dtype=False)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: {"x_m": t.x_m * 100, "y_m": t.y_m * 100}, "look like centimetres"),
+        (lambda t: {"x_m": t.x_m * 1000, "y_m": t.y_m * 1000}, "look like millimetres"),
+        (lambda t: {"heading_rad": np.degrees(t.heading_rad)}, "looks like degrees"),
+        (lambda t: {"t_s": t.t_s * 1000}, "t_s looks like milliseconds"),
+        (lambda t: {"heading_rad": -t.heading_rad}, "counter-clockwise"),
+        (lambda t: {"left_m_s": t.left_m_s * 1000, "right_m_s": t.right_m_s * 1000}, "look like mm/s"),
+        (lambda t: {"x_m": np.nan}, "no tracked pose"),
+        (lambda t: {"y_m": "here"}, r"Row 0: y_m is 'here'; it must be a number"),
+        (lambda t: {"t_s": t.t_s.where(t.index != 7)}, r"Row 7: t_s is empty"),
+        (lambda t: {"x_m": t.x_m.where(t.index != 5, np.inf)}, r"Row 5: x_m is infinite"),
+        (lambda t: {"t_s": t.t_s[::-1].to_numpy()}, "time runs backwards"),
+    ],
+)
+def test_misleading_data_are_refused(table, change, message):
+    with pytest.raises(DataError, match=message):
+        checked(table.assign(**change(table)))
+
+
+def test_missing_columns_are_named(table):
+    with pytest.raises(DataError, match=r"lack heading_rad; they have trial, t_s.*bns import"):
+        checked(table.drop(columns="heading_rad"))
+    with pytest.raises(DataError, match="no rows"):
+        checked(table.iloc[:0])
+
+
+def test_jumps_are_found_also_in_pairs_and_at_the_ends(table):
+    broken = table.copy()
+    rows = [0, 40, 41, 90]
+    broken.loc[rows, "x_m"] += [0.3, 0.25, -0.4, 0.2]
+    usable, findings = checked(broken)
+    assert sorted(f.row for f in findings if "jumps" in f.text) == rows
+    assert usable.loc[rows, "x_m"].isna().all()
+    assert usable["x_m"].isna().sum() == len(rows)
+
+
+def test_a_pose_that_is_held_and_catches_up_is_no_jump(table):
+    held = table.copy()
+    columns = ["x_m", "y_m", "heading_rad"]
+    for _, rows in held.groupby("trial"):
+        held.loc[rows.index, columns] = rows[columns].iloc[np.arange(len(rows)) // 5 * 5].to_numpy()
+    assert not [f for f in checked(held)[1] if "jumps" in f.text]
+
+
+def test_gaps_repeats_and_losses_are_listed(table):
+    first = table[table.trial == 0]
+    odd = pd.concat([first.iloc[:20], first.iloc[19:40], first.iloc[60:], table[table.trial != 0]], ignore_index=True)
+    odd.loc[5:8, "x_m"] = np.nan
+    usable, findings = checked(odd)
+    texts = [f.text for f in findings if f.trial == "0"]
+    assert any("repeats an earlier one; row left out" in text for text in texts)
+    assert any("no row for 0.84 s" in text for text in texts)
+    assert any("4 poses lost" in text for text in texts)
+    assert len(usable) == len(odd) - 1
+
+
+def test_tracks_hold_commands_as_they_were_in_force(table):
+    tracks = tracks_of(table)
+    assert len(tracks) == 3
+    assert tracks.first[-1] == len(table)
+    first = table[table.trial == 0]
+    assert tracks.duration_s[0].sum() == pytest.approx(first.t_s.iloc[-1])
+    assert tracks.left_m_s[0, 0] == first.left_m_s.iloc[0]
+    assert tracks.start_s[1] == pytest.approx(first.t_s.iloc[-1])
+    assert not tracks.start_known
+    known = tracks_of(table.assign(session_s=table.t_s + 100 * table.trial))
+    np.testing.assert_allclose(known.start_s, [0, 100, 200])
+    some = tracks.only(np.array([2, 0]))
+    assert some.names == ("2", "0")
+    np.testing.assert_array_equal(some.pose[: some.first[1]], tracks.pose[tracks.first[2] :])

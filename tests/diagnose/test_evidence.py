@@ -1,0 +1,72 @@
+"""Chances are what they say, and fits say how well they know."""
+
+import numpy as np
+import pytest
+
+from bns.diagnose.evidence import held_out_gain, sign_flip_p
+from bns.diagnose.search import problem_for
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.wheels import WheelPredictor
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def test_sign_flips_are_exact_under_heavy_tails():
+    """Where nothing is hidden, a chance below 5 % comes in 5 % of the cases, for trials of any scatter."""
+    rng = np.random.default_rng(1)
+    scores = rng.standard_t(2, size=(400, 20, 2)) * rng.lognormal(0, 1, size=(400, 20, 1))
+    chances = np.array([sign_flip_p(s, s.T @ s) for s in scores])
+    assert 0.02 < (chances < 0.05).mean() < 0.085
+    assert 0.40 < (chances < 0.5).mean() < 0.60
+
+
+def test_trials_that_pull_together_are_no_luck():
+    scores = 1.0 + 0.1 * np.random.default_rng(2).normal(size=(20, 1))
+    assert sign_flip_p(scores, scores.T @ scores) < 1e-4
+    assert sign_flip_p(np.zeros((20, 1)), np.zeros((1, 1))) == 1.0
+
+
+def test_gain_is_paired_by_trial():
+    before = np.array([10.0, 20.0, 30.0])
+    assert held_out_gain(before, before - 1.0) == (1.0, 0.0)
+    assert held_out_gain(before, np.array([10.0, np.inf, 30.0]))[0] == -np.inf
+
+
+@pytest.mark.parametrize(
+    ("effects", "effect", "name", "true"),
+    [
+        ({"motor_lag": {"tau_s": 0.08}}, "motor-lag", "tau_s", 0.08),
+        ({"wheelbase": {"factor": 1.06}}, "wheelbase", "factor", 1.06),
+        ({"speed_limit": {"max_m_s": 0.16}}, "speed-limit", "max_m_s", 0.16),
+        ({"side_slip": {"slip_s": -0.08}}, "side-slip", "slip_s", -0.08),
+        ({"camera_rotation": {"angle_rad": 0.05}}, "camera-rotation", "angle_rad", 0.05),
+    ],
+)
+def test_planted_numbers_come_back_within_their_intervals(effects, effect, name, true):
+    from bns.diagnose.candidates import fit_with
+    from bns.physics.effects import effect_named
+
+    predictor = WheelPredictor(tracks_of(measured(hidden(**effects), trials=14, seed=3)))
+    problem = problem_for(predictor, NOMINAL)
+    fit = fit_with(problem, problem.fit(NOMINAL), effect_named(effect))
+    index = [f.parameter.name for f in fit.free].index(name)
+    low, high = fit.interval(index, 0.999)
+    assert low < true < high
+    assert high - low < 0.5 * abs(true - (1.0 if name == "factor" else 0.0)) + 0.02
+
+
+def test_what_holds_a_trial_out_is_close_to_a_fit_without_it():
+    """One Newton step from the common fit stands for a fit to all other trials."""
+    from bns.diagnose.fit import Problem
+    from bns.diagnose.noise import huber
+
+    predictor = WheelPredictor(tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=8, seed=5)))
+    model = NOMINAL.with_effect("wheelbase", factor=1.0)
+    problem = problem_for(predictor, model)
+    fit = problem.fit(model)
+    for trial in (0, 5):
+        counted = np.ones(8)
+        counted[trial] = 0.0
+        without = Problem(predictor, problem.following, counted).fit(model)
+        truly = problem.per_trial(huber(problem.white(without.model)))[trial]
+        assert fit.held_out[trial] == pytest.approx(truly, rel=2e-3)
+        assert fit.held_out[trial] >= fit.losses[trial] - 1e-6

@@ -1,0 +1,86 @@
+"""A user's own columns, units and conventions."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.cli import main
+from bns.diagnose.importing import applied, load_mapping
+from bns.diagnose.intake import load_measured
+from bns.errors import DataError
+from tests.diagnose.worlds import NOMINAL, measured
+
+MAPPING = """
+columns:
+  trial: {from: run}
+  t_s: {from: time, unit: ms}
+  left_m_s: {from: vl, unit: mm/s}
+  right_m_s: {from: vr, unit: mm/s}
+  x_m: {from: X, unit: cm}
+  y_m: {from: Y, unit: cm}
+  heading_rad: {from: compass, unit: deg, clockwise: true, zero_deg: 90}
+"""
+
+
+@pytest.fixture
+def log(tmp_path):
+    table = measured(NOMINAL, trials=2)
+    foreign = pd.DataFrame(
+        {
+            "run": table.trial,
+            "time": table.t_s * 1000,
+            "vl": table.left_m_s * 1000,
+            "vr": table.right_m_s * 1000,
+            "X": table.x_m * 100,
+            "Y": table.y_m * 100,
+            "compass": 90 - np.degrees(table.heading_rad),
+            "mood": "good",
+        }
+    )
+    foreign.to_csv(tmp_path / "log.csv", index=False)
+    (tmp_path / "map.yaml").write_text(MAPPING)
+    return tmp_path, table
+
+
+def test_a_foreign_log_becomes_the_table(log, capsys):
+    folder, table = log
+    done = main(["import", str(folder / "log.csv"), "--map", str(folder / "map.yaml"), "-o", str(folder / "m.parquet")])
+    assert done == 0
+    back = pd.read_parquet(folder / "m.parquet")
+    for name in ("t_s", "left_m_s", "x_m", "heading_rad"):
+        np.testing.assert_allclose(back[name], table[name], atol=1e-9)
+    assert (back["mood"] == "good").all()
+    assert "2 trials written" in capsys.readouterr().out
+
+
+def test_the_mapping_is_kept_beside_the_data_and_used(log):
+    folder, table = log
+    main(["import", str(folder / "log.csv"), "--map", str(folder / "map.yaml"), "-o", str(folder / "m.csv")])
+    assert (folder / "log.csv.import.yaml").is_file()
+    np.testing.assert_allclose(load_measured(folder / "log.csv").tracks.pose[:, 0], table["x_m"], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("unit: cm", "unit: rad", "x_m cannot be in rad; it may be in m, cm, mm, in"),
+        ("unit: cm", "unit: furlong", "unknown unit 'furlong'"),
+        ("from: X", "form: X", "x_m is .*; write {from: COLUMN"),
+        ("clockwise", "clokwise", "Did you mean 'clockwise'"),
+        ("from: X,", "from: x,", "asks for an unknown column 'x'"),
+        ("columns:", "cols:", "one key columns"),
+    ],
+)
+def test_mappings_that_are_wrong_say_where(log, old, new, message):
+    folder, _ = log
+    path = folder / "map.yaml"
+    path.write_text(MAPPING.replace(old, new))
+    with pytest.raises(DataError, match=message):
+        applied(pd.read_csv(folder / "log.csv"), load_mapping(path))
+
+
+def test_no_mapping_lists_the_columns(log, capsys):
+    folder, _ = log
+    assert main(["import", str(folder / "log.csv"), "-o", str(folder / "m.csv")]) == 2
+    assert "has the columns run, time, vl" in capsys.readouterr().err
+    assert not (folder / "m.csv").exists()

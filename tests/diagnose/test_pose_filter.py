@@ -1,0 +1,90 @@
+"""The compiled loops against plain matrices, and the drive they follow against the physics."""
+
+import numpy as np
+import pytest
+
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.wheels import WheelPredictor
+from bns.engine import reference
+from bns.engine.pose_filter import filter_gains, innovations
+from bns.physics.differential_drive import track
+from tests.diagnose.worlds import FRAME_S, NOMINAL, hidden, measured
+
+NOISE = np.array([2e-3, 8e-3, 4e-3, 2e-3, 2e-2])
+
+
+@pytest.fixture(scope="module")
+def followed_world():
+    predictor = WheelPredictor(tracks_of(measured(hidden(motor_lag={"tau_s": 0.05}), trials=4)))
+    return predictor, predictor.steps(NOMINAL)
+
+
+def test_innovations_equal_a_filter_written_with_matrices():
+    """The compiled one keeps its covariance in the robot's frame, the twin in the world's: alike while corrections are small."""
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=3, jitter=0.0, noise=(0.002, 1e-4))))
+    steps, tracks = predictor.steps(NOMINAL), predictor.tracks
+    noise = np.array([2e-3, 1e-4, 4e-3, 2e-3, 1e-3])
+    gain, whiten, logdet = filter_gains(steps.body, tracks.is_first, predictor.way_m, noise)
+    white = innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, gain, whiten)
+    slow, slow_logdet = reference.innovations(
+        steps.body, steps.drift_m, tracks.pose, tracks.is_first, predictor.way_m, noise
+    )
+    np.testing.assert_allclose((white**2).sum(axis=1), (slow**2).sum(axis=1), rtol=2e-3, atol=2e-3)
+    np.testing.assert_allclose(logdet, slow_logdet, atol=1e-4)
+
+
+def test_a_true_model_leaves_white_noise():
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=12, jitter=0.0, noise=(0.002, 0.008))))
+    steps = predictor.steps(NOMINAL)
+    noise = np.array([2e-3, 8e-3, 1e-5, 1e-5, 1e-4])
+    gain, whiten, _ = filter_gains(steps.body, predictor.tracks.is_first, predictor.way_m, noise)
+    tracks = predictor.tracks
+    white = innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, gain, whiten)[~tracks.is_first]
+    assert np.abs(white.mean(axis=0)).max() < 0.06
+    assert np.abs(white.std(axis=0) - 1).max() < 0.06
+    assert np.abs(np.corrcoef(white[1:, 0], white[:-1, 0])[0, 1]) < 0.06
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {},
+        {"motor_lag": {"tau_s": 0.08}, "turn_slip": {"slip_s": 0.05}},
+        {"marker_offset": {"forward_m": 0.02, "left_m": -0.01}, "camera_scale": {"factor": 1.05}},
+        {"clock_offset": {"offset_s": 0.06}, "wheelbase": {"factor": 1.05}},
+        {"floor_slope": {"x_m_s": 0.004, "y_m_s": -0.002}},
+        {"battery_sag": {"rate_per_s": 0.01, "per_volt": 0.0}, "camera_rotation": {"angle_rad": 0.1}},
+    ],
+    ids=lambda e: "+".join(e) or "none",
+)
+def test_steps_are_those_of_the_simulated_drive(effects):
+    """Without noise, a model's steps lead from each frame to the next."""
+    model = hidden(**effects)
+    table = measured(model, trials=1, noise=(0.0, 0.0), jitter=0.0)
+    predictor = WheelPredictor(tracks_of(table))
+    steps, pose = predictor.steps(model), predictor.tracks.pose
+    cos, sin = np.cos(pose[:-1, 2]), np.sin(pose[:-1, 2])
+    east = pose[:-1, 0] + cos * steps.body[1:, 0] - sin * steps.body[1:, 1] + steps.drift_m[1:, 0]
+    north = pose[:-1, 1] + sin * steps.body[1:, 0] + cos * steps.body[1:, 1] + steps.drift_m[1:, 1]
+    np.testing.assert_allclose(np.stack([east, north], 1), pose[1:, :2], atol=6e-5)
+    np.testing.assert_allclose(pose[:-1, 2] + steps.body[1:, 2], pose[1:, 2], atol=1e-4)
+
+
+def test_a_marker_mistaken_at_the_start_does_not_lose_the_trial(followed_world):
+    predictor, steps = followed_world
+    tracks = predictor.tracks
+    gain, whiten, _ = filter_gains(steps.body, tracks.is_first, predictor.way_m, NOISE)
+    pose = tracks.pose.copy()
+    pose[0, :2] += 0.3
+    white = innovations(steps.body, steps.drift_m, pose, tracks.is_first, gain, whiten)
+    assert np.linalg.norm(white[1:4], axis=1).min() > 20
+    assert np.linalg.norm(white[8 : tracks.first[1]], axis=1).max() < 20
+
+
+def test_the_clock_shifts_a_track_along_itself():
+    late = track(
+        hidden(clock_offset={"offset_s": 2 * FRAME_S}), [[0.1]], [[0.12]], [[2.0]], dense_dt_s=FRAME_S
+    ).poses[0]
+    true = track(NOMINAL, [[0.1]], [[0.12]], [[2.0]], dense_dt_s=FRAME_S).poses[0]
+    np.testing.assert_allclose(late[2:], true[:-2], atol=1e-9)
+    np.testing.assert_allclose(late[:2], true[:1].repeat(2, 0), atol=1e-12)

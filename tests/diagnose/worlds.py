@@ -1,0 +1,55 @@
+"""Small worlds for the tests of the diagnosis: few trials, honest noise, one thing hidden or none."""
+
+import numpy as np
+import pandas as pd
+
+from bns.physics.differential_drive import observe, track
+from bns.physics.model import Model
+
+BASE_M = 0.0884
+NOMINAL = Model(wheelbase_m=BASE_M, name="khepera")
+FRAME_S = 0.04
+
+
+def hidden(**effects):
+    """The nominal robot with effects: ``hidden(motor_lag={"tau_s": 0.1})``."""
+    model = NOMINAL
+    for name, values in effects.items():
+        model = model.with_effect(name.replace("_", "-"), **values)
+    return model
+
+
+def measured(model, trials=16, seed=0, noise=(0.0015, 0.005), jitter=0.004, ends_only=False, commands=5):
+    """A table of measurements of a model's robot: random commands, motors that vary a little, a camera at 25 Hz."""
+    rng = np.random.default_rng(seed)
+    return pd.concat(
+        [_trial(model, i, rng, noise, jitter, ends_only, commands) for i in range(trials)], ignore_index=True
+    )
+
+
+def _trial(model, number, rng, noise, jitter, ends_only, commands):
+    left, right = rng.uniform(0.02, 0.2, (2, commands))
+    duration = np.round(rng.uniform(0.4, 2.0, commands) / FRAME_S) * FRAME_S
+    scatter = 1 + jitter * rng.normal(size=(2, commands))
+    start = [*rng.uniform(-0.4, 0.4, 2), rng.uniform(-3, 3)]
+    seen = track(model, [left * scatter[0]], [right * scatter[1]], [duration], dense_dt_s=FRAME_S, start=start)
+    poses = observe(seen.poses[0], None, model)
+    poses = poses + rng.normal(size=poses.shape) * [noise[0], noise[0], noise[1]]
+    t = seen.t_s[0]
+    force = np.searchsorted(np.cumsum(duration), t + 1e-9, side="right")
+    told = [np.where(force < commands, u[np.minimum(force, commands - 1)], np.nan) for u in (left, right)]
+    table = pd.DataFrame(
+        {
+            "trial": number,
+            "t_s": t,
+            "left_m_s": told[0],
+            "right_m_s": told[1],
+            "x_m": poses[:, 0],
+            "y_m": poses[:, 1],
+            "heading_rad": poses[:, 2],
+        }
+    )
+    if ends_only:
+        changes = np.concatenate([[True], np.diff(force) != 0])
+        table = table[changes]
+    return table
