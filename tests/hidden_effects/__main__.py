@@ -64,7 +64,8 @@ def result_of(world: World, record: Record) -> Result:
         return Result(world, WRONG, "no answer", record["seconds_s"])
     answer = read(record["answer"])
     outcome, covered = judge(world, answer), tuple(coverage(world, answer))
-    return Result(world, outcome, said(world, answer), record["seconds_s"], covered, ratios(world, answer))
+    told = said(world, answer)
+    return Result(world, outcome, told, record["seconds_s"], covered, ratios(world, answer), record.get("cpu_s", 0.0))
 
 
 def _report(results: Sequence[Result], folder: Path) -> None:
@@ -77,6 +78,7 @@ def _report(results: Sequence[Result], folder: Path) -> None:
             "outcome": one.outcome,
             "said": one.said,
             "seconds_s": one.seconds_s,
+            "cpu_s": one.cpu_s,
             "ratios": one.ratios,
             "covered": [vars(interval) | {"inside": interval.inside} for interval in one.covered],
         }

@@ -1,4 +1,4 @@
-"""Ask the product through its command line, in workers of their own; what was answered once is not asked again."""
+"""Ask the product through its command line, in workers of their own; what this code has answered is not asked again."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ import time
 import traceback
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+import bns
 from tests.hidden_effects.acceptable import acceptable
 from tests.hidden_effects.world import World, write
 
 Record = dict[str, Any]
+ASKED = ("diagnose", "physics", "engine")
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 """Set before workers are started: worlds are asked side by side, one core each."""
 
@@ -47,17 +50,17 @@ def answers(
 
 
 def ask(world: World, options: Sequence[str] = ()) -> Record:
-    """One world: {answer, seconds, exit, error}. `answer` is None where there is no JSON object to be read."""
+    """One world: {answer, seconds_s, cpu_s, exit, error}. `answer` is None where there is no JSON object to be read."""
     with tempfile.TemporaryDirectory() as folder:
         data = write(world, Path(folder), acceptable(world))
-        began = time.perf_counter()
+        began, worked = time.perf_counter(), time.process_time()
         status, out, fault = _call(["diagnose", str(data), *world.nominal.arguments, "--json", *options])
-        seconds = time.perf_counter() - began
+        seconds, cpu = time.perf_counter() - began, time.process_time() - worked
     try:
         given = json.loads(out)
     except ValueError:
         given, fault = None, fault or f"no JSON on stdout: {out[-300:]!r}"
-    return {"answer": given, "seconds_s": seconds, "exit": status, "error": fault}
+    return {"answer": given, "seconds_s": seconds, "cpu_s": cpu, "exit": status, "error": fault}
 
 
 def _call(arguments: list[str]) -> tuple[int, str, str]:
@@ -76,7 +79,16 @@ def _call(arguments: list[str]) -> tuple[int, str, str]:
 
 
 def _digest(world: World) -> str:
-    return hashlib.sha256(json.dumps(world.truth(), sort_keys=True, default=str).encode()).hexdigest()[:16]
+    """Of the world, and of the code that is asked about it: an answer of other code is no answer."""
+    truth = json.dumps(world.truth(), sort_keys=True, default=str)
+    return hashlib.sha256((truth + code_asked()).encode()).hexdigest()[:16]
+
+
+@cache
+def code_asked() -> str:
+    """Digest of the files that an answer depends on."""
+    files = [path for room in ASKED for path in sorted((Path(bns.__file__).parent / room).rglob("*.py"))]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
 
 def _path(world: World, folder: Path) -> Path:

@@ -66,5 +66,5 @@ def _drawn(counts: np.ndarray, right: np.ndarray, rows: list[str], columns: list
         weight = "bold" if right[row, column] else "normal"
         axes.text(column, row, counts[row, column], ha="center", va="center", color=colour, weight=weight)
     axes.set_xlabel(LABEL)
-    axes.set_ylabel("what was hidden (worlds)")
+    axes.set_ylabel("hidden (worlds)")
     return figure

@@ -1,5 +1,6 @@
 """Asking: what was answered is kept, a world that changed is asked again, and a failure is an answer."""
 
+import hashlib
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +36,17 @@ def test_an_answer_is_kept_for_the_very_same_world(tmp_path):
     assert asking._kept(replace(WORLD, jitter=0.001), tmp_path) is None
     assert asking._kept(replace(WORLD, seed=1), tmp_path) is None
     assert [world for world, _ in asking.answers([WORLD], tmp_path, 1, False)] == [WORLD]
+
+
+def test_an_answer_of_other_code_is_asked_again(tmp_path, monkeypatch):
+    asking._keep(WORLD, tmp_path, {"answer": {"verdict": "none"}, "seconds_s": 1.0})
+    monkeypatch.setattr(asking, "code_asked", lambda: "another")
+    assert asking._kept(WORLD, tmp_path) is None
+
+
+def test_the_code_that_is_asked_is_there():
+    nothing = hashlib.sha256(b"").hexdigest()
+    assert asking.code_asked() != nothing
 
 
 def test_a_command_that_does_not_exist_is_told_not_raised():
