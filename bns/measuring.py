@@ -46,6 +46,9 @@ def add_commands(command: Adder) -> None:
     )
     more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the mended model")
     more.add_argument("--data", type=Path, required=True, metavar="FILE", help="measurements (.csv or .parquet)")
+    found.add_argument(
+        "--also", action="append", default=[], metavar="FILE.py", help="an effect of your own to try beside the listed ones"
+    )
     for one in (held, found):
         one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
         one.add_argument("--json", action="store_true", help="one JSON object on stdout")
@@ -114,10 +117,12 @@ def diagnose(options: argparse.Namespace) -> int:
     from bns.diagnose.diagnosis import diagnose as find
     from bns.diagnose.figures import diagnosis_figure
     from bns.diagnose.words import diagnosis_text
+    from bns.physics.effects import effect_in_file
 
+    own = {effect.name: effect for effect in map(effect_in_file, map(Path, options.also))}
     _, predictor, model = _ready(options)
     with _ticking("diagnosing") as tick:
-        result = find(predictor, model, tick=tick)
+        result = find(predictor, model, extra=own, tick=tick)
     print(json.dumps(result.as_json()) if options.json else diagnosis_text(result))
     if result.found is not None:
         _drawn(options, lambda folder: diagnosis_figure(result, folder / "diagnosis"))

@@ -15,7 +15,7 @@ from bns.physics.model import Model
 _SHARES = (0.01, 0.05, 0.2)
 """Starts of an ordinary number: these shares of the way from neutral to either end of what is plausible."""
 NOTHING = 5e-3
-"""A gain of fewer trials' losses than this, over all trials, is not worth a fit: what counts is a hundred times that."""
+"""A gain of fewer trials' losses than this, over all trials, is not worth a fit: it would not count (`MIN_GAIN` in `search`)."""
 _LIMITS = 30
 """Starts of a number that is neutral at infinity: so many, evenly spaced on a logarithmic scale."""
 

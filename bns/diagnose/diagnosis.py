@@ -123,7 +123,7 @@ def too_little(tracks: Tracks) -> str:
         return (
             "Most trials have a single tracked pose; a displacement needs two: log the pose before and after commands."
         )
-    if not (np.abs(tracks.left_m_s) + np.abs(tracks.right_m_s) * (tracks.duration_s > 0)).any():
+    if not ((np.abs(tracks.left_m_s) + np.abs(tracks.right_m_s)) * tracks.duration_s).any():
         return "The robot was never told to move; give it commands of different speeds."
     ends = [tracks.pose[a:b, :2] for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
     if max(float(np.ptp(p, axis=0).max()) for p in ends if len(p)) < 5e-3:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
@@ -72,7 +72,6 @@ class Found:
     accepted: tuple[str, ...]
     steps: tuple[Step, ...]
     rivals: tuple[tuple[str, ...], ...] = ()
-    remarks: tuple[str, ...] = field(default=())
 
 
 class Search:

@@ -8,6 +8,7 @@ from bns.diagnose.adding import Mended
 from bns.diagnose.checks import Finding
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.diagnosis import Diagnosis, numbers_of, ties_of
+from bns.physics.decoys import DECOYS
 from bns.physics.effects import all_effects
 
 _VERDICTS = {
@@ -75,7 +76,7 @@ def _ranking(d: Diagnosis) -> Iterator[str]:
     for c in d.found.steps[0].ranking[:_SHOWN]:
         e = c.evidence
         yield f"  {c.name:20}{e.gain:10.3f}{e.se:10.3f}{e.p_value:10.2g}  {c.veto and 'not considered: ' + c.veto}".rstrip()
-    yield f"  (the best of {6} decoys: {d.found.steps[0].bar:.3f})"
+    yield f"  (the best of {len(DECOYS)} decoys: {d.found.steps[0].bar:.3f})"
 
 
 def comparison_text(c: Comparison) -> str:

@@ -52,7 +52,7 @@ def test_a_formula_is_added_and_comes_back(data, tmp_path):
     assert model.values_of("mine")["k"] == pytest.approx(-0.12, abs=0.03)
 
 
-def test_an_effect_of_ones_own_is_a_file(data, tmp_path):
+def test_an_effect_of_ones_own_is_a_file(data, tmp_path, capsys):
     mine = tmp_path / "drag.py"
     mine.write_text(
         "from dataclasses import replace\nfrom bns.physics.effect import Effect, Parameter\n"
@@ -63,6 +63,11 @@ def test_an_effect_of_ones_own_is_a_file(data, tmp_path):
     new = tmp_path / "own.yaml"
     assert main(["add", str(mine), "--model", "khepera", "--data", str(data), "-o", str(new)]) == 0
     assert load_model(new).values_of("my-drag")["k"] == pytest.approx(0.12, abs=0.03)
+    capsys.readouterr()
+    assert main(["diagnose", str(data), "--model", "khepera", "--json", "--also", str(mine)]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert {"my-drag", "turn-slip"} <= {entry["name"] for entry in answer["ranking"]}
+    assert answer["ties"] == [["my-drag", "turn-slip"]]
 
 
 @pytest.mark.parametrize(
