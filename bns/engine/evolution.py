@@ -82,7 +82,7 @@ def pick(key: Key, purpose: Purpose, step: int, order: np.ndarray, cdf: np.ndarr
 
 
 @exact
-def _winner(order, cdf, word):  # type: ignore[no-untyped-def]  # compiled
+def winner(order, cdf, word):  # type: ignore[no-untyped-def]  # compiled
     """As `pick`: the first rank whose share lies above the draw. Halving without a branch, which would be guessed wrongly."""
     u, at, left = word * _UNIT, 0, cdf.size
     while left > 1:
@@ -93,7 +93,7 @@ def _winner(order, cdf, word):  # type: ignore[no-untyped-def]  # compiled
 
 
 @inline
-def _below(word: Any, n: Any) -> Any:
+def below(word: Any, n: Any) -> Any:
     """Uniform whole number 0..n-1."""
     return np.int64(np.uint64(word) * np.uint64(n) >> np.uint64(32))
 
@@ -104,17 +104,36 @@ def _copy(source, row, start, target, child, at, count):  # type: ignore[no-unty
         target[child, at + e] = source[row, start + e]
 
 
+@inline
+def cut_places(how: Any, one: Any, other: Any, length_a: Any, length_b: Any) -> Any:
+    """Where two parents of these lengths are cut, by three words: at the same place or each at its own."""
+    if how * _UNIT >= IDENTICAL_CUT:
+        return below(one, length_a + 1), below(other, length_b + 1)
+    same = below(one, min(length_a, length_b) + 1)
+    return same, same
+
+
+@inline
+def spliced(cut_front: Any, cut_back: Any, length_back: Any, shortest: Any, capacity: Any) -> Any:
+    """A child of two cuts: how many commands of the front parent, the back parent's first, the length, and what is kept of it.
+
+    Too short a list is not made: the parent passes unchanged.
+    """
+    length = cut_front + length_back - cut_back
+    if length < shortest:
+        cut_front, cut_back, length = 0, 0, length_back
+    kept = min(length, capacity)
+    return min(cut_front, kept), cut_back, length, kept
+
+
 @exact
 def _cross(children, child, lists, lengths, front, back, cut_front, cut_back, shortest):  # type: ignore[no-untyped-def]  # compiled
     """First cut_front commands of one parent, then the other parent's from cut_back on; the length before and after the bound.
 
     children and lists are (n, capacity * components): lists of commands laid end to end.
     """
-    length = cut_front + lengths[back] - cut_back
-    if length < shortest:  # too short a list is not made: the parent passes unchanged
-        cut_front, cut_back, length = 0, 0, lengths[back]
-    kept = min(length, lists.shape[1] // COMPONENTS)
-    first = min(cut_front, kept)
+    capacity = lists.shape[1] // COMPONENTS
+    first, cut_back, length, kept = spliced(cut_front, cut_back, lengths[back], shortest, capacity)
     _copy(lists, front, 0, children, child, 0, first * COMPONENTS)
     _copy(lists, back, cut_back * COMPONENTS, children, child, first * COMPONENTS, (kept - first) * COMPONENTS)
     return length, kept
@@ -131,6 +150,19 @@ def _draws(slot, individual, purpose, step, k0, k1, out):  # type: ignore[no-unt
         third[m] = draws[2]
 
 
+@inline
+def mutation_threshold(rate: Any) -> Any:
+    """Words below it mutate."""
+    return np.uint64(rate / _UNIT)
+
+
+@inline
+def mutated(value: Any, word: Any, threshold: Any, low: Any, high: Any, span: Any) -> Any:
+    """A component moved by a word that fell below the threshold: it is uniform there, so it serves twice."""
+    moved = value + np.float32((2.0 * np.float64(word) / np.float64(threshold) - 1.0) * span)
+    return min(max(moved, low), high)
+
+
 @exact
 def _mutate(children, lengths, rate, low, high, span, step, k0, k1):  # type: ignore[no-untyped-def]  # compiled
     """Mutate all controllers but the first, which is the elite."""
@@ -145,15 +177,13 @@ def _mutate(children, lengths, rate, low, high, span, step, k0, k1):  # type: ig
             m += 1
     draws = np.empty((3, total), np.uint32)
     _draws(slot, individual, Purpose.MUTATION, step, k0, k1, draws)
-    threshold = np.uint64(rate / _UNIT)
+    threshold = mutation_threshold(rate)
     for c in range(COMPONENTS):
         for m in range(total):
             word = np.uint64(draws[c, m])
             if word < threshold:
-                # Given that it fell below the threshold, the draw is uniform there: it serves twice.
                 i, j = individual[m], slot[m]
-                value = children[i, j, c] + np.float32((2.0 * np.float64(word) / np.float64(threshold) - 1.0) * span[c])
-                children[i, j, c] = min(max(value, low[c]), high[c])
+                children[i, j, c] = mutated(children[i, j, c], word, threshold, low[c], high[c], span[c])
 
 
 @exact
@@ -171,12 +201,8 @@ def breed_into(commands, lengths, order, cdf, rate, low, high, span, shortest, s
     _draws(slot, pairs, Purpose.CUTS, step, k0, k1, cuts)
     for pair in range(n // 2):
         first = 1 + 2 * pair
-        a, b = _winner(order, cdf, parents[0, pair]), _winner(order, cdf, parents[1, pair])
-        cut_a = _below(cuts[1, pair], min(lengths[a], lengths[b]) + 1)
-        cut_b = cut_a
-        if cuts[0, pair] * _UNIT >= IDENTICAL_CUT:
-            cut_a = _below(cuts[1, pair], lengths[a] + 1)
-            cut_b = _below(cuts[2, pair], lengths[b] + 1)
+        a, b = winner(order, cdf, parents[0, pair]), winner(order, cdf, parents[1, pair])
+        cut_a, cut_b = cut_places(cuts[0, pair], cuts[1, pair], cuts[2, pair], lengths[a], lengths[b])
         length, kept = _cross(child_lists, first, lists, lengths, a, b, cut_a, cut_b, shortest)
         child_lengths[first] = kept
         hits += length > kept
@@ -224,25 +250,30 @@ def breed(
     )
 
 
+@inline
+def spread(commands: Any, lengths: Any, j: Any, c: Any, scale: Any, total: Any) -> Any:
+    """Add to total how far component c of everybody's command j is from the mean one."""
+    members, mean = 0, 0.0
+    for i in range(lengths.size):
+        if lengths[i] > j:
+            members += 1
+            mean += commands[i, j, c]
+    if members > 0:
+        mean /= members
+        for i in range(lengths.size):
+            if lengths[i] > j:
+                total += abs(commands[i, j, c] - mean) * scale
+    return total
+
+
 @exact
 def _diversity(commands, lengths, low, high):  # type: ignore[no-untyped-def]  # compiled
-    n, longest, width = commands.shape
     total = 0.0
-    for c in range(width):
+    for c in range(commands.shape[2]):
         scale = 1.0 / (high[c] - low[c])
-        for j in range(longest):
-            members, mean = 0, 0.0
-            for i in range(n):
-                if lengths[i] > j:
-                    members += 1
-                    mean += commands[i, j, c]
-            if members == 0:
-                break
-            mean /= members
-            for i in range(n):
-                if lengths[i] > j:
-                    total += abs(commands[i, j, c] - mean) * scale
-    return total / n
+        for j in range(lengths.max()):
+            total = spread(commands, lengths, j, c, scale, total)
+    return total / lengths.size
 
 
 def diversity(population: Population, bounds: CommandBounds) -> float:

@@ -79,7 +79,7 @@ class Rprop:
 
 
 @inline
-def _share(g: Any, d: Any, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any) -> Any:
+def share(g: Any, d: Any, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any) -> Any:
     return g[0] + d * x0, g[1] + d * x1, g[2] + d * x2, g[3] + d * x3, g[4] + d * x4, g[5] + d
 
 
@@ -110,10 +110,10 @@ def _backward4(X, w, first, hidden_out, error, gradient, a, b):  # type: ignore[
         o1 += e1
         o2 += e2
         o3 += e3
-        g0 = _share(g0, e0 - e0 * h0[p], v0, v1, v2, v3, v4)
-        g1 = _share(g1, e1 - e1 * h1[p], v0, v1, v2, v3, v4)
-        g2 = _share(g2, e2 - e2 * h2[p], v0, v1, v2, v3, v4)
-        g3 = _share(g3, e3 - e3 * h3[p], v0, v1, v2, v3, v4)
+        g0 = share(g0, e0 - e0 * h0[p], v0, v1, v2, v3, v4)
+        g1 = share(g1, e1 - e1 * h1[p], v0, v1, v2, v3, v4)
+        g2 = share(g2, e2 - e2 * h2[p], v0, v1, v2, v3, v4)
+        g3 = share(g3, e3 - e3 * h3[p], v0, v1, v2, v3, v4)
     k = first * PER_NEURON
     _write(gradient, w, k, g0, o0)
     _write(gradient, w, k + PER_NEURON, g1, o1)
@@ -176,23 +176,31 @@ def gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squ
             _backward4(X, w, first, hidden_out, e, gradient, a, b)
 
 
+@inline
+def changed(g: Any, w: Any, step: Any, last_gradient: Any, last_change: Any, backtrack: Any) -> Any:
+    """One weight after an iteration with gradient g: weight, step, gradient and change to be remembered."""
+    agreement = g * last_gradient
+    if agreement < _ZERO:
+        step = max(step * _SHRINK, _SMALLEST)
+        if backtrack:
+            last_change = -last_change
+            w += last_change
+        last_gradient = _ZERO
+    else:
+        if agreement > _ZERO:
+            step = min(step * _GROW, _LARGEST)
+        last_change = -np.sign(g) * step
+        w += last_change
+        last_gradient = g
+    return w, step, last_gradient, last_change
+
+
 @exact
 def _update(w, step, last_gradient, last_change, gradient, backtrack):  # type: ignore[no-untyped-def]  # compiled
     for i in range(w.size):
-        g = gradient[i]
-        agreement = g * last_gradient[i]
-        if agreement < _ZERO:
-            step[i] = max(step[i] * _SHRINK, _SMALLEST)
-            if backtrack:
-                last_change[i] = -last_change[i]
-                w[i] += last_change[i]
-            last_gradient[i] = _ZERO
-            continue
-        if agreement > _ZERO:
-            step[i] = min(step[i] * _GROW, _LARGEST)
-        last_change[i] = -np.sign(g) * step[i]
-        w[i] += last_change[i]
-        last_gradient[i] = g
+        w[i], step[i], last_gradient[i], last_change[i] = changed(
+            gradient[i], w[i], step[i], last_gradient[i], last_change[i], backtrack
+        )
 
 
 @exact

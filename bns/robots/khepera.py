@@ -35,25 +35,39 @@ _SCALE = np.array([0.2, 0.3, 3.0], np.float32)
 """Metres, metres and radians that an output of 1 stands for: the order of what random commands do."""
 
 
+@inline
+def normalised(command, centre, per_unit):  # type: ignore[no-untyped-def]  # compiled
+    """Left, right and duration as the networks see them."""
+    return (
+        (command[0] - centre[0]) * per_unit[0],
+        (command[1] - centre[1]) * per_unit[1],
+        (command[2] - centre[2]) * per_unit[2],
+    )
+
+
+@inline
+def at_rest(centre, per_unit):  # type: ignore[no-untyped-def]  # compiled
+    """The previous left and right of a first command."""
+    return -centre[0] * per_unit[0], -centre[1] * per_unit[1]
+
+
 @fast
 def _gather(commands, lengths, centre, per_unit, X, starts):  # type: ignore[no-untyped-def]  # compiled
     """Inputs of all commands of all controllers, side by side: previous left and right (0 at first), left, right, duration."""
     n = 0
     for i in range(lengths.size):
         starts[i] = n
-        left, right = -centre[0] * per_unit[0], -centre[1] * per_unit[1]
+        left, right = at_rest(centre, per_unit)
         for j in range(lengths[i]):
             X[0, n], X[1, n] = left, right
-            left = (commands[i, j, 0] - centre[0]) * per_unit[0]
-            right = (commands[i, j, 1] - centre[1]) * per_unit[1]
-            X[2, n], X[3, n] = left, right
-            X[4, n] = (commands[i, j, 2] - centre[2]) * per_unit[2]
+            left, right, duration = normalised(commands[i, j], centre, per_unit)
+            X[2, n], X[3, n], X[4, n] = left, right, duration
             n += 1
     return n
 
 
 @inline
-def _sine(x):  # type: ignore[no-untyped-def]  # compiled
+def unbranched_sine(x):  # type: ignore[no-untyped-def]  # compiled
     """Sine to 1e-11 for |x| below LARGEST_HEADING_RAD, without a branch, so that it vectorises."""
     half_turns = np.int32(x / math.pi + 1048576.5) - 1048576
     r = x - half_turns * math.pi
@@ -70,8 +84,8 @@ def _sine(x):  # type: ignore[no-untyped-def]  # compiled
 @fast
 def _directions(heading, sine, cosine):  # type: ignore[no-untyped-def]  # compiled
     for c in range(heading.size):
-        sine[c] = _sine(heading[c])
-        cosine[c] = _sine(heading[c] + math.pi / 2)
+        sine[c] = unbranched_sine(heading[c])
+        cosine[c] = unbranched_sine(heading[c] + math.pi / 2)
 
 
 @exact
@@ -86,14 +100,39 @@ def _headings(turns, starts, lengths, scale, heading, astray):  # type: ignore[n
         astray[i] = np.inf if furthest > LARGEST_HEADING_RAD else 0.0
 
 
+@inline
+def step_of(right, ahead, sine, cosine):  # type: ignore[no-untyped-def]  # compiled
+    """Step in the world, x and y, of a displacement in the frame of a robot with that heading."""
+    return ahead * cosine + right * sine, ahead * sine - right * cosine
+
+
 @exact
 def _steps(outputs, scale, sine, cosine):  # type: ignore[no-untyped-def]  # compiled
     """Steps in the world, in place of the directions: x in `cosine`, y in `sine`; apart from the walk, so that it vectorises."""
     to_right, forward = outputs[0], outputs[1]
     for c in range(sine.size):
         right, ahead = to_right[c] * scale[0], forward[c] * scale[1]
-        x, y = ahead * cosine[c] + right * sine[c], ahead * sine[c] - right * cosine[c]
-        cosine[c], sine[c] = x, y
+        cosine[c], sine[c] = step_of(right, ahead, sine[c], cosine[c])
+
+
+@inline
+def aimed(x, y, goal, goals):  # type: ignore[no-untyped-def]  # compiled
+    """The goal that a position leaves to be reached, and the distance to it or, after the last, to the last (algorithm 2)."""
+    last = goals.shape[0] - 1
+    aim = min(goal, last)
+    distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
+    if goal <= last and distance <= GOAL_RADIUS_M:
+        goal += 1
+        aim = min(goal, last)
+        distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
+    return goal, distance
+
+
+@inline
+def fitness_of(total, goal, goals):  # type: ignore[no-untyped-def]  # compiled
+    """Fitness of a path with that sum of distances that reached so many goals; 0 where the arithmetic failed."""
+    total += MISSED_GOAL_M * (goals.shape[0] - goal)
+    return 1.0 / max(total, SMALLEST_SUM_M) if math.isfinite(total) else 0.0
 
 
 @exact
@@ -105,25 +144,17 @@ def _walk(outputs, starts, lengths, scale, goals, fitness, reached):  # type: ig
     _headings(outputs[2], starts, lengths, scale[2], heading, astray)
     _directions(heading, step_y, step_x)
     _steps(outputs, scale, step_y, step_x)
-    failures, last = 0, goals.shape[0] - 1
+    failures = 0
     for i in range(lengths.size):
         x, y, total, goal = START[0], START[1], astray[i], 0
         for c in range(starts[i], starts[i] + lengths[i]):
             x += step_x[c]
             y += step_y[c]
-            aim = min(goal, last)
-            distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
-            if goal <= last and distance <= GOAL_RADIUS_M:
-                goal += 1
-                aim = min(goal, last)
-                distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
+            goal, distance = aimed(x, y, goal, goals)
             total += distance
-        total += MISSED_GOAL_M * (goals.shape[0] - goal)
         reached[i] = goal
-        fitness[i] = 1.0 / max(total, SMALLEST_SUM_M)
-        if not np.isfinite(total):
-            fitness[i] = 0.0
-            failures += 1
+        fitness[i] = fitness_of(total, goal, goals)
+        failures += fitness[i] == 0.0
     return failures
 
 
