@@ -44,6 +44,10 @@ class ClusterError(BnsError):
     """Other machines that cannot be used as asked: a scheduler, its workers, a batch system."""
 
 
+class DeviceError(BnsError):
+    """A GPU that is not there, cannot be used, or failed."""
+
+
 class DataError(BnsError):
     """Measurements that cannot be used as they are."""
 

@@ -18,7 +18,7 @@ FLOORS = (
     {"physics"},
     {"hardware"},
     {"worlds"},
-    {"evolver", "trainer", "recorder", "loop", "precompute", "refinement", "validation"},
+    {"evolver", "trainer", "recorder", "loop", "cuda", "precompute", "refinement", "validation"},
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "single", "watch"},

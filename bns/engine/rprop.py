@@ -80,6 +80,7 @@ class Rprop:
 
 @inline
 def share(g: Any, d: Any, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any) -> Any:
+    """The input sums of a hidden neuron (6,) with one more pattern, whose error reaches it as d."""
     return g[0] + d * x0, g[1] + d * x1, g[2] + d * x2, g[3] + d * x3, g[4] + d * x4, g[5] + d
 
 
@@ -189,7 +190,8 @@ def changed(g: Any, w: Any, step: Any, last_gradient: Any, last_change: Any, bac
     else:
         if agreement > _ZERO:
             step = min(step * _GROW, _LARGEST)
-        last_change = -np.sign(g) * step
+        # By comparisons, for a GPU's compiler knows no sign; 0 stays 0, and what is not a number stays visible.
+        last_change = -step if g > _ZERO else step if g < _ZERO else -g
         w += last_change
         last_gradient = g
     return w, step, last_gradient, last_change

@@ -30,8 +30,8 @@ START = (0.0, 0.0, math.pi / 2)
 
 _LOW = np.array([3000.0, 3000.0, 400.0], np.float32)
 _HIGH = np.array([30000.0, 30000.0, 3000.0], np.float32)
-_CENTRE, _PER_UNIT = (_LOW + _HIGH) / 2, 2 / (_HIGH - _LOW)
-_SCALE = np.array([0.2, 0.3, 3.0], np.float32)
+CENTRE, PER_UNIT = (_LOW + _HIGH) / 2, 2 / (_HIGH - _LOW)
+SCALE = np.array([0.2, 0.3, 3.0], np.float32)
 """Metres, metres and radians that an output of 1 stands for: the order of what random commands do."""
 
 
@@ -192,16 +192,16 @@ class Khepera:
     def inputs(self, commands: np.ndarray) -> np.ndarray:
         """Inputs (5, n): previous left, previous right, left, right, duration, normalised; at rest before the first."""
         X, starts = np.empty((5, len(commands)), np.float32), np.empty(1, np.int64)
-        _gather(commands[None].astype(np.float32), np.array([len(commands)], np.int32), _CENTRE, _PER_UNIT, X, starts)
+        _gather(commands[None].astype(np.float32), np.array([len(commands)], np.int32), CENTRE, PER_UNIT, X, starts)
         return X
 
     def displacements(self, outputs: np.ndarray) -> np.ndarray:
         """(n, 3): to the right m, ahead m, counter-clockwise rad, in the frame the command began in."""
-        return (outputs * _SCALE[:, None]).T.astype(np.float64)
+        return (outputs * SCALE[:, None]).T.astype(np.float64)
 
     def targets(self, displacements: np.ndarray) -> np.ndarray:
         """Network targets (3, n)."""
-        return np.ascontiguousarray((displacements / _SCALE).T, np.float32)
+        return np.ascontiguousarray((displacements / SCALE).T, np.float32)
 
     def poses(self, displacements: np.ndarray) -> np.ndarray:
         """Poses x_m, y_m, heading_rad (not wrapped) after each displacement."""
@@ -259,10 +259,10 @@ class Khepera:
         X = np.empty((5, total), np.float32)
         outputs = np.empty((3, total), np.float32)
         starts = np.empty(n, np.int64)
-        _gather(population.commands, population.lengths, _CENTRE, _PER_UNIT, X, starts)
+        _gather(population.commands, population.lengths, CENTRE, PER_UNIT, X, starts)
         predict_into(weights, X, total, outputs)
         fitness, reached = np.empty(n), np.empty(n, np.int32)
-        failures = _walk(outputs, starts, population.lengths, _SCALE, task.goals_m, fitness, reached)
+        failures = _walk(outputs, starts, population.lengths, SCALE, task.goals_m, fitness, reached)
         return Scores(fitness, reached, int(failures))
 
     def judge(self, poses: np.ndarray, task: Task) -> tuple[float, int]:

@@ -1,0 +1,197 @@
+"""A batch of runs on the GPU: the four steps of `bns.loop`, for all of them at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from bns.cuda.device import device_name, faults
+from bns.cuda.settings import settings_of
+from bns.cuda.support import check_supported
+from bns.engine.evolution import tournament_cdf
+from bns.engine.philox import Key, Purpose
+from bns.engine.rprop import INITIAL_STEP
+from bns.engine.snn import INPUTS, initial_weights, predict
+from bns.loop import RunResult
+from bns.robots import load_robot
+from bns.robots.simulator import load_static_simulator
+from bns.spec import RunSpec
+from bns.tasks import load_task
+from bns.worlds import build_world
+
+THREADS = 128
+_FEW = 64
+"""Threads of a block where a thread has a run of its own: the runs spread over all of the GPU."""
+
+
+class Batch:
+    """Runs of one robot side by side. `step` carries out the next evaluation of all; `done` says when there is none left.
+
+    Raises, also in `step`:
+        SpecError: a run that only the CPU can do.
+        DeviceError: no GPU, or it failed.
+        OutOfDeviceMemoryError: so many runs do not fit.
+    """
+
+    def __init__(self, specs: Sequence[RunSpec], threads: int = THREADS) -> None:
+        check_supported(specs)
+        device_name()
+        self.specs, self._threads = tuple(specs), threads
+        self.robot = load_robot(specs[0].robot)
+        self._kernels = _kernels(self.robot.name)
+        self.evaluations, self.evaluation = max(spec.evaluations for spec in specs), 0
+        self._seconds = np.zeros((2, self.evaluations))
+        with faults():
+            self._allocate()
+            self._evolve(0)
+
+    @property
+    def done(self) -> bool:
+        """Whether every run has come to its end."""
+        return self.evaluation == self.evaluations
+
+    def step(self) -> None:
+        """The next evaluation, in the order of `bns.loop.run`."""
+        self.evaluation += 1
+        with faults():
+            self._drive(Purpose.WORLD_EVALUATED, True, self._cdf_world, self._evaluated)
+            began = self._now()
+            self._train(self.evaluation)
+            trained = self._now()
+            self._evolve(self.evaluation)
+            evolved = self._now()
+            self._drive(Purpose.WORLD_FITTEST, False, self._cdf_world, self._fittest)
+            self._measure()
+        active = sum(spec.evaluations >= self.evaluation for spec in self.specs)
+        self._seconds[:, self.evaluation - 1] = (trained - began) / active, (evolved - trained) / active
+
+    def evals(self) -> list[dict[str, np.ndarray] | ArithmeticError]:
+        """Columns of every run, or what is wrong with its numbers; the times are its share of the GPU's."""
+        from bns.cuda.rows import evals_of  # noqa: PLC0415  # kernels again
+
+        with faults():
+            rows = [array.copy_to_host() for array in (self._evaluated, self._fittest, self._measured)]
+        found: list[dict[str, np.ndarray] | ArithmeticError] = []
+        for run, spec in enumerate(self.specs):
+            own = [table[run, : spec.evaluations] for table in rows]
+            try:
+                found.append(evals_of(self._kernels.driven, *own, *self._seconds[:, : spec.evaluations]))
+            except ArithmeticError as error:
+                found.append(error)
+        return found
+
+    def result(self, run: int = 0) -> RunResult:
+        """One run as `bns.loop.run` gives it; ArithmeticError if its numbers are not finite."""
+        spec, evals = self.specs[run], self.evals()[run]
+        if isinstance(evals, ArithmeticError):
+            raise evals
+        task, world = load_task(spec.robot, spec.task), build_world(spec.world, self.robot)
+        with faults():
+            weights, half = self._weights[run].copy_to_host(), spec.generations_per_evaluation * spec.evaluations % 2
+            best = int(self._order[run].copy_to_host()[0])
+            length = int(self._lengths[half, run].copy_to_host()[best])
+            controller = self._commands[half, run, best].copy_to_host()[:length]
+        fittest = self.robot.plan(controller, weights, task)
+        poses = world.drive(fittest, self._keys[run], Purpose.WORLD_FITTEST, spec.evaluations)
+        outputs = predict(weights, self.robot.inputs(fittest), self.robot.sigmoid_output)
+        simulated = self.robot.poses(self.robot.displacements(outputs))
+        return RunResult({"evals": evals}, world.digest, self.robot.networks, weights, fittest, poses, simulated)
+
+    def _allocate(self) -> None:
+        """Everything in the GPU's memory; what begins a run is drawn by the CPU engine itself."""
+        specs, robot, cuda = self.specs, self.robot, self._kernels.cuda
+        tasks = [load_task(spec.robot, spec.task) for spec in specs]
+        self._keys = [Key.of_run(spec.seed, spec.root_seed, spec.robot, spec.task) for spec in specs]
+        runs, networks = len(specs), len(robot.networks)
+        n, longest = max(spec.population_size for spec in specs), max(spec.max_commands for spec in specs)
+        goals = np.zeros((runs, max(len(task.goals_m) for task in tasks), 2))
+        cdfs = np.ones((2, runs, n))
+        lists, lengths = np.zeros((runs, n, longest, 3), np.float32), np.zeros((2, runs, n), np.int32)
+        for run, (spec, task, key) in enumerate(zip(specs, tasks, self._keys, strict=True)):
+            goals[run, : len(task.goals_m)] = task.goals_m
+            size = spec.population_size
+            cdfs[0, run, :size] = tournament_cdf(size, spec.tournament_size)
+            cdfs[1, run, :size] = tournament_cdf(size, spec.real_world_selection_size)
+            population = robot.initial_population(key, size, spec.min_commands, spec.max_commands)
+            lists[run, :size, : spec.max_commands], lengths[0, run, :size] = population.commands, population.lengths
+        untrained = np.stack([initial_weights(key, networks, robot.hidden, robot.input_count) for key in self._keys])
+        most = max(spec.evaluations * spec.max_commands for spec in specs)  # no run can gather more patterns
+        static = load_static_simulator(robot.name)
+
+        put, empty = cuda.to_device, cuda.device_array
+        self._settings = put(settings_of(specs, self._keys, [len(task.goals_m) for task in tasks]))
+        self._goals, self._cdf_parents, self._cdf_world = put(goals), put(cdfs[0]), put(cdfs[1])
+        self._commands = empty((2, *lists.shape), np.float32)
+        self._commands[0].copy_to_device(lists)
+        self._lengths = put(lengths)
+        self._fitness, self._reached, self._order = (empty((runs, n), kind) for kind in (np.float64, np.int32, np.int32))
+        self._untrained, self._weights = put(untrained), put(untrained)
+        self._flat = self._weights.reshape(runs, networks * untrained.shape[2])
+        self._step = put(np.full_like(untrained, INITIAL_STEP))
+        self._last_gradient, self._last_change = put(np.zeros_like(untrained)), put(np.zeros_like(untrained))
+        self._X = empty((2, runs, INPUTS, most), np.float32)
+        self._targets = empty((2, runs, networks, most), np.float32)
+        self._counts = put(np.zeros((2, runs), np.int32))
+        self._failures, self._hits = put(np.zeros(runs, np.int32)), put(np.zeros(runs, np.int32))
+        self._static, self._noise_sd = put(static.weights.ravel().copy()), put(static.noise_sd)
+        self._evaluated, self._fittest = (
+            put(np.full((runs, self.evaluations, len(self._kernels.driven)), np.nan)) for _ in range(2)
+        )
+        self._measured = put(np.full((runs, self.evaluations, len(self._kernels.measured)), np.nan))
+
+    def _drive(self, purpose: Purpose, learning: bool, cdf: Any, rows: Any) -> None:
+        self._kernels.drive[-(-len(self.specs) // _FEW), min(_FEW, len(self.specs))](
+            self.evaluation, self._settings, np.uint32(purpose), learning, self._static, self._noise_sd, self._flat,
+            self._commands, self._lengths, self._order, cdf, self._goals, self._X, self._targets, self._counts,
+            self._failures, rows,
+        )  # fmt: skip
+
+    def _train(self, evaluation: int) -> None:
+        runs, networks = self._weights.shape[:2]
+        state = self._weights, self._step, self._last_gradient, self._last_change
+        self._kernels.train[(runs, networks), self._kernels.warp](
+            evaluation, self._settings, *state, self._X[0], self._targets[0], self._counts[0]
+        )
+        self._kernels.restart[-(-runs * networks // self._threads), self._threads](
+            evaluation, self._settings, self._untrained, *state, self._failures
+        )
+
+    def _evolve(self, evaluation: int) -> None:
+        self._kernels.evolve[len(self.specs), self._threads](
+            evaluation, self._settings, self._weights, self._commands, self._lengths, self._fitness, self._reached,
+            self._order, self._cdf_parents, self._goals, self._failures, self._hits,
+        )  # fmt: skip
+
+    def _measure(self) -> None:
+        self._kernels.measure[len(self.specs), self._threads](
+            self.evaluation, self._settings, self._flat, self._commands, self._lengths, self._fitness, self._order,
+            self._X, self._targets, self._counts, self._failures, self._hits, self._measured,
+        )  # fmt: skip
+
+    def _now(self) -> float:
+        self._kernels.cuda.synchronize()
+        return time.perf_counter()
+
+
+@cache
+def _kernels(name: str) -> _Kernels:
+    return _Kernels(load_robot(name), name)
+
+
+class _Kernels:
+    """The kernels of one robot, made once, and loaded only here: numba's CUDA support need not be there if nobody asks for it."""
+
+    def __init__(self, robot: Any, name: str) -> None:
+        load = import_module
+        self.cuda = load("numba.cuda")
+        own, training = load(f"bns.cuda.robots.{name}"), load("bns.cuda.training")
+        measuring, networks = load("bns.cuda.measuring"), len(robot.networks)
+        self.train, self.restart, self.warp = training.training_kernel(robot.hidden), training.restart, training.WARP
+        self.evolve = load("bns.cuda.evolution").evolution_kernel(own.scored, robot.bounds, networks, robot.hidden)
+        self.measure = measuring.measuring_kernel(robot.bounds, networks, robot.hidden)
+        self.drive, self.driven, self.measured = own.drive, own.DRIVEN, measuring.MEASURED

@@ -1,0 +1,92 @@
+"""The GPU itself: whether there is one, how much memory it has, and its faults in our words."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import numba
+
+from bns.errors import DeviceError
+
+_ELSE = "or leave --device out: the CPU gives the same study"
+_OUT_OF_MEMORY = ("OUT_OF_MEMORY", "out of memory")
+
+
+class OutOfDeviceMemoryError(Exception):
+    """What was asked for does not fit into the GPU's memory now."""
+
+
+@cache
+def device_name() -> str:
+    """Name of the GPU, found once by a kernel that ran on it and gave what it should.
+
+    Raises:
+        DeviceError: there is none, or its driver is missing or too old.
+    """
+    cuda = _module()
+    if not cuda.is_available():
+        reason = " ".join(str(cuda.cuda_error() or "the driver sees no GPU").split())
+        raise DeviceError(
+            f"--device cuda: no GPU can be used: {reason} Install NVIDIA's driver and pip install 'bns[cuda]', {_ELSE}."
+        )
+    try:
+        return _tried(cuda)
+    except DeviceError:
+        raise
+    except Exception as error:  # of many kinds, from the compiler down to the driver
+        raise DeviceError(
+            f"--device cuda: a GPU is there, but a trial kernel failed: {_first_line(error)}. Most often its driver is older "
+            f"than the CUDA version of numba-cuda: update the driver, install an older numba-cuda, {_ELSE}."
+        ) from error
+
+
+def _module() -> Any:
+    numba.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # type: ignore[attr-defined]  # one run alone is allowed, too
+    try:
+        return importlib.import_module("numba.cuda")
+    except ImportError as error:
+        raise DeviceError(
+            f"--device cuda needs numba-cuda ({_first_line(error)}). Install it with: pip install 'bns[cuda]', {_ELSE}."
+        ) from error
+
+
+def _tried(cuda: Any) -> str:
+    if importlib.import_module("bns.cuda.probe").doubled(4) != [0, 2, 4, 6]:
+        raise DeviceError(f"--device cuda: the GPU does not double small numbers rightly; have it repaired, {_ELSE}.")
+    name = getattr(cuda.current_context().device, "name", "simulated GPU")
+    return name.decode() if isinstance(name, bytes) else str(name)
+
+
+def free_bytes() -> float:
+    """Memory of the GPU that nobody uses now; infinite in the simulator."""
+    return float(_module().current_context().get_memory_info()[0])
+
+
+@contextmanager
+def faults() -> Iterator[None]:
+    """Turn what the driver raises into an error of ours.
+
+    Raises:
+        OutOfDeviceMemoryError: the GPU's memory is full.
+        DeviceError: anything else of the GPU.
+    """
+    try:
+        yield
+    except Exception as error:
+        if any(text in str(error) for text in _OUT_OF_MEMORY):
+            raise OutOfDeviceMemoryError(_first_line(error)) from error
+        if type(error).__module__.startswith(("numba.cuda", "numba_cuda", "cuda.")):
+            raise DeviceError(
+                f"the GPU failed: {_first_line(error)}. What was finished is stored. See nvidia-smi whether it is there; then "
+                "repeat the command, which goes on from here."
+            ) from error
+        raise
+
+
+def _first_line(error: BaseException) -> str:
+    lines = str(error).strip().splitlines()
+    return lines[0].rstrip(". ") if lines else type(error).__name__

@@ -1,0 +1,44 @@
+"""What the kernels are told of each run of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bns.engine.philox import Key
+from bns.spec import RunSpec
+
+SETTINGS = np.dtype(
+    [
+        ("evaluations", np.int32),
+        ("generations", np.int32),
+        ("iterations", np.int32),
+        ("population", np.int32),
+        ("shortest", np.int32),
+        ("longest", np.int32),
+        ("goals", np.int32),
+        ("backtrack", np.int32),
+        ("key0", np.uint32),
+        ("key1", np.uint32),
+        ("mutation_rate", np.float64),
+    ],
+    align=True,
+)
+"""One record a run; generations and iterations are those of one evaluation, goals is how many there are."""
+
+
+def settings_of(specs: Sequence[RunSpec], keys: Sequence[Key], goals: Sequence[int]) -> np.ndarray:
+    """Records (runs,) of runs with these keys and numbers of goals."""
+    table = np.zeros(len(specs), SETTINGS)
+    for row, spec, key, count in zip(table, specs, keys, goals, strict=True):
+        row["evaluations"] = spec.evaluations
+        row["generations"] = spec.generations_per_evaluation
+        row["iterations"] = spec.training_iterations_per_evaluation
+        row["population"] = spec.population_size
+        row["shortest"], row["longest"] = spec.min_commands, spec.max_commands
+        row["goals"] = count
+        row["backtrack"] = spec.training_algorithm == "rprop+"
+        row["key0"], row["key1"] = key.words
+        row["mutation_rate"] = spec.mutation_rate
+    return table
