@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bns import __version__
-from bns.cluster_options import add_cluster_options, request_of
+from bns.cluster_options import DEVICES, add_cluster_options, request_of, way_of
 from bns.errors import BnsError, SpecError
 from bns.measuring import add_commands
 from bns.spec import FIELDS, RunSpec, checked, field_type
@@ -77,6 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_spec_options(one)
     one.add_argument("--measurements", type=Path, metavar="FILE", help="also write what was driven as a table (.csv, .parquet)")
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
+    one.add_argument("--device", choices=DEVICES, default="cpu", help="what computes: cpu (default), or a GPU: cuda")
     one.add_argument(
         "--render", type=Path, metavar="FILE", help="show the fittest controller move, where the world can: .mp4 or .png"
     )
@@ -204,7 +205,8 @@ def run(options: argparse.Namespace) -> int:
         options.task = default_task(load_robot(options.robot).name)
     spec = RunSpec(**{name: getattr(options, name) for name in FIELDS})
     _say_if_compiling(spec)
-    print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, options.save_snn, options.render, options.measurements))
+    kept = options.save_snn, options.render, options.measurements
+    print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, *kept, device=options.device))
     return 0
 
 
@@ -251,7 +253,7 @@ def sweep(options: argparse.Namespace) -> int:
 
     files = [load_sweep(file) for file in options.files]
     sweeps = in_turn(files, options.results, options.confirm_top)
-    way = load_executor(options.executor)
+    way = load_executor(way_of(options))
     with SweepProgress() as bar:
         request = request_of(options, bar)
         if options.dry_run:
@@ -260,7 +262,8 @@ def sweep(options: argparse.Namespace) -> int:
                 estimate = foretell(one, options.results, place.workers, options.shard, retry_failed=options.retry_failed)
                 print(planned(estimate, place))
             return 0
-        _say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files))
+        if options.device == "cpu":
+            _say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files))
         failed = 0
         for one in sweeps:
             summary = way.carry_out(one, request)

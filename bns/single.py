@@ -16,7 +16,7 @@ from rich.live import Live
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from bns.errors import ModelError
+from bns.errors import ModelError, SpecError
 from bns.loop import RunResult, run
 from bns.measurements import check_table_name
 from bns.plotting import path_figure
@@ -44,8 +44,11 @@ def run_by_hand(
     save_snn: Path | None = None,
     render: Path | None = None,
     measurements: Path | None = None,
+    device: str = "cpu",
 ) -> str:
     """Carry out a run with a live view, store it, draw the path of its fittest controller; the report in words."""
+    if device != "cpu":
+        check_gpu(spec, measurements)
     robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
     if render is not None:
         check_renderable(spec, build_world(spec.world, robot), render)
@@ -60,9 +63,9 @@ def run_by_hand(
     started, wall, cpu = datetime.now(UTC), time.perf_counter(), time.process_time()
     memory.reset_peak()
     with live_view(spec) as show:
-        result = run(spec, show, world)
+        result = run(spec, show, world) if device == "cpu" else _run_on_gpu(spec, show)
     wall_s = time.perf_counter() - wall
-    keep_run(spec, result, results, sweep, started, wall_s, time.process_time() - cpu)
+    keep_run(spec, result, results, sweep, started, wall_s, time.process_time() - cpu, device)
     if measurements is not None:
         logged.write(measurements)
     if save_snn is not None:
@@ -84,6 +87,23 @@ def run_by_hand(
         world.render(robot.plan(result.fittest, result.weights, task), render)  # type: ignore[attr-defined]  # checked above
         told += f"\nmoving picture: {render}"
     return told
+
+
+def check_gpu(spec: RunSpec, measurements: Path | None) -> None:
+    """SpecError or DeviceError if the GPU cannot do this run, before anything is written."""
+    from bns.cuda.device import device_name  # noqa: PLC0415  # as below
+    from bns.cuda.support import check_supported  # noqa: PLC0415
+
+    if measurements is not None:
+        raise SpecError("a GPU does not tell what was driven; leave out --measurements or --device.")
+    check_supported([spec])
+    device_name()
+
+
+def _run_on_gpu(spec: RunSpec, progress: Callable[[Mapping[str, Any]], None]) -> RunResult:
+    from bns.cuda.single import run as run_there  # noqa: PLC0415  # loads numba's CUDA support, which need not be installed
+
+    return run_there(spec, progress)
 
 
 def check_renderable(spec: RunSpec, world: Any, path: Path) -> None:
@@ -109,6 +129,7 @@ def keep_run(
     started: datetime,
     wall_s: float,
     cpu_s: float = float("nan"),
+    device: str = "cpu",
 ) -> None:
     """Put a run that ended well into the store."""
     row = {
@@ -121,6 +142,10 @@ def keep_run(
         "peak_memory_mib": memory.peak_mib(),
         "attempts": 1,
     }
+    if device != "cpu":
+        from bns.sweep.batches import gpu_columns  # noqa: PLC0415  # as below
+
+        row |= gpu_columns()
     with _patient_writer(results, sweep) as writer:
         writer.append(RunRecord(spec, row, result.tables))
 

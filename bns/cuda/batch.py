@@ -38,10 +38,10 @@ class Batch:
         OutOfDeviceMemoryError: so many runs do not fit.
     """
 
-    def __init__(self, specs: Sequence[RunSpec], threads: int = THREADS) -> None:
+    def __init__(self, specs: Sequence[RunSpec], threads: int | None = None) -> None:
         check_supported(specs)
         device_name()
-        self.specs, self._threads = tuple(specs), threads
+        self.specs, self._threads = tuple(specs), threads or THREADS
         self.robot = load_robot(specs[0].robot)
         self._kernels = _kernels(self.robot.name)
         self.evaluations, self.evaluation = max(spec.evaluations for spec in specs), 0
@@ -71,25 +71,29 @@ class Batch:
         self._seconds[:, self.evaluation - 1] = (trained - began) / active, (evolved - trained) / active
 
     def evals(self) -> list[dict[str, np.ndarray] | ArithmeticError]:
-        """Columns of every run, or what is wrong with its numbers; the times are its share of the GPU's."""
-        from bns.cuda.rows import evals_of  # noqa: PLC0415  # kernels again
-
+        """Columns of every run so far, or what is wrong with its numbers; the times are its share of the GPU's."""
         with faults():
             rows = [array.copy_to_host() for array in (self._evaluated, self._fittest, self._measured)]
         found: list[dict[str, np.ndarray] | ArithmeticError] = []
         for run, spec in enumerate(self.specs):
-            own = [table[run, : spec.evaluations] for table in rows]
+            upto = min(spec.evaluations, self.evaluation)
+            own, seconds = [table[run, :upto] for table in rows], self._seconds[:, :upto]
             try:
-                found.append(evals_of(self._kernels.driven, *own, *self._seconds[:, : spec.evaluations]))
+                found.append(self._kernels.evals_of(self._kernels.driven, *own, *seconds))
             except ArithmeticError as error:
                 found.append(error)
         return found
 
+    def columns(self, run: int) -> dict[str, np.ndarray]:
+        """Those of one run; ArithmeticError if its numbers are not finite."""
+        found = self.evals()[run]
+        if isinstance(found, ArithmeticError):
+            raise found
+        return found
+
     def result(self, run: int = 0) -> RunResult:
-        """One run as `bns.loop.run` gives it; ArithmeticError if its numbers are not finite."""
-        spec, evals = self.specs[run], self.evals()[run]
-        if isinstance(evals, ArithmeticError):
-            raise evals
+        """One run that is done, as `bns.loop.run` gives it; ArithmeticError if its numbers are not finite."""
+        spec, evals = self.specs[run], self.columns(run)
         task, world = load_task(spec.robot, spec.task), build_world(spec.world, self.robot)
         with faults():
             weights, half = self._weights[run].copy_to_host(), spec.generations_per_evaluation * spec.evaluations % 2
@@ -195,3 +199,4 @@ class _Kernels:
         self.evolve = load("bns.cuda.evolution").evolution_kernel(own.scored, robot.bounds, networks, robot.hidden)
         self.measure = measuring.measuring_kernel(robot.bounds, networks, robot.hidden)
         self.drive, self.driven, self.measured = own.drive, own.DRIVEN, measuring.MEASURED
+        self.evals_of = load("bns.cuda.rows").evals_of

@@ -27,9 +27,12 @@ def device_name() -> str:
     Raises:
         DeviceError: there is none, or its driver is missing or too old.
     """
-    cuda = _module()
-    if not cuda.is_available():
-        reason = " ".join(str(cuda.cuda_error() or "the driver sees no GPU").split())
+    try:
+        cuda = _module()
+        reason = "" if cuda.is_available() else " ".join(str(cuda.cuda_error() or "the driver sees no GPU.").split())
+    except (ValueError, OSError) as error:  # a driver named by NUMBA_CUDA_DRIVER that is none
+        reason = f"{_first_line(error)}."
+    if reason:
         raise DeviceError(
             f"--device cuda: no GPU can be used: {reason} Install NVIDIA's driver and pip install 'bns[cuda]', {_ELSE}."
         )

@@ -42,9 +42,9 @@ class Provenance:
 def provenance() -> Provenance:
     """Provenance of this process, found out once; never fails."""
     sha, clean = git_state(Path(bns.__file__).resolve().parent)
-    libraries = {name: _version(name) for name in _LIBRARIES}
+    libraries = {name: version(name) for name in _LIBRARIES}
     versions = json.dumps({"python": platform.python_version(), **libraries}, sort_keys=True)
-    return Provenance(sha, clean, _version("bns"), platform.node(), versions)
+    return Provenance(sha, clean, version("bns"), platform.node(), versions)
 
 
 def git_state(package: Path) -> tuple[str, bool | None]:
@@ -66,7 +66,8 @@ def _git(folder: Path, *arguments: str) -> str | None:
     return done.stdout.strip() if done.returncode == 0 else None
 
 
-def _version(package: str) -> str:
+def version(package: str) -> str:
+    """Installed version of a package; "" if it is not installed."""
     try:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:

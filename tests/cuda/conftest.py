@@ -1,22 +1,19 @@
 """The kernels run in numba's CUDA simulator: Python threads, no GPU, no driver.
 
-It lacks two things. Warps cannot exchange values there, and its arrays cannot be handed to the compiled functions that kernels
-share with the CPU engine: here kernels see plain numpy arrays.
+It lacks three things. Warps cannot exchange values there; its arrays cannot be handed to the compiled functions that kernels
+share with the CPU engine: here kernels see plain numpy arrays; and its threads wait for each other in a busy loop.
 """
 
 import sys
 import threading
 
 import numba
-import pytest
+import numpy as np
 
 assert "numba.cuda" not in sys.modules, "something has loaded numba's CUDA support before the simulator could be chosen"
 numba.config.ENABLE_CUDASIM = 1
 
-from numba import cuda  # noqa: E402
 from numba.cuda.simulator import kernel, kernelapi  # noqa: E402
-
-from bns.spec import RunSpec  # noqa: E402
 
 
 def _shfl_xor_sync(self, mask, value, apart):
@@ -34,17 +31,29 @@ def _shfl_xor_sync(self, mask, value, apart):
 kernel.FakeWithinKernelCUDAArray = lambda fake: fake._ary
 kernelapi.FakeCUDAModule.shfl_xor_sync = _shfl_xor_sync
 
-TINY = RunSpec(
-    population_size=8,
-    evaluations=2,
-    generations_per_evaluation=2,
-    training_iterations_per_evaluation=3,
-    max_commands=6,
-    min_commands=2,
-)
+
+def _run(self, place, *arguments):
+    """A block: its own threads, which wait for each other at a barrier; the simulator's way is a busy loop."""
+    size = self._block_dim[0] * self._block_dim[1] * self._block_dim[2]
+    self.barrier, faults = threading.Barrier(size), []
+
+    def work():
+        try:
+            self._f(*arguments)
+        except threading.BrokenBarrierError:
+            pass  # another thread has told why
+        except Exception as fault:
+            faults.append(fault)
+            self.barrier.abort()
+
+    threads = [kernel.BlockThread(work, self, place, point, False) for point in np.ndindex(*self._block_dim)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    if faults:
+        raise faults[0]
 
 
-@pytest.fixture
-def device():
-    """numba.cuda, simulated."""
-    return cuda
+kernel.BlockManager.run = _run
+kernel.BlockThread.syncthreads = lambda thread: thread._manager.barrier.wait()

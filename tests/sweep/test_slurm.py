@@ -156,7 +156,7 @@ def test_what_makes_no_sense_is_refused(tmp_path, monkeypatch):
 
 
 def test_executors_are_found_by_name():
-    assert executor_names() == ("dask", "joblib", "slurm")
+    assert executor_names() == ("cuda", "dask", "joblib", "slurm")
     with pytest.raises(ClusterError, match=r"unknown executor 'slrm'\. Did you mean 'slurm'\?"):
         load_executor("slrm")
 

@@ -1,0 +1,186 @@
+"""Batches behind a sweep: order, size, resume, memory that is full, runs that fail, a GPU that fails."""
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from bns.cli import main
+from bns.cuda.device import OutOfDeviceMemoryError, faults
+from bns.errors import DeviceError
+from bns.spec import RunSpec
+from bns.store.reader import load
+from bns.store.schema import PARAMETERS, SCHEMAS
+from bns.sweep import batches
+from bns.sweep.batches import BatchExecutor, DeviceWarning
+from bns.sweep.budget import Budget
+from bns.sweep.grid import Sweep
+from bns.sweep.order import ordered_specs
+from bns.sweep.runner import run_sweep
+
+SWEEP = Sweep("demo", "khepera", 3, tuple({"population_size": 10 + n, "evaluations": 2} for n in range(4)), "", Path("x.yaml"))
+
+
+class Steps:
+    """A batch that computes nothing; `room` runs fit into memory; runs in `lost` come back without their numbers."""
+
+    begun: ClassVar[list] = []
+    room, fault, lost = 100, None, ()
+
+    def __init__(self, specs):
+        Steps.begun.append(list(specs))
+        if len(specs) > Steps.room:
+            raise OutOfDeviceMemoryError("CUDA_ERROR_OUT_OF_MEMORY")
+        self.specs, self.left = specs, 2
+
+    @property
+    def done(self):
+        return self.left == 0
+
+    def step(self):
+        if Steps.fault is not None:
+            with faults():
+                raise Steps.fault
+        self.left -= 1
+
+    def evals(self):
+        return [ArithmeticError("diversity is nan") if spec.run_id in Steps.lost else columns(spec) for spec in self.specs]
+
+
+def columns(spec):
+    own = [f for f in SCHEMAS["evals"] if f.name not in {"run_id", "robot", *PARAMETERS}]
+    values = {f.name: np.zeros(spec.evaluations, f.type.to_pandas_dtype()) for f in own}
+    return values | {"evaluation": np.arange(1, spec.evaluations + 1)}
+
+
+@pytest.fixture(autouse=True)
+def _fresh(monkeypatch):
+    for name, value in {"begun": [], "room": 100, "fault": None, "lost": ()}.items():
+        monkeypatch.setattr(Steps, name, value)
+
+
+def swept(results, executor=None, **options):
+    return run_sweep(SWEEP, results, executor=executor or BatchExecutor(make=Steps, first=5), warm_up=int, **options)
+
+
+def test_runs_are_taken_in_the_sweeps_order_and_stored_once(tmp_path):
+    assert swept(tmp_path).done == 12
+    assert list(itertools.chain(*Steps.begun)) == ordered_specs(SWEEP)
+    assert [len(batch) for batch in Steps.begun] == [5, 7]  # the second is larger, and takes what there is
+    runs = load(tmp_path, "runs")
+    assert set(runs["run_id"]) == {spec.run_id for spec in ordered_specs(SWEEP)}
+    assert runs["versions"].str.contains('"device": "simulated GPU"').all()
+    assert runs["world_digest"].nunique() == 1
+
+
+def test_what_is_done_is_skipped(tmp_path):
+    swept(tmp_path, limit=4)
+    Steps.begun.clear()
+    assert swept(tmp_path).new == 8
+    assert list(itertools.chain(*Steps.begun)) == ordered_specs(SWEEP)[4:]
+
+
+@pytest.mark.parametrize("wall_s", [0.5, 10.0, 600.0])
+def test_batches_grow_and_shrink_towards_a_minute(monkeypatch, wall_s):
+    clock = itertools.count()
+    monkeypatch.setattr(batches.time, "perf_counter", lambda: wall_s * next(clock))
+    executor = BatchExecutor(make=Steps, first=4, largest=40)
+    for spec in ordered_specs(SWEEP)[: executor.free]:
+        executor.submit(spec)
+    while executor.in_flight:
+        executor.next(0.0)
+    assert executor.free == {0.5: 16, 10.0: 16, 600.0: 1}[wall_s]
+
+
+def test_a_batch_is_no_larger_than_the_time_that_is_left_allows(monkeypatch):
+    clock = itertools.count()
+    monkeypatch.setattr(batches.time, "perf_counter", lambda: 10.0 * next(clock))
+    executor = BatchExecutor(lambda: 25.0, make=Steps, first=4)
+    for spec in ordered_specs(SWEEP)[:4]:
+        executor.submit(spec)
+    while executor.in_flight:
+        executor.next(0.0)
+    assert executor.free == 10
+
+
+def test_no_batch_is_begun_when_the_time_is_up(tmp_path):
+    assert swept(tmp_path, budget=Budget(0.0)).stopped_by == "budget"
+    assert Steps.begun == []
+
+
+def test_memory_that_is_full_halves_the_batch_and_loses_nothing(tmp_path):
+    Steps.room = 2
+    with pytest.warns(DeviceWarning, match=r"5 runs side by side do not fit .*OUT_OF_MEMORY.*; going on with 2"):
+        assert swept(tmp_path).done == 12
+    assert [len(batch) for batch in Steps.begun] == [5, 2, 2, 2, 2, 2, 2]
+    assert list(itertools.chain(*Steps.begun[1:])) == ordered_specs(SWEEP)
+
+
+def test_a_run_that_does_not_fit_alone_fails_alone(tmp_path):
+    Steps.room = 0
+    assert swept(tmp_path, BatchExecutor(make=Steps, first=1), limit=2).failed == 2
+    assert load(tmp_path, "runs")["error"].str.contains("not even this run alone fits").all()
+
+
+def test_a_run_without_its_numbers_fails_alone(tmp_path):
+    Steps.lost = (ordered_specs(SWEEP)[1].run_id,)
+    summary = swept(tmp_path)
+    assert (summary.done, summary.failed) == (11, 1)
+    runs = load(tmp_path, "runs").set_index("run_id")
+    assert runs.loc[Steps.lost[0], "error"].startswith("ArithmeticError: diversity is nan")
+
+
+class _DriverError(Exception):
+    pass
+
+
+_DriverError.__module__ = "numba.cuda.cudadrv.driver"
+
+
+def test_a_gpu_that_fails_ends_the_sweep_and_what_was_stored_stays(tmp_path):
+    swept(tmp_path, limit=3)
+    Steps.fault = _DriverError("[700] Call to cuMemcpyDtoH results in CUDA_ERROR_ILLEGAL_ADDRESS")
+    with pytest.raises(DeviceError, match=r"the GPU failed: .*ILLEGAL_ADDRESS.*What was finished is stored"):
+        swept(tmp_path)
+    Steps.fault = None
+    assert swept(tmp_path).new == 9
+
+
+def test_memory_that_fills_up_later_halves_the_batch_too():
+    Steps.fault = _DriverError("[2] Call to cuMemAlloc results in CUDA_ERROR_OUT_OF_MEMORY")
+    executor = BatchExecutor(make=Steps, first=4)
+    for spec in ordered_specs(SWEEP)[:4]:
+        executor.submit(spec)
+    with pytest.warns(DeviceWarning, match="going on with 2"):
+        assert executor.next(0.0) is None
+    assert (executor.in_flight, executor.free) == (4, 0)
+
+
+def test_what_is_cancelled_is_not_in_flight():
+    executor = BatchExecutor(make=Steps, first=4)
+    executor.submit(ordered_specs(SWEEP)[0])
+    executor.cancel()
+    assert (executor.in_flight, executor.free, executor.next(0.0)) == (0, 0, None)
+
+
+def test_faults_of_our_own_are_left_as_they_are():
+    with pytest.raises(KeyError), faults():
+        raise KeyError("x")
+
+
+def test_sweep_and_run_from_the_command_line_on_the_simulated_gpu(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("few.yaml").write_text(
+        "name: few\nrobot: khepera\nseeds: 2\nfixed: {evaluations: 1, population_size: 3, generations_per_evaluation: 0, "
+        "training_iterations_per_evaluation: 0, max_commands: 4}\ngrid: {mutation_rate: [0.1]}\n"
+    )
+    monkeypatch.setattr("bns.cuda.batch.THREADS", 2)
+    assert main(["sweep", "few.yaml", "--device", "cuda"]) == 0
+    assert load(Path("results"), "runs")["status"].tolist() == ["ok", "ok"]
+    spec = RunSpec(seed=1, evaluations=1, population_size=3, generations_per_evaluation=0, max_commands=4)
+    spec = replace(spec, training_iterations_per_evaluation=0)
+    evals = load(Path("results"))
+    assert spec.run_id in set(evals["run_id"])  # by the same name as on the CPU
