@@ -12,7 +12,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench hidden-effects precompute soak-dask clean sweep-snake soak
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench bench-gpu hidden-effects precompute soak-dask clean sweep-snake soak
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-14s %s\n", $$1, $$2}'
@@ -55,6 +55,9 @@ figures: setup ## page and figures of whatever results there are, into results/f
 
 bench: setup ## speed, as ratios against named peers measured in the same run
 	$(BIN)/python -m tests.bench --json "$(RESULTS)/bench.json"
+
+bench-gpu: setup ## the Khepera study on this machine's GPU, from a slice of it (needs: pip install -e '.[cuda]' in .venv)
+	$(BIN)/python -m tests.bench.gpu --json "$(RESULTS)/bench-gpu.json"
 
 hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")

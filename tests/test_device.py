@@ -4,6 +4,8 @@ import re
 
 import pytest
 
+from bns.errors import DeviceError
+
 SWEEP = "name: few\nrobot: khepera\nseeds: 2\nfixed: {evaluations: 1, population_size: 8}\ngrid: {mutation_rate: [0.1]}\n"
 NO_GPU = {"NUMBA_CUDA_DRIVER": "/nonexistent/libcuda.so", "CUDA_VISIBLE_DEVICES": ""}
 
@@ -42,3 +44,40 @@ def test_the_package_does_not_load_cuda_unless_asked(tmp_path, bns):
     assert "numba.core" in done.stderr
     assert "numba.cuda.cudadrv" not in done.stderr
     assert "bns.cuda" not in done.stderr
+
+
+def test_bench_says_that_there_is_no_gpu(monkeypatch, capsys):
+    from tests.bench import gpu
+
+    def none():
+        raise DeviceError("no GPU can be used: no driver")
+
+    monkeypatch.setattr(gpu, "device_name", none)
+    assert gpu.main([]) == 2
+    assert capsys.readouterr().err == "bench-gpu: nothing measured. no GPU can be used: no driver\n"
+
+
+def test_table_of_the_bench_from_known_figures():
+    from tests.bench.gpu import Peak, Slice, lines_of
+
+    part = Slice(
+        runs=2000, wall_s=40, training_s=30, evolution_s=8, training_ops=4e14, evolution_ops=1e14, moved_bytes=1e12,
+        neuron_iterations=1e13,
+    )  # fmt: skip
+    lines = lines_of(part, Peak(flops=5e13, bytes_s=5e12), 45_000, cpu_s=3.0)
+    values = [line.measured for line in lines]
+    assert values == pytest.approx([15, 26.667, 11.25, 22.5, 150, 20666.7], rel=1e-3)
+    assert [line.met for line in lines[:2]] == [True, True]
+    assert lines[0].floor == pytest.approx(22.5 * 10 / 60)  # 5e14 operations are 10 s at the peak, more than the bytes take
+
+
+def test_peak_is_that_of_the_attributes():
+    from tests.bench.gpu import peak_of
+
+    class H200:
+        compute_capability = (9, 0)
+        MULTIPROCESSOR_COUNT, CLOCK_RATE = 132, 1_980_000
+        MEMORY_CLOCK_RATE, GLOBAL_MEMORY_BUS_WIDTH = 3_201_000, 6144
+
+    assert peak_of(H200).flops == pytest.approx(66.9e12, rel=1e-3)
+    assert peak_of(H200).bytes_s == pytest.approx(4.9e12, rel=1e-2)

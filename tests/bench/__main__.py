@@ -39,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     met = [line.met for line in lines if line.target is not None]
     print(f"{met.count(True)} met, {met.count(False)} NOT met, {met.count(None)} not measured")
     if options.json:
-        _write(options.json, lines, options.quick)
+        write(options.json, lines, options.quick)
     return 0
 
 
@@ -56,7 +56,8 @@ def _load() -> str:
     return f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
 
 
-def _write(path: Path, lines: list[Line], quick: bool) -> None:
+def write(path: Path, lines: list[Line], quick: bool) -> None:
+    """The lines and the machine as JSON."""
     about = {
         "at": datetime.now(UTC).isoformat(timespec="seconds"),
         "quick": quick,
