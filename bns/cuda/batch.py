@@ -21,7 +21,7 @@ from bns.loop import RunResult
 from bns.robots import load_robot
 from bns.robots.simulator import load_static_simulator
 from bns.spec import RunSpec
-from bns.tasks import load_task
+from bns.tasks import default_task, load_task
 from bns.worlds import build_world
 
 THREADS = 128
@@ -180,6 +180,20 @@ class Batch:
     def _now(self) -> float:
         self._kernels.cuda.synchronize()
         return time.perf_counter()
+
+
+@cache
+def warm(robot: str) -> None:
+    """Compile the robot's kernels, once a process, so that no batch is charged with it."""
+    tiny = RunSpec(
+        robot=robot,
+        task=default_task(robot),
+        population_size=2,
+        evaluations=1,
+        generations_per_evaluation=0,
+        training_iterations_per_evaluation=1,
+    )
+    Batch([tiny]).step()
 
 
 @cache

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+
+from bns.cuda.batch import warm
 from bns.cuda.device import device_name
 from bns.cuda.support import check_supported
 from bns.errors import SpecError
@@ -34,5 +37,5 @@ def carry_out(sweep: Sweep, request: Request) -> Summary:
         on_progress=request.on_progress,
         shard=request.shard,
         executor=BatchExecutor(lambda: request.budget.left_s),
-        warm_up=lambda: None,  # the first batch does it
+        warm_up=partial(warm, sweep.robot),
     )
