@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import pkgutil
 import sys
+import traceback
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -30,12 +31,12 @@ def figures() -> dict[str, ModuleType]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw what the store has data for; 0, or 2 with one line on stderr."""
-    wanted = _parser().parse_args(arguments)
+    """Draw what the store has data for; 0, 1 where a script failed at it, or 2 with one line on stderr."""
+    wanted, failed = _parser().parse_args(arguments), False
     try:
         modules, out = _chosen(wanted.only), wanted.out or wanted.results / "figures"
         if not wanted.page:
-            _draw_all(modules, wanted.results, out, everything=wanted.only is None)
+            failed = not _draw_all(modules, wanted.results, out, everything=wanted.only is None)
         print(f"page: {write_page(out, wanted.refresh)}")
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -43,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted; what is drawn stays. Repeat the command for the rest.", file=sys.stderr)
         return 130
-    return 0
+    return int(failed)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -65,8 +66,9 @@ def _chosen(only: str | None) -> dict[str, ModuleType]:
     return {only: found[only]}
 
 
-def _draw_all(modules: dict[str, ModuleType], results: Path, out: Path, *, everything: bool) -> None:
-    store, made = Store(results), set()
+def _draw_all(modules: dict[str, ModuleType], results: Path, out: Path, *, everything: bool) -> bool:
+    """Whether every script could be carried through: one that cannot does not cost the others their figures."""
+    store, made, failed = Store(results), set(), False
     console = Console(stderr=True)
     for name, module in track(modules.items(), "figures", console=console, disable=not console.is_terminal):
         try:
@@ -78,8 +80,17 @@ def _draw_all(modules: dict[str, ModuleType], results: Path, out: Path, *, every
             print(f"{name} ({module.PAPER}) skipped: {reason}")
             publish_skipped(name, module.PAPER, str(reason), out)
             made.add(name)
+        except BnsError:
+            raise
+        except Exception as fault:
+            failed = True
+            traceback.print_exc()
+            print(f"error: {name} ({module.PAPER}) could not be drawn; the others are", file=sys.stderr)
+            publish_skipped(name, module.PAPER, f"its script failed: {type(fault).__name__}: {fault}", out)
+            made.add(name)
     if everything:
         forget_all_but(made, out)
+    return not failed
 
 
 if __name__ == "__main__":
