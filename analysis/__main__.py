@@ -16,7 +16,7 @@ from rich.progress import track
 
 import analysis
 from analysis.gallery import write_page
-from analysis.publish import forget_all_but, publish_drawn, publish_skipped
+from analysis.publish import forget_all_but, forget_skipped, publish_drawn, publish_skipped
 from analysis.store import NoDataError, Store
 from analysis.words import place
 from bns.errors import BnsError, SpecError, unknown_name
@@ -72,6 +72,7 @@ def _draw_all(modules: dict[str, ModuleType], results: Path, out: Path, *, every
     console = Console(stderr=True)
     for name, module in track(modules.items(), "figures", console=console, disable=not console.is_terminal):
         try:
+            forget_skipped(name, out)
             for drawn in module.draw(store):
                 place = publish_drawn(drawn, module.PAPER, store, out)
                 print(f"{place}  ({module.PAPER}, n = {drawn.n:,} runs)")

@@ -63,6 +63,9 @@ def test_a_script_that_fails_is_told_and_costs_no_other_figure(tmp_path, monkeyp
     told = capsys.readouterr().err
     assert "ZeroDivisionError" in told
     assert "error: findings (sections 4.6 and 5.9) could not be drawn; the others are" in told
+    monkeypatch.undo()
+    assert main(["--results", str(tmp_path / "results"), "--out", str(tmp_path / "out"), "--only", "findings"]) == 0
+    assert [caption["name"] for caption in captions(tmp_path / "out") if "findings" in caption["name"]] == ["findings-khepera"]
 
 
 def test_a_robot_without_goal_radii_has_its_own_success_and_no_centimetres(tmp_path):
