@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pandas as pd
 
 from analysis.clouds import combinations
 from analysis.diversity_of_extremes import curves
@@ -19,7 +18,7 @@ from analysis.outcomes import by_seed
 from analysis.potential_success import RADIUS_CM
 from analysis.ranking import any_of, by_seed_array, extremes, ranking, varied
 from analysis.selection import Selection
-from analysis.store import BEGIN, NoDataError, Store
+from analysis.store import Store
 from analysis.verdicts import UNDECIDED, Checked, likely, near, within
 from analysis.words import TITLES, valued
 
@@ -37,7 +36,7 @@ def largest_gap(store: Store, chosen: Selection, task: str, parameter: str, poin
 
 
 def most_influential(store: Store, chosen: Selection, task: str, parameter: str) -> Checked:
-    names = varied(_combinations(store, chosen, task))
+    names = varied(combinations(store, chosen)[0].query("task == @task"))
     gaps = {name: _gaps(store, chosen, task, name) for name in names}
     claim = f"{TITLES[parameter]} matters most"
     if parameter not in gaps or len(gaps) < 2 or gaps[parameter] is None:
@@ -73,7 +72,7 @@ def larger_is_better(store: Store, chosen: Selection, task: str, parameter: str)
 
 def best_combination(store: Store, chosen: Selection, task: str, column: str, percent: float) -> Checked:
     radius = f" within {column.removeprefix('success_')[:-2]} cm" if column != "success" else ""
-    rows = _combinations(store, chosen, task)
+    rows = combinations(store, chosen)[0].query("task == @task")
     best = rows.loc[(rows[column] / rows.runs).idxmax()]
     low, high = (100 * float(end) for end in wilson(best[column], best.runs))
     ours = f"{100 * best[column] / best.runs:.0f}{_interval(low, high, '.0f')} % of {best.runs:.0f} runs, as swept"
@@ -93,7 +92,7 @@ def diversity_range(store: Store, chosen: Selection, task: str, range: list[floa
 def error_rises(store: Store, chosen: Selection, task: str) -> Checked:
     from scipy.stats import spearmanr  # noqa: PLC0415  # slow to load
 
-    rows = _combinations(store, chosen, task).dropna(subset=["diversity", "fitness_error"])
+    rows = combinations(store, chosen)[0].query("task == @task").dropna(subset=["diversity", "fitness_error"])
     upper = rows[rows.diversity > rows.diversity.median()]
     claim = "fitness error rises beyond some diversity"
     if len(upper) < 4 or upper.fitness_error.nunique() < 2:
@@ -165,14 +164,6 @@ def _bootstrapped(sums: np.ndarray, counts: np.ndarray) -> tuple[float, float]:
         return math.nan, math.nan
     low, high = band(ratios(resampled(len(sums), DRAWS), sums, counts))
     return float(low), float(high)
-
-
-def _combinations(store: Store, chosen: Selection, task: str) -> pd.DataFrame:
-    """The task's combinations with enough runs; a sweep that is under way may have them on other tasks alone."""
-    rows = combinations(store, chosen)[0].query("task == @task")
-    if rows.empty:
-        raise NoDataError(f"no combination of task {task} has enough runs yet; run {BEGIN}")
-    return rows
 
 
 def _mostly(claim: str, holds: np.ndarray) -> Checked:
