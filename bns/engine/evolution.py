@@ -1,4 +1,4 @@
-"""The genetic algorithm over command lists of varying length: ranking, tournaments, crossover, mutation, diversity.
+"""Populations of command lists of varying length: ranking, tournaments, diversity. How they breed: `bns.engine.breeding`.
 
 A population is `commands` (n, longest, 3) float32 in device units and `lengths` (n,) int32. Fitness is larger for better,
 and 0 where the arithmetic failed.
@@ -6,27 +6,30 @@ and 0 where the arithmetic failed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from bns.engine.jit import exact, fast, inline
-from bns.engine.philox import Key, Purpose, philox, uniforms, words
+from bns.engine.jit import exact
+from bns.engine.philox import Key, Purpose, uniforms, words
 
-IDENTICAL_CUT = 0.8
-"""Probability that both parents are cut at the same place (section 4.3)."""
-COMPONENTS = 3
-"""Numbers a command has: left, right, duration."""
 _UNIT = 2.0**-32
 
 
 @dataclass
 class Population:
-    """Controllers side by side: commands (n, longest, components) float32, lengths (n,) int32."""
+    """Controllers side by side: commands (n, longest, components) float32, lengths (n,) int32.
+
+    ``origin`` (n, longest) int32 says of each command where its parents' generation had the same command after the same
+    one, counted through all lists; -1 where it is new. Whoever knows what the old ones do need only ask for the new.
+    """
 
     commands: np.ndarray
     lengths: np.ndarray
+    origin: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.origin = np.full(self.commands.shape[:2], -1, np.int32)
 
     def controller(self, index: int) -> np.ndarray:
         """The commands of one controller, (length, components), a copy."""
@@ -79,149 +82,6 @@ def pick(key: Key, purpose: Purpose, step: int, order: np.ndarray, cdf: np.ndarr
     """The winner of one tournament."""
     u = words(key, purpose, step, 1, 1)[0, 0, 0] * _UNIT
     return int(order[np.searchsorted(cdf, u, side="right")])
-
-
-@exact
-def _winner(order, cdf, word):  # type: ignore[no-untyped-def]  # compiled
-    """As `pick`: the first rank whose share lies above the draw. Halving without a branch, which would be guessed wrongly."""
-    u, at, left = word * _UNIT, 0, cdf.size
-    while left > 1:
-        half = left >> 1
-        at += half * np.int64(cdf[at + half - 1] <= u)
-        left -= half
-    return order[min(at + np.int64(cdf[at] <= u), order.size - 1)]
-
-
-@inline
-def _below(word: Any, n: Any) -> Any:
-    """Uniform whole number 0..n-1."""
-    return np.int64(np.uint64(word) * np.uint64(n) >> np.uint64(32))
-
-
-@inline
-def _copy(source, row, start, target, child, at, count):  # type: ignore[no-untyped-def]  # compiled
-    for e in range(count):
-        target[child, at + e] = source[row, start + e]
-
-
-@exact
-def _cross(children, child, lists, lengths, front, back, cut_front, cut_back, shortest):  # type: ignore[no-untyped-def]  # compiled
-    """First cut_front commands of one parent, then the other parent's from cut_back on; the length before and after the bound.
-
-    children and lists are (n, capacity * components): lists of commands laid end to end.
-    """
-    length = cut_front + lengths[back] - cut_back
-    if length < shortest:  # too short a list is not made: the parent passes unchanged
-        cut_front, cut_back, length = 0, 0, lengths[back]
-    kept = min(length, lists.shape[1] // COMPONENTS)
-    first = min(cut_front, kept)
-    _copy(lists, front, 0, children, child, 0, first * COMPONENTS)
-    _copy(lists, back, cut_back * COMPONENTS, children, child, first * COMPONENTS, (kept - first) * COMPONENTS)
-    return length, kept
-
-
-@fast
-def _draws(slot, individual, purpose, step, k0, k1, out):  # type: ignore[no-untyped-def]  # compiled
-    """Three words for each (slot, individual) into out (3, n), all at once, so that the generator vectorises."""
-    first, second, third = out[0], out[1], out[2]
-    for m in range(slot.size):
-        draws = philox(slot[m], individual[m], step, np.uint32(purpose), k0, k1)
-        first[m] = draws[0]
-        second[m] = draws[1]
-        third[m] = draws[2]
-
-
-@exact
-def _mutate(children, lengths, rate, low, high, span, step, k0, k1):  # type: ignore[no-untyped-def]  # compiled
-    """Mutate all controllers but the first, which is the elite."""
-    total = 0
-    for i in range(1, lengths.size):
-        total += lengths[i]
-    slot, individual = np.empty(total, np.uint32), np.empty(total, np.uint32)
-    m = 0
-    for i in range(1, lengths.size):
-        for j in range(lengths[i]):
-            slot[m], individual[m] = j, i
-            m += 1
-    draws = np.empty((3, total), np.uint32)
-    _draws(slot, individual, Purpose.MUTATION, step, k0, k1, draws)
-    threshold = np.uint64(rate / _UNIT)
-    for c in range(COMPONENTS):
-        for m in range(total):
-            word = np.uint64(draws[c, m])
-            if word < threshold:
-                # Given that it fell below the threshold, the draw is uniform there: it serves twice.
-                i, j = individual[m], slot[m]
-                value = children[i, j, c] + np.float32((2.0 * np.float64(word) / np.float64(threshold) - 1.0) * span[c])
-                children[i, j, c] = min(max(value, low[c]), high[c])
-
-
-@exact
-def breed_into(commands, lengths, order, cdf, rate, low, high, span, shortest, step, k0, k1, children, child_lengths):  # type: ignore[no-untyped-def]  # compiled
-    """Fill children with the best controller and the offspring of tournament winners; count those cut at the bound."""
-    hits = 0
-    n = commands.shape[0]
-    lists, child_lists = commands.reshape(n, -1), children.reshape(n, -1)
-    best = order[0]
-    _copy(lists, best, 0, child_lists, 0, 0, lengths[best] * COMPONENTS)
-    child_lengths[0] = lengths[best]
-    slot, pairs = np.zeros(n // 2, np.uint32), np.arange(n // 2).astype(np.uint32)
-    parents, cuts = np.empty((3, n // 2), np.uint32), np.empty((3, n // 2), np.uint32)
-    _draws(slot, pairs, Purpose.PARENTS, step, k0, k1, parents)
-    _draws(slot, pairs, Purpose.CUTS, step, k0, k1, cuts)
-    for pair in range(n // 2):
-        first = 1 + 2 * pair
-        a, b = _winner(order, cdf, parents[0, pair]), _winner(order, cdf, parents[1, pair])
-        cut_a = _below(cuts[1, pair], min(lengths[a], lengths[b]) + 1)
-        cut_b = cut_a
-        if cuts[0, pair] * _UNIT >= IDENTICAL_CUT:
-            cut_a = _below(cuts[1, pair], lengths[a] + 1)
-            cut_b = _below(cuts[2, pair], lengths[b] + 1)
-        length, kept = _cross(child_lists, first, lists, lengths, a, b, cut_a, cut_b, shortest)
-        child_lengths[first] = kept
-        hits += length > kept
-        if first + 1 < n:
-            length, kept = _cross(child_lists, first + 1, lists, lengths, b, a, cut_b, cut_a, shortest)
-            child_lengths[first + 1] = kept
-            hits += length > kept
-    _mutate(children, child_lengths, rate, low, high, span, step, k0, k1)
-    return hits
-
-
-def breed(
-    key: Key,
-    parents: Population,
-    order: np.ndarray,
-    cdf: np.ndarray,
-    rate: float,
-    bounds: CommandBounds,
-    shortest: int,
-    generation: int,
-    children: Population,
-) -> int:
-    """One generation into `children` (same shapes as parents); how many children were cut at the longest list allowed.
-
-    Elitism: the best controller goes on unchanged. Two-parent crossover swaps the first segments; the cut is the same in
-    80 % and independent in 20 % of the pairs. Every component mutates with probability `rate`, uniformly within its
-    span, and stays within its bounds (section 4.3).
-    """
-    return int(
-        breed_into(
-            parents.commands,
-            parents.lengths,
-            order,
-            cdf,
-            rate,
-            bounds.low,
-            bounds.high,
-            bounds.mutation_span,
-            shortest,
-            np.uint32(generation),
-            *key.words,
-            children.commands,
-            children.lengths,
-        )
-    )
 
 
 @exact

@@ -13,12 +13,13 @@ from bns.tasks import Task
 
 class Scores(NamedTuple):
     """Per controller: fitness (n,), 0 where the arithmetic failed; goals reached (n,); how many failed; and, where a robot
-    says so, how many of its commands count (n,)."""
+    says so, how many of its commands count (n,), and what its networks said of all commands (networks, commands)."""
 
     fitness: np.ndarray
     goals_reached: np.ndarray
     failures: int
     used: np.ndarray | None = None
+    outputs: np.ndarray | None = None
 
 
 class Luck(NamedTuple):
@@ -102,8 +103,14 @@ class Robot(Protocol):
     def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
         """The commands (m, components) that are driven when this controller is picked."""
 
-    def score(self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None) -> Scores:
-        """Fitness of every controller on simulator networks (networks, W); luck is for robots with noise in evolution."""
+    def score(
+        self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None
+    ) -> Scores:
+        """Fitness of every controller on simulator networks (networks, W); luck is for robots with noise in evolution.
+
+        parents: scores of the generation that this one was bred from, on the same networks: a robot may take over from them
+        what cannot have changed. The scores are the same with them and without.
+        """
 
     def breed(
         self,

@@ -7,7 +7,8 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from bns.engine.evolution import Population, breed, rank, tournament_cdf
+from bns.engine.breeding import breed
+from bns.engine.evolution import Population, rank, tournament_cdf
 from bns.engine.philox import Key
 from bns.engine.snn import initial_weights
 from bns.robots.khepera import ROBOT

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bns.engine import reference
-from bns.engine.evolution import CommandBounds, Population, breed, random_population, tournament_cdf
+from bns.engine.breeding import breed
+from bns.engine.evolution import CommandBounds, Population, random_population, tournament_cdf
 from bns.engine.philox import Key
 
 BOUNDS = CommandBounds(*(np.array(v, np.float32) for v in ([-1, 0, 10], [1, 5, 20], [0.5, 1, 3])))

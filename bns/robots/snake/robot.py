@@ -99,7 +99,9 @@ class Snake:
         outputs = predict(weights, self.inputs(in_full), self.sigmoid_output)
         return in_full[: path.judge(self.poses(self.displacements(outputs)), task)[2]]
 
-    def score(self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None) -> Scores:
+    def score(
+        self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None
+    ) -> Scores:
         """Mean fitness over ten noisy evaluations, all controllers under the same noise; without luck there is none."""
         commands = population.commands
         n, length, _ = commands.shape

@@ -1,0 +1,213 @@
+"""How lists of commands of varying length breed: tournaments, two-parent crossover, mutation (section 4.3).
+
+Of every command of a child it is kept where it comes from (`Population.origin`), so that what the networks said of it need not
+be computed again. The networks see a command together with the speeds of the one before, so both must be unchanged.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bns.engine.evolution import CommandBounds, Population
+from bns.engine.jit import exact, fast, inline
+from bns.engine.philox import Key, Purpose, philox
+
+IDENTICAL_CUT = 0.8
+"""Probability that both parents are cut at the same place (section 4.3)."""
+COMPONENTS = 3
+"""Numbers a command has: left, right, duration."""
+SPEEDS = 2
+"""The first of them, which the networks are told of the command before, too."""
+_UNIT = 2.0**-32
+
+
+@exact
+def _winner(order, cdf, word):  # type: ignore[no-untyped-def]  # compiled
+    """As `evolution.pick`: the first rank whose share lies above the draw. Halved without a branch to guess."""
+    u, at, left = word * _UNIT, 0, cdf.size
+    while left > 1:
+        half = left >> 1
+        at += half * np.int64(cdf[at + half - 1] <= u)
+        left -= half
+    return order[min(at + np.int64(cdf[at] <= u), order.size - 1)]
+
+
+@inline
+def _below(word: Any, n: Any) -> Any:
+    """Uniform whole number 0..n-1."""
+    return np.int64(np.uint64(word) * np.uint64(n) >> np.uint64(32))
+
+
+@inline
+def _copy(source, row, start, target, child, at, count):  # type: ignore[no-untyped-def]  # compiled
+    for e in range(count):
+        target[child, at + e] = source[row, start + e]
+
+
+@inline
+def _number(origin, child, at, start, count):  # type: ignore[no-untyped-def]  # compiled
+    for e in range(count):
+        origin[child, at + e] = start + e
+
+
+@exact
+def _same_before(lists, front, cut_front, back, cut_back):  # type: ignore[no-untyped-def]  # compiled
+    """Whether the speeds before both cuts are the same; before the first command of a list the robot is at rest."""
+    if cut_front == 0 or cut_back == 0:
+        return cut_front == cut_back
+    a, b = (cut_front - 1) * COMPONENTS, (cut_back - 1) * COMPONENTS
+    return lists[front, a] == lists[back, b] and lists[front, a + 1] == lists[back, b + 1]
+
+
+@exact
+def _cross(children, origin, child, lists, lengths, starts, front, back, cut_front, cut_back, shortest):  # type: ignore[no-untyped-def]  # compiled
+    """First cut_front commands of one parent, then the other parent's from cut_back on; the length before and after the bound.
+
+    children and lists are (n, capacity * components): lists of commands laid end to end.
+    """
+    length = cut_front + lengths[back] - cut_back
+    if length < shortest:  # too short a list is not made: the parent passes unchanged
+        cut_front, cut_back, length = 0, 0, lengths[back]
+    kept = min(length, lists.shape[1] // COMPONENTS)
+    first = min(cut_front, kept)
+    _copy(lists, front, 0, children, child, 0, first * COMPONENTS)
+    _copy(lists, back, cut_back * COMPONENTS, children, child, first * COMPONENTS, (kept - first) * COMPONENTS)
+    _number(origin, child, 0, starts[front], first)
+    _number(origin, child, first, starts[back] + cut_back, kept - first)
+    if first < kept and not _same_before(lists, front, cut_front, back, cut_back):
+        origin[child, first] = -1
+    return length, kept
+
+
+@fast
+def _draws(slot, individual, purpose, step, k0, k1, out):  # type: ignore[no-untyped-def]  # compiled
+    """Three words for each (slot, individual) into out (3, n), all at once, so that the generator vectorises."""
+    first, second, third = out[0], out[1], out[2]
+    for m in range(slot.size):
+        draws = philox(slot[m], individual[m], step, np.uint32(purpose), k0, k1)
+        first[m] = draws[0]
+        second[m] = draws[1]
+        third[m] = draws[2]
+
+
+@exact
+def _hits(words, threshold, places):  # type: ignore[no-untyped-def]  # compiled
+    """Places of the words below the threshold, and how many: without a branch, which would be guessed wrongly."""
+    count = 0
+    for m in range(words.size):
+        places[count] = m
+        count += int(words[m] < threshold)
+    return count
+
+
+@exact
+def _mutate(children, origin, lengths, rate, low, high, span, step, k0, k1):  # type: ignore[no-untyped-def]  # compiled
+    """Mutate all controllers but the first, which is the elite."""
+    total = 0
+    for i in range(1, lengths.size):
+        total += lengths[i]
+    slot, individual = np.empty(total, np.uint32), np.empty(total, np.uint32)
+    m = 0
+    for i in range(1, lengths.size):
+        for j in range(lengths[i]):
+            slot[m], individual[m] = j, i
+            m += 1
+    draws, places = np.empty((COMPONENTS, total), np.uint32), np.empty(total, np.int64)
+    _draws(slot, individual, Purpose.MUTATION, step, k0, k1, draws)
+    threshold = np.uint64(rate / _UNIT)
+    for c in range(COMPONENTS):
+        for h in range(_hits(draws[c], threshold, places)):
+            m = places[h]
+            i, j = individual[m], slot[m]
+            # Given that it fell below the threshold, the draw is uniform there: it serves twice.
+            move = 2.0 * np.float64(draws[c, m]) / np.float64(threshold) - 1.0
+            value = children[i, j, c] + np.float32(move * span[c])
+            children[i, j, c] = min(max(value, low[c]), high[c])
+            origin[i, j] = -1
+            if c < SPEEDS and j + 1 < lengths[i]:
+                origin[i, j + 1] = -1
+
+
+@exact
+def number_of_first(lengths):  # type: ignore[no-untyped-def]  # compiled
+    """The number of each list's first command, counted through all lists."""
+    starts = np.empty(lengths.size, np.int32)
+    total = 0
+    for i in range(lengths.size):
+        starts[i] = total
+        total += lengths[i]
+    return starts
+
+
+@exact
+def breed_into(  # type: ignore[no-untyped-def]  # compiled
+    commands, lengths, order, cdf, rate, low, high, span, shortest, step, k0, k1, children, child_lengths, origin
+):
+    """Fill children with the best controller and the offspring of tournament winners; count those cut at the bound."""
+    hits = 0
+    n = commands.shape[0]
+    lists, child_lists = commands.reshape(n, -1), children.reshape(n, -1)
+    best, starts = order[0], number_of_first(lengths)
+    _copy(lists, best, 0, child_lists, 0, 0, lengths[best] * COMPONENTS)
+    _number(origin, 0, 0, starts[best], lengths[best])
+    child_lengths[0] = lengths[best]
+    slot, pairs = np.zeros(n // 2, np.uint32), np.arange(n // 2).astype(np.uint32)
+    parents, cuts = np.empty((3, n // 2), np.uint32), np.empty((3, n // 2), np.uint32)
+    _draws(slot, pairs, Purpose.PARENTS, step, k0, k1, parents)
+    _draws(slot, pairs, Purpose.CUTS, step, k0, k1, cuts)
+    for pair in range(n // 2):
+        first = 1 + 2 * pair
+        a, b = _winner(order, cdf, parents[0, pair]), _winner(order, cdf, parents[1, pair])
+        cut_a = _below(cuts[1, pair], min(lengths[a], lengths[b]) + 1)
+        cut_b = cut_a
+        if cuts[0, pair] * _UNIT >= IDENTICAL_CUT:
+            cut_a = _below(cuts[1, pair], lengths[a] + 1)
+            cut_b = _below(cuts[2, pair], lengths[b] + 1)
+        length, kept = _cross(child_lists, origin, first, lists, lengths, starts, a, b, cut_a, cut_b, shortest)
+        child_lengths[first] = kept
+        hits += length > kept
+        if first + 1 < n:
+            length, kept = _cross(child_lists, origin, first + 1, lists, lengths, starts, b, a, cut_b, cut_a, shortest)
+            child_lengths[first + 1] = kept
+            hits += length > kept
+    _mutate(children, origin, child_lengths, rate, low, high, span, step, k0, k1)
+    return hits
+
+
+def breed(
+    key: Key,
+    parents: Population,
+    order: np.ndarray,
+    cdf: np.ndarray,
+    rate: float,
+    bounds: CommandBounds,
+    shortest: int,
+    generation: int,
+    children: Population,
+) -> int:
+    """One generation into `children` (same shapes as parents); how many children were cut at the longest list allowed.
+
+    Elitism: the best controller goes on unchanged. Two-parent crossover swaps the first segments; the cut is the same in
+    80 % and independent in 20 % of the pairs. Every component mutates with probability `rate`, uniformly within its
+    span, and stays within its bounds (section 4.3).
+    """
+    return int(
+        breed_into(
+            parents.commands,
+            parents.lengths,
+            order,
+            cdf,
+            rate,
+            bounds.low,
+            bounds.high,
+            bounds.mutation_span,
+            shortest,
+            np.uint32(generation),
+            *key.words,
+            children.commands,
+            children.lengths,
+            children.origin,
+        )
+    )

@@ -1,0 +1,207 @@
+"""Compiled: algorithm 2 for whole populations."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from bns.engine.breeding import number_of_first
+from bns.engine.evolution import Population
+from bns.engine.jit import exact, fast, inline
+from bns.engine.snn import INPUTS, predict_into
+
+GOAL_RADIUS_M = 0.07
+MISSED_GOAL_M = 10.0
+"""Penalty for a goal not reached, in metres of distance: more than any path on the surface adds up to, so that one goal
+more always outweighs a shorter path. The source says "a large constant"."""
+SMALLEST_SUM_M = 0.01
+"""The distance sum that fitness is the inverse of is kept above this, so that fitness never exceeds 100 per metre."""
+LARGEST_HEADING_RAD = 1e5
+"""A controller whose heading in simulation runs beyond this counts as failed arithmetic: its networks have diverged."""
+START = (0.0, 0.0, math.pi / 2)
+"""Start of every task: between the goals, facing north."""
+
+LOW = np.array([3000.0, 3000.0, 400.0], np.float32)
+HIGH = np.array([30000.0, 30000.0, 3000.0], np.float32)
+"""Least and largest left speed, right speed (firmware's units) and duration (ms)."""
+_CENTRE, _PER_UNIT = (LOW + HIGH) / 2, 2 / (HIGH - LOW)
+SCALE = np.array([0.2, 0.3, 3.0], np.float32)
+"""Metres, metres and radians that an output of 1 stands for: the order of what random commands do."""
+NOTHING = np.empty((3, 0), np.float32)
+"""Outputs of no command."""
+
+
+@fast
+def _gather(commands, lengths, origin, known, centre, per_unit, X, place, source):  # type: ignore[no-untyped-def]  # compiled
+    """Inputs of the commands whose origin is not among the `known` ones; how many.
+
+    Inputs are previous left and right (0 at first), left, right, duration. place (n,): where each of them stands among
+    all commands, side by side; source (all,): where all the others come from, and 0 of those.
+    """
+    n = new = 0
+    for i in range(lengths.size):
+        left, right = -centre[0] * per_unit[0], -centre[1] * per_unit[1]
+        for j in range(lengths[i]):
+            X[0, new], X[1, new] = left, right
+            left = (commands[i, j, 0] - centre[0]) * per_unit[0]
+            right = (commands[i, j, 1] - centre[1]) * per_unit[1]
+            X[2, new], X[3, new] = left, right
+            X[4, new] = (commands[i, j, 2] - centre[2]) * per_unit[2]
+            place[new] = n
+            is_known = int(0 <= origin[i, j] < known)
+            source[n] = origin[i, j] * is_known
+            # Written in any case, and kept if it is new: a branch would be guessed wrongly.
+            new += 1 - is_known
+            n += 1
+    return new
+
+
+@exact
+def _complete(outputs, known, source, fresh, place, new):  # type: ignore[no-untyped-def]  # compiled
+    """Outputs of all commands: those that are known from where they come from, the first `new` fresh ones at their places."""
+    for net in range(outputs.shape[0]):
+        row, old, made = outputs[net], known[net], fresh[net]
+        for c in range(source.size):
+            row[c] = old[source[c]]
+        for m in range(new):
+            row[place[m]] = made[m]
+
+
+@inline
+def _sine(x):  # type: ignore[no-untyped-def]  # compiled
+    """Sine to 1e-11 for |x| below LARGEST_HEADING_RAD, without a branch, so that it vectorises."""
+    half_turns = np.int32(x / math.pi + 1048576.5) - 1048576
+    r = x - half_turns * math.pi
+    s = r * r
+    p = -1 / 1307674368000 * s + 1 / 6227020800
+    p = p * s - 1 / 39916800
+    p = p * s + 1 / 362880
+    p = p * s - 1 / 5040
+    p = p * s + 1 / 120
+    p = p * s - 1 / 6
+    return (r + r * s * p) * (1.0 - 2.0 * (half_turns & 1))
+
+
+@fast
+def _directions(heading, sine, cosine):  # type: ignore[no-untyped-def]  # compiled
+    for c in range(heading.size):
+        sine[c] = _sine(heading[c])
+        cosine[c] = _sine(heading[c] + math.pi / 2)
+
+
+@exact
+def _headings(turns, starts, lengths, scale, heading, astray):  # type: ignore[no-untyped-def]  # compiled
+    """Heading at the start of every command; infinite in `astray` for controllers that one leads out of bounds, 0 for others."""
+    for i in range(lengths.size):
+        angle, furthest = START[2], 0.0
+        for c in range(starts[i], starts[i] + lengths[i]):
+            heading[c] = angle
+            furthest = max(furthest, abs(angle))
+            angle += turns[c] * scale
+        astray[i] = np.inf if furthest > LARGEST_HEADING_RAD else 0.0
+
+
+@exact
+def _steps(outputs, scale, sine, cosine):  # type: ignore[no-untyped-def]  # compiled
+    """Steps in the world, in place of the directions: x in `cosine`, y in `sine`; apart from the walk, so that it vectorises."""
+    to_right, forward = outputs[0], outputs[1]
+    for c in range(sine.size):
+        right, ahead = to_right[c] * scale[0], forward[c] * scale[1]
+        x, y = ahead * cosine[c] + right * sine[c], ahead * sine[c] - right * cosine[c]
+        cosine[c], sine[c] = x, y
+
+
+@exact
+def _walk(outputs, lengths, scale, goals, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+    """Algorithm 2 for every controller; how many could not be computed."""
+    count, starts = outputs.shape[1], number_of_first(lengths)
+    heading, step_y, step_x = np.empty(count), np.empty(count), np.empty(count)
+    astray = np.empty(lengths.size)
+    _headings(outputs[2], starts, lengths, scale[2], heading, astray)
+    _directions(heading, step_y, step_x)
+    _steps(outputs, scale, step_y, step_x)
+    failures, last = 0, goals.shape[0] - 1
+    for i in range(lengths.size):
+        x, y, total, goal = START[0], START[1], astray[i], 0
+        for c in range(starts[i], starts[i] + lengths[i]):
+            x += step_x[c]
+            y += step_y[c]
+            aim = min(goal, last)
+            distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
+            if goal <= last and distance <= GOAL_RADIUS_M:
+                goal += 1
+                aim = min(goal, last)
+                distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
+            total += distance
+        total += MISSED_GOAL_M * (goals.shape[0] - goal)
+        reached[i] = goal
+        fitness[i] = 1.0 / max(total, SMALLEST_SUM_M)
+        if not np.isfinite(total):
+            fitness[i] = 0.0
+            failures += 1
+    return failures
+
+
+@exact
+def _outputs(commands, lengths, origin, known, weights, centre, per_unit):  # type: ignore[no-untyped-def]  # compiled
+    """Outputs (networks, commands) of the networks for all commands; only those that are not known are computed."""
+    total = lengths.sum()
+    X, place, source = np.empty((INPUTS, total), np.float32), np.empty(total, np.int32), np.empty(total, np.int32)
+    new = _gather(commands, lengths, origin, known.shape[1], centre, per_unit, X, place, source)
+    fresh = np.empty((weights.shape[0], total), np.float32)
+    predict_into(weights, X, new, fresh)
+    if new == total:
+        return fresh
+    outputs = np.empty_like(fresh)
+    _complete(outputs, known, source, fresh, place, new)
+    return outputs
+
+
+@exact
+def _rolled_out(commands, lengths, origin, known, weights, centre, per_unit, scale, goals, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+    outputs = _outputs(commands, lengths, origin, known, weights, centre, per_unit)
+    return outputs, _walk(outputs, lengths, scale, goals, fitness, reached)
+
+
+class Rollout(NamedTuple):
+    """Per controller fitness (n,), 0 where the arithmetic failed, and goals reached (n,); how many failed; what the networks
+    said of all commands, (networks, commands)."""
+
+    fitness: np.ndarray
+    reached: np.ndarray
+    failures: int
+    outputs: np.ndarray
+
+
+def roll_out(population: Population, weights: np.ndarray, goals_m: np.ndarray, known: np.ndarray | None) -> Rollout:
+    """Algorithm 2 on networks (3, W).
+
+    known (3, commands): what the same networks said of all commands of the generation that this one was bred from. An output
+    does not depend on where in a batch its command stands, so taking it over and computing it anew give the same number.
+    """
+    fitness, reached = np.empty(len(population)), np.empty(len(population), np.int32)
+    outputs, failures = _rolled_out(
+        population.commands,
+        population.lengths,
+        population.origin,
+        NOTHING if known is None else known,
+        weights,
+        _CENTRE,
+        _PER_UNIT,
+        SCALE,
+        goals_m,
+        fitness,
+        reached,
+    )
+    return Rollout(fitness, reached, int(failures), outputs)
+
+
+def inputs(commands: np.ndarray) -> np.ndarray:
+    """Inputs (5, n) of the networks for one controller's commands (n, 3)."""
+    n = len(commands)
+    X, nowhere = np.empty((INPUTS, n), np.float32), np.empty(n, np.int32)
+    none = np.full((1, n), -1, np.int32)
+    _gather(commands[None].astype(np.float32), np.array([n], np.int32), none, 0, _CENTRE, _PER_UNIT, X, nowhere, nowhere)
+    return X
