@@ -22,9 +22,9 @@ from bns.hardware.bridge_frames import (
     encoded,
 )
 from bns.hardware.clock import Clock
-from bns.hardware.dynamixel import Health, ServoError
 from bns.hardware.journal import Journal
 from bns.hardware.serial_link import open_port
+from bns.hardware.servo_chain import Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
 
 BAUD = 115200
@@ -36,8 +36,9 @@ _BETWEEN_S = 0.02
 class BridgeChain:
     """Driver of `count` servos behind a bridge. Opening checks the bridge's version and how many servos it has found."""
 
-    def __init__(self, port: str, count: int, clock: Clock, journal: Journal) -> None:
+    def __init__(self, port: str, count: int, clock: Clock, journal: Journal, limits: ServoLimits | None = None) -> None:
         self._clock, self._journal, self.count = clock, journal, count
+        self.limits = limits or ServoLimits()
         self._sequence, self.retries = 0, 0
         self._serial = open_port(port, BAUD)
         try:
@@ -56,9 +57,9 @@ class BridgeChain:
         """Give the port free."""
         self._serial.close()
 
-    def arm(self, torque: float = 0.8) -> None:
-        """Torque on where the joints are, grown in steps by the bridge up to the share `torque`."""
-        self._ask(ARM, bytes([round(100 * torque)]), 0)
+    def arm(self) -> None:
+        """Torque on where the joints are, grown in steps by the bridge up to the limits' share of it."""
+        self._ask(ARM, bytes([round(100 * self.limits.torque)]), 0)
 
     def move(self, angles_rad: Sequence[float], speeds_rad_s: Sequence[float]) -> list[float]:
         """Set goals and speeds; the angles that the bridge has set, after clipping."""
@@ -69,13 +70,14 @@ class BridgeChain:
         return [(goal - CENTRE) * RAD_PER_STEP for goal, _ in GOAL.iter_unpack(answer)]
 
     def health(self) -> dict[int, Health]:
-        """What every servo says, by its place from 1; ServoError if one reports an alarm."""
+        """What every servo says, by its place from 1; ServoError if one reports an alarm or is beyond its limits."""
         found = {}
         for place, (position, load, celsius, decivolts, bits) in enumerate(SERVO.iter_unpack(self._state()), 1):
             if bits:
                 raise ServoError(f"servo {place}: {', '.join(errors_in(bits))}")
             share = (load & 1023) / 1023 * (-1 if load & 1024 else 1)
             found[place] = Health((position - CENTRE) * RAD_PER_STEP, share, decivolts / 10, float(celsius))
+        self.limits.check(found)
         return found
 
     def stop(self, patience_s: float = 5.0) -> Stop:

@@ -22,7 +22,7 @@ from bns.hardware.bridge_frames import (
     encoded,
 )
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.ax12 import Servo
+from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.faults import Faults
 
 _LATENCY_S = 0.004

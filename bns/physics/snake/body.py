@@ -86,7 +86,7 @@ class Body:
         start = self._angles
         for step in range(1, steps + 1):
             self._angles = start + np.clip(way, -furthest * step, furthest * step)
-            self._step()
+            self.step(self._angles)
             if step % LOOK_EVERY == 0:
                 watch.look(self.data, LOOK_EVERY * p.dt_s)
                 if BLEW_UP in watch.seen:
@@ -94,8 +94,9 @@ class Body:
             if on_step is not None:
                 on_step(self.model, self.data)
 
-    def _step(self) -> None:
-        self._waiting.append(self._angles)
+    def step(self, angles: np.ndarray) -> None:
+        """One step of time with these set points of the servos (joints,), rad."""
+        self._waiting.append(angles)
         wanted, there = self._waiting.pop(0), self.data.qpos[7:]
         within = np.abs(wanted - there) < self.parameters.dead_band_rad
         self.data.ctrl[:] = np.where(within, there, wanted)
