@@ -8,11 +8,12 @@ import termios
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
-from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler, PortHandler
+from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler
 
 from bns.errors import HardwareError
 from bns.hardware.ax12_table import BROADCAST, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
 from bns.hardware.clock import Clock
+from bns.hardware.dynamixel_port import ClockedPort
 from bns.hardware.journal import Journal
 from bns.hardware.servo_chain import Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
@@ -21,44 +22,10 @@ BAUD = 1_000_000
 ATTEMPTS = 6
 _AX12 = 12
 _BETWEEN_S = 0.02
-_SLICE_S = 0.002
 _GOAL = REGISTERS["goal_position"]
 _PRESENT = struct.Struct("<HHHBB")
 _STILL_STEPS = 1
 """A joint that is within so many steps of where it was at the last look stands still; the reading jumps by one."""
-
-
-class ClockedPort(PortHandler):
-    """The SDK's port, with time-outs on the trial's clock."""
-
-    def __init__(self, port: str, clock: Clock) -> None:
-        super().__init__(port)
-        self._clock = clock
-        self._silent: Callable[[], bool] = lambda: False
-        self._late: Callable[[], bool] = lambda: False
-
-    def setupPort(self, cflag_baud: int) -> bool:  # noqa: N802  # the SDK's name
-        """Open it. A read sleeps until bytes are there: the SDK's own spins, and holds up whatever computes meanwhile."""
-        opened: bool = super().setupPort(cflag_baud)
-        self.ser.timeout = _SLICE_S
-        return opened
-
-    def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802  # the SDK's name
-        """As the SDK has it: the time of the bytes, twice the adapter's latency, and a little."""
-        super().setPacketTimeout(packet_length)
-        self._late = self._clock.in_vain(self.packet_timeout / 1000.0)
-
-    def clearPort(self) -> None:  # noqa: N802  # the SDK's name
-        """Throw away what came too late; the SDK's own only waits until everything is sent."""
-        self.ser.reset_input_buffer()
-        self._silent = self._clock.in_vain(math.inf)  # from before the question on: an answer can be quick
-
-    def isPacketTimeout(self) -> bool:  # noqa: N802  # the SDK's name
-        """Whether to give up."""
-        late = self._late()
-        if self._silent() and not late:
-            self._clock.waited(self.packet_timeout / 1000.0)
-        return late or self._silent()
 
 
 class Ax12Chain:
@@ -113,11 +80,13 @@ class Ax12Chain:
         for attempt in range(ATTEMPTS):
             self.retries += attempt > 0
             try:
+                self._reopen()
                 value, result, bits = call()
             except IndexError:  # the SDK reads past the end of a status packet that is too short
                 value, result, bits = 0, COMM_RX_CORRUPT, 0
                 problem = "corrupt status packet"
             except (OSError, termios.error) as error:
+                self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             finally:
                 self._port.is_using = False  # an exchange broken off leaves it set, and every later call fails
@@ -131,7 +100,19 @@ class Ax12Chain:
 
     def close(self) -> None:
         """Give the port free."""
-        self._port.closePort()
+        if self._port.is_open:
+            self._port.closePort()
+
+    def _lose(self, error: Exception) -> None:
+        self._journal.note("link-lost", port=self._port.port_name, error=str(error))
+        with suppress(OSError, termios.error):
+            self.close()
+        self._port.is_open = False
+
+    def _reopen(self) -> None:
+        """A port that has vanished (an adapter that was unplugged) is tried again at every exchange."""
+        if not self._port.is_open:
+            self._port.setBaudRate(BAUD)
 
     def arm(self) -> None:
         """Torque on without a jerk: the goal is where the joint is, and the torque grows in steps to its limit."""
@@ -208,6 +189,7 @@ class Ax12Chain:
         began_s, places = self._clock.now_s(), dict[int, int]()
         acknowledged_s, self._port.is_using = None, False
         with suppress(OSError, termios.error):  # to all at once; the rounds below see to those that did not hear it
+            self._reopen()
             self._packets.write1ByteTxOnly(self._port, BROADCAST, REGISTERS["torque_enable"].address, 0)
         while True:
             left = {number: why for number in self.ids if (why := self._not_still(number, places))}

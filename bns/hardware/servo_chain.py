@@ -1,4 +1,4 @@
-"""What all chains of servos have in common, however they are wired: what a servo says, what it must keep, what a driver can do."""
+"""What all chains of servos have in common, however wired: what a servo says, what it must keep, what a driver can do."""
 
 from __future__ import annotations
 

@@ -20,6 +20,7 @@ from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
 from bns.plotting import path_figure
 from bns.robots import load_robot
+from bns.robots.base import on_floor
 from bns.single import keep_run, live_view
 from bns.spec import RunSpec
 from bns.tasks import load_task
@@ -89,7 +90,7 @@ def carry_out(spec: RunSpec, how: Set, results: Path) -> str:
 
 def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: list, robot: Any, task: Any) -> str:
     trial = Trial(spec, "robot-emulated" if how.emulated else "robot", past, how.most_rounds, how.until_success)
-    start = robot.start_pose()[0]
+    start = on_floor(robot, robot.start_pose())[0]
     started, wall = datetime.now(UTC), time.perf_counter()
     try:
         with Stopping() as stopping, live_view(spec) as show, staged(how, spec.seed, folder.journal, stopping) as stage:

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from bns.errors import HardwareError
 from bns.hardware.bridge import BridgeChain
 from bns.hardware.bridge_frames import WATCHDOG_S, Frame, crc16, decoded, encoded
-
 from bns.hardware.emulators.bridge import BridgeEmulator
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.emulators.servo import Servo

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from bns.hardware.ax12_table import (
     ACTION,
@@ -53,6 +53,7 @@ class Bus:
         self._clock, self._faults = clock, faults or Faults()
         self._buffer, self._garbled = b"", False
         self._lock = threading.Lock()
+        self.cut_line: Callable[[float], None] = lambda _seconds: None
 
     def receive(self, data: bytes) -> bytes:
         """Bytes in, bytes out."""
@@ -60,11 +61,19 @@ class Bus:
             self._buffer += data
             answers = b""
             while (found := self._packet()) is not None:
-                answer = self._carried_out(found)
+                answer = b"" if self._lost() else self._carried_out(found)
                 if not answer:
                     self._clock.fell_silent()
                 answers += answer
             return answers
+
+    def _lost(self) -> bool:
+        """Whether nobody on the bus hears this packet."""
+        now_s = self._clock.now_s()
+        if self._faults.strikes("hang-up", now_s):
+            self.cut_line(self._faults.length_s("hang-up"))
+            return True
+        return self._faults.strikes("lost-request", now_s)
 
     def written(self) -> None:
         """The answer is on the line; the rest of a garbled one, whose length may be wrong, is waited for in vain."""

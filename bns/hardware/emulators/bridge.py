@@ -22,8 +22,8 @@ from bns.hardware.bridge_frames import (
     encoded,
 )
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.faults import Faults
+from bns.hardware.emulators.servo import Servo
 
 _LATENCY_S = 0.004
 
@@ -42,6 +42,7 @@ class BridgeEmulator:
             STATE: lambda _p: b"".join(self._state(s) for s in self.servos),
             STOP: lambda _p: self._stop().to_bytes(2, "little"),
         }
+        self.cut_line: Callable[[float], None] = lambda _seconds: None
         clock.listeners.append(self.moved_on)
 
     def moved_on(self, now_s: float) -> None:
@@ -63,6 +64,9 @@ class BridgeEmulator:
             if frame is None:
                 return self._nothing()
             now_s = self._heard_s = self._clock.now_s()
+            if self._faults.strikes("hang-up", now_s):
+                self.cut_line(self._faults.length_s("hang-up"))
+                return self._nothing()
             if self._faults.strikes("lost-request", now_s):
                 return self._nothing()
             for servo in self.servos:

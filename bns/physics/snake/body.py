@@ -36,7 +36,7 @@ class Body:
         self.parameters = parameters
         self.model = build_model(parameters)
         self.data = mujoco.MjData(self.model)
-        self._sites = [self.model.site(name).id for name in (YELLOW, GREEN)]
+        self.sites = [self.model.site(name).id for name in (YELLOW, GREEN)]
         self._angles = np.zeros(parameters.joints)
         self._waiting: list[np.ndarray] = []
         self._tail = self.model.body(f"link{int(parameters.links) - 1}").id
@@ -55,7 +55,7 @@ class Body:
 
     def markers_m(self) -> np.ndarray:
         """Where a camera above sees the markers: (2, 2), yellow and green, x and y."""
-        return self.data.site_xpos[self._sites, :2].copy()
+        return self.data.site_xpos[self.sites, :2].copy()
 
     def set_friction(self, factor: float) -> None:
         """Floor friction as a multiple of the parameter's."""
