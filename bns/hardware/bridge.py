@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import termios
 from collections.abc import Sequence
+from contextlib import suppress
+
+import serial
 
 from bns.errors import HardwareError
 from bns.hardware.ax12_table import CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
@@ -24,7 +27,7 @@ from bns.hardware.bridge_frames import (
 from bns.hardware.clock import Clock
 from bns.hardware.journal import Journal
 from bns.hardware.serial_link import open_port
-from bns.hardware.servo_chain import Health, ServoError, ServoLimits
+from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
 
 BAUD = 115200
@@ -40,7 +43,8 @@ class BridgeChain:
         self._clock, self._journal, self.count = clock, journal, count
         self.limits = limits or ServoLimits()
         self._sequence, self.retries = 0, 0
-        self._serial = open_port(port, BAUD)
+        self._port = port
+        self._serial: serial.Serial | None = open_port(port, BAUD)
         try:
             version, found = self._ask(HELLO, b"", 2)
         except ServoError as error:
@@ -55,7 +59,8 @@ class BridgeChain:
 
     def close(self) -> None:
         """Give the port free."""
-        self._serial.close()
+        if self._serial is not None:
+            self._serial.close()
 
     def arm(self) -> None:
         """Torque on where the joints are, grown in steps by the bridge up to the limits' share of it."""
@@ -81,18 +86,25 @@ class BridgeChain:
         return found
 
     def stop(self, patience_s: float = 5.0) -> Stop:
-        """Torque off; confirmed when the bridge has read back that every servo is off and still. Never raises."""
-        began_s, problem = self._clock.now_s(), ""
+        """Torque off; confirmed when every servo has read it back, and no joint moves between two looks. Never raises."""
+        began_s, acknowledged_s = self._clock.now_s(), None
+        places: list[int] = []
         while True:
+            before = places
             try:
-                moving = int.from_bytes(self._ask(STOP, b"", 2), "little")
-                problem = f"servos {[i + 1 for i in range(16) if moving >> i & 1]} did not stop"
-                if not moving:
-                    return self._stopped(Stop(True, self._clock.now_s() - began_s, self._clock.now_s() - began_s))
+                left, places = int.from_bytes(self._ask(STOP, b"", 2), "little"), []
+                problem = f"servos {[i + 1 for i in range(16) if left >> i & 1]} did not stop"
+                if not left:
+                    acknowledged_s = acknowledged_s or self._clock.now_s() - began_s
+                    places, problem = [position for position, *_ in SERVO.iter_unpack(self._state())], "the joints still move"
             except ServoError as error:
                 problem = str(error)
-            if self._clock.now_s() - began_s > patience_s:
-                return self._stopped(Stop(False, self._clock.now_s() - began_s, None, problem))
+            lasted_s = self._clock.now_s() - began_s
+            still = bool(places) and len(before) == len(places)
+            if still and all(abs(a - b) <= STILL_STEPS for a, b in zip(places, before, strict=True)):
+                return self._stopped(Stop(True, lasted_s, acknowledged_s))
+            if lasted_s > patience_s:
+                return self._stopped(Stop(False, lasted_s, acknowledged_s, problem))
             self._clock.sleep(_BETWEEN_S)
 
     def _state(self) -> bytes:
@@ -110,14 +122,23 @@ class BridgeChain:
             self._sequence = (self._sequence + 1) % 256
             try:
                 answer = self._once(Frame(kind, self._sequence, payload))
-            except (OSError, termios.error) as error:
+            except (OSError, termios.error, HardwareError) as error:
+                self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             if answer is not None and answer.kind == kind | ANSWER and len(answer.payload) == size:
                 return answer.payload
             problem = "no answer" if answer is None else f"the answer was {answer}"
         raise ServoError(f"bridge: {problem}; asked {ATTEMPTS} times")
 
+    def _lose(self, error: Exception) -> None:
+        self._journal.note("link-lost", port=self._port, error=str(error))
+        with suppress(OSError, termios.error):
+            self.close()
+        self._serial = None
+
     def _once(self, frame: Frame) -> Frame | None:
+        if self._serial is None:  # it had vanished, and may be back
+            self._serial = open_port(self._port, BAUD)
         self._serial.reset_input_buffer()
         in_vain = self._clock.in_vain(_TIMEOUT_S)
         self._journal.note("sent", data=encoded(frame).hex())

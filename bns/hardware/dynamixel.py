@@ -15,7 +15,7 @@ from bns.hardware.ax12_table import BROADCAST, CENTRE, RAD_PER_STEP, RAD_S_PER_S
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel_port import ClockedPort
 from bns.hardware.journal import Journal
-from bns.hardware.servo_chain import Health, ServoError, ServoLimits
+from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
 
 BAUD = 1_000_000
@@ -24,8 +24,6 @@ _AX12 = 12
 _BETWEEN_S = 0.02
 _GOAL = REGISTERS["goal_position"]
 _PRESENT = struct.Struct("<HHHBB")
-_STILL_STEPS = 1
-"""A joint that is within so many steps of where it was at the last look stands still; the reading jumps by one."""
 
 
 class Ax12Chain:
@@ -216,7 +214,7 @@ class Ax12Chain:
             places.pop(number, None)
             return f"servo {number} still has its torque on"
         before, places[number] = places.get(number), int.from_bytes(block[-2:], "little")
-        still = before is not None and abs(places[number] - before) <= _STILL_STEPS
+        still = before is not None and abs(places[number] - before) <= STILL_STEPS
         return "" if still else f"servo {number} still moves"
 
 

@@ -8,6 +8,9 @@ from typing import Protocol
 
 from bns.hardware.stop import Stop
 
+STILL_STEPS = 1
+"""A joint within so many steps of where it was at the last look stands still; the reading of a still one jumps by one."""
+
 
 class ServoError(Exception):
     """A servo that does not answer, or answers with an alarm."""

@@ -17,7 +17,7 @@ from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight
 from bns.physics.snake.gait import PARAMETERS, cycle_angles
 
-_TICK_S = 0.1
+_TICK_S = 0.15
 _STRAIGHTENING_RAD_S = 0.5
 _MARKERS = ("yellow", "green")
 _PLACES = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
