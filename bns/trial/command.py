@@ -51,5 +51,6 @@ def how_of(options: argparse.Namespace) -> Set:
     rig = shipped_rig(options.robot) if options.rig is None else load_rig(options.rig, options.robot)
     plan = FaultPlan() if options.faults is None else load_plan(options.faults)
     return Set(
-        rig, options.emulated, options.speed, plan, options.yes, options.resume, options.most_rounds, options.until_success
+        rig, options.emulated, options.speed, plan, options.yes, options.resume, options.most_rounds, options.until_success,
+        not options.no_figures,
     )

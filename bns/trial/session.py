@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from bns.errors import HardwareError
+from bns.errors import BnsError, HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.journal import Journal
@@ -29,6 +29,7 @@ from bns.trial.folder import TrialFolder, spec_event
 from bns.trial.loop import Trial, TrialResult
 from bns.trial.operator import AtTheTerminal, EmulatedHands, Nobody, Operator
 from bns.trial.report import report
+from bns.watch import draw, scripts
 
 SWEEP, SWEEP_EMULATED = "trials", "trials-emulated"
 MOST_ROUNDS = 50
@@ -46,6 +47,7 @@ class Set:
     resume: bool = False
     most_rounds: int = MOST_ROUNDS
     until_success: int | None = None
+    figures: bool = True
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,16 @@ def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: l
     return _kept(spec, how, results, folder, result, robot, task, started, time.perf_counter() - wall, crew)
 
 
+def _figures(spec: RunSpec, results: Path, folder: TrialFolder) -> str:
+    """Figures and table rows of this trial alone, on a page in its folder; what came of it, in words."""
+    page = folder.path / "figures"
+    try:
+        complaint = draw(scripts(), results, "--run", spec.run_id, "--out", str(page.absolute()))
+    except BnsError as error:  # the package was installed without them: the trial is none the worse for it
+        complaint = str(error)
+    return f"figures: {page / 'index.html'}" if not complaint else f"no figures: {complaint}"
+
+
 def _forget_if_empty(folder: TrialFolder) -> None:
     if folder.journal.exists() and '"kind":"trial"' not in folder.journal.read_text(encoding="utf-8"):
         folder.journal.unlink()
@@ -121,4 +133,5 @@ def _kept(
 ) -> str:  # fmt: skip
     keep_run(spec, result.run, results, SWEEP_EMULATED if how.emulated else SWEEP, started, wall_s)
     figure = path_figure(spec, task, robot, result.run, folder.path / "path")
-    return report(spec, result, crew, wall_s, how, folder.path, figure)
+    told = report(spec, result, crew, wall_s, how, folder.path, figure)
+    return f"{told}\n{_figures(spec, results, folder)}" if how.figures else told

@@ -16,7 +16,10 @@ from bns.cli import main
 from bns.hardware.journal import events
 from bns.trial.folder import past_evaluations
 
-QUICK = ["--population-size", "20", "--training-iterations-per-evaluation", "20", "--generations-per-evaluation", "2"]
+QUICK = [
+    *("--no-figures", "--population-size", "20", "--training-iterations-per-evaluation", "20"),
+    *("--generations-per-evaluation", "2"),
+]
 SEEN = {"lost-marker": 0.05, "stuck-marker": 0.05, "reflection": 0.3}
 
 

@@ -141,7 +141,8 @@ def call(*arguments):
 
 
 def test_from_command_to_table_and_replay(tmp_path, capsys):
-    assert call(*TRIAL, "--evaluations", 2, "--results", tmp_path) == 0
+    asked = [option for option in TRIAL if option != "--no-figures"]
+    assert call(*asked, "--evaluations", 2, "--results", tmp_path) == 0
     said = capsys.readouterr().out
     assert "snake, two-regions, seed 0, emulated" in said
     assert "stops: 2 confirmed" in said
@@ -159,6 +160,8 @@ def test_from_command_to_table_and_replay(tmp_path, capsys):
     marked = {e["evaluation"]: e["unstable"] for e in events(journal, "marked")}
     assert {n: list(e.unstable) for n, e in enumerate(past_evaluations(journal), 1) if e.unstable} == marked
     assert (journal.parent / "path.png").exists()
+    assert f"figures: {journal.parent / 'figures' / 'index.html'}" in said
+    assert {"paths-snake-two-regions.png", "trials-snake.png"} <= {f.name for f in (journal.parent / "figures").iterdir()}
 
     assert call("trial", "--replay", journal, "--results", tmp_path) == 0
     rows = bns.load(tmp_path)
