@@ -16,6 +16,7 @@ from bns.hardware.bridge_frames import (
     GOAL,
     HELLO,
     MOVE,
+    NO_ANSWER,
     SERVO,
     STATE,
     STOP,
@@ -34,6 +35,7 @@ BAUD = 115200
 ATTEMPTS = 6
 _TIMEOUT_S = 0.15
 _BETWEEN_S = 0.02
+_STARTING_S = 3.0
 
 
 class BridgeChain:
@@ -46,7 +48,7 @@ class BridgeChain:
         self._port = port
         self._serial: serial.Serial | None = open_port(port, BAUD)
         try:
-            version, found = self._ask(HELLO, b"", 2)
+            version, found = self._greeted()
         except ServoError as error:
             self.close()
             raise HardwareError(f"no bridge answers at {port} ({error}). Is its sketch loaded, is it powered?") from error
@@ -56,6 +58,16 @@ class BridgeChain:
                 f"the bridge speaks version {version} and has found {found} servos; version {VERSION} and {count} servos are "
                 "needed. Load the sketch of this bns; check cables and ids."
             )
+
+    def _greeted(self) -> bytes:
+        """Version and number of servos; an Arduino begins anew when its port is opened, and is deaf meanwhile."""
+        began_s = self._clock.now_s()
+        while True:
+            try:
+                return self._ask(HELLO, b"", 2)
+            except ServoError:
+                if self._clock.now_s() - began_s > _STARTING_S:
+                    raise
 
     def close(self) -> None:
         """Give the port free."""
@@ -78,6 +90,8 @@ class BridgeChain:
         """What every servo says, by its place from 1; ServoError if one reports an alarm or is beyond its limits."""
         found = {}
         for place, (position, load, celsius, decivolts, bits) in enumerate(SERVO.iter_unpack(self._state()), 1):
+            if bits & NO_ANSWER:
+                raise ServoError(f"servo {place} does not answer the bridge")
             if bits:
                 raise ServoError(f"servo {place}: {', '.join(errors_in(bits))}")
             share = (load & 1023) / 1023 * (-1 if load & 1024 else 1)

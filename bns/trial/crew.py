@@ -35,6 +35,8 @@ class Crew:
         self.readings: dict[str, float] = {}
         self.stops_s: list[float] = []
         self.ends: list[str] = []
+        self.marked: int | None = None
+        """How many commands were called unstable in the last evaluation; None for a robot whose commands cannot be."""
 
     def evaluate(self, number: int, controller: np.ndarray) -> Evaluation:
         """Drive a controller until there is an evaluation to keep."""
@@ -50,6 +52,7 @@ class Crew:
                 continue
             verdict = self._asked(number, controller, driven)
             if verdict.answer == "next":
+                self.marked = len(verdict.unstable) if driven.spans_s else None
                 if verdict.unstable:
                     self._journal.note("marked", evaluation=number, unstable=verdict.unstable)
                     self._journal.sync()
@@ -61,6 +64,19 @@ class Crew:
         fitness = {name: row[name] for name in ("evaluated_fitness_world", "evaluated_goals_reached")}
         self._journal.note("evaluated", evaluation=number, rounds=rounds, **fitness)
         self._journal.sync()
+
+    def told(self) -> dict[str, str]:
+        """What a live view shows of robot and rig: heading -> text."""
+        units = {"v": "V", "c": "°C"}
+        shown = {}
+        for name, value in self.readings.items():
+            what, _, unit = name.rpartition("_")
+            shown[what.replace("_", " ")] = f"{value:.1f} {units.get(unit, unit)}"
+        if self.marked is not None:
+            shown["unstable cycles"] = str(self.marked)
+        if self.stops_s:
+            shown["last stop"] = f"{1000 * self.stops_s[-1]:.0f} ms"
+        return shown | {"ended early": str(len(self.ends))}
 
     def _drive(self, number: int, controller: np.ndarray) -> Driven:
         self.readings = self._platform.readings()

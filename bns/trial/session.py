@@ -95,11 +95,12 @@ def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: l
     start = on_floor(robot, robot.start_pose())[0]
     started, wall = datetime.now(UTC), time.perf_counter()
     try:
-        with Stopping() as stopping, live_view(spec) as show, staged(how, spec.seed, folder.journal, stopping) as stage:
+        with Stopping() as stopping, staged(how, spec.seed, folder.journal, stopping) as stage:
             stage.journal.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
             stage.journal.sync()
             crew = Crew(stage.platform, stage.operator, how.rig, start, stage.clock, stage.journal)
-            result = trial.run(crew, show)
+            with live_view(spec, crew.told) as show:
+                result = trial.run(crew, show)
             stage.journal.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
