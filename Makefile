@@ -59,8 +59,9 @@ bench: setup ## speed, as ratios against named peers measured in the same run
 hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")
 
-soak: setup ## 200 emulated trials with faults at random: how they end
-	$(BIN)/python -m tests.hardware.soak 200
+soak: setup ## 200 emulated trials of each robot with faults at random: how they end
+	$(BIN)/python -m tests.hardware.soak khepera 200
+	$(BIN)/python -m tests.hardware.soak snake 200
 
 soak-dask: setup ## twenty minutes of a sweep on Dask whose workers are killed: what it costs, and that no run is lost
 	$(BIN)/python tests/sweep/soak_dask.py

@@ -35,8 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted, failed = _parser().parse_args(arguments), False
     try:
         modules, out = _chosen(wanted.only), wanted.out or wanted.results / "figures"
+        if wanted.run is not None:
+            modules = {name: module for name, module in modules.items() if getattr(module, "OF_A_RUN", False)}
         if not wanted.page:
-            failed = not _draw_all(modules, wanted.results, out, everything=wanted.only is None)
+            failed = not _draw_all(modules, Store(wanted.results, wanted.run), out, everything=wanted.only is None)
         print(f"page: {write_page(out, wanted.refresh)}")
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -51,6 +53,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m analysis", description="Draw figures from stored results.")
     parser.add_argument("--results", type=Path, default=Path("results"), help="folder of the results (results)")
     parser.add_argument("--only", metavar="NAME", help="one figure: " + ", ".join(figures()))
+    parser.add_argument("--run", metavar="ID", help="figures and table rows of one run alone")
     parser.add_argument("--out", type=Path, help="folder of the figures (RESULTS/figures)")
     parser.add_argument("--refresh", type=int, metavar="S", help="let the page reload itself every S seconds")
     parser.add_argument("--page", action="store_true", help="write the page from the figures there are; draw none")
@@ -66,9 +69,9 @@ def _chosen(only: str | None) -> dict[str, ModuleType]:
     return {only: found[only]}
 
 
-def _draw_all(modules: dict[str, ModuleType], results: Path, out: Path, *, everything: bool) -> bool:
+def _draw_all(modules: dict[str, ModuleType], store: Store, out: Path, *, everything: bool) -> bool:
     """Whether every script could be carried through: one that cannot does not cost the others their figures."""
-    store, made, failed = Store(results), set(), False
+    made, failed = set(), False
     console = Console(stderr=True)
     for name, module in track(modules.items(), "figures", console=console, disable=not console.is_terminal):
         try:

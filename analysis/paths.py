@@ -13,7 +13,8 @@ from bns.robots import load_robot
 from bns.tasks import load_task
 
 NAME = "paths"
-PAPER = "figures 4.4 to 4.6"
+PAPER = "figures 4.4 to 4.6 and 5.16 to 5.21"
+OF_A_RUN = True
 FIRST = "prototype"
 """The sweep whose runs come first: the source's own trials."""
 MOST_PANELS = 6

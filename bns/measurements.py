@@ -7,6 +7,7 @@ no command is. Further columns are kept.
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,14 @@ POSE = ("x_m", "y_m", "heading_rad")
 SESSION = "session_s"
 """Time since the session began, where it was logged."""
 COLUMNS = ("trial", "t_s", *COMMANDS, *POSE)
-"""trial: number; t_s: since the trial began; wheel-surface speeds; heading counter-clockwise from x."""
+"""A robot on two wheels. trial: number; t_s: since the trial began; wheel-surface speeds; heading counter-clockwise from x."""
+
+
+SNAKE_COLUMNS = (
+    *("trial", "t_s", "cycle", "a_lat_rad", "a_vert_rad", "omega_rad", "alpha_rad"),
+    *("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m", "stable"),
+)
+"""The snake. cycle: number of the one in force, from 1; stable: whether the cycle that led here was, 1 or 0."""
 
 
 def trial_table(trial: int, commands: ArrayLike, poses: ArrayLike) -> pd.DataFrame:
@@ -51,16 +59,16 @@ def check_table_name(path: Path) -> None:
         raise ModelError(f"There is no folder {path.parent} to write {path.name} into; make it first.")
 
 
-def write_measurements(table: pd.DataFrame, path: str | Path) -> None:
+def write_measurements(table: pd.DataFrame, path: str | Path, columns: Sequence[str] = COLUMNS) -> None:
     """Write a table as .csv or .parquet; a reader never meets half a file.
 
-    ModelError if a column is missing or the name ends otherwise.
+    `columns` are those that it must have. ModelError if one is missing or the name ends otherwise.
     """
     path = Path(path)
-    missing = [name for name in COLUMNS if name not in table.columns]
+    missing = [name for name in columns if name not in table.columns]
     if missing:
         raise ModelError(
-            f"A table of measurements for {path} lacks {', '.join(missing)}; it needs {', '.join(COLUMNS)}."
+            f"A table of measurements for {path} lacks {', '.join(missing)}; it needs {', '.join(columns)}."
         )
     check_table_name(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")

@@ -23,7 +23,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 
 from bns.loop import RunResult
-from bns.robots.base import Robot
+from bns.robots.base import Robot, on_floor
 from bns.spec import RunSpec
 from bns.store.files import publish
 from bns.tasks import Task
@@ -133,8 +133,7 @@ def goal_reach(robot: Robot, task: Task) -> tuple[float, bool]:
 
 def floor_poses(robot: Robot, poses: np.ndarray) -> np.ndarray:
     """x_m, y_m, heading_rad (n + 1, 3) of a robot's own poses, with the start before them."""
-    columns = robot.pose_columns(np.vstack([robot.start_pose(), poses]))
-    return np.column_stack([columns[name] for name in ("x_m", "y_m", "heading_rad")])
+    return on_floor(robot, np.vstack([robot.start_pose(), poses]))
 
 
 def draw_paths(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -66,6 +67,8 @@ class Robot(Protocol):
     radii_m: tuple[float, ...]
     bounds: CommandBounds
     command_columns: tuple[str, ...]
+    measured_columns: tuple[str, ...]
+    """Columns of its table of measurements."""
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """A random population."""
@@ -96,6 +99,12 @@ class Robot(Protocol):
 
     def start_pose(self) -> np.ndarray:
         """Pose (1, columns) of a robot that has not moved yet."""
+
+    def moved(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
+        """Poses (n, columns) turned about the origin, counter-clockwise, and then shifted by (2,)."""
+
+    def marked_unstable(self, poses: np.ndarray, commands: Sequence[int]) -> np.ndarray:
+        """Poses (n, columns) of commands, some of which (numbers from 1) a person called unstable."""
 
     def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
         """What is kept of poses, by name with its unit, (n,) each; x_m, y_m and heading_rad always."""
@@ -139,3 +148,15 @@ class Robot(Protocol):
 
     def driven_ms(self, commands: np.ndarray) -> float:
         """How long these commands drive, in milliseconds."""
+
+
+def turned(points: np.ndarray, turn_rad: float) -> np.ndarray:
+    """Points (n, 2) turned about the origin, counter-clockwise."""
+    cos, sin = np.cos(turn_rad), np.sin(turn_rad)
+    return points @ np.array([[cos, sin], [-sin, cos]])
+
+
+def on_floor(robot: Robot, poses: np.ndarray) -> np.ndarray:
+    """x_m, y_m, heading_rad (n, 3) of a robot's own poses (n, columns)."""
+    columns = robot.pose_columns(poses)
+    return np.column_stack([columns[name] for name in ("x_m", "y_m", "heading_rad")])

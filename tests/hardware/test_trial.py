@@ -1,5 +1,6 @@
 """Whole trials on the emulated Khepera, from command to table."""
 
+import io
 import itertools
 import json
 import os
@@ -8,15 +9,18 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from rich.console import Console
 
 import bns
 from bns.cli import main
 from bns.hardware.journal import events
+from bns.single import view
 from bns.trial.folder import past_evaluations
 
 from . import soak
@@ -271,6 +275,23 @@ def test_bad_commands_are_named_before_anything_moves(tmp_path, capsys, text, me
     assert call(*asked) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "trials").exists()
+
+
+def test_the_live_view_shows_robot_and_rig(tmp_path, monkeypatch):
+    console, seen = Console(width=200, record=True, file=io.StringIO()), []
+
+    def watching(spec, more):
+        return nullcontext(lambda row: seen.append((spec, row, more())))
+
+    monkeypatch.setattr("bns.trial.session.live_view", watching)
+    assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path) == 0
+    console.print(view(*seen[0]))
+    shown = console.export_text()
+    for heading in ("7 cm", "20 cm", "battery", "last stop", "ended early"):
+        assert heading in shown
+    assert re.search(r"7\.9 V", shown)
+    assert re.search(r"\d+ ms", shown)
+    assert "unstable" not in shown
 
 
 def test_a_trial_can_end_with_success(tmp_path, monkeypatch, capsys):

@@ -10,6 +10,7 @@ from bns.engine.philox import Key
 from bns.engine.snn import initial_weights, predict
 from bns.errors import SpecError
 from bns.robots import load_robot, robot_names
+from bns.robots.base import on_floor
 from bns.spec import FIELDS
 from bns.tasks import load_task, task_names
 
@@ -47,6 +48,26 @@ def goal(request):
 
 def weights_of(robot, seed=0, scale=0.5):
     return initial_weights(Key(seed, 1), len(robot.networks), robot.hidden, robot.input_count) * np.float32(scale)
+
+
+def test_poses_move_as_one_body(robot):
+    points = np.array([[0.2, -0.1], [0.5, 0.3], [-0.4, 0.0]])
+    poses, shift = poses_at(robot, points), np.array([0.3, -0.2])
+    moved = robot.moved(poses, 0.6, shift)
+    before, after = on_floor(robot, poses), on_floor(robot, moved)
+    assert after[:, 2] - before[:, 2] == pytest.approx(0.6)
+    expected = before[:, :2] @ np.array([[np.cos(0.6), np.sin(0.6)], [-np.sin(0.6), np.cos(0.6)]]) + shift
+    np.testing.assert_allclose(after[:, :2], expected, atol=1e-12)
+    learned = robot.measured_displacements(poses)[1:]
+    np.testing.assert_allclose(robot.measured_displacements(moved)[1:], learned, atol=1e-9)
+
+
+def test_a_cycle_called_unstable_teaches_no_displacement(robot):
+    poses = poses_at(robot, np.array([[0.2, -0.1], [0.5, 0.3], [-0.4, 0.0]]))
+    marked = robot.marked_unstable(poses, (2,))
+    learns = robot.learnable(robot.measured_displacements(marked))
+    assert learns.all() if "stable" not in robot.networks else learns[0].tolist() == [True, False, True]
+    np.testing.assert_array_equal(robot.marked_unstable(poses, ()), poses)
 
 
 def test_defaults_name_a_robot_and_its_task():

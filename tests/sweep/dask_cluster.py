@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from distributed import Client
@@ -61,14 +62,11 @@ class Cluster:
 
 def _wait_for(port: int, patience_s: float = 60.0) -> None:
     give_up_at = time.monotonic() + patience_s
-    while True:
-        try:
-            socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
+    while time.monotonic() < give_up_at:
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1.0):
             return
-        except OSError:
-            if time.monotonic() > give_up_at:
-                raise
-            time.sleep(0.05)
+        time.sleep(0.05)
+    raise TimeoutError(f"nothing listens at port {port} after {patience_s:.0f} s")
 
 
 class Killer(threading.Thread):

@@ -6,6 +6,7 @@ Device units: wheel speeds in the firmware's units (144.01 units per mm/s before
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from bns.engine.breeding import breed
 from bns.engine.evolution import CommandBounds, Population, diversity, random_population
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.snn import INPUTS
-from bns.robots.base import Luck, Scores
+from bns.measurements import COLUMNS
+from bns.robots.base import Luck, Scores, turned
 from bns.robots.khepera.rollout import (
     GOAL_RADIUS_M,
     HIGH,
@@ -44,6 +46,7 @@ class Khepera:
     radii_m = (0.07, 0.10, 0.14, 0.20)
     bounds = CommandBounds(LOW, HIGH, np.array([2000.0, 2000.0, 400.0], np.float32))
     command_columns = ("left_units", "right_units", "duration_ms")
+    measured_columns = COLUMNS
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """4 to 13 random commands a controller; more where the shortest list allowed is longer."""
@@ -101,6 +104,14 @@ class Khepera:
     def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
         """Position, m, and heading, rad."""
         return dict(zip(("x_m", "y_m", "heading_rad"), poses.T, strict=True))
+
+    def moved(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
+        """Poses (n, 3) turned about the origin, then shifted."""
+        return np.column_stack([turned(poses[:, :2], turn_rad) + shift_m, poses[:, 2] + turn_rad])
+
+    def marked_unstable(self, poses: np.ndarray, commands: Sequence[int]) -> np.ndarray:
+        """As they are: no command of two wheels is unstable."""
+        return poses
 
     def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
         """A controller is driven as it is."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from bns.engine.evolution import Population, diversity
 from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import predict
-from bns.robots.base import Luck, Recipe, Scores
+from bns.measurements import SNAKE_COLUMNS
+from bns.robots.base import Luck, Recipe, Scores, turned
 from bns.robots.snake import cycles, path
 from bns.robots.snake.rollout import evaluate
 from bns.tasks import Task
@@ -36,6 +38,7 @@ class Snake:
     radii_m: tuple[float, ...] = ()
     bounds = cycles.BOUNDS
     command_columns = cycles.COLUMNS
+    measured_columns = SNAKE_COLUMNS
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """Random cycles, as many as ``capacity`` allows up to ten; all controllers have the same number."""
@@ -92,6 +95,17 @@ class Snake:
         named = {"x_m": middle[:, 0], "y_m": middle[:, 1], "heading_rad": np.arctan2(line[:, 1], line[:, 0])}
         markers = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
         return named | dict(zip(markers, poses[:, 4:8].T, strict=True)) | {"stable": poses[:, path.STABLE] >= 0.5}
+
+    def moved(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
+        """Observations (n, 9) whose markers are turned about the origin, then shifted."""
+        markers = turned(poses[:, : path.STABLE].reshape(-1, 2), turn_rad) + shift_m
+        return np.column_stack([markers.reshape(len(poses), path.STABLE), poses[:, path.STABLE]])
+
+    def marked_unstable(self, poses: np.ndarray, commands: Sequence[int]) -> np.ndarray:
+        """Observations (n, 9) of which those of these cycles (numbers from 1) were not stable."""
+        marked = poses.copy()
+        marked[[number - 1 for number in commands], path.STABLE] = 0.0
+        return marked
 
     def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
         """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2)."""
