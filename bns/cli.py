@@ -334,7 +334,7 @@ def validate(options: argparse.Namespace) -> int:
 
     robot = load_robot(options.robot)
     name = options.task or max(task_names(robot.name), key=lambda one: load_task(robot.name, one).source)
-    task, path = load_task(robot.name, name), table_path(options.results, robot.name, name)
+    task, path = load_task(robot.name, name), table_path(options.results, options.robot, name)
     with counting(f"trials of {robot.name} on {task.title}") as progress:
         table = trials(robot, task, build_world("physics", robot), progress)
     write_table(table, path)

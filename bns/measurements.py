@@ -1,12 +1,13 @@
 """The table of what was commanded and where the robot was; simulated or real, never told apart.
 
 One row a tracked pose. The command columns hold what is in force from this row's time on, and are empty where
-no command is. Further columns are kept.
+no command is. Further columns are kept. A robot without wheels has columns of its own (`bns/robots/ROBOT`).
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -51,16 +52,16 @@ def check_table_name(path: Path) -> None:
         raise ModelError(f"There is no folder {path.parent} to write {path.name} into; make it first.")
 
 
-def write_measurements(table: pd.DataFrame, path: str | Path) -> None:
-    """Write a table as .csv or .parquet; a reader never meets half a file.
+def write_measurements(table: pd.DataFrame, path: str | Path, columns: Sequence[str] = COLUMNS) -> None:
+    """Write a table with these columns as .csv or .parquet; a reader never meets half a file.
 
     ModelError if a column is missing or the name ends otherwise.
     """
     path = Path(path)
-    missing = [name for name in COLUMNS if name not in table.columns]
+    missing = [name for name in columns if name not in table.columns]
     if missing:
         raise ModelError(
-            f"A table of measurements for {path} lacks {', '.join(missing)}; it needs {', '.join(COLUMNS)}."
+            f"A table of measurements for {path} lacks {', '.join(missing)}; it needs {', '.join(columns)}."
         )
     check_table_name(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")

@@ -39,7 +39,7 @@ def validate(
         evolver = _evolved(robot, task, trial, simulator.weights)
         planned = robot.plan(evolver.fittest(), simulator.weights, task)
         outputs = predict(simulator.weights, robot.inputs(planned), robot.sigmoid_output)
-        simulated = robot.poses(robot.displacements(outputs))
+        simulated = robot.poses(robot.displacements(outputs), planned)
         about = {"trial": trial + 1, "commands": len(planned), "generations": evolver.generations}
         rows.append(_rows(robot, task, simulated, simulated, about | {"repeat": -1}))
         for repeat in range(REPEATS):
