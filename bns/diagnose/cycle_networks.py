@@ -43,6 +43,7 @@ class CyclePredictor:
         commands = np.column_stack([tracks.gait, np.ones(len(tracks.gait))])
         outputs = predict(saved.weights, robot.inputs(commands), robot.sigmoid_output)
         self._moved = robot.displacements(outputs)
+        self._changes = robot.changes(tracks.gait) if robot.with_changes else None
         self._networks = self._driven()
         self.way_m = np.hypot(*self._since_previous(tracks.pose)[:, :2].T)
         self._at = np.arange(len(tracks.t_s)) - tracks.first[:-1][tracks.trial]
@@ -114,19 +115,34 @@ class CyclePredictor:
                 out[name] = accuracy(seen[kept, net], self._moved[kept, net])
         return out
 
+    def gap_errors(self, horizon: str) -> Array:
+        """Measured minus predicted distance of the markers at the ends of a horizon's windows, m, (windows,)."""
+        starts, ends = self.windows(horizon)
+        out = np.empty(len(starts))
+        for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
+            markers = self._cycles.markers_m[start]
+            for frame in range(start + 1, end + 1):
+                markers = self._foreseen(frame, markers)
+            line = self._cycles.markers_m[end, 1] - self._cycles.markers_m[end, 0]
+            out[i] = np.hypot(*line) - np.hypot(*(markers[1] - markers[0]))
+        return out
+
+    def _foreseen(self, frame: int, markers: Array) -> Array:
+        """Markers (2, 2) at a frame, from where they are at the one before: through a cycle, or through a change."""
+        cycle, ends_cycle = divmod(frame, 2)
+        if ends_cycle:
+            gap = float(np.hypot(*(markers[1] - markers[0]))) if self._robot.rigid else None
+            return path.moved_on(markers, self._moved[cycle], gap)
+        if self._changes is None:
+            return markers
+        return path.moved_on(markers, self._changes[cycle], self._changes[cycle, 4] if self._robot.rigid else None)
+
     def _driven(self) -> Array:
         """Predicted displacement since the frame before, (frames, 3): along, to the left, turn; 0 at a change."""
         out = np.zeros((len(self.tracks.t_s), 3))
-        markers = self._cycles.markers_m
-        for cycle, moved in enumerate(self._moved):
-            before = markers[2 * cycle]
-            gap = float(np.hypot(*(before[1] - before[0]))) if self._robot.rigid else None
-            out[2 * cycle + 1] = _pose_change(before, path.moved_on(before, moved, gap))
-        if self._robot.with_changes:
-            for cycle, moved in enumerate(self._robot.changes(self._cycles.gait)):
-                if not self.tracks.is_first[2 * cycle]:
-                    before = markers[2 * cycle - 1]
-                    out[2 * cycle] = _pose_change(before, path.moved_on(before, moved))
+        for frame in np.flatnonzero(~self.tracks.is_first):
+            before = self._cycles.markers_m[frame - 1]
+            out[frame] = _pose_change(before, self._foreseen(int(frame), before))
         return out
 
     def _stable_runs(self, trial: int) -> list[list[int]]:
