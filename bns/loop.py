@@ -42,7 +42,8 @@ class RunResult:
 
 def run(spec: RunSpec, progress: Progress | None = None, world: World | None = None) -> RunResult:
     """Carry out one run; `progress` is called with each evaluation's row. `world` replaces the one that the spec names."""
-    robot, key = load_robot(spec.robot), Key.of_run(spec.seed, spec.root_seed, spec.robot, spec.task)
+    robot = load_robot(spec.robot)
+    key = Key.of_run(spec.seed, spec.root_seed, robot.name, spec.task)  # options are compared on the same luck
     task = load_task(spec.robot, spec.task)
     world = world or build_world(spec.world, robot)
     trainer = Trainer.start(robot, key, spec)

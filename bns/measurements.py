@@ -1,7 +1,7 @@
 """The table of what was commanded and where the robot was; simulated or real, never told apart.
 
 One row a tracked pose. The command columns hold what is in force from this row's time on, and are empty where
-no command is. Further columns are kept.
+no command is. Further columns are kept. A robot without wheels has columns of its own (`bns/robots/ROBOT`).
 """
 
 from __future__ import annotations
@@ -22,13 +22,6 @@ SESSION = "session_s"
 """Time since the session began, where it was logged."""
 COLUMNS = ("trial", "t_s", *COMMANDS, *POSE)
 """A robot on two wheels. trial: number; t_s: since the trial began; wheel-surface speeds; heading counter-clockwise from x."""
-
-
-SNAKE_COLUMNS = (
-    *("trial", "t_s", "cycle", "a_lat_rad", "a_vert_rad", "omega_rad", "alpha_rad"),
-    *("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m", "stable"),
-)
-"""The snake. cycle: number of the one in force, from 1; stable: whether the cycle that led here was, 1 or 0."""
 
 
 def trial_table(trial: int, commands: ArrayLike, poses: ArrayLike) -> pd.DataFrame:

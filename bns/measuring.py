@@ -16,6 +16,7 @@ from bns.errors import DataError, ModelError
 
 if TYPE_CHECKING:
     from bns.diagnose.intake import Measured
+    from bns.diagnose.predictor import Predictor
     from bns.diagnose.wheels import WheelPredictor
     from bns.physics.model import Model
 
@@ -58,7 +59,7 @@ def add_commands(command: Adder) -> None:
             "--model",
             required=True,
             metavar="M",
-            help="khepera, differential-drive, a YAML file; networks (.safetensors) for compare",
+            help="khepera, differential-drive, a YAML file; for compare also networks (.safetensors), snake, snake+changes",
         )
         one.add_argument(
             "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"
@@ -101,7 +102,9 @@ def compare(options: argparse.Namespace) -> int:
     from bns.diagnose.figures import comparison_figure
     from bns.diagnose.words import comparison_text
 
-    measured, predictor, model = _ready(options, networks=True)
+    networks = _networks(options)
+    ready: tuple[Measured, Predictor, Model] = _ready(options) if networks is None else _ready_with_networks(options, *networks)
+    measured, predictor, model = ready
     with _ticking("comparing"):
         result = hold(predictor, model)
     if options.json:
@@ -151,29 +154,52 @@ def add(options: argparse.Namespace) -> int:
     return 0
 
 
-def _ready(options: argparse.Namespace, networks: bool = False) -> tuple[Measured, WheelPredictor, Model]:
-    """Data, predictor and model of the options; what is odd about the data goes to stderr."""
+def _ready(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model]:
+    """Data, predictor and model of effects; what is odd about the data goes to stderr."""
+    from bns.diagnose.cycles import CycleTracks
     from bns.diagnose.fitting_robot import check_named_robot, check_same_robot
-    from bns.diagnose.intake import load_measured
-    from bns.diagnose.networks import NetworkPredictor
     from bns.diagnose.wheels import WheelPredictor
-    from bns.diagnose.words import findings_text
+
+    if _networks(options) is not None:
+        raise ModelError(f"{options.model} holds networks, which have no effects: they can be compared, not diagnosed.")
+    model = _model(options)
+    measured = _measured(options)
+    check_named_robot(measured.robot, model)
+    if isinstance(measured.tracks, CycleTracks):
+        raise DataError(
+            f"{options.data} holds cycles and markers, and the model {options.model} drives wheels; "
+            "compare them with networks: --model snake, or a file (.safetensors) of bns run --robot snake --save-snn FILE."
+        )
+    predictor = WheelPredictor(measured.tracks)
+    check_same_robot(predictor, model)
+    return measured, predictor, model
+
+
+def _ready_with_networks(options: argparse.Namespace, file: Path, robot: str) -> tuple[Measured, Predictor, Model]:
+    """Data and networks that predict them; the model has no effects of its own."""
+    from bns.diagnose.saved_networks import network_predictor
     from bns.physics.model import Model
 
-    of_networks = options.model.endswith(".safetensors")
-    if of_networks and not networks:
-        raise ModelError(f"{options.model} holds networks, which have no effects: they can be compared, not diagnosed.")
-    model = Model(wheelbase_m=1.0, name=options.model) if of_networks else _model(options)
+    measured = _measured(options)
+    return measured, network_predictor(file, measured.tracks, robot), Model(wheelbase_m=1.0, name=options.model)
+
+
+def _networks(options: argparse.Namespace) -> tuple[Path, str] | None:
+    from bns.diagnose.saved_networks import networks_file
+    from bns.physics.model import model_names
+
+    return networks_file(options.model, model_names())
+
+
+def _measured(options: argparse.Namespace) -> Measured:
+    from bns.diagnose.intake import load_measured
+    from bns.diagnose.words import findings_text
+
     measured = load_measured(options.data, options.robot)
     if measured.findings:
         most = len(measured.findings) if getattr(options, "findings", False) else 5
         print(findings_text(measured.findings, most), file=sys.stderr)
-    if of_networks:
-        return measured, NetworkPredictor(measured.tracks, Path(options.model)), model
-    predictor = WheelPredictor(measured.tracks)
-    check_named_robot(measured.robot, model)
-    check_same_robot(predictor, model)
-    return measured, predictor, model
+    return measured
 
 
 def _model(options: argparse.Namespace) -> Model:

@@ -20,6 +20,15 @@ ENGINE_VERSION = 2
 """Raised whenever the same spec would give other numbers; part of every run's name."""
 
 
+OPTION_MARK = "+"
+
+
+def robot_and_options(name: str) -> tuple[str, tuple[str, ...]]:
+    """The robot and the options of its model that a name such as ``snake+changes+rigid`` switches on."""
+    robot, *options = name.split(OPTION_MARK)
+    return robot, tuple(options)
+
+
 def _field(
     default: Any,
     text: str,
@@ -42,7 +51,7 @@ class RunSpec:
     (section 4.5). Shares are fractions of the population, 0..1.
     """
 
-    robot: str = _field("khepera", "robot")
+    robot: str = _field("khepera", "robot; what its simulator can do beyond the source is added to the name: snake+changes+rigid")
     task: str = _field("circle", "goal task of that robot")
     world: str = _field(
         "substitute",

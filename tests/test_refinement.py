@@ -60,7 +60,7 @@ def test_same_seed_same_networks_and_another_seed_others(quick):
 
 
 def some_patterns(n=200):
-    shop = refinement.Workshop(ROBOT, Meadow(), KEY, n, lambda done, of: None)
+    shop = refinement.Workshop(ROBOT, Meadow(), KEY, n, lambda done, of: None, 1)
     return shop.drive(ROBOT.random_controllers(KEY, n, 1).commands[:, 0])
 
 

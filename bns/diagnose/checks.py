@@ -5,7 +5,7 @@ Every finding names trial and row; nothing goes in silence.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -35,13 +35,13 @@ class Finding:
 
 def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     """The rows that can be used, in order, and what was found. DataError where going on would be guessing."""
-    _columns(table)
+    check_columns(table, COLUMNS)
     table = table.reset_index(drop=True)
-    _numbers(table)
+    to_numbers(table, COLUMNS[1:])
     findings: list[Finding] = []
     kept = []
     for trial, rows in table.groupby("trial", sort=False):
-        good = _forward_in_time(str(trial), rows, findings)
+        good = forward_in_time(str(trial), rows, findings)
         good = _without_jumps(str(trial), good, findings)
         _gaps_and_losses(str(trial), good, findings)
         kept.append(good)
@@ -52,19 +52,21 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     return usable.reset_index(drop=True), findings
 
 
-def _columns(table: pd.DataFrame) -> None:
-    missing = [name for name in COLUMNS if name not in table.columns]
+def check_columns(table: pd.DataFrame, columns: Sequence[str]) -> None:
+    """DataError if one of the columns is missing, or if there are no rows."""
+    missing = [name for name in columns if name not in table.columns]
     if missing:
         raise DataError(
             f"The measurements lack {', '.join(missing)}; they have {', '.join(map(str, table.columns))}. "
-            "Name the columns with `bns import`, or write " + ", ".join(COLUMNS) + "."
+            "Name the columns with `bns import`, or write " + ", ".join(columns) + "."
         )
     if table.empty:
         raise DataError("The measurements have no rows.")
 
 
-def _numbers(table: pd.DataFrame) -> None:
-    for name in COLUMNS[1:]:
+def to_numbers(table: pd.DataFrame, columns: Sequence[str]) -> None:
+    """Make these columns floats, in place. DataError names the first row that holds something else, or no time."""
+    for name in columns:
         values = pd.to_numeric(table[name], errors="coerce")
         wrong = values.isna() & table[name].notna() & (table[name].astype(str).str.lower() != "nan")
         if wrong.any():
@@ -79,7 +81,7 @@ def _numbers(table: pd.DataFrame) -> None:
         raise DataError(f"Row {row}: t_s is empty; every row needs its time.")
 
 
-def _forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
+def forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
     """Rows later than all before them."""
     t = rows["t_s"].to_numpy()
     latest = np.maximum.accumulate(t)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.fit import Fit
-from bns.diagnose.horizons import HORIZONS, Errors, errors_of, noise_floor
+from bns.diagnose.horizons import Errors, errors_of, noise_floor
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.search import problem_for
 from bns.diagnose.structure import Pattern, patterns
@@ -45,7 +45,8 @@ class Curve:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `compare` found. ``floor``: position error (m) of tracking noise alone, at each horizon."""
+    """What `compare` found. ``floor``: position error (m) of tracking noise alone, at each horizon; ``near``: the horizon of
+    the worst moments and the curves; ``scores``: how well each network agrees, where the model is networks of cycles."""
 
     model: str
     trials: int
@@ -55,6 +56,8 @@ class Comparison:
     patterns: tuple[Pattern, ...]
     worst: tuple[Moment, ...]
     curves: tuple[Curve, ...]
+    near: str
+    scores: Mapping[str, Mapping[str, float]]
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values."""
@@ -68,6 +71,7 @@ class Comparison:
                 for p in self.patterns
             ],
             "worst": [vars(w) for w in self.worst],
+            "networks": {name: dict(score) for name, score in self.scores.items()},
         }
 
 
@@ -77,7 +81,7 @@ def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
     if not (np.diff(tracks.first) > 1).any():
         raise DataError("No trial has two tracked poses, and a displacement needs two: log the pose before and after commands.")
     problem = problem_for(predictor, model)
-    errors = {h: errors_of(predictor, steps, h) for h in HORIZONS}
+    errors = {h: errors_of(predictor, steps, h) for h in predictor.horizons}
     # scatter of the drive cannot be told from faults of the model before these are mended: only the camera's noise is sure
     tracking = problem.following.noise * np.array([1, 1, 0, 0, 0])
     found = patterns(problem, _as_is(problem, model))
@@ -86,10 +90,12 @@ def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
         len(tracks),
         len(tracks.t_s),
         {h: e.summary(len(tracks)) for h, e in errors.items()},
-        {h: noise_floor(predictor, tracking, h).get("position_m", float("nan")) for h in HORIZONS},
+        {h: noise_floor(predictor, tracking, h).get("position_m", float("nan")) for h in predictor.horizons},
         tuple(found),
-        tuple(_worst(predictor, errors["1s"])),
-        tuple(_curves(predictor, errors["1s"], found, np.random.default_rng(seed))),
+        tuple(_worst(predictor, errors[predictor.near])),
+        tuple(_curves(predictor, errors[predictor.near], found, np.random.default_rng(seed))),
+        predictor.near,
+        predictor.scores(),
     )
 
 

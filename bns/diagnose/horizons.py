@@ -88,7 +88,7 @@ def _marks(tracks: Tracks, trial: int, horizon: str, t_s: Array) -> NDArray[np.i
 def errors_of(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
     """Measured minus predicted at the ends of a horizon's windows, each predicted from the pose measured at its start."""
     tracks = predictor.tracks
-    start, end = windows(tracks, horizon)
+    start, end = predictor.windows(horizon)
     path = _path(tracks, steps)
     pose = tracks.pose
     turn = pose[start, 2] - path[start, 2]
@@ -118,7 +118,7 @@ def _path(tracks: Tracks, steps: Steps) -> Array:
 def noise_floor(predictor: Predictor, noise: Array, horizon: str) -> dict[str, float]:
     """Error that a perfect model would show: tracking noise at both ends, and the scatter of the drive between."""
     tracks = predictor.tracks
-    start, end = windows(tracks, horizon)
+    start, end = predictor.windows(horizon)
     if not len(start):
         return {}
     way = np.cumsum(predictor.way_m)

@@ -10,6 +10,7 @@ import pandas as pd
 import yaml
 
 from bns.diagnose.checks import Finding, checked
+from bns.diagnose.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.importing import applied, mapping_beside
 from bns.diagnose.tracks import Tracks, tracks_of
 from bns.errors import DataError
@@ -39,9 +40,17 @@ def load_measured(path: str | Path, robot: str | None = None) -> Measured:
         table = applied(table, mapping)
     table = _of_one_robot(table, robot)
     of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
-    table, findings = checked(table)
+    tracks, findings = _tracks(table)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()[:20]
-    return Measured(path, tracks_of(table), tuple(findings), digest, of)
+    return Measured(path, tracks, tuple(findings), digest, of)
+
+
+def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:
+    if are_cycles(table):
+        cycles, findings = checked_cycles(table)
+        return cycle_tracks(cycles), findings
+    usable, findings = checked(table)
+    return tracks_of(usable), findings
 
 
 def read_table(path: Path) -> pd.DataFrame:

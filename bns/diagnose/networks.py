@@ -6,7 +6,6 @@ Networks predict a whole command at once, so the tracks are looked at where comm
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +14,10 @@ from bns.diagnose.predictor import Steps
 from bns.diagnose.tracks import Array, Tracks
 from bns.diagnose.wheels import WheelPredictor
 from bns.engine.snn import predict
-from bns.errors import DataError, ModelError
+from bns.errors import DataError
 from bns.physics.model import Model
-from bns.robots import load_robot
-from bns.robots.simulator import StaticSimulator, load_simulator
+from bns.robots.base import Robot
+from bns.robots.simulator import StaticSimulator
 
 _NEAR_S = 0.06
 """A pose tracked this near the end of a command stands for it."""
@@ -29,15 +28,11 @@ class NetworkPredictor(WheelPredictor):
 
     A model handed to `steps` counts only by its effects, which come on top: so the free curves of `structure` say where
     networks fail.
-    DataError if no pose was tracked at the ends of commands; ModelError if the networks are not the robot's.
+    DataError if no pose was tracked at the ends of commands.
     """
 
-    def __init__(self, tracks: Tracks, file: Path, robot: str = "khepera") -> None:
-        saved, self._robot = load_simulator(file), load_robot(robot)
-        if tuple(saved.networks) != tuple(self._robot.networks):
-            raise ModelError(
-                f"The networks of {file} are {', '.join(saved.networks)}; those of {robot} are {', '.join(self._robot.networks)}."
-            )
+    def __init__(self, tracks: Tracks, saved: StaticSimulator, robot: Robot) -> None:
+        self._robot = robot
         nodes = _command_ends(tracks)
         super().__init__(_only_frames(tracks, nodes >= 0))
         if len(self.tracks.t_s) < 2 * len(self.tracks):
@@ -69,7 +64,7 @@ class NetworkPredictor(WheelPredictor):
             [speeds[:, 0] / unit[0], speeds[:, 1] / unit[1], tracks.duration_s[trial][lasting] / unit[2]]
         )
         displaced = self._robot.displacements(predict(saved.weights, self._robot.inputs(commands)))
-        return np.vstack([self._robot.start_pose(), self._robot.poses(displaced)])
+        return np.vstack([self._robot.start_pose(), self._robot.poses(displaced, commands)])
 
 
 def _command_ends(tracks: Tracks) -> NDArray[np.int64]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
+from bns.diagnose.horizons import HORIZONS, windows
 from bns.diagnose.predictor import Steps
 from bns.diagnose.tracks import Array, Tracks
 from bns.engine.pose_filter import followed
@@ -20,6 +23,9 @@ _TAIL_S = 1.0
 
 class WheelPredictor:
     """Drives the commands of tracks once, and answers any model with the displacement between successive frames."""
+
+    horizons: tuple[str, ...] = HORIZONS
+    near = "1s"
 
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
         self.tracks = tracks
@@ -48,6 +54,14 @@ class WheelPredictor:
         for active in model.at("measure"):
             view = active.effect.apply(view, **active.by_name)
         return Steps(self._in_robot_frame(view.poses), self._drift(model, self._since_previous(at[:, 3])))
+
+    def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Back to back within each trial."""
+        return windows(self.tracks, horizon)
+
+    def scores(self) -> Mapping[str, Mapping[str, float]]:
+        """A model of wheels has but a path."""
+        return {}
 
     def variables(self) -> dict[str, Array]:
         """What the robot was told and where it was, at every step of the grid, (trials, steps)."""

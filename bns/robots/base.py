@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
+import pandas as pd
 
 from bns.engine.evolution import CommandBounds, Population
 from bns.engine.philox import Key
@@ -67,6 +68,8 @@ class Robot(Protocol):
     radii_m: tuple[float, ...]
     bounds: CommandBounds
     command_columns: tuple[str, ...]
+    options: tuple[str, ...]
+    """What its simulator can do beyond the source, switched on by ``ROBOT+OPTION`` as its name in a spec."""
     measured_columns: tuple[str, ...]
     """Columns of its table of measurements."""
 
@@ -88,8 +91,12 @@ class Robot(Protocol):
     def targets(self, displacements: np.ndarray) -> np.ndarray:
         """The inverse of `displacements`: network targets (networks, n) float32."""
 
-    def poses(self, displacements: np.ndarray) -> np.ndarray:
-        """Poses (n, columns) after each displacement, from the start of every task."""
+    def with_options(self, names: tuple[str, ...]) -> Robot:
+        """The robot with some of its options, and no others, switched on."""
+
+    def poses(self, displacements: np.ndarray, commands: np.ndarray | None = None) -> np.ndarray:
+        """Poses (n, columns) after each displacement, from the start of every task; ``commands`` (n, components), which led to
+        them, where what lies between two commands is simulated too."""
 
     def measured_displacements(self, poses: np.ndarray) -> np.ndarray:
         """Displacements (n, networks) between measured poses, the first from the start."""
@@ -148,6 +155,9 @@ class Robot(Protocol):
 
     def driven_ms(self, commands: np.ndarray) -> float:
         """How long these commands drive, in milliseconds."""
+
+    def measurements(self, trial: int, commands: np.ndarray, poses: np.ndarray) -> pd.DataFrame:
+        """The rows of the table of measurements for commands (n, components) and the poses (n, columns) they led to."""
 
 
 def turned(points: np.ndarray, turn_rad: float) -> np.ndarray:

@@ -19,9 +19,9 @@ from bns.hardware.platforms import snake
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
 from bns.hardware.snake_settings import snake_settings
-from bns.measurements import SNAKE_COLUMNS
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
+from bns.robots import load_robot
 from bns.trial.folder import past_evaluations
 
 from . import soak
@@ -148,7 +148,7 @@ def test_from_command_to_table_and_replay(tmp_path, capsys):
     assert "stops: 2 confirmed" in said
     [journal] = (tmp_path / "trials").glob("*/journal.jsonl")
     table = pd.read_csv(journal.parent / "measurements.csv")
-    assert set(SNAKE_COLUMNS) <= set(table)
+    assert set(load_robot("snake").measured_columns) <= set(table)
     assert {"session_s", "battery_v", "temperature_c"} <= set(table)
     for number, drive in table.groupby("trial"):
         assert (drive["t_s"].diff().dropna() > 0).all()

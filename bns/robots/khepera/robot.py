@@ -9,12 +9,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 
 from bns.engine.breeding import breed
 from bns.engine.evolution import CommandBounds, Population, diversity, random_population
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.snn import INPUTS
-from bns.measurements import COLUMNS
+from bns.measurements import COLUMNS, trial_table
 from bns.robots.base import Luck, Scores, turned
 from bns.robots.khepera.rollout import (
     GOAL_RADIUS_M,
@@ -47,6 +48,11 @@ class Khepera:
     bounds = CommandBounds(LOW, HIGH, np.array([2000.0, 2000.0, 400.0], np.float32))
     command_columns = ("left_units", "right_units", "duration_ms")
     measured_columns = COLUMNS
+    options: tuple[str, ...] = ()
+
+    def with_options(self, names: tuple[str, ...]) -> Khepera:
+        """There are none."""
+        return self
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """4 to 13 random commands a controller; more where the shortest list allowed is longer."""
@@ -77,7 +83,7 @@ class Khepera:
         """Network targets (3, n)."""
         return np.ascontiguousarray((displacements / SCALE).T, np.float32)
 
-    def poses(self, displacements: np.ndarray) -> np.ndarray:
+    def poses(self, displacements: np.ndarray, commands: np.ndarray | None = None) -> np.ndarray:
         """Poses x_m, y_m, heading_rad (not wrapped) after each displacement."""
         heading = START[2] + np.concatenate([[0.0], np.cumsum(displacements[:, 2])])
         before = heading[:-1]
@@ -168,6 +174,11 @@ class Khepera:
     def driven_ms(self, commands: np.ndarray) -> float:
         """Sum of the durations."""
         return float(commands[:, 2].sum())
+
+    def measurements(self, trial: int, commands: np.ndarray, poses: np.ndarray) -> pd.DataFrame:
+        """Rows of the poses at the start and at the end of every command, with wheel speeds in m/s."""
+        told = np.column_stack(self.wheel_speeds_m_s(commands.astype(np.float64)))
+        return trial_table(trial, told, np.vstack([self.start_pose(), poses]))
 
     def wheel_speeds_m_s(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Left and right wheel-surface speeds m/s and durations s, each (n,), of commands in device units."""
