@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bns.engine.evolution import CommandBounds, Population
-from bns.engine.jit import exact, fast, inline
+from bns.engine.jit import copy_items, exact, fast, inline
 from bns.engine.philox import Key, Purpose, philox
 
 IDENTICAL_CUT = 0.8
@@ -40,44 +40,35 @@ def _below(word: Any, n: Any) -> Any:
     return np.int64(np.uint64(word) * np.uint64(n) >> np.uint64(32))
 
 
-@inline
-def _copy(source, row, start, target, child, at, count):  # type: ignore[no-untyped-def]  # compiled
-    for e in range(count):
-        target[child, at + e] = source[row, start + e]
-
-
-@inline
-def _number(origin, child, at, start, count):  # type: ignore[no-untyped-def]  # compiled
-    for e in range(count):
-        origin[child, at + e] = start + e
+@exact
+def _same_before(lists, front, back):  # type: ignore[no-untyped-def]  # compiled
+    """Whether the two commands that end at these places have the same speeds."""
+    a, b = front - COMPONENTS, back - COMPONENTS
+    return lists[a] == lists[b] and lists[a + 1] == lists[b + 1]
 
 
 @exact
-def _same_before(lists, front, cut_front, back, cut_back):  # type: ignore[no-untyped-def]  # compiled
-    """Whether the speeds before both cuts are the same; before the first command of a list the robot is at rest."""
-    if cut_front == 0 or cut_back == 0:
-        return cut_front == cut_back
-    a, b = (cut_front - 1) * COMPONENTS, (cut_back - 1) * COMPONENTS
-    return lists[front, a] == lists[back, b] and lists[front, a + 1] == lists[back, b + 1]
-
-
-@exact
-def _cross(children, origin, child, lists, lengths, starts, front, back, cut_front, cut_back, shortest):  # type: ignore[no-untyped-def]  # compiled
+def _cross(children, origin, child, lists, lengths, starts, numbers, front, back, cut_front, cut_back, shortest):  # type: ignore[no-untyped-def]  # compiled
     """First cut_front commands of one parent, then the other parent's from cut_back on; the length before and after the bound.
 
-    children and lists are (n, capacity * components): lists of commands laid end to end.
+    children, origin and lists are laid end to end. starts (n,): the number of each parent's first command, counted through
+    all lists; numbers: all of them, to be copied from.
     """
     length = cut_front + lengths[back] - cut_back
     if length < shortest:  # too short a list is not made: the parent passes unchanged
         cut_front, cut_back, length = 0, 0, lengths[back]
-    kept = min(length, lists.shape[1] // COMPONENTS)
+    capacity = origin.size // lengths.size
+    kept = min(length, capacity)
     first = min(cut_front, kept)
-    _copy(lists, front, 0, children, child, 0, first * COMPONENTS)
-    _copy(lists, back, cut_back * COMPONENTS, children, child, first * COMPONENTS, (kept - first) * COMPONENTS)
-    _number(origin, child, 0, starts[front], first)
-    _number(origin, child, first, starts[back] + cut_back, kept - first)
-    if first < kept and not _same_before(lists, front, cut_front, back, cut_back):
-        origin[child, first] = -1
+    to, front_end, rest = child * capacity, front * capacity + cut_front, back * capacity + cut_back
+    copy_items(children, to * COMPONENTS, lists, (front_end - cut_front) * COMPONENTS, first * COMPONENTS)
+    copy_items(children, (to + first) * COMPONENTS, lists, rest * COMPONENTS, (kept - first) * COMPONENTS)
+    copy_items(origin, to, numbers, starts[front], first)
+    copy_items(origin, to + first, numbers, starts[back] + cut_back, kept - first)
+    if first < kept and cut_front + cut_back > 0:
+        at_rest = cut_front == 0 or cut_back == 0  # in one list, but not in the other
+        if at_rest or not _same_before(lists, front_end * COMPONENTS, rest * COMPONENTS):
+            origin[to + first] = -1
     return length, kept
 
 
@@ -105,9 +96,7 @@ def _hits(words, threshold, places):  # type: ignore[no-untyped-def]  # compiled
 @exact
 def _mutate(children, origin, lengths, rate, low, high, span, step, k0, k1):  # type: ignore[no-untyped-def]  # compiled
     """Mutate all controllers but the first, which is the elite."""
-    total = 0
-    for i in range(1, lengths.size):
-        total += lengths[i]
+    total = lengths.sum() - lengths[0]
     slot, individual = np.empty(total, np.uint32), np.empty(total, np.uint32)
     m = 0
     for i in range(1, lengths.size):
@@ -131,14 +120,9 @@ def _mutate(children, origin, lengths, rate, low, high, span, step, k0, k1):  # 
 
 
 @exact
-def number_of_first(lengths):  # type: ignore[no-untyped-def]  # compiled
+def _starts(lengths):  # type: ignore[no-untyped-def]  # compiled
     """The number of each list's first command, counted through all lists."""
-    starts = np.empty(lengths.size, np.int32)
-    total = 0
-    for i in range(lengths.size):
-        starts[i] = total
-        total += lengths[i]
-    return starts
+    return (np.cumsum(lengths) - lengths).astype(np.int64)
 
 
 @exact
@@ -146,13 +130,10 @@ def breed_into(  # type: ignore[no-untyped-def]  # compiled
     commands, lengths, order, cdf, rate, low, high, span, shortest, step, k0, k1, children, child_lengths, origin
 ):
     """Fill children with the best controller and the offspring of tournament winners; count those cut at the bound."""
-    hits = 0
-    n = commands.shape[0]
-    lists, child_lists = commands.reshape(n, -1), children.reshape(n, -1)
-    best, starts = order[0], number_of_first(lengths)
-    _copy(lists, best, 0, child_lists, 0, 0, lengths[best] * COMPONENTS)
-    _number(origin, 0, 0, starts[best], lengths[best])
-    child_lengths[0] = lengths[best]
+    hits, n, best = 0, commands.shape[0], order[0]
+    starts, numbers = _starts(lengths), np.arange(lengths.sum()).astype(np.int32)
+    every, every_child, every_origin = commands.reshape(-1), children.reshape(-1), origin.reshape(-1)
+    _, child_lengths[0] = _cross(every_child, every_origin, 0, every, lengths, starts, numbers, best, best, 0, 0, 0)
     slot, pairs = np.zeros(n // 2, np.uint32), np.arange(n // 2).astype(np.uint32)
     parents, cuts = np.empty((3, n // 2), np.uint32), np.empty((3, n // 2), np.uint32)
     _draws(slot, pairs, Purpose.PARENTS, step, k0, k1, parents)
@@ -165,13 +146,13 @@ def breed_into(  # type: ignore[no-untyped-def]  # compiled
         if cuts[0, pair] * _UNIT >= IDENTICAL_CUT:
             cut_a = _below(cuts[1, pair], lengths[a] + 1)
             cut_b = _below(cuts[2, pair], lengths[b] + 1)
-        length, kept = _cross(child_lists, origin, first, lists, lengths, starts, a, b, cut_a, cut_b, shortest)
-        child_lengths[first] = kept
-        hits += length > kept
-        if first + 1 < n:
-            length, kept = _cross(child_lists, origin, first + 1, lists, lengths, starts, b, a, cut_b, cut_a, shortest)
-            child_lengths[first + 1] = kept
+        for child in range(first, min(first + 2, n)):
+            length, kept = _cross(
+                every_child, every_origin, child, every, lengths, starts, numbers, a, b, cut_a, cut_b, shortest
+            )
+            child_lengths[child] = kept
             hits += length > kept
+            a, b, cut_a, cut_b = b, a, cut_b, cut_a
     _mutate(children, origin, child_lengths, rate, low, high, span, step, k0, k1)
     return hits
 

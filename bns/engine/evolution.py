@@ -75,7 +75,20 @@ def tournament_cdf(n: int, share: float) -> np.ndarray:
 
 def rank(fitness: np.ndarray) -> np.ndarray:
     """Indices from best to worst; equals keep their order; NaN and 0 come last. int64 (n,)."""
-    return np.argsort(np.where(fitness > 0, -fitness, 0.0), kind="stable")
+    worth = np.where(fitness > 0, fitness, 0.0)
+    order = np.argsort(-worth)  # with the sort of equals below it takes half as long as a stable sort
+    _equals_in_order(order, worth)
+    return order
+
+
+@exact
+def _equals_in_order(order, worth):  # type: ignore[no-untyped-def]  # compiled
+    begin = 0
+    for end in range(1, order.size + 1):
+        if end == order.size or worth[order[end]] != worth[order[begin]]:
+            if end - begin > 1:
+                order[begin:end].sort()
+            begin = end
 
 
 def pick(key: Key, purpose: Purpose, step: int, order: np.ndarray, cdf: np.ndarray) -> int:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bns.engine.breeding import number_of_first
 from bns.engine.evolution import Population
 from bns.engine.jit import exact, fast, inline
 from bns.engine.snn import INPUTS, predict_into
@@ -33,40 +32,52 @@ NOTHING = np.empty((3, 0), np.float32)
 """Outputs of no command."""
 
 
-@fast
-def _gather(commands, lengths, origin, known, centre, per_unit, X, place, source):  # type: ignore[no-untyped-def]  # compiled
-    """Inputs of the commands whose origin is not among the `known` ones; how many.
-
-    Inputs are previous left and right (0 at first), left, right, duration. place (n,): where each of them stands among
-    all commands, side by side; source (all,): where all the others come from, and 0 of those.
-    """
-    n = new = 0
+@exact
+def _side_by_side(lengths, origin, place, before, source):  # type: ignore[no-untyped-def]  # compiled
+    """Of all commands, list after list, each (all,): its place in `commands` laid end to end, that of the one before (its own
+    for the first of a list), and its origin."""
+    n, longest = 0, origin.shape[1]
     for i in range(lengths.size):
-        left, right = -centre[0] * per_unit[0], -centre[1] * per_unit[1]
+        begin, end = i * longest, n + lengths[i]
+        places, befores, sources = place[n:end], before[n:end], source[n:end]
         for j in range(lengths[i]):
-            X[0, new], X[1, new] = left, right
-            left = (commands[i, j, 0] - centre[0]) * per_unit[0]
-            right = (commands[i, j, 1] - centre[1]) * per_unit[1]
-            X[2, new], X[3, new] = left, right
-            X[4, new] = (commands[i, j, 2] - centre[2]) * per_unit[2]
-            place[new] = n
-            is_known = int(0 <= origin[i, j] < known)
-            source[n] = origin[i, j] * is_known
-            # Written in any case, and kept if it is new: a branch would be guessed wrongly.
-            new += 1 - is_known
-            n += 1
-    return new
+            places[j], befores[j], sources[j] = begin + j, begin + j - int(j > 0), origin[i, j]
+        n = end
 
 
 @exact
-def _complete(outputs, known, source, fresh, place, new):  # type: ignore[no-untyped-def]  # compiled
-    """Outputs of all commands: those that are known from where they come from, the first `new` fresh ones at their places."""
+def _new(source, known, which):  # type: ignore[no-untyped-def]  # compiled
+    """Which commands' origin is not among the `known` ones, and how many: without a branch, which would be guessed wrongly."""
+    count = 0
+    for c in range(source.size):
+        which[count] = c
+        count += int(not 0 <= source[c] < known)
+    return count
+
+
+@fast
+def _fill(commands, which, place, before, centre, per_unit, X):  # type: ignore[no-untyped-def]  # compiled
+    """Inputs of these commands: previous left and right (0 at first), left, right, duration."""
+    for m in range(which.size):
+        c = np.uint64(which[m])
+        at, last = np.uint64(place[c]), np.uint64(before[c])
+        left, right = commands[last, 0], commands[last, 1]
+        if at == last:
+            left = right = np.float32(0)
+        X[0, m], X[1, m] = (left - centre[0]) * per_unit[0], (right - centre[1]) * per_unit[1]
+        X[2, m], X[3, m] = (commands[at, 0] - centre[0]) * per_unit[0], (commands[at, 1] - centre[1]) * per_unit[1]
+        X[4, m] = (commands[at, 2] - centre[2]) * per_unit[2]
+
+
+@exact
+def _complete(outputs, known, source, fresh, which):  # type: ignore[no-untyped-def]  # compiled
+    """Outputs of all commands: the known ones from where they come from, the fresh ones where they belong."""
     for net in range(outputs.shape[0]):
         row, old, made = outputs[net], known[net], fresh[net]
         for c in range(source.size):
-            row[c] = old[source[c]]
-        for m in range(new):
-            row[place[m]] = made[m]
+            row[c] = old[np.uint64(max(source[c], 0))]
+        for m in range(which.size):
+            row[np.uint64(which[m])] = made[m]
 
 
 @inline
@@ -116,7 +127,7 @@ def _steps(outputs, scale, sine, cosine):  # type: ignore[no-untyped-def]  # com
 @exact
 def _walk(outputs, lengths, scale, goals, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
     """Algorithm 2 for every controller; how many could not be computed."""
-    count, starts = outputs.shape[1], number_of_first(lengths)
+    count, starts = outputs.shape[1], np.cumsum(lengths) - lengths
     heading, step_y, step_x = np.empty(count), np.empty(count), np.empty(count)
     astray = np.empty(lengths.size)
     _headings(outputs[2], starts, lengths, scale[2], heading, astray)
@@ -148,14 +159,17 @@ def _walk(outputs, lengths, scale, goals, fitness, reached):  # type: ignore[no-
 def _outputs(commands, lengths, origin, known, weights, centre, per_unit):  # type: ignore[no-untyped-def]  # compiled
     """Outputs (networks, commands) of the networks for all commands; only those that are not known are computed."""
     total = lengths.sum()
-    X, place, source = np.empty((INPUTS, total), np.float32), np.empty(total, np.int32), np.empty(total, np.int32)
-    new = _gather(commands, lengths, origin, known.shape[1], centre, per_unit, X, place, source)
-    fresh = np.empty((weights.shape[0], total), np.float32)
+    place, before, source = np.empty(total, np.int32), np.empty(total, np.int32), np.empty(total, np.int32)
+    _side_by_side(lengths, origin, place, before, source)
+    which = np.empty(total, np.int32)
+    new = _new(source, known.shape[1], which)
+    X, fresh = np.empty((INPUTS, new), np.float32), np.empty((weights.shape[0], new), np.float32)
+    _fill(commands.reshape(-1, commands.shape[2]), which[:new], place, before, centre, per_unit, X)
     predict_into(weights, X, new, fresh)
     if new == total:
         return fresh
-    outputs = np.empty_like(fresh)
-    _complete(outputs, known, source, fresh, place, new)
+    outputs = np.empty((weights.shape[0], total), np.float32)
+    _complete(outputs, known, source, fresh, which[:new])
     return outputs
 
 
@@ -200,8 +214,6 @@ def roll_out(population: Population, weights: np.ndarray, goals_m: np.ndarray, k
 
 def inputs(commands: np.ndarray) -> np.ndarray:
     """Inputs (5, n) of the networks for one controller's commands (n, 3)."""
-    n = len(commands)
-    X, nowhere = np.empty((INPUTS, n), np.float32), np.empty(n, np.int32)
-    none = np.full((1, n), -1, np.int32)
-    _gather(commands[None].astype(np.float32), np.array([n], np.int32), none, 0, _CENTRE, _PER_UNIT, X, nowhere, nowhere)
+    X, each = np.empty((INPUTS, len(commands)), np.float32), np.arange(len(commands))
+    _fill(np.ascontiguousarray(commands, np.float32), each, each, np.maximum(each - 1, 0), _CENTRE, _PER_UNIT, X)
     return X
