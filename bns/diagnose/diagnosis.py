@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from bns.diagnose.candidates import listed
+from bns.diagnose.equivalents import longer
 from bns.diagnose.fit import Fit
 from bns.diagnose.folds import errors_at_horizons, held_out_steps
 from bns.diagnose.formula_search import Formula, best_formula
@@ -105,6 +107,9 @@ def diagnose(
     formula = best_formula(found.problem, found.fit, guesses) if guesses else None
     hint = _hint(found, len(predictor.tracks))
     verdict = _verdict(found, rest.any, hint)
+    tick("longer explanations")
+    others = [effect for name, effect in listed(found.nominal.model, extra).items() if name not in found.accepted]
+    more = [] if rest.any else longer(found.problem, found.fit, found.accepted, others)
     tick("errors on trials held out")
     return Diagnosis(
         verdict,
@@ -113,7 +118,7 @@ def diagnose(
         rest,
         formula,
         errors_before_and_after(found),
-        tuple(notes_on(found, predictor.tracks, rest, formula, hint)),
+        tuple(notes_on(found, predictor.tracks, rest, formula, hint, more)),
     )
 
 

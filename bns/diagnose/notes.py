@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -17,9 +17,18 @@ NOTABLE = 0.01
 """An effect that would have earned this share of the loss, but for a veto, is mentioned."""
 
 
-def notes_on(found: Found, tracks: Tracks, rest: Unexplained, formula: Formula | None, hint: Candidate | None) -> Iterator[str]:
-    """All notes, one sentence or two each."""
+def notes_on(
+    found: Found,
+    tracks: Tracks,
+    rest: Unexplained,
+    formula: Formula | None,
+    hint: Candidate | None,
+    longer: Sequence[tuple[str, ...]] = (),
+) -> Iterator[str]:
+    """All notes, one sentence or two each. ``longer``: explanations with one effect more that fit as well."""
     yield from _on_effects(found, tracks)
+    for names in longer:
+        yield f"{' with '.join(names)} would explain as much, with one effect more."
     yield from _on_rest(rest, tracks)
     if formula is not None:
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
