@@ -9,6 +9,7 @@ from bns.diagnose.outbreaks import FAR, TRIALS, WIDTH, outbreaks
 from bns.diagnose.search import problem_for
 from bns.diagnose.structure import SHARE, nudge
 from bns.diagnose.tracks import tracks_of
+from bns.diagnose.unexplained import unexplained
 from bns.diagnose.wheels import RECENT_S, WheelPredictor
 from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
 
@@ -71,6 +72,24 @@ def test_a_diagnosis_says_where_to_look():
     assert found.verdict == "unlisted"
     assert {o["trial"] for o in found.as_json()["outbreaks"]} == {"1", "8", "9", "15"}
     assert any(note.startswith("4 of 20 trials have moments over 6 times") for note in found.notes)
+
+
+def loudest(table):
+    predictor = WheelPredictor(tracks_of(table))
+    problem = problem_for(predictor, NOMINAL)
+    return unexplained(problem, problem.fit(NOMINAL), ()).rhythm
+
+
+@pytest.mark.parametrize("jitter", [0.002, 0.02])
+def test_motors_that_vary_have_no_rhythm(jitter):
+    assert loudest(measured(NOMINAL, trials=30, seed=2, jitter=jitter)) is None
+
+
+def test_a_heading_that_swings_with_a_period_has_a_rhythm():
+    table = measured(NOMINAL, trials=30, seed=2)
+    phase = 2 * np.pi * (table.t_s + 0.37 * table.trial) / 1.5
+    rhythm = loudest(table.assign(heading_rad=table.heading_rad + 0.02 * np.sin(phase)))
+    assert (rhythm.direction, rhythm.scale) == ("heading", "within")
 
 
 def variables_of(left_m_s, command_s=0.4):
