@@ -204,13 +204,17 @@ class Search:
         rivals: list[tuple[tuple[str, ...], Fit]] = []
         for name, other, tried in self._exchanges(problem, fit, accepted):
             without = problem.fit(fit.model.without(name))
-            worth = held_out_gain(without.held_out, fit.held_out)[0]
-            lost, se = held_out_gain(tried.held_out, fit.held_out)
-            alike = lost < TIE_Z * se or lost < TIE_SHARE * worth
             # at a bound it may be: a tether from ever farther away is a slope
-            if alike and not veto_of(tried, other, bounds=False):
+            if alike(tried, fit, without) and not veto_of(tried, other, bounds=False):
                 rivals.append((tuple(other if a == name else a for a in accepted), tried))
         return rivals
+
+
+def alike(tried: Fit, fit: Fit, without: Fit) -> bool:
+    """Whether ``tried`` cannot be told from ``fit``, an explanation that both put in the place of nothing (``without``)."""
+    worth = held_out_gain(without.held_out, fit.held_out)[0]
+    lost, se = held_out_gain(tried.held_out, fit.held_out)
+    return bool(lost < TIE_Z * se or lost < TIE_SHARE * worth)
 
 
 def problem_for(predictor: Predictor, model: Model, start: Array | None = None) -> Problem:

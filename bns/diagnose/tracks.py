@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -21,8 +22,9 @@ class Tracks:
 
     ``first`` (trials + 1): where each trial's frames begin. ``t_s`` (frames,) since the trial's first row, ``pose`` (frames, 3),
     all finite. ``left_m_s, right_m_s, duration_s`` (trials, commands): what was in force, back to back from the first
-    row, padded with commands of 0 s. ``extra``: further numeric columns, (frames,) each. ``start_s`` (trials,): time of
-    the session at the first row; ``start_known``: it was logged, not made up from the order of the trials.
+    row, padded with the command of the last row for 0 s. ``extra``: further numeric columns, (frames,) each.
+    ``start_s`` (trials,): time of the session at the first row; ``start_known``: it was logged, not made up from the order of
+    the trials.
     """
 
     names: tuple[str, ...]
@@ -84,9 +86,9 @@ def tracks_of(table: pd.DataFrame) -> Tracks:
         first=np.concatenate([[0], np.cumsum(frames)]).astype(np.int64),
         t_s=np.concatenate([t[mask] for t, mask in zip(times, seen, strict=True)]),
         pose=np.concatenate([g[list(POSE)].to_numpy(dtype=float)[m] for g, m in zip(groups, seen, strict=True)]),
-        left_m_s=_padded([c[0] for c in commands]),
-        right_m_s=_padded([c[1] for c in commands]),
-        duration_s=_padded([c[2] for c in commands]),
+        left_m_s=_padded([c[0] for c in commands], "edge"),
+        right_m_s=_padded([c[1] for c in commands], "edge"),
+        duration_s=_padded([c[2] for c in commands], "constant"),
         start_s=start,
         start_known=known,
         extra={
@@ -106,11 +108,10 @@ def _commands(rows: pd.DataFrame) -> tuple[Array, Array, Array]:
     return given[begins, 0], given[begins, 1], ends - t[begins]
 
 
-def _padded(rows: list[Array]) -> Array:
-    out = np.zeros((len(rows), max(map(len, rows))))
-    for row, values in zip(out, rows, strict=True):
-        row[: len(values)] = values
-    return out
+def _padded(rows: list[Array], mode: Literal["edge", "constant"]) -> Array:
+    """Rows of one length: their last value goes on, or zeros follow."""
+    width = max(map(len, rows))
+    return np.stack([np.pad(row, (0, width - len(row)), mode=mode) for row in rows])
 
 
 def _session(table: pd.DataFrame, groups: list[pd.DataFrame], times: list[Array]) -> tuple[Array, bool]:
