@@ -89,7 +89,7 @@ def errors_of(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
     """Measured minus predicted at the ends of a horizon's windows, each predicted from the pose measured at its start."""
     tracks = predictor.tracks
     start, end = windows(tracks, horizon)
-    path = _path(tracks, steps)
+    path = paths_of(tracks, steps)
     pose = tracks.pose
     turn = pose[start, 2] - path[start, 2]
     cos, sin = np.cos(turn), np.sin(turn)
@@ -103,7 +103,7 @@ def errors_of(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
     return Errors(tracks.trial[start], start, end, c * ex + s * ey, c * ey - s * ex, eh)
 
 
-def _path(tracks: Tracks, steps: Steps) -> Array:
+def paths_of(tracks: Tracks, steps: Steps) -> Array:
     """The predicted path of every trial from the origin, (frames, 3): displacements in the robot's frame put end to end."""
     turns = np.cumsum(steps.body[:, 2])
     heading = turns - turns[tracks.first[:-1]][tracks.trial]
