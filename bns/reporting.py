@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,10 +27,13 @@ def add_commands(command: Adder) -> None:
     next_one = command("propose", propose, "the next experiment: commands that tell rival explanations apart")
     next_one.add_argument("-o", "--output", type=Path, metavar="FILE.csv", help="trial file for bns trial --commands")
     next_one.add_argument("--json", action="store_true", help="one JSON object on stdout")
-    next_one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
-    add_experiment_options(next_one)
-    add_model_options(next_one)
-    add_effect_options(next_one)
+    page = command("report", report, "one HTML page for people: what is missing, how sure that is, what to do next")
+    page.add_argument("-o", "--output", type=Path, metavar="FILE.html", default=Path("report.html"), help="the page")
+    for one in (next_one, page):
+        one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
+        add_experiment_options(one)
+        add_model_options(one)
+        add_effect_options(one)
 
 
 def add_experiment_options(parser: argparse.ArgumentParser) -> None:
@@ -45,10 +49,8 @@ def propose(options: argparse.Namespace) -> int:
     from bns.diagnose.proposal_words import proposal_text
     from bns.store.files import publish
 
-    _check(options)
+    _check(options, "The commands", ".csv")
     out = options.output
-    if out is not None and (out.suffix != ".csv" or not out.parent.is_dir()):
-        raise DataError(f"The commands cannot be written to {out}; give a name that ends in .csv, in a folder that is there.")
     _, predictor, model, found = diagnosed(options)
     proposal = proposed(options, found, predictor.tracks, model)
     written = ""
@@ -61,6 +63,28 @@ def propose(options: argparse.Namespace) -> int:
     return 0
 
 
+def report(options: argparse.Namespace) -> int:
+    """The page."""
+    from bns.diagnose.report import gathered, report_html
+    from bns.store.files import publish
+
+    _check(options, "The report", ".html")
+    out = options.output
+    measured, predictor, model, found = diagnosed(options)
+    with ticking("reporting") as tick:
+        material = gathered(measured, predictor, model, found, lambda: proposed(options, found, predictor.tracks, model), tick)
+    page = report_html(material, _repeated(options)).encode()
+    publish(page, out.with_name(f".{out.name}.part"), out)
+    print(f"verdict: {found.verdict}\nwritten to {out} ({len(page) / 1e6:.1f} MB): one file, to be opened in a browser or mailed")
+    return 0
+
+
+def _repeated(options: argparse.Namespace) -> dict[str, str]:
+    """Words of this command that the next ones repeat."""
+    base = [] if options.wheelbase is None else ["--wheelbase", f"{options.wheelbase:g}"]
+    return {"data": shlex.quote(str(options.data)), "model": shlex.join(["--model", str(options.model), *base])}
+
+
 def proposed(options: argparse.Namespace, found: Diagnosis, tracks: Tracks, model: Model) -> Proposal:
     """The experiment for a diagnosis, within what the options allow."""
     from bns.diagnose.limits import arena_of, bounds_of
@@ -71,6 +95,10 @@ def proposed(options: argparse.Namespace, found: Diagnosis, tracks: Tracks, mode
         return search(found, arena, bounds, options.minutes, tick=tick)
 
 
-def _check(options: argparse.Namespace) -> None:
+def _check(options: argparse.Namespace, what: str, ending: str) -> None:
+    """What can be seen to be wrong before the work begins."""
     if not (math.isfinite(options.minutes) and 0 < options.minutes <= _MOST_MINUTES):
         raise DataError(f"--minutes is {options.minutes:g}; it must be above 0 and at most {_MOST_MINUTES:g}.")
+    out = options.output
+    if out is not None and (out.suffix != ending or not out.parent.is_dir()):
+        raise DataError(f"{what} cannot be written to {out}; give a name that ends in {ending}, in a folder that is there.")

@@ -89,7 +89,7 @@ def errors_of(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
     """Measured minus predicted at the ends of a horizon's windows, each predicted from the pose measured at its start."""
     tracks = predictor.tracks
     start, end = windows(tracks, horizon)
-    path = paths_of(tracks, steps)
+    path = _path(tracks, steps)
     pose = tracks.pose
     turn = pose[start, 2] - path[start, 2]
     cos, sin = np.cos(turn), np.sin(turn)
@@ -103,7 +103,7 @@ def errors_of(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
     return Errors(tracks.trial[start], start, end, c * ex + s * ey, c * ey - s * ex, eh)
 
 
-def paths_of(tracks: Tracks, steps: Steps) -> Array:
+def _path(tracks: Tracks, steps: Steps) -> Array:
     """The predicted path of every trial from the origin, (frames, 3): displacements in the robot's frame put end to end."""
     turns = np.cumsum(steps.body[:, 2])
     heading = turns - turns[tracks.first[:-1]][tracks.trial]
@@ -113,6 +113,19 @@ def paths_of(tracks: Tracks, steps: Steps) -> Array:
     y = np.cumsum(sin * steps.body[:, 0] + cos * steps.body[:, 1])
     begin = tracks.first[:-1]
     return np.stack([x - x[begin][tracks.trial], y - y[begin][tracks.trial], heading], axis=1)
+
+
+def laid_paths(tracks: Tracks, steps: Steps) -> Array:
+    """Predicted poses (frames, 3) of every trial, each path begun at the trial's first measured pose."""
+    path = _path(tracks, steps)
+    begin = tracks.first[:-1]
+    start = tracks.pose[begin][tracks.trial]
+    cos, sin = np.cos(start[:, 2]), np.sin(start[:, 2])
+    drift = np.cumsum(steps.drift_m, axis=0)
+    drift = drift - drift[begin][tracks.trial]
+    x = start[:, 0] + cos * path[:, 0] - sin * path[:, 1] + drift[:, 0]
+    y = start[:, 1] + sin * path[:, 0] + cos * path[:, 1] + drift[:, 1]
+    return np.stack([x, y, start[:, 2] + path[:, 2]], axis=1)
 
 
 def noise_floor(predictor: Predictor, noise: Array, horizon: str) -> dict[str, float]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bns.diagnose.horizons import paths_of
+from bns.diagnose.horizons import laid_paths
 from bns.diagnose.sequences import Sequences
 from bns.diagnose.tracks import Array, Tracks
 from bns.diagnose.wheels import WheelPredictor
@@ -41,21 +41,9 @@ def foreseen(model: Model, tracks: Tracks) -> WheelPredictor:
     predictor = WheelPredictor(tracks)
     placed = any(model.at("world")) or any(active.effect.needs_place for active in model.effects)
     for _ in range(_PLACE_ROUNDS if placed else 1):
-        steps = predictor.steps(model)
-        tracks = replace(tracks, pose=_laid(tracks, paths_of(tracks, steps), steps.drift_m))
+        tracks = replace(tracks, pose=laid_paths(tracks, predictor.steps(model)))
         predictor = WheelPredictor(tracks)
     return predictor
-
-
-def _laid(tracks: Tracks, path: Array, drift_m: Array) -> Array:
-    """Paths from the origin laid at each trial's first pose, what the floor adds on top."""
-    start = tracks.pose[tracks.first[:-1]][tracks.trial]
-    cos, sin = np.cos(start[:, 2]), np.sin(start[:, 2])
-    drift = np.cumsum(drift_m, axis=0)
-    drift = drift - drift[tracks.first[:-1]][tracks.trial]
-    x = start[:, 0] + cos * path[:, 0] - sin * path[:, 1] + drift[:, 0]
-    y = start[:, 1] + sin * path[:, 0] + cos * path[:, 1] + drift[:, 1]
-    return np.stack([x, y, start[:, 2] + path[:, 2]], axis=1)
 
 
 def _times(lasts: Array, frame_s: float | None) -> Array:

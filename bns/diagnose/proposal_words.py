@@ -11,7 +11,8 @@ from bns.diagnose.proposal import Contest, Proposal
 
 def proposal_text(p: Proposal, written: str = "") -> str:
     """Who stands against whom, what the experiment would decide, and what to type next."""
-    return "\n".join(_lines(p, written))
+    first = f"verdict so far: {p.verdict}; explanations to tell apart: {'; '.join(r.title for r in p.rivals)}"
+    return "\n".join([first, *proposal_lines(p), *_next(written)])
 
 
 def contest_text(c: Contest) -> str:
@@ -26,21 +27,22 @@ def contest_text(c: Contest) -> str:
     return f"{pair}: decided with a chance of {c.power:.0%}; nine in ten would be after {_minutes(c.minutes)}{beside}."
 
 
-def _lines(p: Proposal, written: str) -> Iterator[str]:
-    yield f"verdict so far: {p.verdict}; explanations to tell apart: {'; '.join(r.title for r in p.rivals)}"
-    yield from (f"  {contest_text(c)}" for c in p.contests)
+def proposal_lines(p: Proposal) -> list[str]:
+    """A sentence a pair, then what the trials are."""
+    lines = [contest_text(c) for c in p.contests]
     if not len(p.plan):
-        yield "No trial is proposed: no commands would decide anything."
-        return
+        return [*lines, "No trial is proposed: no commands would decide anything."]
     a = p.arena
-    yield (
-        f"{len(p.plan)} trials of about {p.plan.lasting_s.mean():.0f} s, {p.plan.lasting_s.sum() / 60:.1f} min of driving, "
-        f"inside x {a.x_low_m:.2f} to {a.x_high_m:.2f} m, y {a.y_low_m:.2f} to {a.y_high_m:.2f} m,"
-    )
-    yield (
-        f"each from x = {a.start[0]:.2f} m, y = {a.start[1]:.2f} m, heading {np.degrees(a.start[2]):.0f}°; wheels "
-        f"{p.bounds.slowest_m_s:.3g} to {p.bounds.fastest_m_s:.3g} m/s."
-    )
+    return [
+        *lines,
+        f"{len(p.plan)} trials of about {p.plan.lasting_s.mean():.0f} s are proposed, {p.plan.lasting_s.sum() / 60:.1f} min of "
+        f"driving, inside x {a.x_low_m:.2f} to {a.x_high_m:.2f} m, y {a.y_low_m:.2f} to {a.y_high_m:.2f} m, each from "
+        f"x = {a.start[0]:.2f} m, y = {a.start[1]:.2f} m, heading {np.degrees(a.start[2]):.0f}°; wheels "
+        f"{p.bounds.slowest_m_s:.3g} to {p.bounds.fastest_m_s:.3g} m/s.",
+    ]
+
+
+def _next(written: str) -> Iterator[str]:
     if written:
         yield f"written to {written}; drive it with: bns trial --robot khepera --rig RIG.yaml --commands {written}"
         yield "then: bns diagnose DATA --more NEW.csv --model M"

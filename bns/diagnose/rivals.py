@@ -15,8 +15,8 @@ from bns.physics.effect import Effect
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
 
-MOST = 3
-"""Explanations held against each other at most: pairs grow with the square, and an experiment for all is one for none."""
+MOST, MOST_TIED = 3, 5
+"""Explanations held against each other at most, after a clear verdict and after a tie: pairs grow with the square."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Rival:
         return " + ".join(self.names) or "nothing missing"
 
 
-def rivals_of(d: Diagnosis, most: int = MOST) -> tuple[Rival, ...]:
+def rivals_of(d: Diagnosis) -> tuple[Rival, ...]:
     """The diagnosis' own explanation first, then what stands against it, best first; empty where nothing was searched.
 
     After a tie these are the explanations that fit as well. After any other verdict: the formula found, and the candidates that
@@ -48,7 +48,7 @@ def rivals_of(d: Diagnosis, most: int = MOST) -> tuple[Rival, ...]:
     sets: Iterable[tuple[str, ...]] = found.rivals or _nearest(found)
     others = [Rival(names, refitted(problem, found.fit, names, effects)) for names in sets]
     others.sort(key=lambda rival: float(rival.fit.held_out.sum()))
-    return (first, *others[: most - 1])
+    return (first, *others[: (MOST_TIED if found.rivals else MOST) - 1])
 
 
 def contests_of(d: Diagnosis, rivals: Sequence[Rival]) -> tuple[tuple[int, int], ...]:

@@ -1,22 +1,24 @@
 """How far planned trials drive two fitted explanations apart, when each may adjust its numbers to what will be seen.
 
-If explanation A holds, a trial shows B the whitened error d = white_B - white_A on A's path, up to unit noise. B answers
-with its numbers, and A's own are known only so well: both move within what the old tracks allow. What is left is
+If explanation A holds with numbers a (known from the old tracks up to their covariance C), a trial shows B the whitened error
+d + J_A (a - a0), d = white_B - white_A at the fitted numbers, up to unit noise. B then moves its numbers within what the old
+tracks allow (curvature H_B), and so does A (H_A). Twice the expected gain in log-likelihood of A over B, a integrated out, is
 
-    sum d'd - g' (H + sum J'J)^-1 g,   J = (J_B, -J_A),  g = sum J'd,  H = diag(H_B, H_A),
+    d'd - g_B' K_B g_B  +  tr C (G_AA K_A G_AA - G_AB K_B G_BA),   K = (H + G)^-1,   g_B = sum J_B'd,   G = sum J'J:
 
-twice the expected gain in log-likelihood of the one over the other: Hunter and Reiner's criterion (Technometrics 7, 1965) with
-the predictive covariance of Box and Hill (Technometrics 9, 1967), the linear form of Atkinson and Fedorov's T-optimality
-(Biometrika 62, 1975). It is taken with either explanation as the true one, and the mean of both counts.
+Hunter and Reiner's criterion (Technometrics 7, 1965) with Box and Hill's regard for what is not known of the numbers
+(Technometrics 9, 1967); without the old tracks it is Atkinson and Fedorov's T-optimality, made linear (Biometrika 62, 1975). It
+vanishes where B can follow A. It is taken with either explanation as the true one, and the mean of both counts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from bns.diagnose.fit import Fit, Problem
 from bns.diagnose.noise import filter_for, huber, weights
@@ -31,36 +33,69 @@ Pair = tuple[int, int]
 
 @dataclass(frozen=True)
 class Apart:
-    """Sums of each planned trial for one pair in one direction: s = d'd (trials,), g (trials, p), J'J (trials, p, p).
+    """Sums of each planned trial for one pair in one direction: d'd (trials,), J'd (trials, p), J'J (trials, p, p).
 
-    ``prior`` (p, p): H.
+    J = (J_B, J_A), the first ``split`` columns B's. ``prior`` (p, p): H of both; ``spread``: C.
     """
 
     square: Array
     pull: Array
     give: Array
     prior: Array
+    spread: Array
+    split: int
 
     def only(self, chosen: NDArray[np.int64]) -> Apart:
         """Some of the trials."""
-        return Apart(self.square[chosen], self.pull[chosen], self.give[chosen], self.prior)
+        return replace(self, square=self.square[chosen], pull=self.pull[chosen], give=self.give[chosen])
 
-    def of(self, square: float, pull: Array, give: Array) -> float:
-        """The separation that sums over trials come to."""
-        solved = np.linalg.lstsq(self.prior + give, pull, rcond=None)[0] if len(pull) else pull
-        return max(float(square - pull @ solved), 0.0)
+    def joined(self, other: Apart) -> Apart:
+        """These trials, then the other's."""
+        return replace(
+            self,
+            square=np.concatenate([self.square, other.square]),
+            pull=np.concatenate([self.pull, other.pull]),
+            give=np.concatenate([self.give, other.give]),
+        )
+
+    def of(self, square: Array, pull: Array, give: Array) -> Array:
+        """The separation of sums over sets of trials, (sets,); the sums are (sets,), (sets, p), (sets, p, p)."""
+        k = self.split
+        step, follow, own = self._answers(pull, give)
+        known = np.einsum("sij,sjk->sik", give[:, k:, k:], own) - np.einsum("sij,sjk->sik", give[:, k:, :k], follow)
+        gained = square - np.einsum("sp,sp->s", pull[:, :k], step) + np.einsum("ij,sji->s", self.spread, known)
+        return np.maximum(gained, 0.0)
 
     def total(self) -> float:
         """The separation of all the trials together."""
-        return self.of(float(self.square.sum()), self.pull.sum(axis=0), self.give.sum(axis=0))
+        return float(self.of(*(v.sum(axis=0)[None] for v in (self.square, self.pull, self.give)))[0])
 
     def each(self) -> Array:
-        """What each trial adds to `total` where all of them shared its adjustment, (trials,); summing to it but for H."""
-        if not self.pull.shape[1]:
-            return self.square
-        step = np.linalg.lstsq(self.prior + self.give.sum(axis=0), self.pull.sum(axis=0), rcond=None)[0]
-        left = self.square - 2 * self.pull @ step + np.einsum("tpq,p,q->t", self.give, step, step)
+        """What each trial has of `total`, all having adjusted to all of them, (trials,)."""
+        k = self.split
+        (step,), (follow,), (own,) = self._answers(self.pull.sum(axis=0)[None], self.give.sum(axis=0)[None])
+        left = self.square - 2 * self.pull[:, :k] @ step + np.einsum("tpq,p,q->t", self.give[:, :k, :k], step, step)
+        wrong = np.concatenate([-follow, np.eye(len(self.spread))])  # what B cannot follow of a change of A's numbers
+        rest = np.eye(len(self.spread)) - own
+        for answer, sign, part in ((wrong, 1.0, self.give), (rest, -1.0, self.give[:, k:, k:])):
+            left = left + sign * np.einsum("ij,kj,tkl,li->t", self.spread, answer, part, answer)
         return np.maximum(left, 0.0)
+
+    def _answers(self, pull: Array, give: Array) -> tuple[Array, Array, Array]:
+        """K_B g_B (sets, b), K_B G_BA (sets, b, a), K_A G_AA (sets, a, a)."""
+        k = self.split
+        right = np.concatenate([pull[:, :k, None], give[:, :k, k:]], axis=2)
+        of_b = _solved(self.prior[:k, :k] + give[:, :k, :k], right)
+        return of_b[..., 0], of_b[..., 1:], _solved(self.prior[k:, k:] + give[:, k:, k:], give[:, k:, k:])
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """Solutions of symmetric systems, (sets, p, columns), whose numbers may be of any size."""
+    if not matrix.shape[-1]:
+        return np.zeros_like(right)
+    scale = np.sqrt(np.maximum(np.einsum("spp->sp", matrix), 1e-300))[..., None]
+    scaled = matrix / scale / scale.swapaxes(1, 2) + 1e-10 * np.eye(matrix.shape[-1])
+    return np.asarray(np.linalg.solve(scaled, right / scale) / scale)
 
 
 @dataclass(frozen=True)
@@ -91,11 +126,10 @@ def apart(
         held = stage.arena.holds(predictor.tracks.pose[:, 0], predictor.tracks.pose[:, 1], 0.0)
         inside &= problem.per_trial((~held).astype(float)) == 0
         seen.append([whitened(problem, rival.fit.model) for rival in rivals])
-    priors = [curvature_of(rival.fit) for rival in rivals]
     found = {
         (a, b): (
-            _sums(problems[a], seen[a][b], seen[a][a], priors[b], priors[a]),
-            _sums(problems[b], seen[b][a], seen[b][b], priors[a], priors[b]),
+            _sums(problems[a], seen[a][b], seen[a][a], rivals[b].fit, rivals[a].fit),
+            _sums(problems[b], seen[b][a], seen[b][b], rivals[a].fit, rivals[b].fit),
         )
         for a, b in stage.pairs
     }
@@ -124,20 +158,17 @@ def curvature_of(fit: Fit) -> Array:
     return out
 
 
-def _sums(problem: Problem, other: tuple[Array, Array], true: tuple[Array, Array], prior: Array, own: Array) -> Apart:
+def _sums(problem: Problem, other: tuple[Array, Array], true: tuple[Array, Array], of_other: Fit, of_true: Fit) -> Apart:
     error = other[0] - true[0]
-    jacobian = np.concatenate([other[1], -true[1]], axis=2)
-    weight = weights(error)[:, None]
-    size = jacobian.shape[2]
-    both = np.zeros((size, size))
-    split = len(prior)
-    both[:split, :split], both[split:, split:] = prior, own
-    weighted = jacobian * weight[..., None]
+    jacobian = np.concatenate([other[1], true[1]], axis=2)
+    weighted = jacobian * weights(error)[:, None, None]
     return Apart(
         problem.per_trial(2 * huber(error)),  # the diagnosis counts a large error linearly, and so must who foresees it
         problem.per_trial(np.einsum("kcp,kc->kp", weighted, error)),
         problem.per_trial(np.einsum("kcp,kcq->kpq", weighted, jacobian)),
-        both,
+        block_diag(curvature_of(of_other), curvature_of(of_true)),
+        of_true.covariance,
+        len(of_other.free),
     )
 
 

@@ -95,19 +95,28 @@ def test_separation_is_what_a_real_refit_leaves(narrow):
     stage = Stage(d.found.problem, ARENA, None, lambda p: np.zeros(len(p)), ((0, 1),))
     found, _ = apart([a, b], plan, stage)
     one = found[(0, 1)][0]
-    own = len(a.fit.free)
-    free = np.diag([1e-9] * len(b.fit.free) + [1e15] * own)  # nothing known of the rival's numbers, all of the true ones
-    foretold = replace(one, prior=free).total()
+    # nothing known of the rival's numbers, all of the true ones
+    free = replace(one, prior=1e-9 * np.eye(len(one.prior)), spread=np.zeros_like(one.spread))
     from bns.diagnose.fit import Problem
     from bns.diagnose.noise import filter_for
 
     predictor = foreseen(a.fit.model, planned_tracks(plan, ARENA.start, None, np.zeros(12)))
     problem = Problem(predictor, filter_for(predictor, predictor.steps(a.fit.model), d.found.problem.following.noise))
     left = 2 * problem.fit(b.fit.model).loss
-    assert foretold == pytest.approx(left, rel=0.1)
+    assert free.total() == pytest.approx(left, rel=0.1)
+    assert free.each().sum() == pytest.approx(free.total(), rel=0.01)
+    known = replace(one, spread=free.spread)
+    assert known.total() > free.total()  # what was known before helps to tell them apart
     assert one.each().sum() <= one.total() + 1e-6
-    known = free + np.pad(one.prior[:-own, :-own], (0, own))
-    assert replace(one, prior=known).total() > foretold  # what was known before helps to tell them apart
+
+
+def test_an_explanation_is_not_driven_apart_from_itself(narrow):
+    d, _ = narrow
+    a = rivals_of(d)[0]
+    plan = drawn(np.random.default_rng(5), 12, BOUNDS, ARENA, BASE_M, extreme(BOUNDS))
+    found, _ = apart([a, a], plan, Stage(d.found.problem, ARENA, None, lambda p: np.zeros(len(p)), ((0, 1),)))
+    assert found[(0, 1)][0].total() < 1e-3
+    assert found[(0, 1)][0].each().max() < 1e-3
 
 
 def test_an_experiment_decides_in_half_the_time_of_random_commands(narrow):
@@ -156,7 +165,8 @@ def test_power_grows_with_trials_and_is_small_where_nothing_separates():
 
 
 def test_a_pair_without_numbers_separates_by_its_error_alone():
-    one = Apart(np.array([1.0, 2.0]), np.zeros((2, 0)), np.zeros((2, 0, 0)), np.zeros((0, 0)))
+    none = np.zeros((0, 0))
+    one = Apart(np.array([1.0, 2.0]), np.zeros((2, 0)), np.zeros((2, 0, 0)), none, none, 0)
     assert one.total() == 3.0
     assert one.each().tolist() == [1.0, 2.0]
 
