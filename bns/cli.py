@@ -12,10 +12,9 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from bns import __version__
+from bns import __version__, measuring, reporting
 from bns.cluster_options import add_cluster_options, request_of
 from bns.errors import BnsError, SpecError
-from bns.measuring import add_commands
 from bns.spec import FIELDS, RunSpec, checked, field_type
 from bns.trial.options import add_looking_options, add_trial_options
 
@@ -122,7 +121,8 @@ def _parser() -> argparse.ArgumentParser:
     look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
     look.add_argument("results", nargs="?", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
     look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
-    add_commands(command)
+    measuring.add_commands(command)
+    reporting.add_commands(command)
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     planned = command("validate", validate, "evolve controllers on the static simulator, drive each three times in physics")
     planned.add_argument("--robot", default="snake")

@@ -15,6 +15,7 @@ import yaml
 from bns.errors import DataError, ModelError
 
 if TYPE_CHECKING:
+    from bns.diagnose.diagnosis import Diagnosis
     from bns.diagnose.intake import Measured
     from bns.diagnose.predictor import Predictor
     from bns.diagnose.wheels import WheelPredictor
@@ -47,25 +48,36 @@ def add_commands(command: Adder) -> None:
     )
     more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the mended model")
     more.add_argument("--data", type=Path, required=True, metavar="FILE", help="measurements (.csv or .parquet)")
-    found.add_argument(
-        "--also", action="append", default=[], metavar="FILE.py", help="an effect of your own to try beside the listed ones"
-    )
     for one in (held, found):
         one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
         one.add_argument("--json", action="store_true", help="one JSON object on stdout")
         one.add_argument("--findings", action="store_true", help="list everything odd in the data")
     for one in (held, found, more):
-        one.add_argument(
-            "--model",
-            required=True,
-            metavar="M",
-            help="khepera, differential-drive, a YAML file; for compare also networks (.safetensors), snake, snake+changes",
-        )
-        one.add_argument(
-            "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"
-        )
-        one.add_argument("--robot", metavar="NAME", help="which robot, where a column robot names several")
+        add_model_options(one)
         one.add_argument("--figures", type=Path, metavar="DIR", help="also draw figures into this folder")
+    add_effect_options(found)
+
+
+def add_model_options(parser: argparse.ArgumentParser) -> None:
+    """Which model, and which robot of the data."""
+    parser.add_argument(
+        "--model",
+        required=True,
+        metavar="M",
+        help="khepera, differential-drive, a YAML file; for compare also networks (.safetensors), snake, snake+changes",
+    )
+    parser.add_argument("--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive")
+    parser.add_argument("--robot", metavar="NAME", help="which robot, where a column robot names several")
+    parser.add_argument(
+        "--more", action="append", default=[], type=Path, metavar="FILE", help="further measurements, taken together with these"
+    )
+
+
+def add_effect_options(parser: argparse.ArgumentParser) -> None:
+    """What is tried beside the listed effects."""
+    parser.add_argument(
+        "--also", action="append", default=[], metavar="FILE.py", help="an effect of your own to try beside the listed ones"
+    )
 
 
 def import_(options: argparse.Namespace) -> int:
@@ -103,9 +115,9 @@ def compare(options: argparse.Namespace) -> int:
     from bns.diagnose.words import comparison_text
 
     networks = _networks(options)
-    ready: tuple[Measured, Predictor, Model] = _ready(options) if networks is None else _ready_with_networks(options, *networks)
-    measured, predictor, model = ready
-    with _ticking("comparing"):
+    held: tuple[Measured, Predictor, Model] = ready(options) if networks is None else _ready_with_networks(options, *networks)
+    measured, predictor, model = held
+    with ticking("comparing"):
         result = hold(predictor, model)
     if options.json:
         print(json.dumps({**result.as_json(), "findings": [vars(f) for f in measured.findings]}))
@@ -117,19 +129,25 @@ def compare(options: argparse.Namespace) -> int:
 
 def diagnose(options: argparse.Namespace) -> int:
     """The verdict on what a model lacks."""
-    from bns.diagnose.diagnosis import diagnose as find
     from bns.diagnose.figures import diagnosis_figure
     from bns.diagnose.words import diagnosis_text
-    from bns.physics.effects import effect_in_file
 
-    own = {effect.name: effect for effect in map(effect_in_file, map(Path, options.also))}
-    _, predictor, model = _ready(options)
-    with _ticking("diagnosing") as tick:
-        result = find(predictor, model, extra=own, tick=tick)
+    _, _, _, result = diagnosed(options)
     print(json.dumps(result.as_json()) if options.json else diagnosis_text(result))
     if result.found is not None:
         _drawn(options, lambda folder: diagnosis_figure(result, folder / "diagnosis"))
     return 0
+
+
+def diagnosed(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model, Diagnosis]:
+    """Data, predictor and model of the options, and the diagnosis of what the model lacks."""
+    from bns.diagnose.diagnosis import diagnose as find
+    from bns.physics.effects import effect_in_file
+
+    own = {effect.name: effect for effect in map(effect_in_file, map(Path, options.also))}
+    measured, predictor, model = ready(options)
+    with ticking("diagnosing") as tick:
+        return measured, predictor, model, find(predictor, model, extra=own, tick=tick)
 
 
 def add(options: argparse.Namespace) -> int:
@@ -144,8 +162,8 @@ def add(options: argparse.Namespace) -> int:
     if options.term is not None and len(options.effects) != 1:
         raise ModelError(f"A formula needs one name, not {', '.join(options.effects)}: bns add NAME --term … --on …")
     effects = [effect_from(name, options.term, options.on) for name in options.effects]
-    measured, predictor, model = _ready(options)
-    with _ticking("fitting"):
+    measured, predictor, model = ready(options)
+    with ticking("fitting"):
         mended = add_effects(predictor, model, effects, measured)
     publish(model_yaml(mended.model).encode(), options.output.with_name(f".{options.output.name}.part"), options.output)
     print(mended_text(mended))
@@ -154,8 +172,8 @@ def add(options: argparse.Namespace) -> int:
     return 0
 
 
-def _ready(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model]:
-    """Data, predictor and model of effects; what is odd about the data goes to stderr."""
+def ready(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model]:
+    """Data, predictor and model of the options; what is odd about the data goes to stderr."""
     from bns.diagnose.cycles import CycleTracks
     from bns.diagnose.fitting_robot import check_named_robot, check_same_robot
     from bns.diagnose.wheels import WheelPredictor
@@ -195,7 +213,7 @@ def _measured(options: argparse.Namespace) -> Measured:
     from bns.diagnose.intake import load_measured
     from bns.diagnose.words import findings_text
 
-    measured = load_measured(options.data, options.robot)
+    measured = load_measured(options.data, options.robot, options.more)
     if measured.findings:
         most = len(measured.findings) if getattr(options, "findings", False) else 5
         print(findings_text(measured.findings, most), file=sys.stderr)
@@ -222,7 +240,7 @@ def _drawn(options: argparse.Namespace, draw: Callable[[Path], Path]) -> None:
 
 
 @contextmanager
-def _ticking(text: str) -> Iterator[Callable[[str], None]]:
+def ticking(text: str) -> Iterator[Callable[[str], None]]:
     """A line on stderr that says what is being looked at; nothing where stderr is no terminal."""
     from rich.console import Console
     from rich.status import Status
