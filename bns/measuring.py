@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,6 +44,9 @@ def add_commands(command: Adder) -> None:
     more.add_argument("--term", metavar="FORMULA", help="a formula instead of a listed effect: 'k * v * abs(w)'")
     more.add_argument(
         "--on", default="v", metavar="VELOCITY", help="what the formula is added to: v, w, s, east, north"
+    )
+    more.add_argument(
+        "--per-trial", action="store_true", help="every trial has a value of its own (clock-offset: clocks set anew each time)"
     )
     more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the mended model")
     more.add_argument("--data", type=Path, required=True, metavar="FILE", help="measurements (.csv or .parquet)")
@@ -143,7 +147,7 @@ def add(options: argparse.Namespace) -> int:
     effects = [effect_from(name, options.term, options.on) for name in options.effects]
     measured, predictor, model = _ready(options)
     with _ticking("fitting"):
-        mended = add_effects(predictor, model, effects, measured)
+        mended = add_effects(predictor, model, effects, measured, options.per_trial)
     publish(model_yaml(mended.model).encode(), options.output.with_name(f".{options.output.name}.part"), options.output)
     print(mended_text(mended))
     print(f"written to {options.output}; the model before is as it was ({options.model})")
@@ -156,6 +160,7 @@ def _ready(options: argparse.Namespace, networks: bool = False) -> tuple[Measure
     from bns.diagnose.fitting_robot import check_named_robot, check_same_robot
     from bns.diagnose.intake import load_measured
     from bns.diagnose.networks import NetworkPredictor
+    from bns.diagnose.tracks import slimmed
     from bns.diagnose.wheels import WheelPredictor
     from bns.diagnose.words import findings_text
     from bns.physics.model import Model
@@ -170,15 +175,17 @@ def _ready(options: argparse.Namespace, networks: bool = False) -> tuple[Measure
         print(findings_text(measured.findings, most), file=sys.stderr)
     if of_networks:
         return measured, NetworkPredictor(measured.tracks, Path(options.model)), model
-    predictor = WheelPredictor(measured.tracks)
+    tracks = measured.tracks if networks else slimmed(measured.tracks)
+    if len(tracks.t_s) < len(measured.tracks.t_s):
+        print(f"{len(tracks.t_s)} of {len(measured.tracks.t_s)} poses are used, evenly chosen; all commands are", file=sys.stderr)
+        measured = replace(measured, tracks=tracks)
+    predictor = WheelPredictor(tracks)
     check_named_robot(measured.robot, model)
     check_same_robot(predictor, model)
     return measured, predictor, model
 
 
 def _model(options: argparse.Namespace) -> Model:
-    from dataclasses import replace
-
     from bns.physics.model import Model, load_model
 
     if options.model == "differential-drive":

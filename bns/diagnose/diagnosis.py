@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 from bns.diagnose.fit import Fit
 from bns.diagnose.folds import errors_at_horizons, held_out_steps
@@ -19,7 +20,7 @@ from bns.diagnose.structure import Pattern, patterns, remaining
 from bns.diagnose.tracks import Tracks
 from bns.physics.effect import Effect
 from bns.physics.effects import all_effects
-from bns.physics.model import Model
+from bns.physics.model import ActiveEffect, Model
 
 VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
 FEWEST_TRIALS = 8
@@ -173,6 +174,9 @@ def errors_before_and_after(found: Found) -> dict[str, dict[str, float]]:
 def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
     """{effect: {name: value, se, low, high, unit, at_bound}} of a fitted model."""
     out: dict[str, dict[str, dict[str, Any]]] = {}
+    differing = fit.model.differing
+    if differing is not None:
+        out[differing.effect.name] = _spread(differing)
     for index, number in enumerate(fit.free):
         p, (low, high) = number.parameter, fit.interval(index)
         out.setdefault(number.effect, {})[p.name] = {
@@ -184,6 +188,19 @@ def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
             "at_bound": bool(fit.values[index] in {p.low, p.high}),
         }
     return out
+
+
+def _spread(differing: ActiveEffect) -> dict[str, dict[str, Any]]:
+    """The mean and the standard deviation of the trials' own values, with their intervals."""
+    p, own = differing.effect.parameters[0], np.array(differing.own)
+    scatter = float(own.std(ddof=1))
+    se = scatter / np.sqrt(len(own))
+    half = float(student.ppf(0.975, len(own) - 1)) * se
+    mean = {"value": float(own.mean()), "se": se, "low": float(own.mean()) - half, "high": float(own.mean()) + half}
+    loose = scatter / np.sqrt(2 * (len(own) - 1))
+    between = {"value": scatter, "se": loose, "low": max(scatter - 1.96 * loose, 0.0), "high": scatter + 1.96 * loose}
+    always = {"unit": p.unit, "at_bound": False}
+    return {p.name: {**mean, **always, "per_trial": True}, f"between_trials_{p.unit}": {**between, **always}}
 
 
 def ties_of(found: Found) -> list[list[str]]:
@@ -242,6 +259,14 @@ def _notes(
         yield "A floor-slope is a tether-pull from far away: drive on both sides of the supposed anchor to tell them apart."
     if {"command-delay", "clock-offset"} <= names:
         yield "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
+    differing = found.fit.model.differing
+    if differing is not None:
+        own = np.array(differing.own)
+        yield (
+            f"{differing.effect.name} has a value of its own in every trial, {own.min():+.3f} to {own.max():+.3f} s; "
+            "trials held out are judged with the clock that other poses of the same trial ask for. "
+            "A delay common to all trials cannot be told from the clocks."
+        )
     for p in left[:4]:
         yield (
             f"Left unexplained: {p.channel} along {p.variable}, {p.share:.2%} of the loss on held-out trials "
