@@ -6,13 +6,14 @@ RESULTS ?= results
 BUDGET  ?=
 JOBS    ?=
 ONLY    ?=
+DATA    ?=
 STAMP   := $(VENV)/.installed
 # The CPU build: a tagged wheel where one is at hand, else from PyTorch's own index. Never the CUDA packages.
 TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench hidden-effects precompute soak-dask clean sweep-snake soak
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench hidden-effects precompute soak-dask clean sweep-snake soak real-robots
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-14s %s\n", $$1, $$2}'
@@ -58,6 +59,9 @@ bench: setup ## speed, as ratios against named peers measured in the same run
 
 hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")
+
+real-robots: setup ## what a plain model lacks on logs of real robots: numbers and a figure; DATA=folder that holds them
+	$(BIN)/python -m analysis.real_robots --data "$(or $(DATA),../shared/data)" --out "$(RESULTS)/real-robots" $(if $(ONLY),--only "$(ONLY)")
 
 soak: setup ## 200 emulated trials of each robot with faults at random: how they end
 	$(BIN)/python -m tests.hardware.soak khepera 200

@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,6 +46,9 @@ def add_commands(command: Adder) -> None:
     more.add_argument("--term", metavar="FORMULA", help="a formula instead of a listed effect: 'k * v * abs(w)'")
     more.add_argument(
         "--on", default="v", metavar="VELOCITY", help="what the formula is added to: v, w, s, east, north"
+    )
+    more.add_argument(
+        "--per-trial", action="store_true", help="every trial has a value of its own (clock-offset: clocks set anew each time)"
     )
     more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the mended model")
     more.add_argument("--data", type=Path, required=True, metavar="FILE", help="measurements (.csv or .parquet)")
@@ -115,7 +119,8 @@ def compare(options: argparse.Namespace) -> int:
     from bns.diagnose.words import comparison_text
 
     networks = _networks(options)
-    held: tuple[Measured, Predictor, Model] = ready(options) if networks is None else _ready_with_networks(options, *networks)
+    held: tuple[Measured, Predictor, Model]
+    held = ready(options, slim=False) if networks is None else _ready_with_networks(options, *networks)
     measured, predictor, model = held
     with ticking("comparing"):
         result = hold(predictor, model)
@@ -164,7 +169,7 @@ def add(options: argparse.Namespace) -> int:
     effects = [effect_from(name, options.term, options.on) for name in options.effects]
     measured, predictor, model = ready(options)
     with ticking("fitting"):
-        mended = add_effects(predictor, model, effects, measured)
+        mended = add_effects(predictor, model, effects, measured, options.per_trial)
     publish(model_yaml(mended.model).encode(), options.output.with_name(f".{options.output.name}.part"), options.output)
     print(mended_text(mended))
     print(f"written to {options.output}; the model before is as it was ({options.model})")
@@ -172,10 +177,14 @@ def add(options: argparse.Namespace) -> int:
     return 0
 
 
-def ready(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model]:
-    """Data, predictor and model of the options; what is odd about the data goes to stderr."""
+def ready(options: argparse.Namespace, *, slim: bool = True) -> tuple[Measured, WheelPredictor, Model]:
+    """Data, predictor and model of the options; what is odd about the data goes to stderr.
+
+    ``slim``: of very many poses only some are taken, as fits need.
+    """
     from bns.diagnose.cycles import CycleTracks
     from bns.diagnose.fitting_robot import check_named_robot, check_same_robot
+    from bns.diagnose.tracks import slimmed
     from bns.diagnose.wheels import WheelPredictor
 
     if _networks(options) is not None:
@@ -188,7 +197,11 @@ def ready(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model]
             f"{options.data} holds cycles and markers, and the model {options.model} drives wheels; "
             "compare them with networks: --model snake, or a file (.safetensors) of bns run --robot snake --save-snn FILE."
         )
-    predictor = WheelPredictor(measured.tracks)
+    tracks = slimmed(measured.tracks) if slim else measured.tracks
+    if len(tracks.t_s) < len(measured.tracks.t_s):
+        print(f"{len(tracks.t_s)} of {len(measured.tracks.t_s)} poses are used, evenly chosen; all commands are", file=sys.stderr)
+        measured = replace(measured, tracks=tracks)
+    predictor = WheelPredictor(tracks)
     check_same_robot(predictor, model)
     return measured, predictor, model
 
@@ -221,8 +234,6 @@ def _measured(options: argparse.Namespace) -> Measured:
 
 
 def _model(options: argparse.Namespace) -> Model:
-    from dataclasses import replace
-
     from bns.physics.model import Model, load_model
 
     if options.model == "differential-drive":

@@ -12,14 +12,18 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
+from bns.diagnose.importing import repeated
 from bns.errors import DataError
 from bns.measurements import COLUMNS, COMMANDS, POSE
 
+_HELD = 0.2
 _JUMP_M = 0.02
 _JUMP_RAD = 0.35
 _JUMP_ROUNDS = 6
 _NEAR_S = 0.4
 _LONG_STEP_S = 30.0
+_FINER = ((1e6, "nanoseconds"), (3e3, "microseconds"), (0.0, "milliseconds"))
+"""A step between rows above so many seconds was written in such a unit."""
 _DEGREES_AT_LEAST = 150.0
 """Radians a metre: a wheelbase of under a centimetre, or degrees."""
 
@@ -39,6 +43,7 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     table = table.reset_index(drop=True)
     to_numbers(table, COLUMNS[1:])
     findings: list[Finding] = []
+    _held(table, findings)
     kept = []
     for trial, rows in table.groupby("trial", sort=False):
         good = forward_in_time(str(trial), rows, findings)
@@ -79,6 +84,18 @@ def to_numbers(table: pd.DataFrame, columns: Sequence[str]) -> None:
     if table["t_s"].isna().any():
         row = int(np.flatnonzero(table["t_s"].isna())[0])
         raise DataError(f"Row {row}: t_s is empty; every row needs its time.")
+
+
+def _held(table: pd.DataFrame, findings: list[Finding]) -> None:
+    """Says so where a slow tracker's poses are repeated until the next comes: they look like a robot that moves in jerks."""
+    again = repeated(table)
+    if again.mean() > _HELD:
+        row = int(np.flatnonzero(again)[0])
+        text = (
+            f"{again.mean():.0%} of all poses repeat the one before while the robot is told to move, the first here: is the "
+            "tracker slower than the log? `repeated_poses: lost` in the mapping of `bns import` takes them out"
+        )
+        findings.append(Finding(str(table["trial"].iloc[row]), row, text))
 
 
 def forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
@@ -165,11 +182,15 @@ def _gaps_and_losses(trial: str, rows: pd.DataFrame, findings: list[Finding]) ->
 
 def _units(table: pd.DataFrame) -> None:
     """Compare what was commanded with what was seen: units show as factors."""
-    ways, turns = np.array(list(_driven(table))), table["t_s"].diff()
-    step = float(turns[turns > 0].median())
+    pauses = table["t_s"].diff()
+    step = float(pauses[pauses > 0].median())
+    if step > _LONG_STEP_S:  # before anything is done second by second
+        unit = next(unit for least, unit in _FINER if step > least)
+        raise DataError(f"Successive rows are {step:g} s apart: t_s looks like {unit}; it must be seconds.")
+    ways = np.array(list(_driven(table)))
     speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
     ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
-    if step > _LONG_STEP_S or (step >= 1.0 and 1 / 3000 < ratio < 1 / 300):
+    if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
         raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
     if speed > 20:
         raise DataError(f"Commands of up to {speed:g} m/s: left_m_s and right_m_s look like mm/s or a device's units.")

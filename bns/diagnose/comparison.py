@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bns.diagnose.fit import Fit
 from bns.diagnose.horizons import Errors, errors_of, noise_floor
+from bns.diagnose.own_clocks import steps_of
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.search import problem_for
 from bns.diagnose.structure import Pattern, patterns
@@ -77,14 +78,16 @@ class Comparison:
 
 def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
     """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands."""
-    steps, tracks = predictor.steps(model), predictor.tracks
+    tracks = predictor.tracks
     if not (np.diff(tracks.first) > 1).any():
         raise DataError("No trial has two tracked poses, and a displacement needs two: log the pose before and after commands.")
     problem = problem_for(predictor, model)
+    fit = _as_is(problem, model)
+    steps = steps_of(predictor, problem.following, fit.model)
     errors = {h: errors_of(predictor, steps, h) for h in predictor.horizons}
     # scatter of the drive cannot be told from faults of the model before these are mended: only the camera's noise is sure
     tracking = problem.following.noise * np.array([1, 1, 0, 0, 0])
-    found = patterns(problem, _as_is(problem, model))
+    found = patterns(problem, fit)
     return Comparison(
         model.name,
         len(tracks),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 from bns.diagnose.candidates import listed
 from bns.diagnose.equivalents import longer
@@ -21,7 +22,7 @@ from bns.diagnose.structure import Pattern, patterns
 from bns.diagnose.tracks import Tracks
 from bns.diagnose.unexplained import Unexplained, unexplained
 from bns.physics.effect import Effect
-from bns.physics.model import Model
+from bns.physics.model import ActiveEffect, Model
 
 VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
 FEWEST_TRIALS = 8
@@ -184,6 +185,9 @@ def errors_before_and_after(found: Found) -> dict[str, dict[str, float]]:
 def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
     """{effect: {name: value, se, low, high, unit, at_bound}} of a fitted model."""
     out: dict[str, dict[str, dict[str, Any]]] = {}
+    differing = fit.model.differing
+    if differing is not None:
+        out[differing.effect.name] = _spread(differing)
     for index, number in enumerate(fit.free):
         p, (low, high) = number.parameter, fit.interval(index)
         out.setdefault(number.effect, {})[p.name] = {
@@ -195,6 +199,19 @@ def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
             "at_bound": bool(fit.values[index] in {p.low, p.high}),
         }
     return out
+
+
+def _spread(differing: ActiveEffect) -> dict[str, dict[str, Any]]:
+    """The mean and the standard deviation of the trials' own values, with their intervals."""
+    p, own = differing.effect.parameters[0], np.array(differing.own)
+    scatter = float(own.std(ddof=1))
+    se = scatter / np.sqrt(len(own))
+    half = float(student.ppf(0.975, len(own) - 1)) * se
+    mean = {"value": float(own.mean()), "se": se, "low": float(own.mean()) - half, "high": float(own.mean()) + half}
+    loose = scatter / np.sqrt(2 * (len(own) - 1))
+    between = {"value": scatter, "se": loose, "low": max(scatter - 1.96 * loose, 0.0), "high": scatter + 1.96 * loose}
+    always = {"unit": p.unit, "at_bound": False}
+    return {p.name: {**mean, **always, "per_trial": True}, f"between_trials_{p.unit}": {**between, **always}}
 
 
 def ties_of(found: Found) -> list[list[str]]:

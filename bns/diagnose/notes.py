@@ -52,6 +52,14 @@ def _on_effects(found: Found, tracks: Tracks) -> Iterator[str]:
         yield "A floor-slope is a tether-pull from far away: drive on both sides of the supposed anchor to tell them apart."
     if {"command-delay", "clock-offset"} <= names:
         yield "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
+    differing = found.fit.model.differing
+    if differing is not None:
+        own = np.array(differing.own)
+        yield (
+            f"{differing.effect.name} has a value of its own in every trial, {own.min():+.3f} to {own.max():+.3f} s; "
+            "trials held out are judged with the clock that other poses of the same trial ask for. "
+            "A delay common to all trials cannot be told from the clocks."
+        )
 
 
 def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:

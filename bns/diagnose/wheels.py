@@ -50,7 +50,7 @@ class WheelPredictor:
             body.yaw_rad_s,
             body.moving,
             tracks.trial,
-            taken_at(model, tracks.t_s),
+            taken_at(model, tracks.t_s, tracks.trial),
         )
         view = View(at[:, :3])
         for active in model.at("measure"):
