@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from bns.engine.evolution import CommandBounds, Population
-from bns.engine.philox import Key
 from bns.tasks import Task
+
+if TYPE_CHECKING:  # whoever only asks for the robots' names does not wait for the compiler
+    from bns.engine.evolution import CommandBounds, Population
+    from bns.engine.philox import Key
 
 
 class Scores(NamedTuple):
