@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -22,11 +22,14 @@ from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 
-from bns.loop import RunResult
-from bns.robots.base import Robot, on_floor
-from bns.spec import RunSpec
+from bns.robots.base import on_floor
 from bns.store.files import publish
-from bns.tasks import Task
+
+if TYPE_CHECKING:  # a figure of stored results does not wait for the compiler
+    from bns.loop import RunResult
+    from bns.robots.base import Robot
+    from bns.spec import RunSpec
+    from bns.tasks import Task
 
 COLUMN_IN, PAGE_IN = 3.5, 7.2
 """Widths of one column and of a page."""

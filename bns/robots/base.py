@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 import pandas as pd
 
-from bns.engine.evolution import CommandBounds, Population
-from bns.engine.philox import Key
 from bns.tasks import Task
+
+if TYPE_CHECKING:  # whoever only asks for the robots' names does not wait for the compiler
+    from bns.engine.evolution import CommandBounds, Population
+    from bns.engine.philox import Key
 
 
 class Scores(NamedTuple):

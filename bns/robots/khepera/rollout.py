@@ -32,17 +32,21 @@ NOTHING = np.empty((3, 0), np.float32)
 """Outputs of no command."""
 
 
-@exact
-def _side_by_side(lengths, origin, place, before, source):  # type: ignore[no-untyped-def]  # compiled
-    """Of all commands, list after list, each (all,): its place in `commands` laid end to end, that of the one before (its own
-    for the first of a list), and its origin."""
-    n, longest = 0, origin.shape[1]
+@fast
+def _gather(commands, lengths, origin, centre, per_unit, X, source):  # type: ignore[no-untyped-def]  # compiled
+    """Of all commands of all controllers, side by side: their origins and their inputs, which are previous left and right (0 at
+    first), left, right, duration."""
+    n = 0
     for i in range(lengths.size):
-        begin, end = i * longest, n + lengths[i]
-        places, befores, sources = place[n:end], before[n:end], source[n:end]
+        left, right = -centre[0] * per_unit[0], -centre[1] * per_unit[1]
         for j in range(lengths[i]):
-            places[j], befores[j], sources[j] = begin + j, begin + j - int(j > 0), origin[i, j]
-        n = end
+            X[0, n], X[1, n] = left, right
+            left = (commands[i, j, 0] - centre[0]) * per_unit[0]
+            right = (commands[i, j, 1] - centre[1]) * per_unit[1]
+            X[2, n], X[3, n] = left, right
+            X[4, n] = (commands[i, j, 2] - centre[2]) * per_unit[2]
+            source[n] = origin[i, j]
+            n += 1
 
 
 @exact
@@ -55,18 +59,14 @@ def _new(source, known, which):  # type: ignore[no-untyped-def]  # compiled
     return count
 
 
-@fast
-def _fill(commands, which, place, before, centre, per_unit, X):  # type: ignore[no-untyped-def]  # compiled
-    """Inputs of these commands: previous left and right (0 at first), left, right, duration."""
-    for m in range(which.size):
-        c = np.uint64(which[m])
-        at, last = np.uint64(place[c]), np.uint64(before[c])
-        left, right = commands[last, 0], commands[last, 1]
-        if at == last:
-            left = right = np.float32(0)
-        X[0, m], X[1, m] = (left - centre[0]) * per_unit[0], (right - centre[1]) * per_unit[1]
-        X[2, m], X[3, m] = (commands[at, 0] - centre[0]) * per_unit[0], (commands[at, 1] - centre[1]) * per_unit[1]
-        X[4, m] = (commands[at, 2] - centre[2]) * per_unit[2]
+@exact
+def _columns(X, which):  # type: ignore[no-untyped-def]  # compiled
+    some = np.empty((X.shape[0], which.size), np.float32)
+    for r in range(X.shape[0]):
+        row, kept = X[r], some[r]
+        for m in range(which.size):
+            kept[m] = row[np.uint64(which[m])]
+    return some
 
 
 @exact
@@ -159,15 +159,14 @@ def _walk(outputs, lengths, scale, goals, fitness, reached):  # type: ignore[no-
 def _outputs(commands, lengths, origin, known, weights, centre, per_unit):  # type: ignore[no-untyped-def]  # compiled
     """Outputs (networks, commands) of the networks for all commands; only those that are not known are computed."""
     total = lengths.sum()
-    place, before, source = np.empty(total, np.int32), np.empty(total, np.int32), np.empty(total, np.int32)
-    _side_by_side(lengths, origin, place, before, source)
-    which = np.empty(total, np.int32)
-    new = _new(source, known.shape[1], which)
-    X, fresh = np.empty((INPUTS, new), np.float32), np.empty((weights.shape[0], new), np.float32)
-    _fill(commands.reshape(-1, commands.shape[2]), which[:new], place, before, centre, per_unit, X)
-    predict_into(weights, X, new, fresh)
+    X, source, which = np.empty((INPUTS, total), np.float32), np.empty(total, np.int32), np.empty(total, np.int32)
+    _gather(commands, lengths, origin, centre, per_unit, X, source)
+    new = total if known.shape[1] == 0 else _new(source, known.shape[1], which)
+    fresh = np.empty((weights.shape[0], new), np.float32)
     if new == total:
+        predict_into(weights, X, total, fresh)
         return fresh
+    predict_into(weights, _columns(X, which[:new]), new, fresh)
     outputs = np.empty((weights.shape[0], total), np.float32)
     _complete(outputs, known, source, fresh, which[:new])
     return outputs
@@ -214,6 +213,8 @@ def roll_out(population: Population, weights: np.ndarray, goals_m: np.ndarray, k
 
 def inputs(commands: np.ndarray) -> np.ndarray:
     """Inputs (5, n) of the networks for one controller's commands (n, 3)."""
-    X, each = np.empty((INPUTS, len(commands)), np.float32), np.arange(len(commands))
-    _fill(np.ascontiguousarray(commands, np.float32), each, each, np.maximum(each - 1, 0), _CENTRE, _PER_UNIT, X)
+    n = len(commands)
+    X, origin = np.empty((INPUTS, n), np.float32), np.empty((1, n), np.int32)
+    lengths, one = np.array([n], np.int32), np.ascontiguousarray(commands[None], np.float32)
+    _gather(one, lengths, origin, _CENTRE, _PER_UNIT, X, origin[0])
     return X
