@@ -102,6 +102,8 @@ def measured(journal: Path) -> pd.DataFrame:
             led_here = tables[-1]["cycle"].shift(1)
             tables[-1].loc[led_here.isin(event["unstable"]), "stable"] = 0.0
             continue
+        if not event["rows"]:  # it ended before the robot stood at its start
+            continue
         table = pd.DataFrame(event["rows"]).astype(float)
         table.insert(0, "trial", len(tables) + 1)
         table["evaluation"], table["session_s"] = event["evaluation"], event["session_s"] + table["t_s"]

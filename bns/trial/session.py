@@ -117,7 +117,7 @@ def _figures(spec: RunSpec, results: Path, folder: TrialFolder) -> str:
     """Figures and table rows of this trial alone, on a page in its folder; what came of it, in words."""
     page = folder.path / "figures"
     try:
-        complaint = draw(scripts(), results, "--run", spec.run_id, "--out", str(page.absolute()))
+        complaint = draw(scripts(), results, "--run", spec.run_id, "--out", str(page.absolute()), polite=False)
     except BnsError as error:  # the package was installed without them: the trial is none the worse for it
         complaint = str(error)
     return f"figures: {page / 'index.html'}" if not complaint else f"no figures: {complaint}"

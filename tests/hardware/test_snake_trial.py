@@ -13,6 +13,7 @@ import yaml
 import bns
 from bns.cli import main
 from bns.errors import HardwareError, TrialPausedError
+from bns.hardware.doctor import examine
 from bns.hardware.emulators.faults import Fault, FaultPlan
 from bns.hardware.journal import Journal, events
 from bns.hardware.platforms import snake
@@ -22,7 +23,7 @@ from bns.hardware.snake_settings import snake_settings
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 from bns.robots import load_robot
-from bns.trial.folder import past_evaluations
+from bns.trial.folder import measured, past_evaluations
 
 from . import soak
 
@@ -120,6 +121,20 @@ def test_a_limit_in_a_servo_that_cuts_the_gait_is_named(rigged):
     assert not any(torques(on))
 
 
+def examined(rigged, clock, tmp_path, **driver):
+    on = rigged(**driver)
+    on.platform._chain.close()
+    return on, lambda: [str(found) for found in examine(on.emulation.rig, clock, tmp_path)]
+
+
+@pytest.mark.parametrize("wiring", ["bus", "bridge"])
+def test_the_doctor_asks_the_servos(rigged, clock, tmp_path, wiring):
+    on, said = examined(rigged, clock, tmp_path, wiring=wiring)
+    assert f"ok   12 servos answer ({wiring}), 12.0 V or more, 30 °C or less" in said()
+    on.emulation.servos[4].put("present_voltage", 80)
+    assert any("servo 5 has 8.0 V, not 9 to 13; see to the supply" in found and found.startswith("BAD") for found in said())
+
+
 @pytest.mark.parametrize(
     ("driver", "message"),
     [
@@ -177,6 +192,20 @@ def test_a_pause_is_gone_on_with(tmp_path, capsys):
     assert call(*asked, "--faults", plan) == 3
     assert "the servos failed: the port is gone" in capsys.readouterr().err
     assert call(*asked, "--resume") == 0
+
+
+def test_a_robot_that_is_lost_while_it_straightens_has_driven_nothing(rigged, clock, tmp_path):
+    on = rigged(Fault("lost-marker", at_s=3.0, for_s=60.0))
+    on.platform._chain.arm()
+    on.platform._chain.move([1.0, 0.0] * 6, [1.0] * 12)  # bent, so that straightening takes time
+    clock.sleep(3.0 - clock.now_s())
+    driven = on.platform.drive(np.array([GENTLE], np.float32))
+    assert "has not seen the robot" in driven.ended
+    assert (len(driven.commands), len(driven.poses), driven.rows) == (0, 0, [])
+    assert not any(torques(on))
+    on.journal.note("driven", evaluation=1, rows=driven.rows, session_s=0.0, readings={})
+    on.journal.sync()
+    assert measured(tmp_path / "snake1.jsonl").empty
 
 
 def test_ten_trials_with_faults_at_random(tmp_path):

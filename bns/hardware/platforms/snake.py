@@ -81,16 +81,19 @@ class SnakePlatform:
         return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, drive.spans_s)
 
 
+def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: Journal) -> ServoChain:
+    """The servos as a rig's settings say that they are wired; HardwareError names who is missing."""
+    if settings.wiring == "bridge":
+        return BridgeChain(port, len(settings.ids), clock, journal, settings.limits)
+    return Ax12Chain(port, settings.ids, clock, journal, settings.limits)
+
+
 def open_platform(rig: Rig, clock: Clock, journal: Journal, stopping: Stopping) -> SnakePlatform:
     """Open port and tracker, and make sure before anything else that the servos are limp, fit and all there."""
     settings = snake_settings(rig.driver)
     if rig.tracker["kind"] != "colour":
         raise HardwareError(f"the snake's ends are told apart by colour; its tracker is {rig.tracker['kind']}, not kind: colour.")
-    chain: ServoChain
-    if settings.wiring == "bridge":
-        chain = BridgeChain(rig.port, len(settings.ids), clock, journal, settings.limits)
-    else:
-        chain = Ax12Chain(rig.port, settings.ids, clock, journal, settings.limits)
+    chain = open_chain(rig.port, settings, clock, journal)
     try:
         with StopsAtTheEnd(chain.stop):
             chain.health()
