@@ -15,7 +15,7 @@ from bns.diagnose.cycles import CycleTracks
 from bns.diagnose.horizons import errors_of
 from bns.diagnose.intake import load_measured
 from bns.physics.model import Model
-from bns.plotting import OKABE_ITO, note, panels, style
+from bns.plotting import OKABE_ITO, lettered, note, panels, style
 from bns.robots import load_robot, robot_names
 from bns.robots.simulator import load_static_simulator
 from bns.robots.snake.robot import Snake
@@ -65,13 +65,13 @@ def _draw(robot: str, path: Path) -> Drawn:
     assert isinstance(tracks, CycleTracks)
     data = errors(robot, tracks)
     kinds = (
-        ("position_m", 100.0, "middle (cm)"),
-        ("heading_rad", 180 / np.pi, "direction (degrees)"),
-        ("gap_m", 100.0, "markers' distance (cm)"),
+        ("position_m", 100.0, "where the middle is", "cm"),
+        ("heading_rad", 180 / np.pi, "where it faces", "degrees"),
+        ("gap_m", 100.0, "how far apart\nthe markers are", "cm"),
     )
-    figure, axes = panels(len(kinds), 2.6)
+    figure, axes = panels(len(kinds), 3.3)
     horizons = list(dict.fromkeys(data.horizon))
-    for (column, unit, label), ax in zip(kinds, axes[:, 0], strict=True):
+    for panel, ((column, unit, what, name_of_unit), ax) in enumerate(zip(kinds, axes[:, 0], strict=True)):
         names = list(dict.fromkeys(data.simulator))
         for number, name in enumerate(names):
             rows = data[data.simulator == name].set_index("horizon").reindex(horizons)
@@ -80,8 +80,9 @@ def _draw(robot: str, path: Path) -> Drawn:
             title = _AS_SOURCE if name == robot else f"with {' and '.join(name.split(OPTION_MARK)[1:])}"
             look = {"fmt": "osD^"[number % 4], "color": OKABE_ITO[number], "capsize": 2}
             ax.errorbar(place, unit * rows[column], error, label=title, **look)
-        ax.set(ylim=(0, None), ylabel=f"error of the {label}")
-        ax.set_xticks(range(len(horizons)), [one.replace("trial", "whole\ntrial") for one in horizons])
+        ax.set(ylim=(0, 1.05 * ax.get_ylim()[1]), ylabel=f"error ({name_of_unit})")
+        ax.set_title(lettered(panel, len(kinds), what))
+        ax.set_xticks(range(len(horizons)), [_in_two_lines(one) for one in horizons])
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     said = f"{len(tracks)} random controllers, {int(tracks.stable.sum())} stable cycles of {len(tracks.stable)}"
     note(figure, f"{said}; root mean square; bars: 95 %, by controller. Cycles are predicted from where the markers were seen.")
@@ -93,3 +94,7 @@ def _draw(robot: str, path: Path) -> Drawn:
     see = "An option is worth what it takes off the first of each group."
     title = f"What options of the simulator buy, {robot}"
     return Drawn(f"{NAME}-{robot}", title, figure, shows, len(tracks), (), see=see, data=data)
+
+
+def _in_two_lines(horizon: str) -> str:
+    return horizon.replace("trial", "whole\ntrial").replace(" cycles", "\ncycles")

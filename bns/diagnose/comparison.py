@@ -133,7 +133,7 @@ def _worst(predictor: Predictor, errors: Errors, most: int = 5) -> list[Moment]:
 def _curves(predictor: Predictor, errors: Errors, found: list[Pattern], rng: np.random.Generator) -> list[Curve]:
     """Residuals along the variables that explain most, and bands from a bootstrap over trials."""
     at = predictor.at_frames(errors.start)
-    names = list(dict.fromkeys(p.variable for p in found if p.variable in at))[:6]
+    names = [name for name in dict.fromkeys(p.variable for p in found if p.variable in at) if np.ptp(at[name]) > 0][:6]
     lasted = np.maximum(predictor.tracks.t_s[errors.end] - predictor.tracks.t_s[errors.start], 1e-9)
     rates = {
         "forward, mm/s": 1e3 * errors.forward_m / lasted,

@@ -23,6 +23,7 @@ from bns.robots.snake.table import GAIT
 SEVERAL = 3
 """Cycles of the middle horizon."""
 _FEW = 3
+_LEAST_NOISE_M = 1e-4
 
 
 class CyclePredictor:
@@ -45,6 +46,7 @@ class CyclePredictor:
         self._moved = robot.displacements(outputs)
         self._changes = robot.changes(tracks.gait) if robot.with_changes else None
         self._networks = self._driven()
+        self.tracking = self._tracking()
         self.way_m = np.hypot(*self._since_previous(tracks.pose)[:, :2].T)
         self._at = np.arange(len(tracks.t_s)) - tracks.first[:-1][tracks.trial]
         self._step_s = self._on_grid(np.diff(tracks.t_s, append=tracks.t_s[-1]), fill=0.0)
@@ -114,6 +116,17 @@ class CyclePredictor:
             elif kept.sum() >= _FEW:
                 out[name] = accuracy(seen[kept, net], self._moved[kept, net])
         return out
+
+    def _tracking(self) -> tuple[float, float] | None:
+        """A stable cycle ends in the posture in which it began: what its markers' distance differs by is the camera's noise."""
+        markers = self._cycles.markers_m
+        gap = np.hypot(*(markers[:, 1] - markers[:, 0]).T)
+        differ = np.abs(gap[1::2] - gap[::2])[self._cycles.stable]
+        if len(differ) < _FEW:
+            return None
+        # robust: the median of a normal difference is 0.674 of its sd, which is twice that of one marker's coordinate
+        marker_m = max(float(np.median(differ)) / 0.674 / 2, _LEAST_NOISE_M)
+        return marker_m / np.sqrt(2), marker_m * np.sqrt(2) / float(np.median(gap))
 
     def gap_errors(self, horizon: str) -> Array:
         """Measured minus predicted distance of the markers at the ends of a horizon's windows, m, (windows,)."""

@@ -31,10 +31,10 @@ _LABELS = {
     "a_vert_rad": "vertical amplitude (rad)",
     "omega_rad": "ω (rad)",
     "alpha_rad": "α (rad)",
-    "previous_a_lat_rad": "lateral amplitude of the cycle before (rad)",
-    "previous_a_vert_rad": "vertical amplitude of the cycle before (rad)",
-    "previous_omega_rad": "ω of the cycle before (rad)",
-    "previous_alpha_rad": "α of the cycle before (rad)",
+    "previous_a_lat_rad": "lateral amplitude before (rad)",
+    "previous_a_vert_rad": "vertical amplitude before (rad)",
+    "previous_omega_rad": "ω before (rad)",
+    "previous_alpha_rad": "α before (rad)",
     "cycle": "cycle of the trial",
 }
 

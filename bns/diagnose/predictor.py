@@ -29,13 +29,15 @@ class Predictor(Protocol):
     """Tracks with all that can be worked out of them once.
 
     ``way_m`` (frames,): how far the robot was driven since the frame before. ``horizons``: names of the times over which
-    predictions are judged; ``near``: the one of them that curves and worst moments are about.
+    predictions are judged; ``near``: the one of them that curves and worst moments are about. ``tracking``: noise of a tracked
+    position (m) and heading (rad), where the tracks tell it by themselves; None: it is estimated under a model.
     """
 
     tracks: Tracks
     way_m: Array
     horizons: tuple[str, ...]
     near: str
+    tracking: tuple[float, float] | None
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Frames at which the windows of a horizon begin and end."""

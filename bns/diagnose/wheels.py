@@ -28,6 +28,7 @@ class WheelPredictor:
 
     horizons: tuple[str, ...] = HORIZONS
     near = "1s"
+    tracking: tuple[float, float] | None = None
 
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
         self.tracks = tracks

@@ -183,3 +183,12 @@ def test_networks_of_another_robot_are_refused(tmp_path, capsys):
 
     assert main(["compare", str(tmp_path / "snake.csv"), "--model", str(static_path("khepera"))]) == 2
     assert "are of cycles and markers, the networks of khepera.safetensors are of khepera" in capsys.readouterr().err
+
+
+def test_the_camera_s_noise_is_read_off_the_markers_distance():
+    for sigma in (0.002, 0.01):
+        position_m, heading_rad = predictor(table(scatter_m=sigma, rigid=True)).tracking
+        assert position_m == pytest.approx(sigma / np.sqrt(2), rel=0.35)
+        assert heading_rad == pytest.approx(sigma * np.sqrt(2) / 0.65, rel=0.35)
+    found = compare(predictor(table(off_m=(0, 0.1, 0, 0.1), scatter_m=0.002, rigid=True)), BARE)
+    assert found.floor["cycle"] < 0.02 < found.errors["cycle"]["position_m"]
