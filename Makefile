@@ -13,10 +13,10 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench hidden-effects precompute soak-dask clean sweep-snake soak real-robots
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench hidden-effects precompute soak-dask clean sweep-snake soak real-robots propose-benchmark
 
 help: ## list the targets
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-14s %s\n", $$1, $$2}'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
 	@echo "  variables: BUDGET=10m (time for a sweep; none: until done)  JOBS=2  RESULTS=results  ONLY=name (one figure)"
 
 setup: $(STAMP) ## virtual environment in .venv with everything but CUDA (does nothing when it is up to date)
@@ -59,6 +59,9 @@ bench: setup ## speed, as ratios against named peers measured in the same run
 
 hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")
+
+propose-benchmark: setup ## robot time until confusable explanations are told apart: proposed commands against random ones
+	$(BIN)/python -m tests.hidden_effects.proposing --results "$(RESULTS)/propose" $(if $(ONLY),--only "$(ONLY)")
 
 real-robots: setup ## what a plain model lacks on logs of real robots: numbers and a figure; DATA=folder that holds them
 	$(BIN)/python -m analysis.real_robots --data "$(or $(DATA),../shared/data)" --out "$(RESULTS)/real-robots" $(if $(ONLY),--only "$(ONLY)")

@@ -49,6 +49,8 @@ def arena_of(tracks: Tracks, size: str | None, start: str | None) -> Arena:
 def bounds_of(tracks: Tracks, model: Model, speeds: str | None) -> Bounds:
     """Speeds and durations that the robot takes, together with those seen; ``speeds`` (LOW,HIGH in m/s) replaces the former."""
     lasting = tracks.duration_s > 0
+    if not lasting.any():
+        raise DataError("No command of these measurements lasts any time; log poses before and after commands.")
     told = np.concatenate([tracks.left_m_s[lasting], tracks.right_m_s[lasting]])
     low, high = float(told.min()), float(told.max())
     short, long = (float(v) for v in np.quantile(tracks.duration_s[lasting], [0.02, 0.98]))

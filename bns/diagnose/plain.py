@@ -33,6 +33,7 @@ PLAIN = {
 _UNITS = {"s": (1e3, "ms"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "rad": (57.29578, "°"), "rad/s": (57.29578, "°/s")}
 """SI unit -> factor and unit for people."""
 _LARGE = 1.0
+_CAUSES = 3
 
 
 def described(name: str) -> str:
@@ -80,17 +81,23 @@ def numbers_in_words(fit: Fit, names: tuple[str, ...]) -> list[dict[str, str]]:
 
 
 def headline(d: Diagnosis) -> str:
-    """The verdict in one sentence."""
-    names = d.effects
-    said = " and ".join(described(name) for name in names)
-    texts = {
+    """The verdict in one sentence or two."""
+    said = _all_of(d.effects)
+    if d.verdict == "tie" and d.found is not None:
+        causes = [_all_of(names) for names in (d.found.accepted, *d.found.rivals)]
+        some = [f"that {cause}" for cause in causes[:_CAUSES]] + (["something else"] if len(causes) > _CAUSES else [])
+        return f"The model misses either {', or '.join(some)}. These measurements cannot say which."
+    return {
         "none": "Nothing is missing from the model that these measurements could show.",
         "effects": f"The model misses that {said}.",
-        "tie": f"The model misses something: it may be that {said}, but these measurements cannot tell it from other causes.",
-        "unlisted": "Something is missing from the model that is none of the known effects.",
+        "unlisted": "Something is missing from the model that is none of the known effects"
+        + (f", beside the fact that {said}." if said else "."),
         "insufficient-data": "These measurements do not suffice to say whether anything is missing.",
-    }
-    return texts[d.verdict]
+    }[d.verdict]
+
+
+def _all_of(names: tuple[str, ...]) -> str:
+    return " and ".join(described(name) for name in names)
 
 
 def certainty(d: Diagnosis) -> str:

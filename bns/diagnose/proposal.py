@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.design import Pool, designed, random_pool
-from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.diagnosis import FEWEST_TRIALS, Diagnosis
 from bns.diagnose.power import Expected, blocked, decided, minutes_needed, scatter_of
 from bns.diagnose.rivals import Rival, contests_of, rivals_of, without_last
 from bns.diagnose.separation import Apart, Pair, Stage, apart, separation
@@ -181,12 +181,13 @@ def _minutes(both: tuple[Expected, Expected], directions: tuple[Apart, Apart], l
 
     Where the old trials decide already, what the new ones would take alone.
     """
-    if decided([e.first(0) for e in both]) < SURE:
-        for trials in np.unique(np.linspace(2, len(lasting_s), 12).astype(int)):
-            if decided([e.first(int(trials)) for e in both]) >= SURE:
-                return float(lasting_s[:trials].sum() / 60)
+    alone = decided([e.first(0) for e in both]) >= SURE
+    for trials in np.unique(np.linspace(2, len(lasting_s), 12).astype(int)) if not alone else ():
+        if decided([e.first(int(trials)) for e in both]) >= SURE:
+            return float(lasting_s[:trials].sum() / 60)
     whole = sum(e.chance * one.total() for e, one in zip(both, directions, strict=True))
-    return minutes_needed(whole, float(lasting_s.sum() / 60), scatter)
+    least = FEWEST_TRIALS * float(lasting_s.mean() / 60) if alone else 0.0
+    return max(minutes_needed(whole, float(lasting_s.sum() / 60), scatter), least)
 
 
 def _scatter(d: Diagnosis, a: Rival, b: Rival) -> float:

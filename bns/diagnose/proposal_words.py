@@ -7,12 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from bns.diagnose.proposal import Contest, Proposal
+from bns.robots.khepera import START
 
 
 def proposal_text(p: Proposal, written: str = "") -> str:
     """Who stands against whom, what the experiment would decide, and what to type next."""
     first = f"verdict so far: {p.verdict}; explanations to tell apart: {'; '.join(r.title for r in p.rivals)}"
-    return "\n".join([first, *proposal_lines(p), *_next(written)])
+    return "\n".join([first, *proposal_lines(p), *_next(p, written)])
 
 
 def contest_text(c: Contest) -> str:
@@ -42,8 +43,10 @@ def proposal_lines(p: Proposal) -> list[str]:
     ]
 
 
-def _next(written: str) -> Iterator[str]:
+def _next(p: Proposal, written: str) -> Iterator[str]:
     if written:
+        if not np.allclose(p.arena.start, START, atol=0.02):
+            yield "note: bns trial starts every trial at x = 0, y = 0, heading 90°; --start=0,0,90 plans for that."
         yield f"written to {written}; drive it with: bns trial --robot khepera --rig RIG.yaml --commands {written}"
         yield "then: bns diagnose DATA --more NEW.csv --model M"
 

@@ -18,7 +18,7 @@ from markupsafe import Markup
 from bns.diagnose import report_tables as tables
 from bns.diagnose.adding import Mended, add_effects
 from bns.diagnose.comparison import Comparison, compare
-from bns.diagnose.diagnosis import Diagnosis, ties_of
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.figures import comparison_figure, diagnosis_figure, ladder_figure
 from bns.diagnose.intake import Measured
 from bns.diagnose.plain import certainty, headline, numbers_in_words
@@ -98,7 +98,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "numbers": numbers_in_words(d.found.fit, d.effects) if d.found is not None else [],
         "formula": _formula(d),
         "improvement": tables.improvement_text(d),
-        "ties": [" or ".join(group) for group in ties_of(d.found)] if d.found is not None else [],
+        "rivals": _rivals(m),
         "paths": Markup(json.dumps(m.paths, separators=(",", ":")).replace("<", "\\u003c")) if m.paths else "",
         "paths_text": _paths_text(m, has_after),
         "has_after": has_after,
@@ -134,12 +134,27 @@ def _formula(d: Diagnosis) -> dict[str, str] | None:
     return {"on": d.formula.on, "term": d.formula.term, "values": values}
 
 
+def _rivals(m: Material) -> list[dict[str, str]]:
+    """The numbers of explanations that fit as well as the accepted one."""
+    if m.diagnosis.verdict != "tie" or m.proposal is None:
+        return []
+    others = m.proposal.rivals[1:]
+    return [
+        number | {"effect": f"{number['effect']} ({rival.title})" if len(rival.names) > 1 else number["effect"]}
+        for rival in others
+        for number in numbers_in_words(rival.fit, rival.names)
+    ]
+
+
 def _paths_text(m: Material, has_after: bool) -> str:
     shown, trials = len(m.paths), len(m.measured.tracks)
     order = "those first in which mending the model changes most" if has_after else "the worst predicted first"
     some = f"{shown} of {trials} trials, {order}" if shown < trials else f"All {trials} trials, {order}"
     after = " The mended model's numbers come from other trials than those it predicts here." if has_after else ""
-    return f"{some}. Predictions start from the first measured pose and know only the commands.{after}"
+    return (
+        f"{some}. Predictions start from the first measured pose and know only the commands; even a perfect model's path parts "
+        f"from the measured one in time, since motors vary and the first heading is known only so well.{after}"
+    )
 
 
 def _compared(c: Comparison | None) -> dict[str, Any] | None:

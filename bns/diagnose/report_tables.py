@@ -24,6 +24,9 @@ def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
     if d.error and d.effects:
         rows = [[AHEAD[h], *(_mm(e[k]) for k in ("before", "after", "noise_floor"))] for h, e in d.error.items()]
         return _table(["after", "as it was (mm)", "mended (mm)", "noise floor (mm)"], rows)
+    if d.error:
+        rows = [[AHEAD[h], _mm(e["before"]), _mm(e["noise_floor"])] for h, e in d.error.items()]
+        return _table(["after", "as it is (mm)", "noise floor (mm)"], rows)
     if c is None:
         return None
     rows = [[AHEAD[h], _mm(c.errors[h]["position_m"]), _mm(c.floor[h])] for h in HORIZONS if c.errors[h]["windows"]]
