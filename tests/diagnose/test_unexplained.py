@@ -50,6 +50,15 @@ def test_lost_and_mistaken_markers_do_not_stand_out():
     assert found_in(table) == []
 
 
+@pytest.mark.parametrize("frames", [3, 6, 14])
+def test_a_marker_that_is_mistaken_for_some_frames_does_not_stand_out(frames):
+    table = measured(NOMINAL, trials=20, seed=3, commands=8)
+    for trial in range(0, 20, 3):
+        rows = table.index[table.trial == trial][30 + trial :][:frames]
+        table.loc[rows, ["x_m", "y_m"]] += [0.11, -0.07]
+    assert found_in(table) == []
+
+
 def test_trials_with_a_kick_are_named_with_the_moment():
     trials = [2, 5, 6, 11]
     found = found_in(kicked(measured(NOMINAL, seed=3), trials))
