@@ -13,7 +13,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench hidden-effects precompute soak-dask clean sweep-snake soak real-robots propose-benchmark
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench hidden-effects precompute soak-dask clean sweep-snake soak real-robots propose-benchmark closing-the-gap
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -59,6 +59,18 @@ bench: setup ## speed, as ratios against named peers measured in the same run
 
 hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")
+
+GAP = docs/closing-the-gap
+OUT = results/closing-the-gap
+closing-the-gap: setup ## from a run on a robot to a mended model, and how controllers of either do on the robot (minutes)
+	@mkdir -p $(OUT)
+	$(BIN)/bns run --world $(GAP)/robot.yaml --task circle --seed 1000 --evaluations 30 --measurements $(OUT)/log.parquet \
+		--save-snn $(OUT)/networks.safetensors --results $(OUT)
+	$(BIN)/bns diagnose $(OUT)/log.parquet --model $(GAP)/drawing.yaml --figures $(OUT)/figures
+	$(BIN)/bns add motor-lag --model $(GAP)/drawing.yaml --data $(OUT)/log.parquet -o $(OUT)/mended.yaml --figures $(OUT)/figures
+	$(BIN)/bns sweep $(GAP)/before.yaml $(GAP)/after.yaml $(GAP)/direct.yaml --results $(OUT)
+	$(BIN)/python -m analysis.transfer "gap-before=the drawing" "gap-after=the mended model" "gap-direct=the robot itself" \
+		--to $(GAP)/robot.yaml --results $(OUT) --out $(OUT)/figures
 
 propose-benchmark: setup ## robot time until confusable explanations are told apart: proposed commands against random ones
 	$(BIN)/python -m tests.hidden_effects.proposing --results "$(RESULTS)/propose" $(if $(ONLY),--only "$(ONLY)")

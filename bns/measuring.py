@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import yaml
 
@@ -113,9 +113,12 @@ def import_(options: argparse.Namespace) -> int:
 
 
 def compare(options: argparse.Namespace) -> int:
-    """Errors of a model as it is."""
+    """Errors of a model as it is; of a run's networks also why they are wrong."""
     from bns.diagnose.comparison import compare as hold
     from bns.diagnose.figures import comparison_figure
+    from bns.diagnose.network_errors import why_wrong
+    from bns.diagnose.network_words import network_errors_figure, network_errors_text
+    from bns.diagnose.networks import NetworkPredictor
     from bns.diagnose.words import comparison_text
 
     networks = _networks(options)
@@ -124,11 +127,18 @@ def compare(options: argparse.Namespace) -> int:
     measured, predictor, model = held
     with ticking("comparing"):
         result = hold(predictor, model)
+        kept = isinstance(predictor, NetworkPredictor) and predictor.learned_from.size > 0
+        why = why_wrong(cast("NetworkPredictor", predictor)) if kept else None
     if options.json:
-        print(json.dumps({**result.as_json(), "findings": [vars(f) for f in measured.findings]}))
+        causes = {} if why is None else {"causes": why.as_json()}
+        print(json.dumps({**result.as_json(), **causes, "findings": [vars(f) for f in measured.findings]}))
     else:
         print(comparison_text(result))
+        if why is not None:
+            print(f"\n{network_errors_text(why)}")
     _drawn(options, lambda folder: comparison_figure(result, folder / "comparison"))
+    if why is not None:
+        _drawn(options, lambda folder: network_errors_figure(why, folder / "network-errors"))
     return 0
 
 

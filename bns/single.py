@@ -68,7 +68,11 @@ def run_by_hand(
     if save_snn is not None:
         save_simulator(
             StaticSimulator(
-                result.networks, result.weights, np.empty(0), {"run_id": spec.run_id, "spec": spec.canonical_json()}
+                result.networks,
+                result.weights,
+                np.empty(0),
+                {"run_id": spec.run_id, "spec": spec.canonical_json()},
+                result.learned_from,
             ),
             save_snn,
         )

@@ -14,7 +14,7 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.words import ahead
 from bns.plotting import GREY, OKABE_ITO, PAGE_IN, save, style
 
-_LABELS = {
+LABELS = {
     "left_m_s": "left wheel commanded (m/s)",
     "right_m_s": "right wheel commanded (m/s)",
     "speed_m_s": "speed commanded (m/s)",
@@ -60,7 +60,7 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.fill_between(curve.centre, curve.low, curve.high, alpha=0.3, color=OKABE_ITO[0], linewidth=0)
     axes.plot(curve.centre, curve.mean, color=OKABE_ITO[0], marker="o")
-    axes.set_xlabel(_LABELS.get(curve.variable, curve.variable))
+    axes.set_xlabel(LABELS.get(curve.variable, curve.variable))
 
 
 @style()

@@ -38,7 +38,29 @@ class NetworkPredictor(WheelPredictor):
         if len(self.tracks.t_s) < 2 * len(self.tracks):
             raise DataError("Networks predict whole commands, and no pose was tracked near the ends of commands.")
         self._bare = Model(wheelbase_m=1.0)
-        self._networks = self._driven(saved, nodes[nodes >= 0])
+        self.node = nodes[nodes >= 0]
+        """How many commands had ended at each frame, (frames,)."""
+        self.learned_from = saved.learned_from
+        self._networks = self._driven(saved, self.node)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot whose networks these are."""
+        return self._robot
+
+    def commands(self, trial: int) -> Array:
+        """Commands of a trial in the robot's own units, (commands, 3)."""
+        tracks = self.tracks
+        lasting = tracks.duration_s[trial] > 0
+        speeds = np.column_stack([tracks.left_m_s[trial], tracks.right_m_s[trial]])[lasting]
+        unit = self._robot.wheel_speeds_m_s(np.ones((1, 3)))  # type: ignore[attr-defined]  # of a differential drive
+        return np.column_stack([speeds[:, 0] / unit[0], speeds[:, 1] / unit[1], tracks.duration_s[trial][lasting] / unit[2]])
+
+    def measured(self) -> Array:
+        """As the networks' own steps: forward, left and turn since the frame before as tracked, (frames, 3)."""
+        seen, told = self._in_robot_frame(self.tracks.pose), self._networks
+        turn = told[:, 2] + (seen[:, 2] - told[:, 2] + np.pi) % (2 * np.pi) - np.pi
+        return np.column_stack([seen[:, :2], turn])
 
     def steps(self, model: Model) -> Steps:
         """What the networks predict between the ends of commands, and what the model's effects add to it."""
@@ -56,13 +78,7 @@ class NetworkPredictor(WheelPredictor):
 
     def _path(self, saved: StaticSimulator, trial: int) -> Array:
         """Pose at the begin and after every command of a trial, (commands + 1, 3)."""
-        tracks = self.tracks
-        lasting = tracks.duration_s[trial] > 0
-        speeds = np.column_stack([tracks.left_m_s[trial], tracks.right_m_s[trial]])[lasting]
-        unit = self._robot.wheel_speeds_m_s(np.ones((1, 3)))  # type: ignore[attr-defined]  # of a differential drive
-        commands = np.column_stack(
-            [speeds[:, 0] / unit[0], speeds[:, 1] / unit[1], tracks.duration_s[trial][lasting] / unit[2]]
-        )
+        commands = self.commands(trial)
         displaced = self._robot.displacements(predict(saved.weights, self._robot.inputs(commands)))
         return np.vstack([self._robot.start_pose(), self._robot.poses(displaced, commands)])
 

@@ -138,4 +138,5 @@ class Trial:
             self._evolver.fittest(),
             self._recorder.last_poses,
             self._recorder.last_simulated,
+            self._trainer.data.training.in_use(),
         )
