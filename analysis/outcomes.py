@@ -67,14 +67,25 @@ def at_the_end(store: Store, chosen: Selection) -> pd.DataFrame:
         FROM {last_outcomes(store, chosen)} GROUP BY ALL ORDER BY ALL""")
 
 
-def by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str = "true") -> pd.DataFrame:
-    """Runs, successes and summed diversity of each seed and group of ``columns``: what a bootstrap over seeds draws from."""
-    return store.query(f"""
-        SELECT task, {"".join(f"{name}, " for name in columns)}root_seed, seed, count(success) AS runs,
-               count(*) FILTER (success) AS successes, sum(success_20cm::INT) AS successes_20cm,
-               sum(diversity) FILTER (isfinite(diversity)) AS diversity,
-               count(*) FILTER (isfinite(diversity)) AS diversities
-        FROM {outcomes(store, chosen)} WHERE {where} GROUP BY ALL ORDER BY ALL""")
+def successes_by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str) -> pd.DataFrame:
+    """Runs and successes of each seed and group of ``columns``: what a bootstrap over seeds draws from."""
+    return _by_seed(store, chosen, columns, where, ())
+
+
+def by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str) -> pd.DataFrame:
+    """As `successes_by_seed`, with successes within 20 cm and summed diversity."""
+    more = (
+        "sum(success_20cm::INT) AS successes_20cm",
+        "sum(diversity) FILTER (isfinite(diversity)) AS diversity",
+        "count(*) FILTER (isfinite(diversity)) AS diversities",
+    )
+    return _by_seed(store, chosen, columns, where, more)
+
+
+def _by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str, more: Sequence[str]) -> pd.DataFrame:
+    groups = ", ".join(("task", *columns, "root_seed", "seed"))
+    sums = ", ".join(("count(success) AS runs", "count(*) FILTER (success) AS successes", *more))
+    return store.query(f"SELECT {groups}, {sums} FROM {outcomes(store, chosen)} WHERE {where} GROUP BY ALL ORDER BY ALL")
 
 
 def _mean(name: str) -> str:

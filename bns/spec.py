@@ -136,7 +136,8 @@ def _allowed(name: str) -> str:
     meta, kind = FIELDS[name].metadata, {int: "a whole number", float: "a number", str: "a text"}[field_type(name)]
     if meta["choices"]:
         return "one of " + ", ".join(meta["choices"])
-    return kind if meta["low"] is None else f"{kind} from {meta['low']:g} to {meta['high']:g}"
+    form = "d" if field_type(name) is int else "g"
+    return kind if meta["low"] is None else f"{kind} from {meta['low']:{form}} to {meta['high']:{form}}"
 
 
 def _percent_hint(name: str, value: float) -> str:
