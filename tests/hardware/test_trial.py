@@ -259,6 +259,22 @@ def test_given_commands_are_driven_and_measured(tmp_path, capsys):
     assert "already; move it away" in capsys.readouterr().err
 
 
+def test_a_filmed_robot_is_seen_where_it_is_at_any_speed(tmp_path):
+    file, rig = tmp_path / "straight.csv", tmp_path / "rig.yaml"
+    file.write_text("trial,left_m_s,right_m_s,duration_s\n1,0.1,0.1,2.0\n")
+    rig.write_text(
+        "robot: khepera\nport: x\nsurface_m: {x: [-0.9, 0.9], y: [-0.7, 0.7]}\n"
+        "tracker: {kind: colour, camera: 0, calibration: x, diameter_m: 0.04, height_m: 0.07, distance_m: 0.1}\n"
+    )
+    asked = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", "--results", tmp_path]
+    assert call(*asked, "--rig", rig, "--commands", file) == 0
+    table = pd.read_csv(tmp_path / "trials" / "experiment-straight-emulated" / "measurements.csv")
+    under_way = table[table["t_s"].between(0.6, 1.9)]
+    speed_m_s = np.polyfit(under_way["t_s"], under_way["y_m"], 1)[0]
+    assert speed_m_s == pytest.approx(0.1, abs=0.005)
+    assert np.abs(under_way["y_m"] - np.polyval(np.polyfit(under_way["t_s"], under_way["y_m"], 1), under_way["t_s"])).max() < 0.01
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
