@@ -129,6 +129,8 @@ def compare(options: argparse.Namespace) -> int:
         result = hold(predictor, model)
         kept = isinstance(predictor, NetworkPredictor) and predictor.learned_from.size > 0
         why = why_wrong(cast("NetworkPredictor", predictor)) if kept else None
+    if isinstance(predictor, NetworkPredictor) and not kept:
+        print("bns: these networks come without their training patterns, so why they are wrong is not said", file=sys.stderr)
     if options.json:
         causes = {} if why is None else {"causes": why.as_json()}
         print(json.dumps({**result.as_json(), **causes, "findings": [vars(f) for f in measured.findings]}))
