@@ -6,16 +6,17 @@ RESULTS ?= results
 BUDGET  ?=
 JOBS    ?=
 ONLY    ?=
+DATA    ?=
 STAMP   := $(VENV)/.installed
 # The CPU build: a tagged wheel where one is at hand, else from PyTorch's own index. Never the CUDA packages.
 TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench bench-gpu hidden-effects precompute soak-dask clean sweep-snake soak
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench bench-gpu hidden-effects precompute soak-dask clean sweep-snake soak real-robots propose-benchmark closing-the-gap
 
 help: ## list the targets
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-14s %s\n", $$1, $$2}'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
 	@echo "  variables: BUDGET=10m (time for a sweep; none: until done)  JOBS=2  RESULTS=results  ONLY=name (one figure)"
 
 setup: $(STAMP) ## virtual environment in .venv with everything but CUDA (does nothing when it is up to date)
@@ -62,8 +63,27 @@ bench-gpu: setup ## the Khepera study on this machine's GPU, from a slice of it 
 hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")
 
-soak: setup ## 200 emulated trials with faults at random: how they end
-	$(BIN)/python -m tests.hardware.soak 200
+GAP = docs/closing-the-gap
+OUT = results/closing-the-gap
+closing-the-gap: setup ## from a run on a robot to a mended model, and how controllers of either do on the robot (minutes)
+	@mkdir -p $(OUT)
+	$(BIN)/bns run --world $(GAP)/robot.yaml --task circle --seed 1000 --evaluations 30 --measurements $(OUT)/log.parquet \
+		--save-snn $(OUT)/networks.safetensors --results $(OUT)
+	$(BIN)/bns diagnose $(OUT)/log.parquet --model $(GAP)/drawing.yaml --figures $(OUT)/figures
+	$(BIN)/bns add motor-lag --model $(GAP)/drawing.yaml --data $(OUT)/log.parquet -o $(OUT)/mended.yaml --figures $(OUT)/figures
+	$(BIN)/bns sweep $(GAP)/before.yaml $(GAP)/after.yaml $(GAP)/direct.yaml --results $(OUT)
+	$(BIN)/python -m analysis.transfer "gap-before=the drawing" "gap-after=the mended model" "gap-direct=the robot itself" \
+		--to $(GAP)/robot.yaml --results $(OUT) --out $(OUT)/figures
+
+propose-benchmark: setup ## robot time until confusable explanations are told apart: proposed commands against random ones
+	$(BIN)/python -m tests.hidden_effects.proposing --results "$(RESULTS)/propose" $(if $(ONLY),--only "$(ONLY)")
+
+real-robots: setup ## what a plain model lacks on logs of real robots: numbers and a figure; DATA=folder that holds them
+	$(BIN)/python -m analysis.real_robots --data "$(or $(DATA),../shared/data)" --out "$(RESULTS)/real-robots" $(if $(ONLY),--only "$(ONLY)")
+
+soak: setup ## 200 emulated trials of each robot with faults at random: how they end
+	$(BIN)/python -m tests.hardware.soak khepera 200
+	$(BIN)/python -m tests.hardware.soak snake 200
 
 soak-dask: setup ## twenty minutes of a sweep on Dask whose workers are killed: what it costs, and that no run is lost
 	$(BIN)/python tests/sweep/soak_dask.py

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import pkgutil
 import sys
+import traceback
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -15,7 +16,7 @@ from rich.progress import track
 
 import analysis
 from analysis.gallery import write_page
-from analysis.publish import forget_all_but, publish_drawn, publish_skipped
+from analysis.publish import forget_all_but, forget_skipped, publish_drawn, publish_skipped
 from analysis.store import NoDataError, Store
 from analysis.words import place
 from bns.errors import BnsError, SpecError, unknown_name
@@ -30,12 +31,14 @@ def figures() -> dict[str, ModuleType]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw what the store has data for; 0, or 2 with one line on stderr."""
-    wanted = _parser().parse_args(arguments)
+    """Draw what the store has data for; 0, 1 where a script failed at it, or 2 with one line on stderr."""
+    wanted, failed = _parser().parse_args(arguments), False
     try:
         modules, out = _chosen(wanted.only), wanted.out or wanted.results / "figures"
+        if wanted.run is not None:
+            modules = {name: module for name, module in modules.items() if getattr(module, "OF_A_RUN", False)}
         if not wanted.page:
-            _draw_all(modules, wanted.results, out, everything=wanted.only is None)
+            failed = not _draw_all(modules, Store(wanted.results, wanted.run), out, everything=wanted.only is None)
         print(f"page: {write_page(out, wanted.refresh)}")
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -43,13 +46,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted; what is drawn stays. Repeat the command for the rest.", file=sys.stderr)
         return 130
-    return 0
+    return int(failed)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m analysis", description="Draw figures from stored results.")
     parser.add_argument("--results", type=Path, default=Path("results"), help="folder of the results (results)")
     parser.add_argument("--only", metavar="NAME", help="one figure: " + ", ".join(figures()))
+    parser.add_argument("--run", metavar="ID", help="figures and table rows of one run alone")
     parser.add_argument("--out", type=Path, help="folder of the figures (RESULTS/figures)")
     parser.add_argument("--refresh", type=int, metavar="S", help="let the page reload itself every S seconds")
     parser.add_argument("--page", action="store_true", help="write the page from the figures there are; draw none")
@@ -65,11 +69,13 @@ def _chosen(only: str | None) -> dict[str, ModuleType]:
     return {only: found[only]}
 
 
-def _draw_all(modules: dict[str, ModuleType], results: Path, out: Path, *, everything: bool) -> None:
-    store, made = Store(results), set()
+def _draw_all(modules: dict[str, ModuleType], store: Store, out: Path, *, everything: bool) -> bool:
+    """Whether every script could be carried through: one that cannot does not cost the others their figures."""
+    made, failed = set(), False
     console = Console(stderr=True)
     for name, module in track(modules.items(), "figures", console=console, disable=not console.is_terminal):
         try:
+            forget_skipped(name, out)
             for drawn in module.draw(store):
                 place = publish_drawn(drawn, module.PAPER, store, out)
                 print(f"{place}  ({module.PAPER}, n = {drawn.n:,} runs)")
@@ -78,8 +84,17 @@ def _draw_all(modules: dict[str, ModuleType], results: Path, out: Path, *, every
             print(f"{name} ({module.PAPER}) skipped: {reason}")
             publish_skipped(name, module.PAPER, str(reason), out)
             made.add(name)
+        except BnsError:
+            raise
+        except Exception as fault:
+            failed = True
+            traceback.print_exc()
+            print(f"error: {name} ({module.PAPER}) could not be drawn; the others are", file=sys.stderr)
+            publish_skipped(name, module.PAPER, f"its script failed: {type(fault).__name__}: {fault}", out)
+            made.add(name)
     if everything:
         forget_all_but(made, out)
+    return not failed
 
 
 if __name__ == "__main__":

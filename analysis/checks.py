@@ -80,8 +80,7 @@ def best_combination(store: Store, chosen: Selection, task: str, column: str, pe
 
 
 def diversity_range(store: Store, chosen: Selection, task: str, range: list[float]) -> Checked:
-    best = extremes(ranking(store, chosen), task)[0]
-    last = curves(store, chosen, task, best).query("evaluation == evaluation.max()")
+    last = curves(store, chosen, task, 0).query("evaluation == evaluation.max()")
     sums, counts = (by_seed_array(last, name)[0][:, 0] for name in ("diversity", "diversities"))
     low, high = _bootstrapped(sums, counts)
     mean = ratios(np.ones((1, len(sums))), sums, counts)[0]
@@ -173,7 +172,7 @@ def _mostly(claim: str, holds: np.ndarray) -> Checked:
 
 def _change(store: Store, chosen: Selection, task: str, which: int, since: int) -> tuple[float, float, float]:
     """Relative change of the mean diversity of the best (0) or worst (1) from an evaluation to the last, and its interval."""
-    rows = curves(store, chosen, task, extremes(ranking(store, chosen), task)[which])
+    rows = curves(store, chosen, task, which)
     ends = rows[rows.evaluation.isin([min(since, rows.evaluation.max()), rows.evaluation.max()])]
     sums, counts = (by_seed_array(ends, name)[0] for name in ("diversity", "diversities"))
     means = ratios(np.ones((1, len(sums))), sums, counts)[0]

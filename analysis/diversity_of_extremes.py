@@ -13,7 +13,7 @@ from analysis.intervals import BOOTSTRAP, bootstrap, ratios
 from analysis.outcomes import by_seed
 from analysis.ranking import any_of, by_seed_array, extremes, ranking
 from analysis.selection import Selection, selections
-from analysis.store import BEGIN, NoDataError, Store
+from analysis.store import BEGIN, NoDataError, Store, remembered
 from analysis.words import CELL, task_title
 from bns.plotting import BLUE, GREY, lettered, note, panels, style
 
@@ -37,12 +37,15 @@ def draw(store: Store) -> list[Drawn]:
     return drawn
 
 
-def curves(store: Store, chosen: Selection, task: str, cells: pd.DataFrame) -> pd.DataFrame:
-    """Of each combination, seed and evaluation from the fifth on: summed diversity and how many runs are in it.
+@remembered
+def curves(store: Store, chosen: Selection, task: str, which: int) -> pd.DataFrame:
+    """Of each of the best (0) or worst (1) combinations, seed and evaluation from the fifth on: summed diversity and how many
+    runs are in it.
 
     Raises:
         NoDataError: the runs end before, or no diversity is known.
     """
+    cells = extremes(ranking(store, chosen), task)[which]
     where = f"task = '{task}' AND evaluation >= {FIRST_EVALUATION} AND ({any_of(cells)})"
     rows = by_seed(store, chosen, ("evaluation", *CELL), where)
     if not rows.diversities.any():
@@ -58,7 +61,7 @@ def _draw(store: Store, chosen: Selection, task: str, ends: tuple[pd.DataFrame, 
     figure, axes = panels(2, 3.2)
     pooled = {}
     for number, (which, cells, ax) in enumerate(zip(("best", "worst"), ends, axes[:, 0], strict=True)):
-        rows = curves(store, chosen, task, cells)
+        rows = curves(store, chosen, task, number)
         pooled[which] = _panel(ax, rows)
         ax.set_title(lettered(number, 2, f"{task_title(chosen.robot, task)}, the {len(cells)} {which} combinations"))
         ax.set(xlabel="evaluation in the world", ylabel="diversity of the population")

@@ -8,8 +8,10 @@ from typing import Any
 import pandas as pd
 
 from analysis import checks
+from analysis.clouds import combinations
 from analysis.coverage import coverage
 from analysis.drawn import Drawn
+from analysis.outcomes import FEWEST
 from analysis.selection import Selection, selections
 from analysis.source import source
 from analysis.store import NoDataError, Store
@@ -18,6 +20,8 @@ from analysis.words import task_number, task_title
 
 NAME = "findings"
 PAPER = "sections 4.6 and 5.9"
+
+TOO_FEW = f"no combination of parameters has {FEWEST} finished runs yet"
 
 
 def draw(store: Store) -> list[Drawn]:
@@ -28,17 +32,32 @@ def draw(store: Store) -> list[Drawn]:
 
 
 def checked(store: Store, chosen: Selection) -> pd.DataFrame:
-    """One row a finding and task: the source's words and ours, the verdict, where it stands."""
+    """One row a finding and task: the source's words and ours, the verdict, where it stands; one row a task with too few runs."""
+    ready = _with_enough_runs(store, chosen)
     numbers = {task_number(chosen.robot, task): task for task in chosen.tasks}
-    made = []
+    made, waiting = [], Counter[int]()
     for finding in (one for one in source()["findings"] if one["robot"] == chosen.robot):
         for number, arguments in _each_task(finding):
-            if number in numbers:
+            if number in numbers and numbers[number] not in ready:
+                waiting[number] += 1
+            elif number in numbers:
                 result = _check(store, chosen, finding["check"], numbers[number], arguments)
                 title = f"{number}, {task_title(chosen.robot, numbers[number])}"
                 row = {"task": title, "the source": result.claim, "these results": result.ours, "verdict": result.verdict}
                 made.append(row | {"where": finding["where"]})
+    for number, findings in waiting.items():
+        title = f"{number}, {task_title(chosen.robot, numbers[number])}"
+        row = {"task": title, "the source": f"all {findings} findings", "these results": TOO_FEW, "verdict": UNDECIDED}
+        made.append(row | {"where": ""})
     return pd.DataFrame(made)
+
+
+def _with_enough_runs(store: Store, chosen: Selection) -> set[str]:
+    """Tasks of which at least one combination has enough runs."""
+    try:
+        return set(combinations(store, chosen)[0].task)
+    except NoDataError:
+        return set()
 
 
 def _each_task(finding: dict[str, Any]) -> list[tuple[int, dict[str, Any]]]:
@@ -60,7 +79,10 @@ def _check(store: Store, chosen: Selection, name: str, task: str, arguments: dic
 
 def _drawn(store: Store, chosen: Selection, table: pd.DataFrame) -> Drawn:
     said, counts = coverage(store, chosen.sweeps, chosen.n), Counter(table.verdict)
-    see = f"{counts[AGREES]} agree, {counts[DIFFERS]} differ, {counts[UNDECIDED]} are undecided"
+    waiting = table[table["these results"] == TOO_FEW]
+    see = f"{counts[AGREES]} agree, {counts[DIFFERS]} differ, {counts[UNDECIDED] - len(waiting)} are undecided"
+    if len(waiting):
+        see += f"; too few runs yet of {' and '.join(task.partition(', ')[2] for task in waiting.task)}"
     shows = (
         f"Each finding of the source that a number can be put to, beside the same measure of these results with its 95 % "
         f"interval (bootstrap over seeds, or Wilson). Agrees: the interval lies within 5, or a fifth of the source's value, of "

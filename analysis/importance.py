@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.intervals import FEWEST_SEEDS, band, ratios, resampled
-from analysis.outcomes import by_seed
+from analysis.outcomes import successes_by_seed
 from analysis.ranking import by_seed_array
 from analysis.selection import Selection
 from analysis.store import Store, remembered
@@ -33,7 +33,7 @@ _STREAM = 5
 @remembered
 def by_value(store: Store, chosen: Selection, task: str, parameter: str) -> tuple[np.ndarray, np.ndarray, list, list]:
     """Successes and runs (seeds, values, evaluations), and the values and evaluations in order."""
-    rows = by_seed(store, chosen, ("evaluation", parameter), f"task = '{task}'")
+    rows = successes_by_seed(store, chosen, ("evaluation", parameter), f"task = '{task}'")
     runs, successes = (
         rows.pivot_table(index=["root_seed", "seed"], columns=[parameter, "evaluation"], values=name, fill_value=0)
         for name in ("runs", "successes")
@@ -66,7 +66,7 @@ def largest_gap(store: Store, chosen: Selection, task: str, parameter: str) -> d
 @remembered
 def at_the_end(store: Store, chosen: Selection, task: str) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
     """Combinations (rows), and successes and runs of each seed at the last evaluation, both (seeds, combinations)."""
-    rows = by_seed(store, chosen, CELL, f"task = '{task}' AND last")
+    rows = successes_by_seed(store, chosen, CELL, f"task = '{task}' AND last")
     cells = rows[list(CELL)].drop_duplicates().sort_values(list(CELL)).reset_index(drop=True)
     numbered = rows.merge(cells.reset_index(names="cell"), on=list(CELL))
     (sums, _), (counts, _) = (by_seed_array(numbered, name, "cell") for name in ("successes", "runs"))

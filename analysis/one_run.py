@@ -13,6 +13,7 @@ from bns.plotting import BLUE, GREY, RED, lettered, note, panels, style
 
 NAME = "one-run"
 PAPER = "figure 4.17"
+OF_A_RUN = True
 FIRST = "prototype"
 """The sweep whose runs come first: the source's own settings."""
 TASK = 2

@@ -21,18 +21,27 @@ _KEPT = ("success", *NEAR, "diversity", "fitness_error", "fitness_world")
 def outcomes(store: Store, chosen: Selection) -> str:
     """Name of a table with a row an evaluation: task, the four parameters, seed, root_seed, evaluation, whether it is the
     run's last, successes of the fittest controller, diversity, fitness_error, fitness_world."""
+    return _kept(store, chosen, "outcomes", "true")
+
+
+def last_outcomes(store: Store, chosen: Selection) -> str:
+    """As `outcomes`, each run's last evaluation alone: much sooner read where a figure needs no more."""
+    return _kept(store, chosen, "last_outcomes", "evaluation = evaluations")
+
+
+def _kept(store: Store, chosen: Selection, name: str, where: str) -> str:
     digest = hashlib.sha256(chosen.sql.encode()).hexdigest()[:12]
     return store.keep(
-        f"outcomes_{digest}",
+        f"{name}_{digest}",
         f"""SELECT task, {", ".join(CELL)}, seed, root_seed, evaluation, evaluation = evaluations AS last,
-        {", ".join(_KEPT)} FROM evals JOIN ({chosen.sql}) AS chosen USING (run_id, sweep)""",
+        {", ".join(_KEPT)} FROM evals JOIN ({chosen.sql}) AS chosen USING (run_id, sweep) WHERE {where}""",
     )
 
 
 @remembered
 def radii_cm(store: Store, chosen: Selection) -> tuple[int, ...]:
     """Goal radii that successes of these runs are known at; none where a task has goal regions instead of points."""
-    known = store.query(f"SELECT {', '.join(f'count({name}) AS {name}' for name in NEAR)} FROM {outcomes(store, chosen)}")
+    known = store.query(f"SELECT {', '.join(f'count({name}) AS {name}' for name in NEAR)} FROM {last_outcomes(store, chosen)}")
     return tuple(cm for cm, name in zip(NEAR_CM, NEAR, strict=True) if known[name][0])
 
 
@@ -55,17 +64,28 @@ def at_the_end(store: Store, chosen: Selection) -> pd.DataFrame:
     return store.query(f"""
         SELECT task, {", ".join(CELL)}, count(*) AS runs, {counts},
                {_mean("diversity")}, {_mean("fitness_error")}, {_spread("fitness_error")}, {_mean("fitness_world")}
-        FROM {outcomes(store, chosen)} WHERE last GROUP BY ALL ORDER BY ALL""")
+        FROM {last_outcomes(store, chosen)} GROUP BY ALL ORDER BY ALL""")
 
 
-def by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str = "true") -> pd.DataFrame:
-    """Runs, successes and summed diversity of each seed and group of ``columns``: what a bootstrap over seeds draws from."""
-    return store.query(f"""
-        SELECT task, {"".join(f"{name}, " for name in columns)}root_seed, seed, count(success) AS runs,
-               count(*) FILTER (success) AS successes, sum(success_20cm::INT) AS successes_20cm,
-               sum(diversity) FILTER (isfinite(diversity)) AS diversity,
-               count(*) FILTER (isfinite(diversity)) AS diversities
-        FROM {outcomes(store, chosen)} WHERE {where} GROUP BY ALL ORDER BY ALL""")
+def successes_by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str) -> pd.DataFrame:
+    """Runs and successes of each seed and group of ``columns``: what a bootstrap over seeds draws from."""
+    return _by_seed(store, chosen, columns, where, ())
+
+
+def by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str) -> pd.DataFrame:
+    """As `successes_by_seed`, with successes within 20 cm and summed diversity."""
+    more = (
+        "sum(success_20cm::INT) AS successes_20cm",
+        "sum(diversity) FILTER (isfinite(diversity)) AS diversity",
+        "count(*) FILTER (isfinite(diversity)) AS diversities",
+    )
+    return _by_seed(store, chosen, columns, where, more)
+
+
+def _by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str, more: Sequence[str]) -> pd.DataFrame:
+    groups = ", ".join(("task", *columns, "root_seed", "seed"))
+    sums = ", ".join(("count(success) AS runs", "count(*) FILTER (success) AS successes", *more))
+    return store.query(f"SELECT {groups}, {sums} FROM {outcomes(store, chosen)} WHERE {where} GROUP BY ALL ORDER BY ALL")
 
 
 def _mean(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Figures 4.4 to 4.6: the path of each run's best controller, as driven and as its simulator saw it."""
+"""Figures 4.4 to 4.6 and 5.16 to 5.21: the path of each run's best controller, as driven and as its simulator saw it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from bns.robots import load_robot
 from bns.tasks import load_task
 
 NAME = "paths"
-PAPER = "figures 4.4 to 4.6"
+PAPER = "figures 4.4 to 4.6, 5.16 to 5.21"
+OF_A_RUN = True
 FIRST = "prototype"
 """The sweep whose runs come first: the source's own trials."""
 MOST_PANELS = 6
@@ -29,7 +30,8 @@ def last_successes(store: Store) -> pd.DataFrame:
         WITH with_paths AS (SELECT run_id, coalesce(min(sweep) FILTER (sweep = '{FIRST}'), min(sweep)) AS sweep
                             FROM paths GROUP BY run_id)
         SELECT robot, task, sweep, seed, run_id,
-               coalesce(max(evaluation) FILTER (success), max(evaluation)) AS evaluation, bool_or(success) AS success
+               coalesce(max(evaluation) FILTER (success), max(evaluation)) AS evaluation, bool_or(success) AS success,
+               coalesce(arg_max(fittest_commands, evaluation) FILTER (success), arg_max(fittest_commands, evaluation)) AS commands
         FROM evals SEMI JOIN with_paths USING (run_id, sweep)
         GROUP BY ALL ORDER BY ALL""").sort_values("sweep", key=lambda sweep: sweep != FIRST, kind="stable")
 
@@ -64,7 +66,9 @@ def _draw_task(store: Store, robot: str, task: str, runs: pd.DataFrame) -> Drawn
         path = walked[run.run_id]
         draw_paths(ax, goals_m, radius_m, path[WORLD].to_numpy(), path[SNN].to_numpy(), square)
         origin = f"{run.sweep},\n" if len(sweeps) > 1 else ""
-        ax.set_title(f"{origin}seed {run.seed}, evaluation {run.evaluation}:\n{outcome(run.success)}")
+        driven = len(path) - 1
+        cut = f",\nended in cycle {driven} of {run.commands}" if driven < run.commands else ""
+        ax.set_title(f"{origin}seed {run.seed}, evaluation {run.evaluation}:\n{outcome(run.success)}{cut}")
     frame_alike(axes[:, 0])
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     succeeded, n = int(runs.success.sum()), len(runs)
@@ -75,8 +79,8 @@ def _draw_task(store: Store, robot: str, task: str, runs: pd.DataFrame) -> Drawn
     shows = (
         f"Paths of the fittest controller of each run at its last success, or at its last evaluation if it had "
         f"none ({succeeded} of n = {n} runs of {', '.join(sweeps)} had one), on task {task_title(robot, task)}. Solid: "
-        f"driven; dashed: as its simulator networks saw it; dots: ends of commands; grey: goals, "
-        f"{100 * radius_m:g} cm from their middle to their edge, in order."
+        f"driven, until it ended; dashed: the same commands as its simulator networks saw them; dots: ends of commands; grey: "
+        f"goals, {100 * radius_m:g} cm from their middle to their edge, in order."
     )
     title = f"Paths of robot and simulator, {task_title(robot, task)}"
     return Drawn(f"{NAME}-{robot}-{task}", title, figure, shows, n, sweeps, said, data=pd.concat(walked.values()))

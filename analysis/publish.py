@@ -49,6 +49,12 @@ def publish_skipped(name: str, paper: str, reason: str, out: Path) -> None:
     _put(out / f"{name}.json", json.dumps({"name": name, "paper": paper, "skipped": reason}, indent=2) + "\n")
 
 
+def forget_skipped(name: str, out: Path) -> None:
+    """Take back that the script ``name`` was skipped: its figures may bear longer names."""
+    if any(caption["name"] == name and "skipped" in caption for caption in captions(out)):
+        _forget(out, name)
+
+
 def captions(out: Path) -> list[dict[str, Any]]:
     """The captions in a folder; files that are none of ours are passed over."""
     found = [_caption(path) for path in sorted(out.glob("*.json"))]

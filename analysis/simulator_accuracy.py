@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,9 @@ from analysis.store import NoDataError, Store
 from bns.errors import ModelError
 from bns.plotting import BLUE, GREY, RED, lettered, note, panels, style
 from bns.robots import load_robot, robot_names
-from bns.robots.simulator import StaticSimulator, load_static_simulator
+
+if TYPE_CHECKING:
+    from bns.robots.simulator import StaticSimulator
 
 NAME = "simulator-accuracy"
 PAPER = "figures 5.7 to 5.10"
@@ -37,6 +39,8 @@ def draw(store: Store) -> list[Drawn]:
 
 
 def _shipped(robot: str) -> StaticSimulator:
+    from bns.robots.simulator import load_static_simulator  # noqa: PLC0415  # brings the compiler, for which no other figure waits
+
     try:
         return load_static_simulator(robot)
     except ModelError as missing:

@@ -18,6 +18,8 @@ from bns.spec import FIELDS
 from bns.sweep.grid import parse_sweep
 
 BEGIN = "make sweep-khepera BUDGET=10m"
+OF_RUNS = ("runs", "evals", "paths", "generations", "probes")
+"""Tables whose rows belong to a run."""
 _TRIES = 5
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -38,21 +40,21 @@ class Plan:
 
 
 class Store:
-    """The results in one folder as they are now: all figures of one call show the same runs.
+    """The results in one folder as they are now: all figures of one call show the same runs; with ``run``, that run alone.
 
     Raises:
-        StoreError: there is no run at all; the message says what to run.
+        StoreError: there is no run at all, or not this one; the message says what to do.
     """
 
-    def __init__(self, results: Path | str) -> None:
-        self.results = Path(results)
+    def __init__(self, results: Path | str, run: str | None = None) -> None:
+        self.results, self.run = Path(results), run
         self._tables: dict[str, str] = {}
         self.memory: dict[tuple[Any, ...], Any] = {}
         written = any((self.results / name).is_dir() for name in ("runs", "journal"))
         if not written or not self.query("SELECT count(*) AS n FROM runs").n[0]:
+            what = "are no runs" if run is None else f"is no run {run}"
             raise StoreError(
-                f"there are no runs in {self.results} to draw. Make some with: {BEGIN}; or name "
-                "another folder with --results DIR."
+                f"there {what} in {self.results} to draw. Make some with: {BEGIN}; or name another folder with --results DIR."
             )
 
     def query(self, sql: str) -> pd.DataFrame:
@@ -75,6 +77,10 @@ class Store:
     @cached_property
     def _connection(self) -> duckdb.DuckDBPyConnection:
         connection = results_store.connect(self.results)
+        if self.run is not None:
+            only = among("run_id", [self.run])
+            for table in OF_RUNS:
+                connection.execute(f"CREATE TEMP VIEW {table} AS SELECT * FROM memory.main.{table} WHERE {only}")
         for name, sql in self._tables.items():
             connection.execute(f"CREATE TABLE {name} AS {sql}")
         return connection

@@ -17,6 +17,7 @@ from bns.plotting import BLUE, GREY, RED, note, panels, style
 
 NAME = "trials"
 PAPER = "tables 4.2 and 5.4"
+OF_A_RUN = True
 SWEEPS = "prototype"
 """Sweeps of this name, or whose names end in it (robot-prototype), are the source's trials: its own settings, a few seeds."""
 IN_A_ROW = 3
@@ -37,13 +38,14 @@ def draw(store: Store) -> list[Drawn]:
 
 
 def trials(store: Store) -> pd.DataFrame:
-    """Of each trial the evaluation of each of MARKS, empty where it never came, and driving minutes until the first.
+    """Of each prototype trial, or of the one run asked for, the evaluation of each of MARKS, and driving minutes until the first.
 
-    Of trials with the same seed (of an older engine, say) the newest counts.
+    Marks that never came are empty. Of trials with the same seed (of an older engine, say) the newest counts.
     """
+    which = "true" if store.run else f"regexp_matches(sweep, '(^|-){SWEEPS}$')"
     rows = store.query(f"""
         SELECT robot, task, sweep, seed, run_id, evaluation, success, success_10cm, driven_ms
-        FROM evals SEMI JOIN (SELECT run_id, sweep FROM runs WHERE status = 'ok' AND regexp_matches(sweep, '(^|-){SWEEPS}$')
+        FROM evals SEMI JOIN (SELECT run_id, sweep FROM runs WHERE status = 'ok' AND {which}
             QUALIFY row_number() OVER (PARTITION BY robot, task, seed ORDER BY started_at DESC, sweep) = 1) USING (run_id, sweep)
         ORDER BY robot, task, seed, run_id, evaluation""")
     return pd.DataFrame([_trial(one) for _, one in rows.groupby("run_id", sort=False)])
@@ -74,7 +76,7 @@ def _draw(store: Store, robot: str, rows: pd.DataFrame) -> Drawn:
     figure, axes = panels(1, 1.9 + 0.7 * len(tasks))
     _dots(axes[0, 0], robot, rows, tasks)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=1)
-    said, never = coverage(store, sweeps), int(rows.consistent.isna().sum())
+    said, never = coverage(store, sweeps, len(rows) if store.run else None), int(rows.consistent.isna().sum())
     not_yet = (f"{never} never {IN_A_ROW} in succession",) if never else ()
     note(figure, "; ".join((*said.sentences, *not_yet, "one mark a trial")) + ".")
     shows = (

@@ -12,10 +12,9 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from bns import __version__
+from bns import __version__, measuring, reporting
 from bns.cluster_options import DEVICES, add_cluster_options, request_of, way_of
 from bns.errors import BnsError, SpecError
-from bns.measuring import add_commands
 from bns.spec import FIELDS, RunSpec, checked, field_type
 from bns.trial.options import add_looking_options, add_trial_options
 
@@ -123,7 +122,8 @@ def _parser() -> argparse.ArgumentParser:
     look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
     look.add_argument("results", nargs="?", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
     look.add_argument("--every", type=_duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
-    add_commands(command)
+    measuring.add_commands(command)
+    reporting.add_commands(command)
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     planned = command("validate", validate, "evolve controllers on the static simulator, drive each three times in physics")
     planned.add_argument("--robot", default="snake")
@@ -131,6 +131,7 @@ def _parser() -> argparse.ArgumentParser:
     ready = command("precompute", precompute, "train the static simulator of a robot and write it")
     ready.add_argument("--robot", default="khepera")
     ready.add_argument("-o", "--output", type=Path, metavar="FILE", help="where (default: into the package)")
+    ready.add_argument("--jobs", type=_positive, metavar="N", help="processes that drive (default: one a core)")
     for with_results in (one, many, planned, costs, status_, ask, small):
         with_results.add_argument(
             "--results",
@@ -331,17 +332,22 @@ def validate(options: argparse.Namespace) -> int:
     from bns.robots import load_robot
     from bns.single import counting
     from bns.tasks import load_task, task_names
-    from bns.validation import describe, table_path, write_table
+    from bns.validation import describe, measurements_path, random_drives, table_path, write_table
     from bns.validation import validate as trials
     from bns.worlds import build_world
 
     robot = load_robot(options.robot)
     name = options.task or max(task_names(robot.name), key=lambda one: load_task(robot.name, one).source)
-    task, path = load_task(robot.name, name), table_path(options.results, robot.name, name)
+    task, path = load_task(robot.name, name), table_path(options.results, options.robot, name)
     with counting(f"trials of {robot.name} on {task.title}") as progress:
         table = trials(robot, task, build_world("physics", robot), progress)
     write_table(table, path)
     print(f"{describe(table)}\nwritten to {path}")
+    beside = measurements_path(options.results, robot.name)
+    if not beside.is_file():
+        with counting(f"random controllers of {robot.name}") as progress:
+            write_table(random_drives(robot, build_world("physics", robot), progress), beside)
+        print(f"{beside}: random controllers, to hold a simulator against (bns compare {beside} --model {options.robot})")
     return 0
 
 
@@ -352,12 +358,13 @@ def precompute(options: argparse.Namespace) -> int:
     from bns.robots import load_robot
     from bns.robots.simulator import save_simulator, static_path
     from bns.single import counting
+    from bns.sweep.cores import cores
     from bns.worlds import build_world
 
     robot = load_robot(options.robot)
     began, path = time.perf_counter(), options.output or static_path(robot.name)
     with counting(f"training the static simulator of {robot.name}") as progress:
-        simulator = train(robot, build_world("physics", robot), progress=progress)
+        simulator = train(robot, build_world("physics", robot), progress=progress, jobs=cores(options.jobs))
     save_simulator(simulator, path)
     print(describe(simulator))
     print(f"written to {path} in {time.perf_counter() - began:.0f} s")

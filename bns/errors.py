@@ -52,6 +52,10 @@ class DataError(BnsError):
     """Measurements that cannot be used as they are."""
 
 
+class SweepWarning(UserWarning):
+    """A sweep goes on, but most likely not as it is meant."""
+
+
 def unknown_name(kind: str, given: object, valid: Iterable[str]) -> str:
     """Say that ``given`` is no ``kind``, which one was probably meant, and list the valid names."""
     names = sorted(valid)

@@ -75,12 +75,13 @@ class Evolver:
                 self._spare,
             )
             self.population, self._spare = self._spare, self.population
-            self._score(weights)
+            self._score(weights, self.scores)
             if self.spec.record == "full":
                 self.history.append(Generation(self.generations, self.fittest(), self.best_fitness, self.mean_fitness))
 
-    def _score(self, weights: np.ndarray) -> None:
-        self.scores = self.robot.score(self.population, weights, self.task, Luck(self.key, self.generations))
+    def _score(self, weights: np.ndarray, parents: Scores | None = None) -> None:
+        luck = Luck(self.key, self.generations)
+        self.scores = self.robot.score(self.population, weights, self.task, luck, parents)
         self.order = rank(self.scores.fitness)
         self.failures += self.scores.failures
 

@@ -29,7 +29,8 @@ Progress = Callable[[Mapping[str, Any]], None]
 @dataclass(frozen=True)
 class RunResult:
     """Tables of one run (name -> columns of equal length), the world's digest, the final networks (networks, W), the
-    fittest controller (n, components) and its last path (n, columns), in the world and as its networks saw it."""
+    fittest controller (n, components) and its last path (n, columns), in the world and as its networks saw it, and the inputs
+    (inputs, patterns) of what the networks were trained on."""
 
     tables: dict[str, dict[str, np.ndarray]]
     world_digest: str
@@ -38,11 +39,13 @@ class RunResult:
     fittest: np.ndarray
     world_poses: np.ndarray
     snn_poses: np.ndarray
+    learned_from: np.ndarray
 
 
 def run(spec: RunSpec, progress: Progress | None = None, world: World | None = None) -> RunResult:
     """Carry out one run; `progress` is called with each evaluation's row. `world` replaces the one that the spec names."""
-    robot, key = load_robot(spec.robot), Key.of_run(spec.seed, spec.root_seed, spec.robot, spec.task)
+    robot = load_robot(spec.robot)
+    key = Key.of_run(spec.seed, spec.root_seed, robot.name, spec.task)  # options are compared on the same luck
     task = load_task(spec.robot, spec.task)
     world = world or build_world(spec.world, robot)
     trainer = Trainer.start(robot, key, spec)
@@ -75,4 +78,5 @@ def run(spec: RunSpec, progress: Progress | None = None, world: World | None = N
         evolver.fittest(),
         recorder.last_poses,
         recorder.last_simulated,
+        trainer.data.training.in_use(),
     )

@@ -1,12 +1,13 @@
 """The table of what was commanded and where the robot was; simulated or real, never told apart.
 
 One row a tracked pose. The command columns hold what is in force from this row's time on, and are empty where
-no command is. Further columns are kept.
+no command is. Further columns are kept. A robot without wheels has columns of its own (`bns/robots/ROBOT`).
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,10 @@ COMMANDS = ("left_m_s", "right_m_s")
 POSE = ("x_m", "y_m", "heading_rad")
 SESSION = "session_s"
 """Time since the session began, where it was logged."""
+BEFORE = ("before_left_m_s", "before_right_m_s")
+"""Wheel speeds before the trial's first row, where it began in motion; the trial's first value counts, none is rest."""
 COLUMNS = ("trial", "t_s", *COMMANDS, *POSE)
-"""trial: number; t_s: since the trial began; wheel-surface speeds; heading counter-clockwise from x."""
+"""A robot on two wheels. trial: number; t_s: since the trial began; wheel-surface speeds; heading counter-clockwise from x."""
 
 
 def trial_table(trial: int, commands: ArrayLike, poses: ArrayLike) -> pd.DataFrame:
@@ -51,16 +54,16 @@ def check_table_name(path: Path) -> None:
         raise ModelError(f"There is no folder {path.parent} to write {path.name} into; make it first.")
 
 
-def write_measurements(table: pd.DataFrame, path: str | Path) -> None:
+def write_measurements(table: pd.DataFrame, path: str | Path, columns: Sequence[str] = COLUMNS) -> None:
     """Write a table as .csv or .parquet; a reader never meets half a file.
 
-    ModelError if a column is missing or the name ends otherwise.
+    `columns` are those that it must have. ModelError if one is missing or the name ends otherwise.
     """
     path = Path(path)
-    missing = [name for name in COLUMNS if name not in table.columns]
+    missing = [name for name in columns if name not in table.columns]
     if missing:
         raise ModelError(
-            f"A table of measurements for {path} lacks {', '.join(missing)}; it needs {', '.join(COLUMNS)}."
+            f"A table of measurements for {path} lacks {', '.join(missing)}; it needs {', '.join(columns)}."
         )
     check_table_name(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")

@@ -7,15 +7,18 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import yaml
 
 from bns.errors import DataError, ModelError
 
 if TYPE_CHECKING:
+    from bns.diagnose.diagnosis import Diagnosis
     from bns.diagnose.intake import Measured
+    from bns.diagnose.predictor import Predictor
     from bns.diagnose.wheels import WheelPredictor
     from bns.physics.model import Model
 
@@ -44,27 +47,41 @@ def add_commands(command: Adder) -> None:
     more.add_argument(
         "--on", default="v", metavar="VELOCITY", help="what the formula is added to: v, w, s, east, north"
     )
+    more.add_argument(
+        "--per-trial", action="store_true", help="every trial has a value of its own (clock-offset: clocks set anew each time)"
+    )
     more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the mended model")
     more.add_argument("--data", type=Path, required=True, metavar="FILE", help="measurements (.csv or .parquet)")
-    found.add_argument(
-        "--also", action="append", default=[], metavar="FILE.py", help="an effect of your own to try beside the listed ones"
-    )
     for one in (held, found):
         one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
         one.add_argument("--json", action="store_true", help="one JSON object on stdout")
         one.add_argument("--findings", action="store_true", help="list everything odd in the data")
     for one in (held, found, more):
-        one.add_argument(
-            "--model",
-            required=True,
-            metavar="M",
-            help="khepera, differential-drive, a YAML file; networks (.safetensors) for compare",
-        )
-        one.add_argument(
-            "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"
-        )
-        one.add_argument("--robot", metavar="NAME", help="which robot, where a column robot names several")
+        add_model_options(one)
         one.add_argument("--figures", type=Path, metavar="DIR", help="also draw figures into this folder")
+    add_effect_options(found)
+
+
+def add_model_options(parser: argparse.ArgumentParser) -> None:
+    """Which model, and which robot of the data."""
+    parser.add_argument(
+        "--model",
+        required=True,
+        metavar="M",
+        help="khepera, differential-drive, a YAML file; for compare also networks (.safetensors), snake, snake+changes",
+    )
+    parser.add_argument("--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive")
+    parser.add_argument("--robot", metavar="NAME", help="which robot, where a column robot names several")
+    parser.add_argument(
+        "--more", action="append", default=[], type=Path, metavar="FILE", help="further measurements, taken together with these"
+    )
+
+
+def add_effect_options(parser: argparse.ArgumentParser) -> None:
+    """What is tried beside the listed effects."""
+    parser.add_argument(
+        "--also", action="append", default=[], metavar="FILE.py", help="an effect of your own to try beside the listed ones"
+    )
 
 
 def import_(options: argparse.Namespace) -> int:
@@ -96,37 +113,58 @@ def import_(options: argparse.Namespace) -> int:
 
 
 def compare(options: argparse.Namespace) -> int:
-    """Errors of a model as it is."""
+    """Errors of a model as it is; of a run's networks also why they are wrong."""
     from bns.diagnose.comparison import compare as hold
     from bns.diagnose.figures import comparison_figure
+    from bns.diagnose.network_errors import why_wrong
+    from bns.diagnose.network_words import network_errors_figure, network_errors_text
+    from bns.diagnose.networks import NetworkPredictor
     from bns.diagnose.words import comparison_text
 
-    measured, predictor, model = _ready(options, networks=True)
-    with _ticking("comparing"):
+    networks = _networks(options)
+    held: tuple[Measured, Predictor, Model]
+    held = ready(options, slim=False) if networks is None else _ready_with_networks(options, *networks)
+    measured, predictor, model = held
+    with ticking("comparing"):
         result = hold(predictor, model)
+        kept = isinstance(predictor, NetworkPredictor) and predictor.learned_from.size > 0
+        why = why_wrong(cast("NetworkPredictor", predictor)) if kept else None
+    if isinstance(predictor, NetworkPredictor) and not kept:
+        print("bns: these networks come without their training patterns, so why they are wrong is not said", file=sys.stderr)
     if options.json:
-        print(json.dumps({**result.as_json(), "findings": [vars(f) for f in measured.findings]}))
+        causes = {} if why is None else {"causes": why.as_json()}
+        print(json.dumps({**result.as_json(), **causes, "findings": [vars(f) for f in measured.findings]}))
     else:
         print(comparison_text(result))
+        if why is not None:
+            print(f"\n{network_errors_text(why)}")
     _drawn(options, lambda folder: comparison_figure(result, folder / "comparison"))
+    if why is not None:
+        _drawn(options, lambda folder: network_errors_figure(why, folder / "network-errors"))
     return 0
 
 
 def diagnose(options: argparse.Namespace) -> int:
     """The verdict on what a model lacks."""
-    from bns.diagnose.diagnosis import diagnose as find
     from bns.diagnose.figures import diagnosis_figure
     from bns.diagnose.words import diagnosis_text
-    from bns.physics.effects import effect_in_file
 
-    own = {effect.name: effect for effect in map(effect_in_file, map(Path, options.also))}
-    _, predictor, model = _ready(options)
-    with _ticking("diagnosing") as tick:
-        result = find(predictor, model, extra=own, tick=tick)
+    _, _, _, result = diagnosed(options)
     print(json.dumps(result.as_json()) if options.json else diagnosis_text(result))
     if result.found is not None:
         _drawn(options, lambda folder: diagnosis_figure(result, folder / "diagnosis"))
     return 0
+
+
+def diagnosed(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model, Diagnosis]:
+    """Data, predictor and model of the options, and the diagnosis of what the model lacks."""
+    from bns.diagnose.diagnosis import diagnose as find
+    from bns.physics.effects import effect_in_file
+
+    own = {effect.name: effect for effect in map(effect_in_file, map(Path, options.also))}
+    measured, predictor, model = ready(options)
+    with ticking("diagnosing") as tick:
+        return measured, predictor, model, find(predictor, model, extra=own, tick=tick)
 
 
 def add(options: argparse.Namespace) -> int:
@@ -141,9 +179,9 @@ def add(options: argparse.Namespace) -> int:
     if options.term is not None and len(options.effects) != 1:
         raise ModelError(f"A formula needs one name, not {', '.join(options.effects)}: bns add NAME --term … --on …")
     effects = [effect_from(name, options.term, options.on) for name in options.effects]
-    measured, predictor, model = _ready(options)
-    with _ticking("fitting"):
-        mended = add_effects(predictor, model, effects, measured)
+    measured, predictor, model = ready(options)
+    with ticking("fitting"):
+        mended = add_effects(predictor, model, effects, measured, options.per_trial)
     publish(model_yaml(mended.model).encode(), options.output.with_name(f".{options.output.name}.part"), options.output)
     print(mended_text(mended))
     print(f"written to {options.output}; the model before is as it was ({options.model})")
@@ -151,34 +189,63 @@ def add(options: argparse.Namespace) -> int:
     return 0
 
 
-def _ready(options: argparse.Namespace, networks: bool = False) -> tuple[Measured, WheelPredictor, Model]:
-    """Data, predictor and model of the options; what is odd about the data goes to stderr."""
-    from bns.diagnose.fitting_robot import check_named_robot, check_same_robot
-    from bns.diagnose.intake import load_measured
-    from bns.diagnose.networks import NetworkPredictor
-    from bns.diagnose.wheels import WheelPredictor
-    from bns.diagnose.words import findings_text
-    from bns.physics.model import Model
+def ready(options: argparse.Namespace, *, slim: bool = True) -> tuple[Measured, WheelPredictor, Model]:
+    """Data, predictor and model of the options; what is odd about the data goes to stderr.
 
-    of_networks = options.model.endswith(".safetensors")
-    if of_networks and not networks:
+    ``slim``: of very many poses only some are taken, as fits need.
+    """
+    from bns.diagnose.cycles import CycleTracks
+    from bns.diagnose.fitting_robot import check_named_robot, check_same_robot
+    from bns.diagnose.tracks import slimmed
+    from bns.diagnose.wheels import WheelPredictor
+
+    if _networks(options) is not None:
         raise ModelError(f"{options.model} holds networks, which have no effects: they can be compared, not diagnosed.")
-    model = Model(wheelbase_m=1.0, name=options.model) if of_networks else _model(options)
-    measured = load_measured(options.data, options.robot)
-    if measured.findings:
-        most = len(measured.findings) if getattr(options, "findings", False) else 5
-        print(findings_text(measured.findings, most), file=sys.stderr)
-    if of_networks:
-        return measured, NetworkPredictor(measured.tracks, Path(options.model)), model
-    predictor = WheelPredictor(measured.tracks)
+    model = _model(options)
+    measured = _measured(options)
     check_named_robot(measured.robot, model)
+    if isinstance(measured.tracks, CycleTracks):
+        raise DataError(
+            f"{options.data} holds cycles and markers, and the model {options.model} drives wheels; "
+            "compare them with networks: --model snake, or a file (.safetensors) of bns run --robot snake --save-snn FILE."
+        )
+    tracks = slimmed(measured.tracks) if slim else measured.tracks
+    if len(tracks.t_s) < len(measured.tracks.t_s):
+        print(f"{len(tracks.t_s)} of {len(measured.tracks.t_s)} poses are used, evenly chosen; all commands are", file=sys.stderr)
+        measured = replace(measured, tracks=tracks)
+    predictor = WheelPredictor(tracks)
     check_same_robot(predictor, model)
     return measured, predictor, model
 
 
-def _model(options: argparse.Namespace) -> Model:
-    from dataclasses import replace
+def _ready_with_networks(options: argparse.Namespace, file: Path, robot: str) -> tuple[Measured, Predictor, Model]:
+    """Data and networks that predict them; the model has no effects of its own."""
+    from bns.diagnose.saved_networks import network_predictor
+    from bns.physics.model import Model
 
+    measured = _measured(options)
+    return measured, network_predictor(file, measured.tracks, robot), Model(wheelbase_m=1.0, name=options.model)
+
+
+def _networks(options: argparse.Namespace) -> tuple[Path, str] | None:
+    from bns.diagnose.saved_networks import networks_file
+    from bns.physics.model import model_names
+
+    return networks_file(options.model, model_names())
+
+
+def _measured(options: argparse.Namespace) -> Measured:
+    from bns.diagnose.intake import load_measured
+    from bns.diagnose.words import findings_text
+
+    measured = load_measured(options.data, options.robot, options.more)
+    if measured.findings:
+        most = len(measured.findings) if getattr(options, "findings", False) else 5
+        print(findings_text(measured.findings, most), file=sys.stderr)
+    return measured
+
+
+def _model(options: argparse.Namespace) -> Model:
     from bns.physics.model import Model, load_model
 
     if options.model == "differential-drive":
@@ -196,7 +263,7 @@ def _drawn(options: argparse.Namespace, draw: Callable[[Path], Path]) -> None:
 
 
 @contextmanager
-def _ticking(text: str) -> Iterator[Callable[[str], None]]:
+def ticking(text: str) -> Iterator[Callable[[str], None]]:
     """A line on stderr that says what is being looked at; nothing where stderr is no terminal."""
     from rich.console import Console
     from rich.status import Status

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -22,11 +22,14 @@ from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 
-from bns.loop import RunResult
-from bns.robots.base import Robot
-from bns.spec import RunSpec
+from bns.robots.base import on_floor
 from bns.store.files import publish
-from bns.tasks import Task
+
+if TYPE_CHECKING:  # a figure of stored results does not wait for the compiler
+    from bns.loop import RunResult
+    from bns.robots.base import Robot
+    from bns.spec import RunSpec
+    from bns.tasks import Task
 
 COLUMN_IN, PAGE_IN = 3.5, 7.2
 """Widths of one column and of a page."""
@@ -133,8 +136,7 @@ def goal_reach(robot: Robot, task: Task) -> tuple[float, bool]:
 
 def floor_poses(robot: Robot, poses: np.ndarray) -> np.ndarray:
     """x_m, y_m, heading_rad (n + 1, 3) of a robot's own poses, with the start before them."""
-    columns = robot.pose_columns(np.vstack([robot.start_pose(), poses]))
-    return np.column_stack([columns[name] for name in ("x_m", "y_m", "heading_rad")])
+    return on_floor(robot, np.vstack([robot.start_pose(), poses]))
 
 
 def draw_paths(

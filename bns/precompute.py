@@ -19,6 +19,7 @@ from bns.refinement import refined
 from bns.robots.base import Robot
 from bns.robots.simulator import StaticSimulator
 from bns.worlds.base import World
+from bns.worlds.many import drive_all
 
 TRIALS, COMMANDS = 300, 10
 """3000 commands: about 85 minutes of driving."""
@@ -36,27 +37,29 @@ class Patterns:
     verification: np.ndarray
 
 
-def collect(robot: Robot, world: World, key: Key) -> Patterns:
+def collect(robot: Robot, world: World, key: Key, jobs: int = 1) -> Patterns:
     """Drive random controllers in the world; whole trials are held out for verification."""
     controllers = robot.random_controllers(key, TRIALS, COMMANDS)
-    inputs, targets = [], []
-    for trial in range(TRIALS):
-        commands = controllers.controller(trial)
-        poses = world.drive(commands, key, Purpose.PRECOMPUTE, 1 + trial)
-        inputs.append(robot.inputs(commands))
-        targets.append(robot.targets(robot.measured_displacements(poses)))
+    drives = [controllers.controller(trial) for trial in range(TRIALS)]
+    driven = drive_all(world, drives, key, Purpose.PRECOMPUTE, 1, jobs)
+    inputs = [robot.inputs(commands) for commands in drives]
+    targets = [robot.targets(robot.measured_displacements(poses)) for poses in driven]
     held_out = uniforms(key, Purpose.SPLIT, 0, TRIALS, 1)[:, 0, 0] < VERIFICATION_SHARE
     return Patterns(np.hstack(inputs), np.hstack(targets), np.repeat(held_out, COMMANDS))
 
 
 def precompute(
-    robot: Robot, world: World, seed: int = 0, progress: Callable[[int, int], None] = lambda done, of: None
+    robot: Robot,
+    world: World,
+    seed: int = 0,
+    progress: Callable[[int, int], None] = lambda done, of: None,
+    jobs: int = 1,
 ) -> StaticSimulator:
-    """Collect, train, verify. Same seed, same numbers."""
+    """Collect, train, verify. Same seed, same numbers, for any number of ``jobs`` that drive."""
     if robot.recipe is not None:
-        return refined(robot, world, robot.recipe, seed, progress)
+        return refined(robot, world, robot.recipe, seed, progress, jobs)
     key = Key.of_run(seed, 0, robot.name, "precompute")
-    patterns = collect(robot, world, key)
+    patterns = collect(robot, world, key, jobs)
     learn = ~patterns.verification
     X, y = np.ascontiguousarray(patterns.inputs[:, learn]), np.ascontiguousarray(patterns.targets[:, learn])
     rule = Rprop.start(initial_weights(key, len(robot.networks), robot.hidden), "rprop+")

@@ -140,7 +140,7 @@ class Recorder:
 
     def _simulated(self, controller: np.ndarray, weights: np.ndarray) -> np.ndarray:
         outputs = predict(weights, self._robot.inputs(controller), self._robot.sigmoid_output)
-        return self._robot.poses(self._robot.displacements(outputs))
+        return self._robot.poses(self._robot.displacements(outputs), controller)
 
     def _successes(self, prefix: str, poses: np.ndarray) -> dict[str, bool | None]:
         within = self._robot.successes(poses, self._task) or (None,) * len(RADII_CM)

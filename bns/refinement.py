@@ -21,6 +21,7 @@ from bns.robots.simulator import StaticSimulator
 from bns.spec import RunSpec
 from bns.tasks import load_task, task_names
 from bns.worlds.base import World
+from bns.worlds.many import drive_all
 
 VERIFICATION_SHARE, WATCHED_SHARE = 0.09, 0.09
 """The source verified on 82 of 900 patterns."""
@@ -65,20 +66,21 @@ class Patterns:
 class Workshop:
     """Drives commands one by one and counts them, so that every drive has draws of its own."""
 
-    def __init__(self, robot: Robot, world: World, key: Key, total: int, progress: Progress) -> None:
-        self.robot, self.world, self.key = robot, world, key
+    def __init__(self, robot: Robot, world: World, key: Key, total: int, progress: Progress, jobs: int) -> None:
+        self.robot, self.world, self.key, self._jobs = robot, world, key, jobs
         self._total, self._progress, self.driven = total, progress, 0
 
     def drive(self, commands: np.ndarray) -> Patterns:
         """What each command does from the start."""
-        moved = np.empty((len(commands), len(self.robot.networks)))
+        before = self.driven
         lot = uniforms(self.key, Purpose.SPLIT, self.driven, 1, len(commands))[0, :, 0]
-        for i in range(len(commands)):
-            self._progress(self.driven, self._total)
-            self.driven += 1
-            seen = self.world.drive(commands[i : i + 1], self.key, Purpose.PRECOMPUTE, self.driven)
-            moved[i] = self.robot.measured_displacements(seen)[0]
-        return Patterns(commands, moved, lot)
+        self.driven += len(commands)
+        alone = [commands[i : i + 1] for i in range(len(commands))]
+        seen = drive_all(
+            self.world, alone, self.key, Purpose.PRECOMPUTE, before + 1, self._jobs,
+            lambda done: self._progress(before + done, self._total),
+        )  # fmt: skip
+        return Patterns(commands, np.array([self.robot.measured_displacements(poses)[0] for poses in seen]), lot)
 
     def again(self, commands: np.ndarray, variants: int) -> Patterns:
         """The same commands once more, and others near each."""
@@ -86,12 +88,12 @@ class Workshop:
         return self.drive(np.concatenate([commands, near]))
 
 
-def refined(robot: Robot, world: World, recipe: Recipe, seed: int, progress: Progress) -> StaticSimulator:
-    """All stages of the recipe. Same seed, same numbers."""
+def refined(robot: Robot, world: World, recipe: Recipe, seed: int, progress: Progress, jobs: int = 1) -> StaticSimulator:
+    """All stages of the recipe. Same seed, same numbers, for any number of ``jobs`` that drive."""
     key, nets = Key.of_run(seed, 0, robot.name, "precompute"), len(robot.networks)
     total = recipe.random + nets * recipe.worst * (1 + recipe.variants)
     total += recipe.evolved_worst * (1 + recipe.evolved_variants) + CONTROLLERS * CYCLES
-    shop = Workshop(robot, world, key, total, progress)
+    shop = Workshop(robot, world, key, total, progress, jobs)
     patterns = shop.drive(robot.random_controllers(key, recipe.random, 1).commands[:, 0])
     weights, _ = trained(robot, key, patterns, recipe.iterations)
     bad = [worst(robot, weights, patterns, recipe.worst, net) for net in range(nets)]

@@ -71,7 +71,11 @@ def run_by_hand(
     if save_snn is not None:
         save_simulator(
             StaticSimulator(
-                result.networks, result.weights, np.empty(0), {"run_id": spec.run_id, "spec": spec.canonical_json()}
+                result.networks,
+                result.weights,
+                np.empty(0),
+                {"run_id": spec.run_id, "spec": spec.canonical_json()},
+                result.learned_from,
             ),
             save_snn,
         )
@@ -192,17 +196,20 @@ def _first(success: Any, evaluation: Any) -> str:
 
 
 @contextmanager
-def live_view(spec: RunSpec) -> Iterator[Callable[[Mapping[str, Any]], None]]:
-    """A table on stderr that follows the evaluations; nothing where stderr is no terminal."""
+def live_view(
+    spec: RunSpec, more: Callable[[], Mapping[str, str]] = dict
+) -> Iterator[Callable[[Mapping[str, Any]], None]]:
+    """A table on stderr that follows the evaluations; nothing where stderr is no terminal. `more`: further headings and texts."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda row: None
         return
     with Live(console=console, refresh_per_second=4) as live:
-        yield lambda row: live.update(_view(spec, row))
+        yield lambda row: live.update(view(spec, row, more()))
 
 
-def _view(spec: RunSpec, row: Mapping[str, Any]) -> Table:
+def view(spec: RunSpec, row: Mapping[str, Any], more: Mapping[str, str]) -> Table:
+    """The table: how the run stands after the evaluation of this row."""
     table = Table(title=f"{spec.robot}, {spec.task}, seed {spec.seed}, world {spec.world}", min_width=64)
     for heading in (
         "evaluation",
@@ -212,6 +219,7 @@ def _view(spec: RunSpec, row: Mapping[str, Any]) -> Table:
         *_radii(row),
         "diversity",
         "training error",
+        *more,
     ):
         table.add_column(heading, justify="right")
     marks = [_mark(row, f"success_{name.replace(' ', '')}" if name in _CM else "success") for name in _radii(row)]
@@ -223,6 +231,7 @@ def _view(spec: RunSpec, row: Mapping[str, Any]) -> Table:
         *marks,
         f"{row['diversity']:.2f}",
         f"{row['training_error']:.5f}",
+        *more.values(),
     )
     return table
 

@@ -20,6 +20,15 @@ ENGINE_VERSION = 2
 """Raised whenever the same spec would give other numbers; part of every run's name."""
 
 
+OPTION_MARK = "+"
+
+
+def robot_and_options(name: str) -> tuple[str, tuple[str, ...]]:
+    """The robot and the options of its model that a name such as ``snake+changes+rigid`` switches on."""
+    robot, *options = name.split(OPTION_MARK)
+    return robot, tuple(options)
+
+
 def _field(
     default: Any,
     text: str,
@@ -42,7 +51,7 @@ class RunSpec:
     (section 4.5). Shares are fractions of the population, 0..1.
     """
 
-    robot: str = _field("khepera", "robot")
+    robot: str = _field("khepera", "robot; what its simulator can do beyond the source is added to the name: snake+changes+rigid")
     task: str = _field("circle", "goal task of that robot")
     world: str = _field(
         "substitute",
@@ -127,7 +136,8 @@ def _allowed(name: str) -> str:
     meta, kind = FIELDS[name].metadata, {int: "a whole number", float: "a number", str: "a text"}[field_type(name)]
     if meta["choices"]:
         return "one of " + ", ".join(meta["choices"])
-    return kind if meta["low"] is None else f"{kind} from {meta['low']:g} to {meta['high']:g}"
+    form = "d" if field_type(name) is int else "g"
+    return kind if meta["low"] is None else f"{kind} from {meta['low']:{form}} to {meta['high']:{form}}"
 
 
 def _percent_hint(name: str, value: float) -> str:

@@ -21,6 +21,8 @@ from bns.tasks import Task
 from bns.worlds.base import World
 
 TRIALS, REPEATS = 12, 3
+RANDOM = 100
+"""Random controllers, driven once each."""
 ROUND, MOST_ROUNDS = 100, 5
 """Generations between two looks at whether the fittest finishes the task in simulation, and how many such rounds at most."""
 COMMANDS, TOURNAMENT = 4, 20 / 400
@@ -39,7 +41,7 @@ def validate(
         evolver = _evolved(robot, task, trial, simulator.weights)
         planned = robot.plan(evolver.fittest(), simulator.weights, task)
         outputs = predict(simulator.weights, robot.inputs(planned), robot.sigmoid_output)
-        simulated = robot.poses(robot.displacements(outputs))
+        simulated = robot.poses(robot.displacements(outputs), planned)
         about = {"trial": trial + 1, "commands": len(planned), "generations": evolver.generations}
         rows.append(_rows(robot, task, simulated, simulated, about | {"repeat": -1}))
         for repeat in range(REPEATS):
@@ -90,6 +92,24 @@ def outcome(robot: Robot, task: Task, poses: np.ndarray, planned: int) -> str:
         True,
     )
     return OUTCOMES[applies.index(True)]
+
+
+def random_drives(robot: Robot, world: World, progress: Callable[[int, int], None] = lambda done, of: None) -> pd.DataFrame:
+    """Random controllers in the world, as a table of measurements: what a simulator is held against without favour."""
+    key, rows = Key.of_run(0, 0, robot.name, "random drives"), []
+    controllers = robot.random_controllers(key, RANDOM, COMMANDS)
+    for i in range(RANDOM):
+        progress(i, RANDOM)
+        commands = controllers.controller(i)
+        driven = world.drive(commands, key, Purpose.PROBE, i + 1)
+        rows.append(robot.measurements(i + 1, commands[: len(driven)], driven))
+    progress(RANDOM, RANDOM)
+    return pd.concat(rows, ignore_index=True)
+
+
+def measurements_path(results: Path, robot: str) -> Path:
+    """Where the rows of `random_drives` are kept."""
+    return results / "measurements" / f"{robot}-random.parquet"
 
 
 def table_path(results: Path, robot: str, task: str) -> Path:

@@ -82,10 +82,10 @@ def trace(results: Path) -> frozenset[tuple[str, int, int]]:
     return frozenset(found)
 
 
-def draw(root: Path, results: Path, *options: str) -> str:
-    """Run the figures' scripts, after the sweep's own processes; "" if all went well, else what they complain of."""
-    polite = ["nice", "-n", "10"] if shutil.which("nice") else []
-    command = [*polite, sys.executable, "-m", "analysis", "--results", str(results.absolute()), *options]
+def draw(root: Path, results: Path, *options: str, polite: bool = True) -> str:
+    """Run the figures' scripts, politely after a sweep's own processes; "" if all went well, else what they complain of."""
+    after_others = ["nice", "-n", "10"] if polite and shutil.which("nice") else []
+    command = [*after_others, sys.executable, "-m", "analysis", "--results", str(results.absolute()), *options]
     # In a session of its own, so that Ctrl-C reaches this process alone, which then ends the other.
     with subprocess.Popen(
         command, cwd=root, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True

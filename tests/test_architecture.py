@@ -22,7 +22,7 @@ FLOORS = (
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "single", "watch"},
-    {"cluster_options", "measuring", "trial"},
+    {"cluster_options", "measuring", "reporting", "trial"},
     {"cli"},
     {"__main__"},
 )

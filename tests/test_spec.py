@@ -44,6 +44,7 @@ def test_whole_numbers_and_shares_are_taken_as_their_own_type():
         ("world", "physic", r"unknown world 'physic'\. Did you mean 'physics'\? Valid: physics, robot, substitute"),
         ("mutation_rte", 0.1, r"unknown parameter 'mutation_rte'\. Did you mean 'mutation_rate'\?"),
         ("evaluations", -1, r"evaluations is -1"),
+        ("seed", 2**32, r"seed is 4294967296; it must be a whole number from 0 to 4294967295\."),
     ],
 )
 def test_bad_values_are_named_with_what_is_allowed(name, value, message):

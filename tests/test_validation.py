@@ -1,9 +1,13 @@
 """Trajectory trials: every drive is counted, and what became of it is what happened."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from analysis import simulator_options
+from analysis.store import NoDataError
 from bns import validation
 from bns.robots import load_robot
 from bns.robots.snake import path
@@ -63,3 +67,23 @@ def test_the_mean_error_at_the_end_is_that_of_the_same_step(quick):
     one = table[(table.trial == 1) & (table.repeat == 2)].iloc[-1]
     same = table[(table.trial == 1) & (table.repeat == -1) & (table.step == one.step)].iloc[0]
     assert one.final_error_m == pytest.approx(np.hypot(one.x_m - same.x_m, one.y_m - same.y_m))
+
+
+def test_random_drives_are_measurements_of_controllers_that_nobody_chose(monkeypatch, tmp_path):
+    monkeypatch.setattr(validation, "RANDOM", 6)
+    table = validation.random_drives(ROBOT, build_world("substitute", ROBOT))
+    assert tuple(table.columns) == ROBOT.measured_columns
+    assert table.trial.unique().tolist() == [1, 2, 3, 4, 5, 6]
+    assert (table.groupby("trial").cycle.max() == validation.COMMANDS).all()
+    pd.testing.assert_frame_equal(validation.random_drives(ROBOT, build_world("substitute", ROBOT)), table)
+    place = validation.measurements_path(tmp_path, "snake")
+    validation.write_table(table, place)
+
+    drawn = simulator_options.draw(SimpleNamespace(results=tmp_path))[0]
+    assert list(dict.fromkeys(drawn.data.simulator)) == ["snake", "snake+changes", "snake+rigid", "snake+changes+rigid"]
+    gaps = drawn.data[drawn.data.horizon == "cycle"].set_index("simulator").gap_m
+    assert gaps["snake+rigid"] != gaps["snake"]
+    cycles = drawn.data[drawn.data.horizon == "cycle"].position_m
+    np.testing.assert_allclose(cycles, cycles.iloc[0])  # both options leave the middle of a single cycle where it is
+    with pytest.raises(NoDataError, match="run bns validate --robot snake"):
+        simulator_options.draw(SimpleNamespace(results=tmp_path / "nothing"))

@@ -36,7 +36,8 @@ def outputs(tmp_path_factory):
 
 
 def test_the_page_has_every_step():
-    assert [shlex.split(c)[1] for c in COMMANDS] == ["-m", "compare", "diagnose", "add", "add", "diagnose", "run"]
+    steps = ["-m", "compare", "diagnose", "report", "propose", "add", "add", "diagnose", "run"]
+    assert [shlex.split(c)[1] for c in COMMANDS] == steps
 
 
 def test_the_walk_ends_with_nothing_missing(outputs):
@@ -46,3 +47,5 @@ def test_the_walk_ends_with_nothing_missing(outputs):
     assert mended.startswith("verdict: none")
     assert (folder / "worlds" / "figures" / "ladder.png").is_file()
     assert (folder / "worlds" / "drag.yaml").is_file()
+    assert "the motors follow their commands with a lag" in (folder / "worlds" / "report.html").read_text()
+    assert len((folder / "worlds" / "next.csv").read_text().splitlines()) > 10

@@ -84,13 +84,20 @@ def test_a_robot_is_driven_by_a_trial_only():
 
 def test_what_a_robot_did_is_judged_as_if_it_had_begun_at_the_start():
     path = np.array([[0.3, -0.1, 0.4], [0.5, 0.1, 1.0], [0.2, 0.4, 7.5]])
-    moved = in_task_frame(path, np.array([0.0, 0.0, np.pi / 2]))
     robot = load_robot("khepera")
+    moved = in_task_frame(robot, path)
     step = robot.measured_displacements(moved)
     turn = np.pi / 2 - 0.4
     assert moved[:, 2] == pytest.approx(path[1:, 2] + turn)
     assert np.hypot(*step[0, :2]) == pytest.approx(np.hypot(0.2, 0.2))
-    np.testing.assert_allclose(in_task_frame(np.vstack([[0.0, 0.0, np.pi / 2], moved]), path[0]), path[1:], atol=1e-12)
+
+
+def test_a_snake_that_was_laid_down_elsewhere_is_judged_from_the_start_too():
+    robot = load_robot("snake")
+    did = robot.poses(np.array([[0.1, 0.02, 0.08, 0.0, 1.0], [-0.2, 0.1, 0.0, 0.1, 0.0]]))
+    elsewhere = robot.moved(np.vstack([robot.start_pose(), did]), 0.7, np.array([0.2, -0.1]))
+    assert abs(elsewhere[1:, :8] - did[:, :8]).min() > 1e-3
+    np.testing.assert_allclose(in_task_frame(robot, elsewhere), did, atol=1e-12)
 
 
 def test_a_robot_answers_only_what_it_has_driven():

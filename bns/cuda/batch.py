@@ -100,11 +100,15 @@ class Batch:
             best = int(self._order[run].copy_to_host()[0])
             length = int(self._lengths[half, run].copy_to_host()[best])
             controller = self._commands[half, run, best].copy_to_host()[:length]
+            patterns = int(self._counts[0].copy_to_host()[run])
+            learned_from = self._X[0, run].copy_to_host()[:, :patterns].copy()
         fittest = self.robot.plan(controller, weights, task)
         poses = world.drive(fittest, self._keys[run], Purpose.WORLD_FITTEST, spec.evaluations)
         outputs = predict(weights, self.robot.inputs(fittest), self.robot.sigmoid_output)
-        simulated = self.robot.poses(self.robot.displacements(outputs))
-        return RunResult({"evals": evals}, world.digest, self.robot.networks, weights, fittest, poses, simulated)
+        simulated = self.robot.poses(self.robot.displacements(outputs), fittest)
+        return RunResult(
+            {"evals": evals}, world.digest, self.robot.networks, weights, fittest, poses, simulated, learned_from
+        )
 
     def _allocate(self) -> None:
         """Everything in the GPU's memory; what begins a run is drawn by the CPU engine itself."""

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numba import cuda, float32
 
-from bns.engine.evolution import COMPONENTS, CommandBounds, cut_places, mutated, mutation_threshold, spliced, winner
+from bns.engine.breeding import COMPONENTS, cut_places, mutated, mutation_threshold, spliced, winner
+from bns.engine.evolution import CommandBounds
 from bns.engine.philox import Purpose, philox
 from bns.engine.snn import weight_count
 
@@ -24,7 +25,7 @@ def _copy(source, start, target, at, count):  # type: ignore[no-untyped-def]  # 
 
 @cuda.jit(device=True)
 def _cross(parents, lengths, front, back, cut_front, cut_back, shortest, longest, child):  # type: ignore[no-untyped-def]  # compiled
-    """As in `bns.engine.evolution`; what is kept of the child, and whether it was cut at the bound."""
+    """As in `bns.engine.breeding`; what is kept of the child, and whether it was cut at the bound."""
     first, cut_back, length, kept = spliced(cut_front, cut_back, lengths[back], shortest, longest)
     _copy(parents[front], 0, child, 0, first)
     _copy(parents[back], cut_back, child, first, kept - first)

@@ -8,7 +8,8 @@ import numpy as np
 from numba import cuda, float64
 
 from bns.cuda.networks import output
-from bns.engine.evolution import COMPONENTS, CommandBounds, spread
+from bns.engine.breeding import COMPONENTS
+from bns.engine.evolution import CommandBounds, spread
 from bns.engine.snn import weight_count
 
 MEASURED = (

@@ -16,11 +16,12 @@ from bns.diagnose.fit import Fit
 from bns.diagnose.folds import errors_at_horizons, held_out_steps
 from bns.diagnose.horizons import noise_floor
 from bns.diagnose.intake import Measured
+from bns.diagnose.own_clocks import with_own_clocks
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.search import problem_for
 from bns.errors import ModelError
 from bns.physics.effect import Effect
-from bns.physics.effects import effect_in_file, effect_named
+from bns.physics.effects import all_effects, effect_in_file, effect_named
 from bns.physics.formula import formula_effect
 from bns.physics.model import ActiveEffect, Model
 
@@ -53,9 +54,20 @@ def effect_from(text: str, term: str | None = None, on: str | None = None) -> tu
 
 
 def add_effects(
-    predictor: Predictor, model: Model, effects: Sequence[tuple[Effect, Mapping[str, str]]], measured: Measured
+    predictor: Predictor,
+    model: Model,
+    effects: Sequence[tuple[Effect, Mapping[str, str]]],
+    measured: Measured,
+    per_trial: bool = False,
 ) -> Mended:
-    """Add effects one after the other, each fitted with all before it; ModelError if the model has one already."""
+    """Add effects one after the other, each fitted with all before it; ModelError if the model has one already.
+
+    ``per_trial``: an effect that may differ from trial to trial does.
+    """
+    if per_trial and not any(effect.may_differ for effect, _ in effects):
+        able = ", ".join(e.name for e in all_effects().values() if e.may_differ)
+        given = ", ".join(e.name for e, _ in effects)
+        raise ModelError(f"None of {given} may differ from trial to trial; --per-trial goes with {able}.")
     for effect, _ in effects:
         if any(a.effect.name == effect.name for a in model.effects):
             raise ModelError(
@@ -67,7 +79,8 @@ def add_effects(
     for effect, written in effects:
         fit = fit_with(problem, fit, effect)
         problem = problem_for(predictor, fit.model, problem.following.noise)
-        fit = problem.fit(_written(fit.model, effect.name, written))
+        added = _written(fit.model, effect.name, written)
+        fit = problem.fit(with_own_clocks(added, effect.name) if per_trial and effect.may_differ else added)
         steps = held_out_steps(predictor, problem.following, fit.model)
         ladder.append(Rung(effect.name, errors_at_horizons(predictor, steps)))
     floor = {h: noise_floor(predictor, problem.following.noise, h).get("position_m", np.nan) for h in ladder[0].error}
@@ -99,6 +112,9 @@ def _documented(fit: Fit, before: Model, measured: Measured, ladder: Sequence[Ru
 
 def _with_interval(fit: Fit, active: ActiveEffect, reason: str) -> ActiveEffect:
     intervals = {f.parameter.name: fit.interval(i) for i, f in enumerate(fit.free) if f.effect == active.effect.name}
+    if active.own:
+        unit = active.effect.parameters[0].unit
+        reason += f"; the mean of one value a trial, {min(active.own):+.3f} to {max(active.own):+.3f} {unit}"
     return replace(active, basis="fitted", reason=reason, intervals=intervals)
 
 
@@ -126,6 +142,8 @@ def model_yaml(model: Model) -> str:
 
 def _entry(active: ActiveEffect) -> dict[str, Any]:
     entry: dict[str, Any] = {"name": active.effect.name, **active.written}
+    if active.per_trial:
+        entry["per_trial"] = True
     entry["values"] = {name: _exact(value) for name, value in active.by_name.items()}
     entry["units"] = {p.name: p.unit for p in active.effect.parameters}
     if active.intervals:

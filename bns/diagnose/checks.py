@@ -5,21 +5,25 @@ Every finding names trial and row; nothing goes in silence.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
+from bns.diagnose.importing import repeated
 from bns.errors import DataError
 from bns.measurements import COLUMNS, COMMANDS, POSE
 
+_HELD = 0.2
 _JUMP_M = 0.02
 _JUMP_RAD = 0.35
 _JUMP_ROUNDS = 6
 _NEAR_S = 0.4
 _LONG_STEP_S = 30.0
+_FINER = ((1e6, "nanoseconds"), (3e3, "microseconds"), (0.0, "milliseconds"))
+"""A step between rows above so many seconds was written in such a unit."""
 _DEGREES_AT_LEAST = 150.0
 """Radians a metre: a wheelbase of under a centimetre, or degrees."""
 
@@ -35,13 +39,14 @@ class Finding:
 
 def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     """The rows that can be used, in order, and what was found. DataError where going on would be guessing."""
-    _columns(table)
+    check_columns(table, COLUMNS)
     table = table.reset_index(drop=True)
-    _numbers(table)
+    to_numbers(table, COLUMNS[1:])
     findings: list[Finding] = []
+    _held(table, findings)
     kept = []
     for trial, rows in table.groupby("trial", sort=False):
-        good = _forward_in_time(str(trial), rows, findings)
+        good = forward_in_time(str(trial), rows, findings)
         good = _without_jumps(str(trial), good, findings)
         _gaps_and_losses(str(trial), good, findings)
         kept.append(good)
@@ -52,19 +57,21 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     return usable.reset_index(drop=True), findings
 
 
-def _columns(table: pd.DataFrame) -> None:
-    missing = [name for name in COLUMNS if name not in table.columns]
+def check_columns(table: pd.DataFrame, columns: Sequence[str]) -> None:
+    """DataError if one of the columns is missing, or if there are no rows."""
+    missing = [name for name in columns if name not in table.columns]
     if missing:
         raise DataError(
             f"The measurements lack {', '.join(missing)}; they have {', '.join(map(str, table.columns))}. "
-            "Name the columns with `bns import`, or write " + ", ".join(COLUMNS) + "."
+            "Name the columns with `bns import`, or write " + ", ".join(columns) + "."
         )
     if table.empty:
         raise DataError("The measurements have no rows.")
 
 
-def _numbers(table: pd.DataFrame) -> None:
-    for name in COLUMNS[1:]:
+def to_numbers(table: pd.DataFrame, columns: Sequence[str]) -> None:
+    """Make these columns floats, in place. DataError names the first row that holds something else, or no time."""
+    for name in columns:
         values = pd.to_numeric(table[name], errors="coerce")
         wrong = values.isna() & table[name].notna() & (table[name].astype(str).str.lower() != "nan")
         if wrong.any():
@@ -79,7 +86,19 @@ def _numbers(table: pd.DataFrame) -> None:
         raise DataError(f"Row {row}: t_s is empty; every row needs its time.")
 
 
-def _forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
+def _held(table: pd.DataFrame, findings: list[Finding]) -> None:
+    """Says so where a slow tracker's poses are repeated until the next comes: they look like a robot that moves in jerks."""
+    again = repeated(table)
+    if again.mean() > _HELD:
+        row = int(np.flatnonzero(again)[0])
+        text = (
+            f"{again.mean():.0%} of all poses repeat the one before while the robot is told to move, the first here: is the "
+            "tracker slower than the log? `repeated_poses: lost` in the mapping of `bns import` takes them out"
+        )
+        findings.append(Finding(str(table["trial"].iloc[row]), row, text))
+
+
+def forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
     """Rows later than all before them."""
     t = rows["t_s"].to_numpy()
     latest = np.maximum.accumulate(t)
@@ -163,11 +182,15 @@ def _gaps_and_losses(trial: str, rows: pd.DataFrame, findings: list[Finding]) ->
 
 def _units(table: pd.DataFrame) -> None:
     """Compare what was commanded with what was seen: units show as factors."""
-    ways, turns = np.array(list(_driven(table))), table["t_s"].diff()
-    step = float(turns[turns > 0].median())
+    pauses = table["t_s"].diff()
+    step = float(pauses[pauses > 0].median())
+    if step > _LONG_STEP_S:  # before anything is done second by second
+        unit = next(unit for least, unit in _FINER if step > least)
+        raise DataError(f"Successive rows are {step:g} s apart: t_s looks like {unit}; it must be seconds.")
+    ways = np.array(list(_driven(table)))
     speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
     ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
-    if step > _LONG_STEP_S or (step >= 1.0 and 1 / 3000 < ratio < 1 / 300):
+    if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
         raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
     if speed > 20:
         raise DataError(f"Commands of up to {speed:g} m/s: left_m_s and right_m_s look like mm/s or a device's units.")

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.fit import Fit
-from bns.diagnose.horizons import HORIZONS, Errors, errors_of, noise_floor
+from bns.diagnose.horizons import Errors, errors_of, noise_floor
+from bns.diagnose.own_clocks import steps_of
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.search import problem_for
 from bns.diagnose.structure import Pattern, patterns
@@ -45,7 +46,8 @@ class Curve:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `compare` found. ``floor``: position error (m) of tracking noise alone, at each horizon."""
+    """What `compare` found. ``floor``: position error (m) of tracking noise alone, at each horizon; ``near``: the horizon of
+    the worst moments and the curves; ``scores``: how well each network agrees, where the model is networks of cycles."""
 
     model: str
     trials: int
@@ -55,6 +57,8 @@ class Comparison:
     patterns: tuple[Pattern, ...]
     worst: tuple[Moment, ...]
     curves: tuple[Curve, ...]
+    near: str
+    scores: Mapping[str, Mapping[str, float]]
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values."""
@@ -68,28 +72,33 @@ class Comparison:
                 for p in self.patterns
             ],
             "worst": [vars(w) for w in self.worst],
+            "networks": {name: dict(score) for name, score in self.scores.items()},
         }
 
 
 def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
     """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands."""
-    steps, tracks = predictor.steps(model), predictor.tracks
+    tracks = predictor.tracks
     if not (np.diff(tracks.first) > 1).any():
         raise DataError("No trial has two tracked poses, and a displacement needs two: log the pose before and after commands.")
     problem = problem_for(predictor, model)
-    errors = {h: errors_of(predictor, steps, h) for h in HORIZONS}
+    fit = _as_is(problem, model)
+    steps = steps_of(predictor, problem.following, fit.model)
+    errors = {h: errors_of(predictor, steps, h) for h in predictor.horizons}
     # scatter of the drive cannot be told from faults of the model before these are mended: only the camera's noise is sure
     tracking = problem.following.noise * np.array([1, 1, 0, 0, 0])
-    found = patterns(problem, _as_is(problem, model))
+    found = patterns(problem, fit)
     return Comparison(
         model.name,
         len(tracks),
         len(tracks.t_s),
         {h: e.summary(len(tracks)) for h, e in errors.items()},
-        {h: noise_floor(predictor, tracking, h).get("position_m", float("nan")) for h in HORIZONS},
+        {h: noise_floor(predictor, tracking, h).get("position_m", float("nan")) for h in predictor.horizons},
         tuple(found),
-        tuple(_worst(predictor, errors["1s"])),
-        tuple(_curves(predictor, errors["1s"], found, np.random.default_rng(seed))),
+        tuple(_worst(predictor, errors[predictor.near])),
+        tuple(_curves(predictor, errors[predictor.near], found, np.random.default_rng(seed))),
+        predictor.near,
+        predictor.scores(),
     )
 
 
@@ -124,7 +133,7 @@ def _worst(predictor: Predictor, errors: Errors, most: int = 5) -> list[Moment]:
 def _curves(predictor: Predictor, errors: Errors, found: list[Pattern], rng: np.random.Generator) -> list[Curve]:
     """Residuals along the variables that explain most, and bands from a bootstrap over trials."""
     at = predictor.at_frames(errors.start)
-    names = list(dict.fromkeys(p.variable for p in found if p.variable in at))[:6]
+    names = [name for name in dict.fromkeys(p.variable for p in found if p.variable in at) if np.ptp(at[name]) > 0][:6]
     lasted = np.maximum(predictor.tracks.t_s[errors.end] - predictor.tracks.t_s[errors.start], 1e-9)
     rates = {
         "forward, mm/s": 1e3 * errors.forward_m / lasted,

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
+from bns.diagnose.candidates import listed
+from bns.diagnose.equivalents import longer
 from bns.diagnose.fit import Fit
 from bns.diagnose.folds import errors_at_horizons, held_out_steps
 from bns.diagnose.formula_search import Formula, best_formula
 from bns.diagnose.horizons import HORIZONS, noise_floor
+from bns.diagnose.notes import notes_on
 from bns.diagnose.predictor import Predictor
-from bns.diagnose.rhythm import Rhythm, rhythms
 from bns.diagnose.search import FALSE_ALARM, MIN_GAIN, Candidate, Found, Search
-from bns.diagnose.structure import Pattern, patterns, remaining
+from bns.diagnose.structure import Pattern, patterns
 from bns.diagnose.tracks import Tracks
+from bns.diagnose.unexplained import Unexplained, unexplained
 from bns.physics.effect import Effect
-from bns.physics.effects import all_effects
-from bns.physics.model import Model
+from bns.physics.model import ActiveEffect, Model
 
 VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
 FEWEST_TRIALS = 8
@@ -29,6 +32,9 @@ _HINT = 3.0
 """A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
 
 
+NOTHING_LEFT = Unexplained((), None, ())
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """A verdict and everything it rests on. ``found`` is None where there was too little to search."""
@@ -36,7 +42,7 @@ class Diagnosis:
     verdict: str
     found: Found | None
     patterns: tuple[Pattern, ...] = ()
-    rhythm: Rhythm | None = None
+    rest: Unexplained = NOTHING_LEFT
     formula: Formula | None = None
     error: Mapping[str, Mapping[str, float]] | None = None
     notes: tuple[str, ...] = ()
@@ -64,6 +70,7 @@ class Diagnosis:
             "error": self.error or {},
             "formula": self._formula(),
             "patterns": [_pattern(p) for p in self.patterns],
+            "outbreaks": [vars(o) for o in self.rest.outbreaks],
             "notes": list(self.notes),
         }
 
@@ -95,19 +102,24 @@ def diagnose(
     found = Search(predictor, model, extra, tick).run()
     tick("what is left")
     seen = patterns(found.problem, found.fit)
-    left, rhythm = remaining(seen), rhythms(found.problem, found.fit)[0]
-    formula = best_formula(found.problem, found.fit, left) if left else None
+    rest = unexplained(found.problem, found.fit, seen)
+    # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
+    guesses = rest.patterns or (tuple(seen[:1]) if rest.outbreaks else ())
+    formula = best_formula(found.problem, found.fit, guesses) if guesses else None
     hint = _hint(found, len(predictor.tracks))
-    verdict = _verdict(found, left, rhythm.loud, hint)
+    verdict = _verdict(found, rest.any, hint)
+    tick("longer explanations")
+    others = [effect for name, effect in listed(found.nominal.model, extra).items() if name not in found.accepted]
+    more = [] if rest.any else longer(found.problem, found.fit, found.accepted, others)
     tick("errors on trials held out")
     return Diagnosis(
         verdict,
         found,
         tuple(seen[:12]),
-        rhythm,
+        rest,
         formula,
         errors_before_and_after(found),
-        tuple(_notes(found, predictor.tracks, left, rhythm if rhythm.loud else None, formula, hint)),
+        tuple(notes_on(found, predictor.tracks, rest, formula, hint, more)),
     )
 
 
@@ -131,8 +143,8 @@ def too_little(tracks: Tracks) -> str:
     return ""
 
 
-def _verdict(found: Found, left: Sequence[Pattern], loud: bool, hint: Candidate | None) -> str:
-    if left or loud:
+def _verdict(found: Found, unexplained: bool, hint: Candidate | None) -> str:
+    if unexplained:
         return "unlisted"
     if found.rivals:
         return "tie"
@@ -173,6 +185,9 @@ def errors_before_and_after(found: Found) -> dict[str, dict[str, float]]:
 def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
     """{effect: {name: value, se, low, high, unit, at_bound}} of a fitted model."""
     out: dict[str, dict[str, dict[str, Any]]] = {}
+    differing = fit.model.differing
+    if differing is not None:
+        out[differing.effect.name] = _spread(differing)
     for index, number in enumerate(fit.free):
         p, (low, high) = number.parameter, fit.interval(index)
         out.setdefault(number.effect, {})[p.name] = {
@@ -184,6 +199,19 @@ def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
             "at_bound": bool(fit.values[index] in {p.low, p.high}),
         }
     return out
+
+
+def _spread(differing: ActiveEffect) -> dict[str, dict[str, Any]]:
+    """The mean and the standard deviation of the trials' own values, with their intervals."""
+    p, own = differing.effect.parameters[0], np.array(differing.own)
+    scatter = float(own.std(ddof=1))
+    se = scatter / np.sqrt(len(own))
+    half = float(student.ppf(0.975, len(own) - 1)) * se
+    mean = {"value": float(own.mean()), "se": se, "low": float(own.mean()) - half, "high": float(own.mean()) + half}
+    loose = scatter / np.sqrt(2 * (len(own) - 1))
+    between = {"value": scatter, "se": loose, "low": max(scatter - 1.96 * loose, 0.0), "high": scatter + 1.96 * loose}
+    always = {"unit": p.unit, "at_bound": False}
+    return {p.name: {**mean, **always, "per_trial": True}, f"between_trials_{p.unit}": {**between, **always}}
 
 
 def ties_of(found: Found) -> list[list[str]]:
@@ -222,43 +250,3 @@ def _pattern(p: Pattern) -> dict[str, Any]:
 def _plain(value: float) -> float | None:
     """A float that JSON knows."""
     return float(value) if np.isfinite(value) else None
-
-
-def _notes(
-    found: Found,
-    tracks: Tracks,
-    left: Sequence[Pattern],
-    rhythm: Rhythm | None,
-    formula: Formula | None,
-    hint: Candidate | None,
-) -> Iterable[str]:
-    names = {*found.accepted, *(name for rival in found.rivals for name in rival)}
-    for name in sorted(names & set(all_effects())):
-        if all_effects()[name].of_measuring:
-            yield f"{name} is a fault of the measuring, not of the robot."
-    if "battery-sag" in names and not tracks.start_known and "battery_v" not in tracks.extra:
-        yield "No session_s or battery_v was logged: the session's time is taken as the trials one right after the other."
-    if {"tether-pull", "floor-slope"} <= names:
-        yield "A floor-slope is a tether-pull from far away: drive on both sides of the supposed anchor to tell them apart."
-    if {"command-delay", "clock-offset"} <= names:
-        yield "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
-    for p in left[:4]:
-        yield (
-            f"Left unexplained: {p.channel} along {p.variable}, {p.share:.2%} of the loss on held-out trials "
-            f"(p {'<' if p.evidence.p_value < 1e-4 else '='} {max(p.evidence.p_value, 1e-4):.2g})."
-        )
-    if rhythm is not None:
-        after = f"{rhythm.lag} frames later" if rhythm.scale == "within" else "in the next command"
-        yield (
-            f"What is not foreseen in the direction {rhythm.direction} repeats itself {after} (correlation "
-            f"{rhythm.correlation:+.2f}): something with a rhythm or a drift of its own that no logged variable shows."
-        )
-    if formula is not None:
-        values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
-        yield f"A candidate for it: {formula.on} + {formula.term} with {values}."
-    if hint is not None:
-        more = int(np.ceil(len(tracks) * max((3.2 / max(hint.evidence.z, 0.5)) ** 2 - 1, 0.5)))
-        yield f"{hint.name} may be missing, but {len(tracks)} trials do not settle it; about {more} more would."
-    for c in found.steps[0].ranking:
-        if c.veto and c.evidence.gain > 0.01 * float(found.nominal.losses.mean()):
-            yield f"{c.name} was not considered: {c.veto}."

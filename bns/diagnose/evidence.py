@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -48,7 +49,12 @@ def sign_flip_p(scores: Array, curvature: Array) -> float:
     seen = float(total @ root @ total)
     if not np.isfinite(seen) or seen <= 0:
         return 1.0
-    signs = np.random.default_rng(_SEED).choice([-1.0, 1.0], size=(FLIPS, len(scores)))
-    sums = signs @ scores
-    by_luck = np.einsum("fk,kl,fl->f", sums, root, sums)
+    sums = _signs(len(scores)) @ scores
+    by_luck = ((sums @ root) * sums).sum(axis=1)
     return float((1 + np.count_nonzero(by_luck >= seen * (1 - 1e-9))) / (1 + FLIPS))
+
+
+@lru_cache(maxsize=1)
+def _signs(trials: int) -> Array:
+    """Lots of +1 and -1, (flips, trials); always the same, so kept: drawing them costs more than using them."""
+    return np.random.default_rng(_SEED).choice([-1.0, 1.0], size=(FLIPS, trials))

@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from bns.diagnose.adding import Mended
 from bns.diagnose.comparison import Comparison, Curve
 from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.words import ahead
 from bns.plotting import GREY, OKABE_ITO, PAGE_IN, save, style
 
-_LABELS = {
+LABELS = {
     "left_m_s": "left wheel commanded (m/s)",
     "right_m_s": "right wheel commanded (m/s)",
     "speed_m_s": "speed commanded (m/s)",
@@ -26,6 +27,15 @@ _LABELS = {
     "way_m": "way driven in the trial (m)",
     "heading_rad": "heading (rad)",
     "place": "place",
+    "a_lat_rad": "lateral amplitude (rad)",
+    "a_vert_rad": "vertical amplitude (rad)",
+    "omega_rad": "ω (rad)",
+    "alpha_rad": "α (rad)",
+    "previous_a_lat_rad": "lateral amplitude before (rad)",
+    "previous_a_vert_rad": "vertical amplitude before (rad)",
+    "previous_omega_rad": "ω before (rad)",
+    "previous_alpha_rad": "α before (rad)",
+    "cycle": "cycle of the trial",
 }
 
 
@@ -41,7 +51,8 @@ def comparison_figure(c: Comparison, path: Path) -> Path:
             _draw_curve(axes[variables.index(curve.variable)][ways.index(curve.direction)], curve)
     for column, way in enumerate(ways):
         axes[0][column].set_title(way)
-    figure.suptitle(f"Measured − predicted by {c.model}, 1 s ahead ({c.trials} trials; bands: 95 %, bootstrap over trials)")
+    trials = f"{c.trials} trials; bands: 95 %, bootstrap over trials"
+    figure.suptitle(f"Measured − predicted by {c.model}, {ahead(c.near)} ahead ({trials})")
     return save(figure, path)[0]
 
 
@@ -49,7 +60,7 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.fill_between(curve.centre, curve.low, curve.high, alpha=0.3, color=OKABE_ITO[0], linewidth=0)
     axes.plot(curve.centre, curve.mean, color=OKABE_ITO[0], marker="o")
-    axes.set_xlabel(_LABELS.get(curve.variable, curve.variable))
+    axes.set_xlabel(LABELS.get(curve.variable, curve.variable))
 
 
 @style()
@@ -83,7 +94,7 @@ def ladder_figure(m: Mended, path: Path) -> Path:
     axes = figure.subplots()
     for colour, marker, horizon in zip(OKABE_ITO, "os^D", m.ladder[0].error, strict=False):
         values = [1e3 * r.error[horizon] for r in m.ladder]
-        axes.plot(range(len(values)), values, marker=marker, color=colour, label=f"{_ahead(horizon)}")
+        axes.plot(range(len(values)), values, marker=marker, color=colour, label=f"{ahead(horizon)}")
         axes.plot([0, len(values) - 1], [1e3 * m.floor[horizon]] * 2, color=colour, linestyle=":", linewidth=1)
     axes.set_xticks(range(len(names)), names)
     axes.set_yscale("log")
@@ -93,7 +104,3 @@ def ladder_figure(m: Mended, path: Path) -> Path:
     axes.legend(title="horizon (dotted: noise floor)", loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.set_title("Error ladder")
     return save(figure, path)[0]
-
-
-def _ahead(horizon: str) -> str:
-    return {"command": "one command", "1s": "1 s", "5s": "5 s", "trial": "whole trial"}[horizon]

@@ -11,8 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from bns.diagnose.clocks import Slopes, with_clocks_begun, without_clocks
 from bns.diagnose.evidence import Evidence, held_out_gain, sign_flip_p
 from bns.diagnose.noise import Filter, huber, weights
 from bns.diagnose.predictor import Predictor
@@ -73,10 +75,10 @@ class Problem:
     """Tracks, a filter that follows them, and which numbers may be fitted."""
 
     def __init__(self, predictor: Predictor, following: Filter, counted: Array | None = None) -> None:
-        """``counted`` (trials,): what each trial counts; 1 for all where it is not given."""
+        """``counted`` (frames,): what each frame counts; 1 for all where it is not given."""
         self.predictor = predictor
         self.following = following
-        self._counted = None if counted is None else np.sqrt(counted)[predictor.tracks.trial][:, None]
+        self._counted = None if counted is None else np.sqrt(counted)[:, None]
         tracks = predictor.tracks
         self._trial, self._trials = tracks.trial, len(tracks)
 
@@ -84,6 +86,11 @@ class Problem:
         """Whitened innovations under a model, (frames, 3)."""
         white = self.following.white(self.predictor.tracks, self.predictor.steps(model))
         return white if self._counted is None else white * self._counted
+
+    @property
+    def frame_trial(self) -> NDArray[np.int64]:
+        """The trial of every frame, (frames,)."""
+        return self._trial
 
     def per_trial(self, values: Array) -> Array:
         """Sums over the frames of each trial; (trials, ...)."""
@@ -95,11 +102,12 @@ class Problem:
         return total if np.isfinite(total) else np.inf
 
     def free(self, model: Model) -> tuple[Free, ...]:
-        """The numbers of the model's effects that these tracks can speak of."""
+        """The numbers of the model's effects that all trials share and these tracks can speak of."""
         columns = self.predictor.tracks.extra
         return tuple(
             Free(active.effect.name, p)
             for active in model.effects
+            if not active.per_trial
             for p in active.effect.parameters
             if not (p.column and p.column not in columns) and not (p.instead_of and p.instead_of in columns)
         )
@@ -108,22 +116,23 @@ class Problem:
         """One undamped step of least squares in all numbers; the model there and its loss."""
         free = self.free(model)
         white = self.white(model)
-        curvature, gradient = _normal(self._jacobian(model, free, white), white)
-        there = moved_by(model, free, _damped_step(curvature, gradient, 1e-9))
+        slopes = self._slopes(model, free, white)
+        there = self._moved(model, free, slopes, _damped_step(*_normal(slopes.jacobian, white), 1e-9), 0.0)
         return there, self.loss(there)
 
     def fit(self, model: Model, rounds: int | None = None) -> Fit:
         """Levenberg-Marquardt from the values the model has, within the bounds of every number; ``rounds`` 0 keeps them."""
+        model = with_clocks_begun(self, model, self._trials)
         free = self.free(model)
         white = self.white(model)
         loss, damping = float(huber(white).sum()), 1e-3
-        jacobian = self._jacobian(model, free, white)
-        for _ in range(_ROUNDS if rounds is None and free else 0):
-            curvature, gradient = _normal(jacobian, white)
+        slopes = self._slopes(model, free, white)
+        for _ in range(_ROUNDS if rounds is None and (free or model.differing) else 0):
+            curvature, gradient = _normal(slopes.jacobian, white)
             moved = False
             for _ in range(8):
                 step = _damped_step(curvature, gradient, damping)
-                trial_model = moved_by(model, free, step)
+                trial_model = self._moved(model, free, slopes, step, damping)
                 trial_white = self.white(trial_model)
                 trial_loss = float(huber(trial_white).sum())
                 if np.isfinite(trial_loss) and trial_loss <= loss:
@@ -134,10 +143,13 @@ class Problem:
                 break
             gain, loss = loss - trial_loss, trial_loss
             model, white, damping = trial_model, trial_white, max(damping / 10, 1e-9)
-            jacobian = self._jacobian(model, free, white)
+            slopes = self._slopes(model, free, white)
             if gain < _SETTLED:
                 break
-        return self._concluded(model, free, white, jacobian)
+        return self._concluded(model, free, white, slopes.jacobian)
+
+    def _moved(self, model: Model, free: Sequence[Free], slopes: Slopes, step: Array, damping: float) -> Model:
+        return slopes.moved(moved_by(model, free, step), step, damping)
 
     def _concluded(self, model: Model, free: tuple[Free, ...], white: Array, jacobian: Array) -> Fit:
         weighted = jacobian * weights(white)[:, None, None]
@@ -190,13 +202,13 @@ class Problem:
         chance = self.chance(base, added.jacobian[..., new]) if new and gain > 0 else 1.0
         return Evidence(gain, se, chance)
 
-    def _jacobian(self, model: Model, free: Sequence[Free], white: Array) -> Array:
+    def _slopes(self, model: Model, free: Sequence[Free], white: Array) -> Slopes:
         out = np.zeros((*white.shape, len(free)))
         for j, number in enumerate(free):
             small = _increment(number, number.of(model))
             changed = moved_by(model, free, small * np.eye(len(free))[j])
             out[..., j] = (self.white(changed) - white) / small
-        return out
+        return without_clocks(self, model, white, out)
 
 
 def moved_by(model: Model, free: Sequence[Free], step: Array) -> Model:
@@ -221,6 +233,8 @@ def _normal(jacobian: Array, white: Array) -> tuple[Array, Array]:
 
 
 def _damped_step(curvature: Array, gradient: Array, damping: float) -> Array:
+    if not len(gradient):
+        return np.zeros(0)
     scale = np.diag(curvature).copy()
     scale[scale <= 0] = 1.0
     solved = np.linalg.lstsq(curvature + damping * np.diag(scale), gradient, rcond=None)[0]

@@ -9,6 +9,7 @@ import numpy as np
 from bns.diagnose.fit import Problem
 from bns.diagnose.horizons import HORIZONS, Errors, errors_of
 from bns.diagnose.noise import Filter
+from bns.diagnose.own_clocks import steps_of
 from bns.diagnose.predictor import Predictor, Steps
 from bns.diagnose.tracks import Array
 from bns.physics.model import Model
@@ -17,16 +18,19 @@ FOLDS = 5
 
 
 def held_out_steps(predictor: Predictor, following: Filter, model: Model) -> Steps:
-    """Steps of every trial under the model's effects, their numbers fitted to the trials of the other folds."""
+    """Steps of every trial under the model's effects, their numbers fitted to the trials of the other folds.
+
+    What belongs to one trial alone (its clock) is set as `own_clocks` says: by other poses of that trial.
+    """
     trials = len(predictor.tracks)
     if not model.effects or trials < 2:
         return predictor.steps(model)
     fold = np.arange(trials) % min(FOLDS, trials)
     body, drift = np.zeros((len(predictor.tracks.t_s), 3)), np.zeros((len(predictor.tracks.t_s), 2))
     for one in np.unique(fold):
-        problem = Problem(predictor, following, (fold != one).astype(float))
-        steps = predictor.steps(problem.fit(model).model)
         frames = (fold == one)[predictor.tracks.trial]
+        fitted = Problem(predictor, following, (~frames).astype(float)).fit(model).model
+        steps = steps_of(predictor, following, fitted)
         body[frames], drift[frames] = steps.body[frames], steps.drift_m[frames]
     return Steps(body, drift)
 

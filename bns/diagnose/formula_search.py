@@ -16,14 +16,14 @@ from sklearn.linear_model import orthogonal_mp
 from bns.diagnose.evidence import Evidence
 from bns.diagnose.fit import Fit, Problem
 from bns.diagnose.noise import weights
-from bns.diagnose.structure import Pattern
+from bns.diagnose.structure import SHARE, Pattern
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.formula import formula_effect
 from bns.physics.model import Model
 
 NAME = "unlisted"
-_ON = {"forward_m_s": "v", "sideways_m_s": "s", "yaw_rad_s": "w", "east_m_s": "east", "north_m_s": "north"}
+_ON = {"forward_m_s": "v", SHARE: "v", "sideways_m_s": "s", "yaw_rad_s": "w", "east_m_s": "east", "north_m_s": "north"}
 _CARRIERS = {
     "v": ("v", "moving"),
     "s": ("v", "v*w", "moving"),
@@ -110,19 +110,22 @@ def _bump(problem: Problem, fit: Fit, on: str) -> Formula | None:
             for width in (0.1, 0.3):
                 term = f"k * {_CARRIERS[on][0]} * exp(-((x - {cx:.3g})**2 + (y - {cy:.3g})**2) / {2 * width**2:.3g})"
                 column = _weighted(fit, _column(problem, fit, formula_effect(NAME, term, on)))
-                score = float(column @ _weighted(fit, fit.white)) ** 2 / max(float(column @ column), 1e-300)
-                if best is None or score > best[0]:
-                    best = (score, cx, cy, width)
+                pull, size = float(column @ _weighted(fit, fit.white)), max(float(column @ column), 1e-300)
+                if best is None or pull**2 / size > best[0]:
+                    best = (pull**2 / size, -pull / size, cx, cy, width)
     assert best is not None
     term = f"k * {_CARRIERS[on][0]} * exp(-((x - a)**2 + (y - b)**2) / (2 * c**2))"
     effect = formula_effect(NAME, term, on)
-    start = {"k": -1e-3, "a": best[1], "b": best[2], "c": best[3]}
+    start = dict(zip("kabc", best[1:], strict=True))
     model = fit.model.with_active(effect, tuple(start[p.name] for p in effect.parameters))
     try:
         added = problem.fit(_written(model, term, on))
     except ModelError:
         return None
-    return Formula(on, term, added, problem.evidence(fit, added))
+    found = Formula(on, term, added, problem.evidence(fit, added))
+    # a patch that has run away from where the robot was is none
+    inside = x0 <= found.values["a"] <= x1 and y0 <= found.values["b"] <= y1
+    return found if inside else None
 
 
 def _fitted(problem: Problem, fit: Fit, on: str, term: str) -> Formula | None:

@@ -88,7 +88,7 @@ def _marks(tracks: Tracks, trial: int, horizon: str, t_s: Array) -> NDArray[np.i
 def errors_of(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
     """Measured minus predicted at the ends of a horizon's windows, each predicted from the pose measured at its start."""
     tracks = predictor.tracks
-    start, end = windows(tracks, horizon)
+    start, end = predictor.windows(horizon)
     path = _path(tracks, steps)
     pose = tracks.pose
     turn = pose[start, 2] - path[start, 2]
@@ -115,10 +115,23 @@ def _path(tracks: Tracks, steps: Steps) -> Array:
     return np.stack([x - x[begin][tracks.trial], y - y[begin][tracks.trial], heading], axis=1)
 
 
+def laid_paths(tracks: Tracks, steps: Steps) -> Array:
+    """Predicted poses (frames, 3) of every trial, each path begun at the trial's first measured pose."""
+    path = _path(tracks, steps)
+    begin = tracks.first[:-1]
+    start = tracks.pose[begin][tracks.trial]
+    cos, sin = np.cos(start[:, 2]), np.sin(start[:, 2])
+    drift = np.cumsum(steps.drift_m, axis=0)
+    drift = drift - drift[begin][tracks.trial]
+    x = start[:, 0] + cos * path[:, 0] - sin * path[:, 1] + drift[:, 0]
+    y = start[:, 1] + sin * path[:, 0] + cos * path[:, 1] + drift[:, 1]
+    return np.stack([x, y, start[:, 2] + path[:, 2]], axis=1)
+
+
 def noise_floor(predictor: Predictor, noise: Array, horizon: str) -> dict[str, float]:
     """Error that a perfect model would show: tracking noise at both ends, and the scatter of the drive between."""
     tracks = predictor.tracks
-    start, end = windows(tracks, horizon)
+    start, end = predictor.windows(horizon)
     if not len(start):
         return {}
     way = np.cumsum(predictor.way_m)

@@ -6,6 +6,10 @@ The mapping is a small YAML, kept beside the data as ``DATA.import.yaml``, so th
       t_s: {from: time_ms, unit: ms}
       x_m: {from: X, unit: cm}
       heading_rad: {from: yaw, unit: deg, clockwise: true, zero_deg: 90}
+    repeated_poses: lost
+
+The last line is for a tracker that is slower than the log: a pose that repeats the one before it while the robot is told to move
+was not measured anew, and counts as lost.
 """
 
 from __future__ import annotations
@@ -15,11 +19,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import yaml
 
 from bns.errors import DataError, unknown_name
-from bns.measurements import COLUMNS
+from bns.measurements import COLUMNS, COMMANDS, POSE
 
 UNITS: Mapping[str, tuple[str, float]] = {
     "s": ("s", 1.0),
@@ -45,7 +50,10 @@ _SI = {
     "y_m": "m",
     "heading_rad": "rad",
     "session_s": "s",
+    "before_left_m_s": "m/s",
+    "before_right_m_s": "m/s",
 }
+REPEATED = ("kept", "lost")
 _KEYS = ("from", "unit", "scale", "offset", "clockwise", "zero_deg")
 
 
@@ -61,10 +69,13 @@ def load_mapping(path: Path) -> dict[str, Any]:
         tree = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, yaml.YAMLError) as fault:
         raise DataError(f"The mapping {path} does not read: {fault}.") from fault
-    if not isinstance(tree, dict) or set(tree) != {"columns"} or not isinstance(tree["columns"], dict):
+    if not isinstance(tree, dict) or not isinstance(tree.get("columns"), dict) or set(tree) - {"columns", "repeated_poses"}:
         raise DataError(
-            f"The mapping {path} must have the one key columns, with an entry for each column of the table."
+            f"The mapping {path} must have the key columns, with an entry for each column of the table, and may have "
+            "repeated_poses; nothing else."
         )
+    if tree.get("repeated_poses", "kept") not in REPEATED:
+        raise DataError(f"{path}: " + unknown_name("word for repeated_poses", tree["repeated_poses"], REPEATED))
     for name, entry in tree["columns"].items():
         _check_entry(path, name, entry)
     return tree
@@ -96,7 +107,18 @@ def applied(table: pd.DataFrame, mapping: Mapping[str, Any]) -> pd.DataFrame:
     out = out.drop(columns=list(used))
     if "trial" not in out.columns:
         out.insert(0, "trial", 0)
+    if mapping.get("repeated_poses") == "lost":
+        out.loc[repeated(out), list(POSE)] = np.nan
     return out[[*(c for c in COLUMNS if c in out.columns), *(c for c in out.columns if c not in COLUMNS)]]
+
+
+def repeated(table: pd.DataFrame) -> pd.Series:
+    """Rows whose pose is exactly the one before it in the trial, though the robot was told to move; (rows,) of bool."""
+    if not {"trial", *POSE, *COMMANDS} <= set(table.columns):
+        return pd.Series(False, index=table.index)
+    same = table[[*POSE]].eq(table[[*POSE]].shift()).all(axis=1) & table["trial"].eq(table["trial"].shift())
+    told = (table[list(COMMANDS)].abs().max(axis=1) > 0).shift(fill_value=False)
+    return same & told
 
 
 def _converted(name: str, values: pd.Series, entry: Mapping[str, Any]) -> pd.Series:

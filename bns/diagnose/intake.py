@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pandas as pd
 import yaml
 
 from bns.diagnose.checks import Finding, checked
+from bns.diagnose.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.importing import applied, mapping_beside
 from bns.diagnose.tracks import Tracks, tracks_of
 from bns.errors import DataError
@@ -27,21 +29,26 @@ class Measured:
     """What a column ``robot`` says; "" where there is none."""
 
 
-def load_measured(path: str | Path, robot: str | None = None) -> Measured:
+def load_measured(path: str | Path, robot: str | None = None, more: Sequence[Path] = ()) -> Measured:
     """Read, map (if ``DATA.import.yaml`` lies beside), check.
 
-    ``robot`` chooses the rows of one robot where a ``robot`` column names several. DataError if the file cannot be used.
+    ``robot`` chooses the rows of one robot where a ``robot`` column names several. ``more``: files whose trials come after those
+    of ``path``, under their file's name. DataError if a file cannot be used.
     """
     path = Path(path)
-    table = read_table(path)
-    mapping = mapping_beside(path)
-    if mapping is not None:
-        table = applied(table, mapping)
-    table = _of_one_robot(table, robot)
+    table = _of_one_robot(_joined([path, *more]), robot)
     of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
-    table, findings = checked(table)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()[:20]
-    return Measured(path, tracks_of(table), tuple(findings), digest, of)
+    tracks, findings = _tracks(table)
+    digest = hashlib.sha256(b"".join(p.read_bytes() for p in (path, *more))).hexdigest()[:20]
+    return Measured(path, tracks, tuple(findings), digest, of)
+
+
+def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:
+    if are_cycles(table):
+        cycles, findings = checked_cycles(table)
+        return cycle_tracks(cycles), findings
+    usable, findings = checked(table)
+    return tracks_of(usable), findings
 
 
 def read_table(path: Path) -> pd.DataFrame:
@@ -56,6 +63,22 @@ def read_table(path: Path) -> pd.DataFrame:
     except (ValueError, OSError, yaml.YAMLError) as fault:
         raise DataError(f"{path} does not read as {path.suffix[1:]}: {fault}.") from fault
     raise DataError(f"{path} is no .csv or .parquet file; measurements come as one of these.")
+
+
+def _joined(paths: Sequence[Path]) -> pd.DataFrame:
+    tables = [_mapped(path) for path in paths]
+    if len(tables) == 1:
+        return tables[0]
+    for number, (path, table) in enumerate(zip(paths, tables, strict=True)):
+        if "trial" in table.columns:
+            before = f"{number}-{path.stem}: " if number else ""
+            table["trial"] = before + table["trial"].astype(str)
+    return pd.concat(tables, ignore_index=True)
+
+
+def _mapped(path: Path) -> pd.DataFrame:
+    table, mapping = read_table(path), mapping_beside(path)
+    return table if mapping is None else applied(table, mapping)
 
 
 def _of_one_robot(table: pd.DataFrame, robot: str | None) -> pd.DataFrame:

@@ -6,7 +6,6 @@ Networks predict a whole command at once, so the tracks are looked at where comm
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +14,10 @@ from bns.diagnose.predictor import Steps
 from bns.diagnose.tracks import Array, Tracks
 from bns.diagnose.wheels import WheelPredictor
 from bns.engine.snn import predict
-from bns.errors import DataError, ModelError
+from bns.errors import DataError
 from bns.physics.model import Model
-from bns.robots import load_robot
-from bns.robots.simulator import StaticSimulator, load_simulator
+from bns.robots.base import Robot
+from bns.robots.simulator import StaticSimulator
 
 _NEAR_S = 0.06
 """A pose tracked this near the end of a command stands for it."""
@@ -29,21 +28,39 @@ class NetworkPredictor(WheelPredictor):
 
     A model handed to `steps` counts only by its effects, which come on top: so the free curves of `structure` say where
     networks fail.
-    DataError if no pose was tracked at the ends of commands; ModelError if the networks are not the robot's.
+    DataError if no pose was tracked at the ends of commands.
     """
 
-    def __init__(self, tracks: Tracks, file: Path, robot: str = "khepera") -> None:
-        saved, self._robot = load_simulator(file), load_robot(robot)
-        if tuple(saved.networks) != tuple(self._robot.networks):
-            raise ModelError(
-                f"The networks of {file} are {', '.join(saved.networks)}; those of {robot} are {', '.join(self._robot.networks)}."
-            )
+    def __init__(self, tracks: Tracks, saved: StaticSimulator, robot: Robot) -> None:
+        self._robot = robot
         nodes = _command_ends(tracks)
         super().__init__(_only_frames(tracks, nodes >= 0))
         if len(self.tracks.t_s) < 2 * len(self.tracks):
             raise DataError("Networks predict whole commands, and no pose was tracked near the ends of commands.")
         self._bare = Model(wheelbase_m=1.0)
-        self._networks = self._driven(saved, nodes[nodes >= 0])
+        self.node = nodes[nodes >= 0]
+        """How many commands had ended at each frame, (frames,)."""
+        self.learned_from = saved.learned_from
+        self._networks = self._driven(saved, self.node)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot whose networks these are."""
+        return self._robot
+
+    def commands(self, trial: int) -> Array:
+        """Commands of a trial in the robot's own units, (commands, 3)."""
+        tracks = self.tracks
+        lasting = tracks.duration_s[trial] > 0
+        speeds = np.column_stack([tracks.left_m_s[trial], tracks.right_m_s[trial]])[lasting]
+        unit = self._robot.wheel_speeds_m_s(np.ones((1, 3)))  # type: ignore[attr-defined]  # of a differential drive
+        return np.column_stack([speeds[:, 0] / unit[0], speeds[:, 1] / unit[1], tracks.duration_s[trial][lasting] / unit[2]])
+
+    def measured(self) -> Array:
+        """As the networks' own steps: forward, left and turn since the frame before as tracked, (frames, 3)."""
+        seen, told = self._in_robot_frame(self.tracks.pose), self._networks
+        turn = told[:, 2] + (seen[:, 2] - told[:, 2] + np.pi) % (2 * np.pi) - np.pi
+        return np.column_stack([seen[:, :2], turn])
 
     def steps(self, model: Model) -> Steps:
         """What the networks predict between the ends of commands, and what the model's effects add to it."""
@@ -61,15 +78,9 @@ class NetworkPredictor(WheelPredictor):
 
     def _path(self, saved: StaticSimulator, trial: int) -> Array:
         """Pose at the begin and after every command of a trial, (commands + 1, 3)."""
-        tracks = self.tracks
-        lasting = tracks.duration_s[trial] > 0
-        speeds = np.column_stack([tracks.left_m_s[trial], tracks.right_m_s[trial]])[lasting]
-        unit = self._robot.wheel_speeds_m_s(np.ones((1, 3)))  # type: ignore[attr-defined]  # of a differential drive
-        commands = np.column_stack(
-            [speeds[:, 0] / unit[0], speeds[:, 1] / unit[1], tracks.duration_s[trial][lasting] / unit[2]]
-        )
+        commands = self.commands(trial)
         displaced = self._robot.displacements(predict(saved.weights, self._robot.inputs(commands)))
-        return np.vstack([self._robot.start_pose(), self._robot.poses(displaced)])
+        return np.vstack([self._robot.start_pose(), self._robot.poses(displaced, commands)])
 
 
 def _command_ends(tracks: Tracks) -> NDArray[np.int64]:

@@ -62,6 +62,8 @@ def estimate_noise(predictor: Predictor, steps: Steps, start: Array | None = Non
     body, drift, pose = steps.body[frames], steps.drift_m[frames], tracks.pose[frames]
     is_first, way_m = tracks.is_first[frames], predictor.way_m[frames]
     low, high = np.log(_LOW), np.log(_HIGH)
+    if predictor.tracking is not None:
+        low[:2] = high[:2] = np.log(predictor.tracking)
 
     def surprise(logs: Array) -> float:
         inside = np.clip(logs, low, high)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -27,11 +28,19 @@ class Steps:
 class Predictor(Protocol):
     """Tracks with all that can be worked out of them once.
 
-    ``way_m`` (frames,): how far the wheels went since the frame before.
+    ``way_m`` (frames,): how far the robot was driven since the frame before. ``horizons``: names of the times over which
+    predictions are judged; ``near``: the one of them that curves and worst moments are about. ``tracking``: noise of a tracked
+    position (m) and heading (rad), where the tracks tell it by themselves; None: it is estimated under a model.
     """
 
     tracks: Tracks
     way_m: Array
+    horizons: tuple[str, ...]
+    near: str
+    tracking: tuple[float, float] | None
+
+    def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Frames at which the windows of a horizon begin and end."""
 
     def steps(self, model: Model) -> Steps:
         """What the model predicts between successive frames."""
@@ -41,3 +50,6 @@ class Predictor(Protocol):
 
     def at_frames(self, frames: NDArray[np.int64]) -> dict[str, Array]:
         """`variables` at the times of some frames, (frames,) each."""
+
+    def scores(self) -> Mapping[str, Mapping[str, float]]:
+        """How well each output of the model agrees with what was measured, by its name; empty where it has but a path."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
@@ -19,6 +19,7 @@ from bns.diagnose.candidates import best_start, fit_with, listed
 from bns.diagnose.evidence import Evidence, held_out_gain
 from bns.diagnose.fit import Fit, Problem
 from bns.diagnose.noise import estimate_noise, filter_for
+from bns.diagnose.own_clocks import OwnClocks, judged, own_clocks, with_one_clock
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.tracks import Array
 from bns.physics.decoys import DECOYS
@@ -39,6 +40,8 @@ TIE_SHARE = 0.005
 """... nor those whose difference is a smaller share than this of what either earns."""
 SCREEN = 0.15
 """An effect is tried in another one's place if its best start alone does this share of the other's work."""
+CLOCKS_CHANCE = 0.01
+"""Chance of a false alarm about clocks that differ from trial to trial."""
 MOST = 6
 """Effects that a search accepts at most."""
 
@@ -86,11 +89,53 @@ class Search:
     ) -> None:
         self.predictor, self.model, self.tick = predictor, model.arranged(), tick
         self.jobs = min(os.cpu_count() or 1, 8)
+        self._extra = extra
         self.catalogue = listed(self.model, extra)
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 
     def run(self) -> Found:
+        """The search; again with a clock for each trial where these differ, since that hides what else is wrong."""
+        plain = self._searched()
+        clocks = own_clocks(plain.problem, plain.fit)
+        if clocks is None or not self._clocks_earned(clocks, plain.fit):
+            return plain
+        given = self.model
+        self.model = self._bare_with_clocks(clocks.fit.model, given)
+        added = self.catalogue.pop(_differing(self.model), None)
+        self._exchanged = None
+        found = self._searched()
+        still = judged(found.problem, found.problem.fit(with_one_clock(found.fit.model)), found.fit)
+        if still is None or not self._clocks_earned(still, found.fit):
+            return plain
+        return self._with_clocks(found, found.problem.fit(given), clocks, added)
+
+    @staticmethod
+    def _bare_with_clocks(fitted: Model, given: Model) -> Model:
+        """The model as given and the trials' clocks, without what the first search added."""
+        kept = {active.effect.name for active in given.effects} | {_differing(fitted)}
+        return replace(fitted, effects=tuple(a for a in fitted.effects if a.effect.name in kept))
+
+    def _clocks_earned(self, clocks: OwnClocks, before: Fit) -> bool:
+        """Few trials may earn all of it, so no number of standard errors is asked for: the clocks of most may be right."""
+        e = clocks.evidence
+        return e.p_value < CLOCKS_CHANCE and e.gain > MIN_GAIN * float(before.held_out.mean())
+
+    def _with_clocks(self, found: Found, nominal: Fit, clocks: OwnClocks, added: Effect | None) -> Found:
+        """The search's end with the clocks named first, where the model given had none."""
+        name = _differing(self.model)
+        candidate = Candidate(name, clocks.fit, clocks.evidence)
+        first = replace(found.steps[0], ranking=(candidate, *found.steps[0].ranking))
+        names = (name,) if added else ()
+        return replace(
+            found,
+            nominal=nominal,
+            accepted=(*names, *found.accepted),
+            steps=(first, *found.steps[1:]),
+            rivals=tuple((*names, *r) for r in found.rivals),
+        )
+
+    def _searched(self) -> Found:
         """Forwards and back until nothing more is earned; then rivals of the same size."""
         problem, nominal = self._settled(self.model)
         if nominal.free:
@@ -204,13 +249,21 @@ class Search:
         rivals: list[tuple[tuple[str, ...], Fit]] = []
         for name, other, tried in self._exchanges(problem, fit, accepted):
             without = problem.fit(fit.model.without(name))
-            worth = held_out_gain(without.held_out, fit.held_out)[0]
-            lost, se = held_out_gain(tried.held_out, fit.held_out)
-            alike = lost < TIE_Z * se or lost < TIE_SHARE * worth
             # at a bound it may be: a tether from ever farther away is a slope
-            if alike and not veto_of(tried, other, bounds=False):
+            if alike(tried, fit, without) and not veto_of(tried, other, bounds=False):
                 rivals.append((tuple(other if a == name else a for a in accepted), tried))
         return rivals
+
+
+def alike(tried: Fit, fit: Fit, without: Fit) -> bool:
+    """Whether ``tried`` cannot be told from ``fit``, an explanation that both put in the place of nothing (``without``)."""
+    worth = held_out_gain(without.held_out, fit.held_out)[0]
+    lost, se = held_out_gain(tried.held_out, fit.held_out)
+    return bool(lost < TIE_Z * se or lost < TIE_SHARE * worth)
+
+
+def _differing(model: Model) -> str:
+    return model.differing.effect.name if model.differing else ""
 
 
 def problem_for(predictor: Predictor, model: Model, start: Array | None = None) -> Problem:

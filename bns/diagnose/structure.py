@@ -1,8 +1,8 @@
 """Is there anything left? What a fitted model still gets wrong, along every variable there is.
 
 For each variable a free curve (a field over the floor for the place) is added to the robot's forward, sideways and turning
-velocity, and judged as any effect is: by what it earns on trials that it was not fitted to. No physics is assumed, so
-whatever moves the robot by a rule that can be seen from outside shows here, listed or not.
+velocity, and to all three as a share of them, and judged as any effect is: by what it earns on trials that it was not
+fitted to. No physics is assumed, so whatever moves the robot by a rule that can be seen from outside shows here, listed or not.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from bns.diagnose.tracks import Array
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Body
 
-CHANNELS = ("forward_m_s", "sideways_m_s", "yaw_rad_s")
+SHARE = "share_of_motion"
+"""All three velocities in proportion: what brakes a robot forward brakes it backward and in its turns as well."""
+CHANNELS = ("forward_m_s", "sideways_m_s", "yaw_rad_s", SHARE)
 WORLD = ("east_m_s", "north_m_s")
 """Velocities in the world's frame, for what a place does to the robot."""
 KNOTS = 5
@@ -67,7 +69,9 @@ def curves(variables: Mapping[str, Array]) -> Iterator[tuple[str, list[Array]]]:
     for name, values in variables.items():
         if name in {"x_m", "y_m"}:
             continue
-        knots = np.unique(np.quantile(values[np.isfinite(values)], np.linspace(0, 1, KNOTS)).round(9))
+        # of the values that occur, however often: a variable that is nearly always zero bends where it is not
+        seen = np.unique(values[np.isfinite(values)].round(6))
+        knots = np.unique(np.quantile(seen, np.linspace(0, 1, KNOTS)))
         if len(knots) > 1:
             yield name, [np.interp(values, knots, row) for row in np.eye(len(knots))]
     if {"x_m", "y_m"} <= set(variables):
@@ -89,9 +93,11 @@ def _bumps(x: Array, y: Array, side: int) -> list[Array]:
 
 
 def nudge(channel: str, curve: Array, heading_rad: Array) -> Effect:
-    """An effect that adds ``size`` times a curve (trials, steps) to one velocity while the robot moves."""
+    """An effect that adds ``size`` times a curve (trials, steps) to one velocity while the robot moves, or to all as a share."""
 
     def apply(body: Body, size: float) -> Body:
+        if channel == SHARE:
+            return body.scaled(1 + size * curve)
         added = size * curve * body.moving
         if channel in WORLD:
             return body.with_drift(channel.removesuffix("_m_s"), added, heading_rad)
@@ -111,7 +117,7 @@ def nudge(channel: str, curve: Array, heading_rad: Array) -> Effect:
 
 def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array) -> Array:
     """Change of the whitened innovations a unit of each basis function, (frames, 3, k)."""
-    small = 1e-3 if channel == "yaw_rad_s" else 1e-4
+    small = 1e-3 if channel in {"yaw_rad_s", SHARE} else 1e-4
     out = np.empty((*fit.white.shape, len(basis)))
     for j, curve in enumerate(basis):
         changed = fit.model.with_active(nudge(channel, curve, headings), (small,))

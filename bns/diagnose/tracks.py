@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bns.measurements import COMMANDS, POSE, SESSION
+from bns.measurements import BEFORE, COMMANDS, POSE, SESSION
 
 Array = NDArray[np.float64]
+
+MOST_FRAMES = 16_000
+"""More frames than these are thinned out before a search: it takes time in proportion, and neighbours say the same."""
+RUN_UP_S = 5.0
+"""How long a robot that was in motion when its trial began is taken to have driven like that: any lag has settled."""
 
 
 @dataclass(frozen=True)
 class Tracks:
     """Trials one after the other.
 
-    ``first`` (trials + 1): where each trial's frames begin. ``t_s`` (frames,) since the trial's first row, ``pose`` (frames, 3),
+    ``first`` (trials + 1): where each trial's frames begin. ``t_s`` (frames,) since the trial's first row (in a table with the
+    columns `BEFORE`: `RUN_UP_S` more, and the speeds before are the first command), ``pose`` (frames, 3),
     all finite. ``left_m_s, right_m_s, duration_s`` (trials, commands): what was in force, back to back from the first
-    row, padded with commands of 0 s. ``extra``: further numeric columns, (frames,) each. ``start_s`` (trials,): time of
-    the session at the first row; ``start_known``: it was logged, not made up from the order of the trials.
+    row, padded with the command of the last row for 0 s. ``extra``: further numeric columns, (frames,) each.
+    ``start_s`` (trials,): time of the session at the first row; ``start_known``: it was logged, not made up from the order of
+    the trials.
     """
 
     names: tuple[str, ...]
@@ -53,20 +62,38 @@ class Tracks:
 
     def only(self, chosen: NDArray[np.int64]) -> Tracks:
         """Some of the trials, in the order of ``chosen``."""
-        frames = np.concatenate([np.arange(self.first[i], self.first[i + 1]) for i in chosen])
-        lengths = np.diff(self.first)[chosen]
+        taken = [np.arange(self.first[i], self.first[i + 1]) for i in chosen]
         return replace(
-            self,
+            self._at(taken),
             names=tuple(self.names[i] for i in chosen),
-            first=np.concatenate([[0], np.cumsum(lengths)]),
-            t_s=self.t_s[frames],
-            pose=self.pose[frames],
             left_m_s=self.left_m_s[chosen],
             right_m_s=self.right_m_s[chosen],
             duration_s=self.duration_s[chosen],
             start_s=self.start_s[chosen],
+        )
+
+    def thinned(self, every: int) -> Tracks:
+        """Every so-manieth frame of each trial, its last one too; the commands stay as they are."""
+        return self._at(
+            [np.unique(np.append(np.arange(a, b, every), b - 1)) if b > a else np.arange(a, b) for a, b in pairwise(self.first)]
+        )
+
+    def _at(self, taken: Sequence[NDArray[np.int64]]) -> Tracks:
+        """These frames, an array a trial."""
+        frames = np.concatenate(taken)
+        return replace(
+            self,
+            first=np.cumsum([0, *map(len, taken)]),
+            t_s=self.t_s[frames],
+            pose=self.pose[frames],
             extra={name: values[frames] for name, values in self.extra.items()},
         )
+
+
+def slimmed(tracks: Tracks) -> Tracks:
+    """The tracks, thinned where they have more than `MOST_FRAMES`."""
+    every = -(-len(tracks.t_s) // MOST_FRAMES)
+    return tracks.thinned(every) if every > 1 else tracks
 
 
 def tracks_of(table: pd.DataFrame) -> Tracks:
@@ -74,19 +101,20 @@ def tracks_of(table: pd.DataFrame) -> Tracks:
     groups = [rows for _, rows in table.groupby("trial", sort=False)]
     commands = [_commands(rows) for rows in groups]
     seen = [rows[list(POSE)].notna().all(axis=1).to_numpy() for rows in groups]
-    times = [(rows["t_s"] - rows["t_s"].iloc[0]).to_numpy(dtype=float) for rows in groups]
+    run_up = RUN_UP_S if set(BEFORE) <= set(table.columns) else 0.0
+    times = [(rows["t_s"] - rows["t_s"].iloc[0]).to_numpy(dtype=float) + run_up for rows in groups]
     frames = [int(mask.sum()) for mask in seen]
     start, known = _session(table, groups, times)
-    others = [name for name in table.columns if name not in {"trial", "t_s", *COMMANDS, *POSE}]
+    others = [name for name in table.columns if name not in {"trial", "t_s", *COMMANDS, *POSE, *BEFORE}]
     numeric = [name for name in others if pd.api.types.is_numeric_dtype(table[name])]
     return Tracks(
         names=tuple(str(rows["trial"].iloc[0]) for rows in groups),
         first=np.concatenate([[0], np.cumsum(frames)]).astype(np.int64),
         t_s=np.concatenate([t[mask] for t, mask in zip(times, seen, strict=True)]),
         pose=np.concatenate([g[list(POSE)].to_numpy(dtype=float)[m] for g, m in zip(groups, seen, strict=True)]),
-        left_m_s=_padded([c[0] for c in commands]),
-        right_m_s=_padded([c[1] for c in commands]),
-        duration_s=_padded([c[2] for c in commands]),
+        left_m_s=_padded([c[0] for c in commands], "edge"),
+        right_m_s=_padded([c[1] for c in commands], "edge"),
+        duration_s=_padded([c[2] for c in commands], "constant"),
         start_s=start,
         start_known=known,
         extra={
@@ -103,14 +131,17 @@ def _commands(rows: pd.DataFrame) -> tuple[Array, Array, Array]:
     changes = np.flatnonzero(np.any(np.diff(given, axis=0) != 0, axis=1)) + 1
     begins = np.concatenate([[0], changes])
     ends = np.append(t[begins[1:]], t[-1])
-    return given[begins, 0], given[begins, 1], ends - t[begins]
+    left, right, lasted = given[begins, 0], given[begins, 1], ends - t[begins]
+    if not set(BEFORE) <= set(rows.columns):
+        return left, right, lasted
+    before = np.nan_to_num(rows[list(BEFORE)].to_numpy(dtype=float)[0])
+    return np.append(before[0], left), np.append(before[1], right), np.append(RUN_UP_S, lasted)
 
 
-def _padded(rows: list[Array]) -> Array:
-    out = np.zeros((len(rows), max(map(len, rows))))
-    for row, values in zip(out, rows, strict=True):
-        row[: len(values)] = values
-    return out
+def _padded(rows: list[Array], mode: Literal["edge", "constant"]) -> Array:
+    """Rows of one length: their last value goes on, or zeros follow."""
+    width = max(map(len, rows))
+    return np.stack([np.pad(row, (0, width - len(row)), mode=mode) for row in rows])
 
 
 def _session(table: pd.DataFrame, groups: list[pd.DataFrame], times: list[Array]) -> tuple[Array, bool]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
+from bns.diagnose.horizons import HORIZONS, windows
 from bns.diagnose.predictor import Steps
 from bns.diagnose.tracks import Array, Tracks
 from bns.engine.pose_filter import followed
@@ -14,12 +17,18 @@ from bns.physics.model import Model
 from bns.physics.motion import body_motion, flow_of
 from bns.physics.signals import Conditions, View
 
+RECENT_S = 0.15
+"""How fast an event fades in the variables that say what has just happened: soon it does nothing any more."""
 _TAIL_S = 1.0
-"""The last command is taken to go on this long: poses may be stamped early."""
+"""What the last row says, a command or none, is in force this long: poses may be stamped early."""
 
 
 class WheelPredictor:
     """Drives the commands of tracks once, and answers any model with the displacement between successive frames."""
+
+    horizons: tuple[str, ...] = HORIZONS
+    near = "1s"
+    tracking: tuple[float, float] | None = None
 
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
         self.tracks = tracks
@@ -42,12 +51,20 @@ class WheelPredictor:
             body.yaw_rad_s,
             body.moving,
             tracks.trial,
-            taken_at(model, tracks.t_s),
+            taken_at(model, tracks.t_s, tracks.trial),
         )
         view = View(at[:, :3])
         for active in model.at("measure"):
             view = active.effect.apply(view, **active.by_name)
         return Steps(self._in_robot_frame(view.poses), self._drift(model, self._since_previous(at[:, 3])))
+
+    def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Back to back within each trial."""
+        return windows(self.tracks, horizon)
+
+    def scores(self) -> Mapping[str, Mapping[str, float]]:
+        """A model of wheels has but a path."""
+        return {}
 
     def variables(self) -> dict[str, Array]:
         """What the robot was told and where it was, at every step of the grid, (trials, steps)."""
@@ -68,8 +85,11 @@ class WheelPredictor:
             "time_in_trial_s": middle,
             "session_s": tracks.start_s[:, None] + middle,
             "way_m": way,
-            "left_since_reversal_s": _since_reversal(grid.left_m_s, grid.step_s),
-            "right_since_reversal_s": _since_reversal(grid.right_m_s, grid.step_s),
+            "left_change_m_s": _fresh_change(grid.left_m_s, middle - began, changed),
+            "right_change_m_s": _fresh_change(grid.right_m_s, middle - began, changed),
+            "left_reversed": _reversed(grid.left_m_s, grid.step_s),
+            "right_reversed": _reversed(grid.right_m_s, grid.step_s),
+            "just_started": np.exp(-middle / RECENT_S),
             **{name: self._seen_on_grid(name) for name in self._seen()},
         }
 
@@ -134,8 +154,7 @@ def _grid_of(tracks: Tracks, dt_s: float) -> Grid:
         node = marks[0] + np.cumsum(inner)
         lasting = np.flatnonzero(tracks.duration_s[trial] > 0)
         middle = (node[1:] + node[:-1]) / 2
-        command = np.searchsorted(ends[lasting], middle).clip(max=max(len(lasting) - 1, 0))
-        which = lasting[command] if len(lasting) else np.zeros(len(middle), dtype=np.int64)
+        which = np.append(lasting, len(ends) - 1)[np.searchsorted(ends[lasting], middle)]
         nodes.append(node)
         lefts.append(tracks.left_m_s[trial][which])
         rights.append(tracks.right_m_s[trial][which])
@@ -156,14 +175,21 @@ def _before(values: Array, changed: NDArray[np.bool_]) -> Array:
     return out
 
 
-def _since_reversal(speed: Array, step_s: Array) -> Array:
-    """Time since a wheel last changed its direction, at most 1 s, with the sign of its speed; 1 s where it never did."""
-    out, since, sign = np.empty_like(speed), np.ones(len(speed)), np.zeros(len(speed))
+def _fresh_change(speed: Array, since_s: Array, changed: NDArray[np.bool_]) -> Array:
+    """By how much a command changed, fading once it is in force."""
+    change: Array = (speed - _before(speed, changed)) * np.exp(-since_s / RECENT_S)
+    return change
+
+
+def _reversed(speed: Array, step_s: Array) -> Array:
+    """The direction of a wheel since it last turned round, fading from 1 or -1; 0 where it never did."""
+    out, fresh, sign = np.zeros_like(speed), np.zeros(len(speed)), np.zeros(len(speed))
     for k in range(speed.shape[1]):
         now = np.sign(speed[:, k])
-        since = np.where((now != 0) & (sign != 0) & (now != sign), 0.0, np.minimum(since + step_s[:, k], 1.0))
+        fresh = np.where((now != 0) & (sign != 0) & (now != sign), 1.0, fresh)
         sign = np.where(now != 0, now, sign)
-        out[:, k] = since * np.where(sign == 0, 1.0, sign)
+        half = np.exp(-step_s[:, k] / (2 * RECENT_S))
+        out[:, k], fresh = sign * fresh * half, fresh * half * half
     return out
 
 

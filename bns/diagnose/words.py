@@ -99,9 +99,30 @@ def _comparison(c: Comparison) -> Iterator[str]:
     yield f"  {'variable':30}{'velocity':16}{'share of loss':>14}{'p':>10}"
     for p in c.patterns[:_SHOWN]:
         yield f"  {p.variable:30}{p.channel:16}{p.share:14.2%}{p.evidence.p_value:10.2g}"
-    yield "\nworst trials and moments (1 s ahead):"
+    yield from _scores(c.scores)
+    yield f"\nworst trials and moments ({ahead(c.near)} ahead):"
     for w in c.worst:
         yield f"  trial {w.trial}, {w.t_s:.2f} s: {1e3 * w.position_m:.1f} mm, {57.29578 * w.heading_rad:+.1f} deg"
+
+
+def ahead(horizon: str) -> str:
+    """A horizon in words."""
+    words = {"command": "one command", "1s": "1 s", "5s": "5 s", "trial": "whole trial", "cycle": "one cycle"}
+    return words.get(horizon, horizon)
+
+
+def _scores(scores: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
+    """What each network is worth, where the model is networks of cycles."""
+    if scores:
+        yield "\nnetworks (displacements: predicted against measured; R² of the regression; mm):"
+    for name, s in scores.items():
+        if "rmse" in s:
+            yield (
+                f"  {name:12} R² {s['regression_r2']:5.2f}  slope {s['slope']:5.2f}  error {1e3 * s['rmse']:6.1f}  "
+                f"bias {1e3 * s['bias']:+6.1f}"
+            )
+        else:
+            yield f"  {name:12} " + "  ".join(f"{kind.replace('_', ' ')} {share:.0%}" for kind, share in s.items())
 
 
 def mended_text(m: Mended) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numba
+from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -97,3 +98,21 @@ def smaller(_typing, a, b):  # type: ignore[no-untyped-def]  # compiled
 def larger(_typing, a, b):  # type: ignore[no-untyped-def]  # compiled
     """The larger of two numbers, b where one of them is NaN."""
     return a(a, a), lambda _context, builder, _signature, ab: builder.select(builder.fcmp_ordered(">", *ab), *ab)
+
+
+def _copy_items(_typing, target, at, source, start, count):  # type: ignore[no-untyped-def]  # compiled
+    """As ``target[at : at + count] = source[start : start + count]`` of arrays with one axis, by memcpy: numba's own loop takes
+    twice as long over a few items. Nothing is checked, as in any kernel.
+    """
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        to, at, of, start, count = arguments
+        there, here = (context.make_array(kind)(context, builder, a) for kind, a in ((target, to), (source, of)))
+        size = context.get_abi_sizeof(context.get_data_type(target.dtype))
+        cgutils.raw_memcpy(builder, builder.gep(there.data, [at]), builder.gep(here.data, [start]), count, size)
+        return context.get_dummy_value()
+
+    return types.void(target, types.intp, source, types.intp, types.intp), generate
+
+
+copy_items: Any = intrinsic(_copy_items)

@@ -45,6 +45,10 @@ class PatternSet:
         self.present[:, self.count : new] = True if present is None else present
         self.count = new
 
+    def in_use(self) -> np.ndarray:
+        """A copy of the inputs so far, (inputs, count)."""
+        return self.inputs[:, : self.count].copy()
+
     def merged(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """For each network its distinct patterns: inputs (inputs, m), mean target (m,), how many each stands for (m,); float32.
 

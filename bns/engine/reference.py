@@ -18,6 +18,8 @@ from bns.engine.snn import INPUTS, PER_NEURON
 
 _WORD = 2**32
 Words = tuple[int, int, int, int]
+_Numbered = tuple[np.ndarray, np.ndarray]
+"""Commands of one controller and their numbers, counted through all parents."""
 
 
 def philox4x32_10(counter: Words, key: tuple[int, int]) -> Words:
@@ -155,29 +157,29 @@ def breed(
     bounds: CommandBounds,
     shortest: int,
     generation: int,
-) -> tuple[list[np.ndarray], int]:
-    """The children as lists of commands, (length, 3) float32 each, and how many were cut at the longest list allowed."""
+) -> tuple[list[np.ndarray], list[np.ndarray], int]:
+    """The children as lists of commands, (length, 3) float32 each; their origins, (length,) each; how many were cut short."""
     capacity = parents.commands.shape[1]
     old = [parents.controller(i) for i in range(len(parents))]
-    children = [old[order[0]]]
+    numbers = np.split(np.arange(parents.lengths.sum()), np.cumsum(parents.lengths)[:-1])
+    families = [(old[order[0]], numbers[order[0]])]
     for pair in range(len(parents) // 2):
-        a, b = _parents(key, old, order, cdf, generation, pair)
-        cut_a, cut_b = _cuts(key, len(a), len(b), generation, pair)
-        children += [_crossed(a, b, cut_a, cut_b, shortest), _crossed(b, a, cut_b, cut_a, shortest)]
-    children = children[: len(parents)]
-    hits = sum(len(child) > capacity for child in children)
-    children = [child[:capacity].copy() for child in children]
-    for i, child in enumerate(children[1:], start=1):
-        _mutate(key, child, i, rate, bounds, generation)
-    return children, hits
+        first, second = _parents(key, order, cdf, generation, pair)
+        a, b = (old[first], numbers[first]), (old[second], numbers[second])
+        cut_a, cut_b = _cuts(key, len(a[0]), len(b[0]), generation, pair)
+        families += [_crossed(a, b, cut_a, cut_b, shortest), _crossed(b, a, cut_b, cut_a, shortest)]
+    families = families[: len(parents)]
+    hits = sum(len(child) > capacity for child, _ in families)
+    families = [(child[:capacity].copy(), origin[:capacity].copy()) for child, origin in families]
+    for i, (child, origin) in enumerate(families[1:], start=1):
+        _mutate(key, child, origin, i, rate, bounds, generation)
+    return [child for child, _ in families], [origin for _, origin in families], hits
 
 
-def _parents(
-    key: Key, old: list[np.ndarray], order: list[int], cdf: np.ndarray, generation: int, pair: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _parents(key: Key, order: list[int], cdf: np.ndarray, generation: int, pair: int) -> tuple[int, int]:
     words = draw(key, Purpose.PARENTS, generation, pair, 0)
     first, second = (next((r for r, p in enumerate(cdf) if word / _WORD < p), len(cdf) - 1) for word in words[:2])
-    return old[order[first]], old[order[second]]
+    return order[first], order[second]
 
 
 def _cuts(key: Key, length_a: int, length_b: int, generation: int, pair: int) -> tuple[int, int]:
@@ -188,12 +190,19 @@ def _cuts(key: Key, length_a: int, length_b: int, generation: int, pair: int) ->
     return first * (length_a + 1) // _WORD, second * (length_b + 1) // _WORD
 
 
-def _crossed(front: np.ndarray, back: np.ndarray, cut_front: int, cut_back: int, shortest: int) -> np.ndarray:
-    child = np.concatenate([front[:cut_front], back[cut_back:]])
-    return child if len(child) >= shortest else back
+def _crossed(front: _Numbered, back: _Numbered, cut_front: int, cut_back: int, shortest: int) -> _Numbered:
+    if cut_front + len(back[0]) - cut_back < shortest:
+        return back
+    child, origin = (np.concatenate([f[:cut_front], b[cut_back:]]) for f, b in zip(front, back, strict=True))
+    before, before_back = front[0][:cut_front][-1:, :2], back[0][:cut_back][-1:, :2]
+    if cut_back < len(back[0]) and not np.array_equal(before, before_back):
+        origin[cut_front] = -1
+    return child, origin
 
 
-def _mutate(key: Key, child: np.ndarray, index: int, rate: float, bounds: CommandBounds, generation: int) -> None:
+def _mutate(
+    key: Key, child: np.ndarray, origin: np.ndarray, index: int, rate: float, bounds: CommandBounds, generation: int
+) -> None:
     threshold = int(rate * _WORD)
     for j in range(len(child)):
         words = draw(key, Purpose.MUTATION, generation, index, j)
@@ -201,6 +210,8 @@ def _mutate(key: Key, child: np.ndarray, index: int, rate: float, bounds: Comman
             if words[c] < threshold:
                 move = np.float32((2.0 * words[c] / threshold - 1.0) * float(bounds.mutation_span[c]))
                 child[j, c] = min(max(child[j, c] + move, bounds.low[c]), bounds.high[c])
+                origin[j] = -1
+                origin[j + 1 : j + 2] = origin[j + 1 : j + 2] if c == 2 else -1  # the duration is not told to the next
 
 
 def diversity(population: Population, bounds: CommandBounds) -> float:

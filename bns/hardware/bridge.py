@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import termios
 from collections.abc import Sequence
+from contextlib import suppress
+
+import serial
 
 from bns.errors import HardwareError
 from bns.hardware.ax12_table import CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
@@ -13,6 +16,7 @@ from bns.hardware.bridge_frames import (
     GOAL,
     HELLO,
     MOVE,
+    NO_ANSWER,
     SERVO,
     STATE,
     STOP,
@@ -22,26 +26,29 @@ from bns.hardware.bridge_frames import (
     encoded,
 )
 from bns.hardware.clock import Clock
-from bns.hardware.dynamixel import Health, ServoError
 from bns.hardware.journal import Journal
 from bns.hardware.serial_link import open_port
+from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
 
 BAUD = 115200
 ATTEMPTS = 6
 _TIMEOUT_S = 0.15
 _BETWEEN_S = 0.02
+_STARTING_S = 3.0
 
 
 class BridgeChain:
     """Driver of `count` servos behind a bridge. Opening checks the bridge's version and how many servos it has found."""
 
-    def __init__(self, port: str, count: int, clock: Clock, journal: Journal) -> None:
+    def __init__(self, port: str, count: int, clock: Clock, journal: Journal, limits: ServoLimits | None = None) -> None:
         self._clock, self._journal, self.count = clock, journal, count
+        self.limits = limits or ServoLimits()
         self._sequence, self.retries = 0, 0
-        self._serial = open_port(port, BAUD)
+        self._port = port
+        self._serial: serial.Serial | None = open_port(port, BAUD)
         try:
-            version, found = self._ask(HELLO, b"", 2)
+            version, found = self._greeted()
         except ServoError as error:
             self.close()
             raise HardwareError(f"no bridge answers at {port} ({error}). Is its sketch loaded, is it powered?") from error
@@ -52,13 +59,24 @@ class BridgeChain:
                 "needed. Load the sketch of this bns; check cables and ids."
             )
 
+    def _greeted(self) -> bytes:
+        """Version and number of servos; an Arduino begins anew when its port is opened, and is deaf meanwhile."""
+        began_s = self._clock.now_s()
+        while True:
+            try:
+                return self._ask(HELLO, b"", 2)
+            except ServoError:
+                if self._clock.now_s() - began_s > _STARTING_S:
+                    raise
+
     def close(self) -> None:
         """Give the port free."""
-        self._serial.close()
+        if self._serial is not None:
+            self._serial.close()
 
-    def arm(self, torque: float = 0.8) -> None:
-        """Torque on where the joints are, grown in steps by the bridge up to the share `torque`."""
-        self._ask(ARM, bytes([round(100 * torque)]), 0)
+    def arm(self) -> None:
+        """Torque on where the joints are, grown in steps by the bridge up to the limits' share of it."""
+        self._ask(ARM, bytes([round(100 * self.limits.torque)]), 0)
 
     def move(self, angles_rad: Sequence[float], speeds_rad_s: Sequence[float]) -> list[float]:
         """Set goals and speeds; the angles that the bridge has set, after clipping."""
@@ -69,28 +87,38 @@ class BridgeChain:
         return [(goal - CENTRE) * RAD_PER_STEP for goal, _ in GOAL.iter_unpack(answer)]
 
     def health(self) -> dict[int, Health]:
-        """What every servo says, by its place from 1; ServoError if one reports an alarm."""
+        """What every servo says, by its place from 1; ServoError if one reports an alarm or is beyond its limits."""
         found = {}
         for place, (position, load, celsius, decivolts, bits) in enumerate(SERVO.iter_unpack(self._state()), 1):
+            if bits & NO_ANSWER:
+                raise ServoError(f"servo {place} does not answer the bridge")
             if bits:
                 raise ServoError(f"servo {place}: {', '.join(errors_in(bits))}")
             share = (load & 1023) / 1023 * (-1 if load & 1024 else 1)
             found[place] = Health((position - CENTRE) * RAD_PER_STEP, share, decivolts / 10, float(celsius))
+        self.limits.check(found)
         return found
 
     def stop(self, patience_s: float = 5.0) -> Stop:
-        """Torque off; confirmed when the bridge has read back that every servo is off and still. Never raises."""
-        began_s, problem = self._clock.now_s(), ""
+        """Torque off; confirmed when every servo has read it back, and no joint moves between two looks. Never raises."""
+        began_s, acknowledged_s = self._clock.now_s(), None
+        places: list[int] = []
         while True:
+            before = places
             try:
-                moving = int.from_bytes(self._ask(STOP, b"", 2), "little")
-                problem = f"servos {[i + 1 for i in range(16) if moving >> i & 1]} did not stop"
-                if not moving:
-                    return self._stopped(Stop(True, self._clock.now_s() - began_s, self._clock.now_s() - began_s))
+                left, places = int.from_bytes(self._ask(STOP, b"", 2), "little"), []
+                problem = f"servos {[i + 1 for i in range(16) if left >> i & 1]} did not stop"
+                if not left:
+                    acknowledged_s = acknowledged_s or self._clock.now_s() - began_s
+                    places, problem = [position for position, *_ in SERVO.iter_unpack(self._state())], "the joints still move"
             except ServoError as error:
                 problem = str(error)
-            if self._clock.now_s() - began_s > patience_s:
-                return self._stopped(Stop(False, self._clock.now_s() - began_s, None, problem))
+            lasted_s = self._clock.now_s() - began_s
+            still = bool(places) and len(before) == len(places)
+            if still and all(abs(a - b) <= STILL_STEPS for a, b in zip(places, before, strict=True)):
+                return self._stopped(Stop(True, lasted_s, acknowledged_s))
+            if lasted_s > patience_s:
+                return self._stopped(Stop(False, lasted_s, acknowledged_s, problem))
             self._clock.sleep(_BETWEEN_S)
 
     def _state(self) -> bytes:
@@ -108,14 +136,23 @@ class BridgeChain:
             self._sequence = (self._sequence + 1) % 256
             try:
                 answer = self._once(Frame(kind, self._sequence, payload))
-            except (OSError, termios.error) as error:
+            except (OSError, termios.error, HardwareError) as error:
+                self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             if answer is not None and answer.kind == kind | ANSWER and len(answer.payload) == size:
                 return answer.payload
             problem = "no answer" if answer is None else f"the answer was {answer}"
         raise ServoError(f"bridge: {problem}; asked {ATTEMPTS} times")
 
+    def _lose(self, error: Exception) -> None:
+        self._journal.note("link-lost", port=self._port, error=str(error))
+        with suppress(OSError, termios.error):
+            self.close()
+        self._serial = None
+
     def _once(self, frame: Frame) -> Frame | None:
+        if self._serial is None:  # it had vanished, and may be back
+            self._serial = open_port(self._port, BAUD)
         self._serial.reset_input_buffer()
         in_vain = self._clock.in_vain(_TIMEOUT_S)
         self._journal.note("sent", data=encoded(frame).hex())

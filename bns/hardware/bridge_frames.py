@@ -10,6 +10,10 @@ HELLO, ARM, MOVE, STATE, STOP = 1, 2, 3, 4, 5
 ANSWER = 0x80
 REFUSED = 0x7F
 VERSION = 1
+NO_ANSWER = 0x80
+"""In a servo's error byte: it did not answer the bridge."""
+TORN_S = 0.05
+"""Bytes whose frame's rest has not come for so long are passed over, one after the other."""
 WATCHDOG_S = 0.5
 """A bridge that hears no whole frame for so long takes the torque off by itself."""
 LONGEST = 255

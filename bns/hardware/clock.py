@@ -29,6 +29,9 @@ class Clock(Protocol):
     def in_vain(self, seconds: float) -> Callable[[], bool]:
         """Begin to wait for an answer; call what is returned to learn whether it is in vain to wait on."""
 
+    def arrived(self) -> None:
+        """Something that comes unasked (a frame) has come."""
+
 
 class RealClock:
     """The computer's steady clock."""
@@ -49,6 +52,9 @@ class RealClock:
         end_s = self.now_s() + seconds
         return lambda: self.now_s() > end_s
 
+    def arrived(self) -> None:
+        """Nothing to do."""
+
 
 class EmulatedClock:
     """Time that passes only when somebody waits; `speed` seconds of it pass in one of the computer's (inf: at once)."""
@@ -58,6 +64,9 @@ class EmulatedClock:
         self._now_s, self._owed_s = 0.0, 0.0
         self._silences = 0
         self._lock = threading.Lock()
+        self.arrivals = threading.Condition()
+        """Notified of everything that `arrived`; `arrived_count` is how much that was."""
+        self.arrived_count = 0
         self.listeners: list[Callable[[float], None]] = []
         """Emulated devices that act by themselves as time goes on; called with the new time."""
 
@@ -98,3 +107,9 @@ class EmulatedClock:
         """An emulated device heard something and will not answer it."""
         with self._lock:
             self._silences += 1
+
+    def arrived(self) -> None:
+        """Let an emulated device know that what it sent was taken: time goes on only then."""
+        with self.arrivals:
+            self.arrived_count += 1
+            self.arrivals.notify_all()

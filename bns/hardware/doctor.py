@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,12 +15,17 @@ from bns.errors import HardwareError
 from bns.hardware.clock import Clock
 from bns.hardware.journal import Journal
 from bns.hardware.khepera import BAUD, KheperaIII, RobotLostError, check_battery
+from bns.hardware.platforms.snake import open_chain
 from bns.hardware.rig import Rig
 from bns.hardware.serial_link import SerialLink
+from bns.hardware.servo_chain import ServoError
+from bns.hardware.snake_settings import snake_settings
 from bns.hardware.tracking.calibration import WORST_RMS_PX, load_calibration
 from bns.hardware.tracking.kinds import open_tracker
 
 _SLOW_LATENCY_MS = 1
+_STRAIGHT_RAD = 0.17
+_CABLES = "check the cables between the servos and the supply"
 
 
 @dataclass(frozen=True)
@@ -81,10 +87,34 @@ def cameras(devices: Path) -> Iterator[Finding]:
 
 
 def robot_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
-    """Firmware, speeds and battery of a Khepera at the rig's port."""
-    if rig.robot != "khepera":
+    """What the robot at the rig's port says of itself."""
+    if rig.robot not in _ROBOTS:
         yield Finding(True, f"the robot {rig.robot} is examined when its driver opens it")
         return
+    yield from _ROBOTS[rig.robot](rig, clock)
+
+
+def servos_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
+    """Whether all servos of a snake are there and fit; nothing moves."""
+    settings = snake_settings(rig.driver)
+    chain = open_chain(rig.port, settings, clock, Journal(None, clock))
+    try:
+        found = chain.health()
+        volts, hottest = min(h.voltage_v for h in found.values()), max(h.temperature_c for h in found.values())
+        yield Finding(True, f"{len(found)} servos answer ({settings.wiring}), {volts:.1f} V or more, {hottest:.0f} °C or less")
+        number, bent = max(found.items(), key=lambda item: abs(item[1].position_rad))
+        angle = f"servo {number} is bent most, by {abs(math.degrees(bent.position_rad)):.0f}°"
+        straight = abs(bent.position_rad) <= _STRAIGHT_RAD
+        yield Finding(straight, angle, "" if straight else "lay the robot straight; check how that servo's horn is mounted")
+        yield Finding(not chain.retries, f"{chain.retries} questions had to be asked again", _CABLES if chain.retries else "")
+    except ServoError as error:
+        raise HardwareError(f"{error}. Try: {_CABLES}") from error
+    finally:
+        chain.close()
+
+
+def khepera_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
+    """Firmware, speeds and battery of a Khepera."""
     journal = Journal(None, clock)
     link = SerialLink(rig.port, BAUD, clock, journal)
     try:
@@ -102,6 +132,9 @@ def robot_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
         raise HardwareError(f"the robot stopped answering: {error}. Bring it nearer, charge it.") from error
     finally:
         link.close()
+
+
+_ROBOTS: Mapping[str, Callable[[Rig, Clock], Iterator[Finding]]] = {"khepera": khepera_of, "snake": servos_of}
 
 
 def tracker_of(rig: Rig, clock: Clock) -> Iterator[Finding]:

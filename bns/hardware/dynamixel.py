@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+import struct
 import termios
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
 
-from dynamixel_sdk import COMM_SUCCESS, GroupSyncWrite, PacketHandler, PortHandler
+from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler
 
 from bns.errors import HardwareError
-from bns.hardware.ax12_table import CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
+from bns.hardware.ax12_table import BROADCAST, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
 from bns.hardware.clock import Clock
+from bns.hardware.dynamixel_port import ClockedPort
 from bns.hardware.journal import Journal
+from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
 
 BAUD = 1_000_000
@@ -20,58 +23,7 @@ ATTEMPTS = 6
 _AX12 = 12
 _BETWEEN_S = 0.02
 _GOAL = REGISTERS["goal_position"]
-
-
-class ServoError(Exception):
-    """A servo that does not answer, or answers with an alarm."""
-
-
-class ClockedPort(PortHandler):
-    """The SDK's port, with time-outs on the trial's clock."""
-
-    def __init__(self, port: str, clock: Clock) -> None:
-        super().__init__(port)
-        self._clock = clock
-        self._silent: Callable[[], bool] = lambda: False
-        self._late: Callable[[], bool] = lambda: False
-
-    def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802  # the SDK's name
-        """As the SDK has it: the time of the bytes, twice the adapter's latency, and a little."""
-        super().setPacketTimeout(packet_length)
-        self._late = self._clock.in_vain(self.packet_timeout / 1000.0)
-
-    def clearPort(self) -> None:  # noqa: N802  # the SDK's name
-        """Throw away what came too late; the SDK's own only waits until everything is sent."""
-        self.ser.reset_input_buffer()
-        self._silent = self._clock.in_vain(math.inf)  # from before the question on: an answer can be quick
-
-    def isPacketTimeout(self) -> bool:  # noqa: N802  # the SDK's name
-        """Whether to give up."""
-        late = self._late()
-        if self._silent() and not late:
-            self._clock.waited(self.packet_timeout / 1000.0)
-        return late or self._silent()
-
-
-@dataclass(frozen=True)
-class Health:
-    """What a servo says of itself; load is a share of the highest torque, with the sign of its direction."""
-
-    position_rad: float
-    load: float
-    voltage_v: float
-    temperature_c: float
-
-
-@dataclass(frozen=True)
-class ServoLimits:
-    """What a servo must keep while it works; `torque` is the share of the highest that it is given."""
-
-    temperature_c: float = 65.0
-    low_v: float = 9.0
-    high_v: float = 13.0
-    load: float = 0.95
-    torque: float = 0.8
+_PRESENT = struct.Struct("<HHHBB")
 
 
 class Ax12Chain:
@@ -126,11 +78,13 @@ class Ax12Chain:
         for attempt in range(ATTEMPTS):
             self.retries += attempt > 0
             try:
+                self._reopen()
                 value, result, bits = call()
             except IndexError:  # the SDK reads past the end of a status packet that is too short
-                value, result, bits = 0, -3001, 0
+                value, result, bits = 0, COMM_RX_CORRUPT, 0
                 problem = "corrupt status packet"
             except (OSError, termios.error) as error:
+                self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             finally:
                 self._port.is_using = False  # an exchange broken off leaves it set, and every later call fails
@@ -144,7 +98,19 @@ class Ax12Chain:
 
     def close(self) -> None:
         """Give the port free."""
-        self._port.closePort()
+        if self._port.is_open:
+            self._port.closePort()
+
+    def _lose(self, error: Exception) -> None:
+        self._journal.note("link-lost", port=self._port.port_name, error=str(error))
+        with suppress(OSError, termios.error):
+            self.close()
+        self._port.is_open = False
+
+    def _reopen(self) -> None:
+        """A port that has vanished (an adapter that was unplugged) is tried again at every exchange."""
+        if not self._port.is_open:
+            self._port.setBaudRate(BAUD)
 
     def arm(self) -> None:
         """Torque on without a jerk: the goal is where the joint is, and the torque grows in steps to its limit."""
@@ -191,25 +157,25 @@ class Ax12Chain:
     def health(self) -> Mapping[int, Health]:
         """What every servo says; ServoError if one is beyond its limits."""
         found = {number: self._health(number) for number in self.ids}
-        for number, h in found.items():
-            low, high = self.limits.low_v, self.limits.high_v
-            if h.temperature_c > self.limits.temperature_c:
-                limit_c = self.limits.temperature_c
-                raise ServoError(f"servo {number} is at {h.temperature_c:.0f} °C; let it cool below {limit_c:g}")
-            if not low <= h.voltage_v <= high:
-                raise ServoError(f"servo {number} has {h.voltage_v:.1f} V, not {low:g} to {high:g}; see to the supply")
-            if abs(h.load) > self.limits.load:
-                raise ServoError(f"servo {number} is loaded with {abs(h.load):.0%} of its torque; is it stuck?")
+        self.limits.check(found)
         return found
 
-    def _health(self, number: int) -> Health:
-        load = self.read(number, "present_load")
-        return Health(
-            (self.read(number, "present_position") - CENTRE) * RAD_PER_STEP,
-            (load & 1023) / 1023 * (-1 if load & 1024 else 1),
-            self.read(number, "present_voltage") / 10,
-            float(self.read(number, "present_temperature")),
-        )
+    def _health(self, number: int, alarms: bool = False) -> Health:
+        """One exchange for all of it: the registers stand side by side."""
+        return told(self._block(number, "present_position", "present_temperature", alarms))
+
+    def _block(self, number: int, first: str, last: str, alarms: bool = False) -> bytes:
+        """The registers from `first` to `last`."""
+        start, end = REGISTERS[first].address, REGISTERS[last].address + REGISTERS[last].size
+        found: list[bytes] = []
+
+        def call() -> tuple[int, int, int]:
+            data, result, bits = self._packets.readTxRx(self._port, number, start, end - start)
+            found[:] = [bytes(data)]
+            return 0, result if result != COMM_SUCCESS or len(data) == end - start else COMM_RX_CORRUPT, bits
+
+        self._checked(number, f"read {first} to {last}", call, alarms)
+        return found[0]
 
     def recover(self, number: int) -> None:
         """After an overload shutdown, when its cause is gone: the torque limit is written again, and no alarm may be left."""
@@ -217,24 +183,44 @@ class Ax12Chain:
         self.read(number, "present_position")
 
     def stop(self, patience_s: float = 5.0) -> Stop:
-        """Torque off, confirmed by every servo: torque reads 0 and nothing moves. Never raises."""
-        began_s, open_ = self._clock.now_s(), self._not_stopped(self.ids)
-        while open_ and self._clock.now_s() - began_s <= patience_s:
+        """Torque off, confirmed by every servo: torque reads 0, and no joint moves from one look to the next. Never raises."""
+        began_s, places = self._clock.now_s(), dict[int, int]()
+        acknowledged_s, self._port.is_using = None, False
+        with suppress(OSError, termios.error):  # to all at once; the rounds below see to those that did not hear it
+            self._reopen()
+            self._packets.write1ByteTxOnly(self._port, BROADCAST, REGISTERS["torque_enable"].address, 0)
+        while True:
+            left = {number: why for number in self.ids if (why := self._not_still(number, places))}
+            lasted_s = self._clock.now_s() - began_s
+            if acknowledged_s is None and len(places) == len(self.ids):
+                acknowledged_s = lasted_s
+            if not left or lasted_s > patience_s:
+                break
             self._clock.sleep(_BETWEEN_S)
-            open_ = self._not_stopped(tuple(open_))
-        lasted_s = self._clock.now_s() - began_s
-        stop = Stop(not open_, lasted_s, None if open_ else lasted_s, "; ".join(open_.values()))
+        stop = Stop(not left, lasted_s, acknowledged_s, "; ".join(left.values()))
         self._journal.note("stop", confirmed=stop.confirmed, seconds=stop.seconds, problem=stop.problem)
         return stop
 
-    def _not_stopped(self, ids: Sequence[int]) -> dict[int, str]:
-        """Take the torque off these servos; those that did not confirm it, and why."""
-        found = {}
-        for number in ids:
-            try:
+    def _not_still(self, number: int, places: dict[int, int]) -> str:
+        """Take the torque off a servo; why it does not stand still yet, or nothing. `places`: where those that are off were."""
+        try:
+            if number not in places:
                 self.write(number, "torque_enable", 0, alarms=True)
-                if any(self.read(number, name, alarms=True) for name in ("torque_enable", "moving")):
-                    found[number] = f"servo {number} still moves"
-            except ServoError as error:
-                found[number] = str(error)
-        return found
+            block = self._block(number, "torque_enable", "present_position", alarms=True)
+        except ServoError as error:
+            places.pop(number, None)
+            return str(error)
+        if block[0]:
+            places.pop(number, None)
+            return f"servo {number} still has its torque on"
+        before, places[number] = places.get(number), int.from_bytes(block[-2:], "little")
+        still = before is not None and abs(places[number] - before) <= STILL_STEPS
+        return "" if still else f"servo {number} still moves"
+
+
+def told(block: bytes) -> Health:
+    """What the registers from `present_position` to `present_temperature` say."""
+    position, _speed, load, decivolts, celsius = _PRESENT.unpack(block)
+    return Health(
+        (position - CENTRE) * RAD_PER_STEP, (load & 1023) / 1023 * (-1 if load & 1024 else 1), decivolts / 10, float(celsius)
+    )

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
 from typing import Any, Protocol
@@ -20,9 +20,10 @@ from bns.hardware.stop import Stop
 class Driven:
     """What a controller became on the robot.
 
-    commands (k, components): those carried out to their end, with what was really sent and how long it really lasted;
-    poses (k + 1, 3): tracked, in the world frame, headings unwrapped, the first at the start, the others at the end of each
-    command; rows: measurements, a row a look; ended: why it was over before its end, or nothing; seconds it took.
+    commands (k, components): those carried out, with what was really sent and how long it really lasted; poses (k + 1,
+    columns): as the robot's module has them, tracked, in the world frame, the first at the start, the others at the end of each
+    command; rows: measurements, a row a look; ended: why it was over before its end, or nothing; seconds it took; spans_s: when
+    each command was under way, of a robot whose commands can be unstable.
     """
 
     commands: np.ndarray
@@ -31,7 +32,7 @@ class Driven:
     stop: Stop
     ended: str = ""
     seconds: float = 0.0
-    readings: Mapping[str, float] = field(default_factory=dict)
+    spans_s: Sequence[tuple[float, float]] = ()
 
 
 class Platform(Protocol):
@@ -65,6 +66,9 @@ class Emulation(Protocol):
 
     def put_down(self, pose: np.ndarray) -> None:
         """What an operator would do: place the robot at a pose (3,)."""
+
+    def unstable_between(self, begin_s: float, end_s: float) -> bool:
+        """Whether somebody who watched would call what the robot did in that time unstable."""
 
     def close(self) -> None:
         """Take it away."""

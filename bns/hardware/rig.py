@@ -15,7 +15,7 @@ import yaml
 from bns.errors import HardwareError, unknown_name
 from bns.hardware.safety import Limits, Surface
 
-_KEYS = ("robot", "port", "surface_m", "tracker", "lost_s", "late_s", "placed_within_m", "driver")
+_KEYS = ("robot", "port", "surface_m", "tracker", "lost_s", "late_s", "placed_within_m", "placed_within_rad", "driver")
 _NEEDED = ("robot", "port", "surface_m", "tracker")
 
 
@@ -23,7 +23,7 @@ _NEEDED = ("robot", "port", "surface_m", "tracker")
 class Rig:
     """A set-up. `tracker` has a `kind` and that kind's own settings, `driver` the settings of the robot's driver.
 
-    A robot further than `placed_within_m` from its start is put back before it drives.
+    A robot further than `placed_within_m` from its start, or turned by more than `placed_within_rad`, is put back before a drive.
     """
 
     robot: str
@@ -32,6 +32,7 @@ class Rig:
     limits: Limits
     placed_within_m: float = 0.1
     driver: Mapping[str, Any] = field(default_factory=dict)
+    placed_within_rad: float = math.pi
 
     def check_task(self, goals_m: np.ndarray) -> None:
         """HardwareError if a goal lies off the surface."""
@@ -93,7 +94,11 @@ def _rig(content: Mapping[str, Any], where: str) -> Rig:
     numbers = {name: _positive(where, name, content[name]) for name in ("lost_s", "late_s") if name in content}
     limits = Limits(_surface(where, content["surface_m"]), **numbers)
     near_m = _positive(where, "placed_within_m", content.get("placed_within_m", 0.1))
-    return Rig(str(content["robot"]), str(content["port"]), tracker, limits, near_m, content.get("driver") or {})
+    near_rad = _positive(where, "placed_within_rad", content.get("placed_within_rad", math.pi))
+    driver = content.get("driver") or {}
+    if not isinstance(driver, dict):
+        raise HardwareError(f"{where}: driver is {driver!r}; it holds the settings of the robot's driver, name: value.")
+    return Rig(str(content["robot"]), str(content["port"]), tracker, limits, near_m, driver, near_rad)
 
 
 def _surface(where: str, given: Any) -> Surface:

@@ -21,6 +21,10 @@ class DriveEnded(Exception):  # noqa: N818  # no error: the robot is stopped, wh
     """The drive is over before its commands are; the message says why. The trial goes on."""
 
 
+class OutOfSight(DriveEnded):
+    """The tracker does not see the robot any more."""
+
+
 @dataclass(frozen=True)
 class Surface:
     """The part of the floor that the robot may be on, m, in the world frame."""
@@ -68,7 +72,7 @@ class Watch:
             if not self._limits.surface.holds(x_m, y_m):
                 raise DriveEnded(f"the robot left the surface at ({x_m:.2f}, {y_m:.2f}) m")
         if now_s - self._seen_s > self._limits.lost_s:
-            raise DriveEnded(f"the tracker has not seen the robot for {now_s - self._seen_s:.1f} s")
+            raise OutOfSight(f"the tracker has not seen the robot for {now_s - self._seen_s:.1f} s")
 
 
 class Stopping:

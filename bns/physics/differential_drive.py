@@ -6,9 +6,10 @@ Nothing is drawn here: jitter and noise come in as standard normal numbers from 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from bns.errors import ModelError
 from bns.physics.grid import Grid, step_grid
@@ -118,11 +119,17 @@ def _nodes(model: Model, grid: Grid, start: Array, place: Array | None) -> Array
     return np.stack([x, y, driven.heading_rad], axis=2)
 
 
-def taken_at(model: Model, stamped_s: Array) -> Array:
-    """When poses stamped so were really taken: the ``clock`` effects."""
+def taken_at(model: Model, stamped_s: Array, trial: NDArray[np.int64] | None = None) -> Array:
+    """When poses stamped so were really taken: the ``clock`` effects.
+
+    ``trial``: of which trial each stamp is, where the trials' own clocks are to count.
+    """
     stamps = Stamps(stamped_s)
     for active in model.at("clock"):
-        stamps = active.effect.apply(stamps, **active.by_name)
+        values: dict[str, Any] = dict(active.by_name)
+        if active.own and trial is not None:
+            values = dict.fromkeys(values, np.array(active.own)[trial])
+        stamps = active.effect.apply(stamps, **values)
     return stamps.t_s
 
 

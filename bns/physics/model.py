@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -28,7 +28,7 @@ _TOP = ("base", "wheelbase_m", "dt_s", "jitter", "noise", "effects", "provenance
 _GROUPS: Mapping[str, tuple[str, ...]] = {"jitter": ("wheel_speed_relative",), "noise": ("position_m", "heading_rad")}
 _WHY = ("basis", "reason")
 _EFFECT_KEYS = ("name", "values", *_WHY)
-_EFFECT_MAY = ("units", "intervals", "term", "on", "file")
+_EFFECT_MAY = ("units", "intervals", "term", "on", "file", "per_trial")
 
 LIMITS: Mapping[str, tuple[float, float]] = {
     "wheelbase_m": (1e-3, 10.0),
@@ -52,6 +52,10 @@ class ActiveEffect:
     """Parameter name -> 95 % interval, where one is known."""
     written: Mapping[str, str] = field(default_factory=dict)
     """How an effect that is not in the catalogue is written down: term and on, or file."""
+    per_trial: bool = False
+    """Has every trial a value of its own? ``values`` then hold the mean, which stands for trials yet to come."""
+    own: tuple[float, ...] = ()
+    """Each trial's value, in the order of the trials at hand; empty while none is known. A matter of data: never written down."""
 
     @property
     def by_name(self) -> dict[str, float]:
@@ -91,6 +95,11 @@ class Model:
                 raise ModelError(f"model {self.name} has the effect {name!r} twice; keep one of them.")
         for active in self.effects:
             active.effect.checked(active.by_name)
+            if active.per_trial and not active.effect.may_differ:
+                raise ModelError(
+                    f"model {self.name}: {active.effect.name} has one value for all trials; per_trial goes with "
+                    f"{_join([e.name for e in all_effects().values() if e.may_differ])} alone."
+                )
 
     def at(self, stage: str) -> Iterator[ActiveEffect]:
         """The effects of one stage, in order."""
@@ -115,6 +124,18 @@ class Model:
         if all(a.effect.name != name for a in self.effects):
             return replace(self, effects=(*self.effects, active))
         return replace(self, effects=tuple(active if a.effect.name == name else a for a in self.effects))
+
+    @property
+    def differing(self) -> ActiveEffect | None:
+        """The effect that has another value in every trial; None if there is none."""
+        return next((active for active in self.effects if active.per_trial), None)
+
+    def with_own(self, own: Iterable[float]) -> Model:
+        """The model with these values of its `differing` effect, one a trial; their mean stands for other trials."""
+        values = tuple(float(v) for v in own)
+        mean = (sum(values) / len(values),)
+        changed = tuple(replace(a, values=mean, own=values) if a.per_trial else a for a in self.effects)
+        return replace(self, effects=changed)
 
     def with_values(self, values: Mapping[str, Mapping[str, float]]) -> Model:
         """The model with other values of effects that are switched on; bounds are the caller's business."""
@@ -212,7 +233,14 @@ def _effect(model: str, entry: Any, folder: Path) -> ActiveEffect:
         *_why(f"{effect.name} in model {model}", keys),
         intervals={name: (float(low), float(high)) for name, (low, high) in intervals.items()},
         written=written,
+        per_trial=_flag(f"per_trial of {effect.name} in model {model}", keys.get("per_trial", False)),
     )
+
+
+def _flag(where: str, value: object) -> bool:
+    if not isinstance(value, bool):
+        raise ModelError(f"{where} is {value!r}; it must be true or false.")
+    return value
 
 
 def _written_effect(where: str, name: str, written: Mapping[str, str], folder: Path) -> Effect:

@@ -77,6 +77,15 @@ class Body:
         """Something added to the velocity of that name."""
         return replace(self, **{velocity: getattr(self, velocity) + values})
 
+    def scaled(self, factor: Array) -> Body:
+        """All velocities times a factor, (batch, steps)."""
+        return replace(
+            self,
+            forward_m_s=self.forward_m_s * factor,
+            sideways_m_s=self.sideways_m_s * factor,
+            yaw_rad_s=self.yaw_rad_s * factor,
+        )
+
     def with_drift(self, direction: str, values: Array, heading_rad: Array) -> Body:
         """Something added to the velocity ``east`` or ``north`` of a robot that heads so."""
         cos, sin = np.cos(heading_rad), np.sin(heading_rad)

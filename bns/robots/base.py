@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
+import pandas as pd
 
-from bns.engine.evolution import CommandBounds, Population
-from bns.engine.philox import Key
 from bns.tasks import Task
+
+if TYPE_CHECKING:  # whoever only asks for the robots' names does not wait for the compiler
+    from bns.engine.evolution import CommandBounds, Population
+    from bns.engine.philox import Key
 
 
 class Scores(NamedTuple):
     """Per controller: fitness (n,), 0 where the arithmetic failed; goals reached (n,); how many failed; and, where a robot
-    says so, how many of its commands count (n,)."""
+    says so, how many of its commands count (n,), and what its networks said of all commands (networks, commands)."""
 
     fitness: np.ndarray
     goals_reached: np.ndarray
     failures: int
     used: np.ndarray | None = None
+    outputs: np.ndarray | None = None
 
 
 class Luck(NamedTuple):
@@ -65,6 +70,10 @@ class Robot(Protocol):
     radii_m: tuple[float, ...]
     bounds: CommandBounds
     command_columns: tuple[str, ...]
+    options: tuple[str, ...]
+    """What its simulator can do beyond the source, switched on by ``ROBOT+OPTION`` as its name in a spec."""
+    measured_columns: tuple[str, ...]
+    """Columns of its table of measurements."""
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """A random population."""
@@ -84,8 +93,12 @@ class Robot(Protocol):
     def targets(self, displacements: np.ndarray) -> np.ndarray:
         """The inverse of `displacements`: network targets (networks, n) float32."""
 
-    def poses(self, displacements: np.ndarray) -> np.ndarray:
-        """Poses (n, columns) after each displacement, from the start of every task."""
+    def with_options(self, names: tuple[str, ...]) -> Robot:
+        """The robot with some of its options, and no others, switched on."""
+
+    def poses(self, displacements: np.ndarray, commands: np.ndarray | None = None) -> np.ndarray:
+        """Poses (n, columns) after each displacement, from the start of every task; ``commands`` (n, components), which led to
+        them, where what lies between two commands is simulated too."""
 
     def measured_displacements(self, poses: np.ndarray) -> np.ndarray:
         """Displacements (n, networks) between measured poses, the first from the start."""
@@ -96,14 +109,26 @@ class Robot(Protocol):
     def start_pose(self) -> np.ndarray:
         """Pose (1, columns) of a robot that has not moved yet."""
 
+    def moved(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
+        """Poses (n, columns) turned about the origin, counter-clockwise, and then shifted by (2,)."""
+
+    def marked_unstable(self, poses: np.ndarray, commands: Sequence[int]) -> np.ndarray:
+        """Poses (n, columns) of commands, some of which (numbers from 1) a person called unstable."""
+
     def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
         """What is kept of poses, by name with its unit, (n,) each; x_m, y_m and heading_rad always."""
 
     def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
         """The commands (m, components) that are driven when this controller is picked."""
 
-    def score(self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None) -> Scores:
-        """Fitness of every controller on simulator networks (networks, W); luck is for robots with noise in evolution."""
+    def score(
+        self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None
+    ) -> Scores:
+        """Fitness of every controller on simulator networks (networks, W); luck is for robots with noise in evolution.
+
+        parents: scores of the generation that this one was bred from, on the same networks: a robot may take over from them
+        what cannot have changed. The scores are the same with them and without.
+        """
 
     def breed(
         self,
@@ -132,3 +157,18 @@ class Robot(Protocol):
 
     def driven_ms(self, commands: np.ndarray) -> float:
         """How long these commands drive, in milliseconds."""
+
+    def measurements(self, trial: int, commands: np.ndarray, poses: np.ndarray) -> pd.DataFrame:
+        """The rows of the table of measurements for commands (n, components) and the poses (n, columns) they led to."""
+
+
+def turned(points: np.ndarray, turn_rad: float) -> np.ndarray:
+    """Points (n, 2) turned about the origin, counter-clockwise."""
+    cos, sin = np.cos(turn_rad), np.sin(turn_rad)
+    return points @ np.array([[cos, sin], [-sin, cos]])
+
+
+def on_floor(robot: Robot, poses: np.ndarray) -> np.ndarray:
+    """x_m, y_m, heading_rad (n, 3) of a robot's own poses (n, columns)."""
+    columns = robot.pose_columns(poses)
+    return np.column_stack([columns[name] for name in ("x_m", "y_m", "heading_rad")])

@@ -1,7 +1,8 @@
 """Simulator networks in files: safetensors with their meaning beside the numbers, and as torch modules.
 
 A file holds for each network ``<network>.hidden.weight`` (H, 5), ``<network>.hidden.bias`` (H,),
-``<network>.output.weight`` (1, H) and ``<network>.output.bias`` (1,), which are the names in the torch modules.
+``<network>.output.weight`` (1, H) and ``<network>.output.bias`` (1,), which are the names in the torch modules. Networks of a
+run bring ``training.inputs`` (patterns, 5) along: where they had data.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from bns.errors import ModelError
 if TYPE_CHECKING:
     import torch
 
+_TRAINING = "training.inputs"
+
 
 @dataclass(frozen=True)
 class StaticSimulator:
@@ -34,6 +37,8 @@ class StaticSimulator:
     weights: np.ndarray
     noise_sd: np.ndarray
     provenance: dict[str, Any] = field(default_factory=dict)
+    learned_from: np.ndarray = field(default_factory=lambda: np.empty((INPUTS, 0), np.float32))
+    """Inputs (5, patterns) of the patterns that the networks were trained on; none where these were not kept."""
 
     @property
     def digest(self) -> str:
@@ -90,7 +95,10 @@ def save_simulator(simulator: StaticSimulator, path: Path) -> None:
         "provenance": simulator.provenance,
     }
     header = {"bns": json.dumps(about, sort_keys=True)}  # one entry: safetensors writes several in any order
-    data = save(tensors(simulator.networks, simulator.weights), metadata=header)
+    numbers = tensors(simulator.networks, simulator.weights)
+    if simulator.learned_from.size:
+        numbers[_TRAINING] = np.ascontiguousarray(simulator.learned_from.T, np.float32)
+    data = save(numbers, metadata=header)
     check_writable(path)
     part = path.with_name(f".{path.name}.part")
     try:
@@ -127,7 +135,10 @@ def load_simulator(path: Path | str) -> StaticSimulator:
     about = json.loads(header["bns"])
     networks = tuple(about["networks"])
     noise_sd = np.asarray(about["noise_sd"], np.float64)
-    return StaticSimulator(networks, from_tensors(networks, named), noise_sd, about["provenance"])
+    learned_from = _part(named, _TRAINING) if _TRAINING in named else np.empty((0, INPUTS), np.float32)
+    if learned_from.ndim != 2 or learned_from.shape[1] != INPUTS:
+        raise ModelError(f"{path} has {_TRAINING} of shape {learned_from.shape}; expected (patterns, {INPUTS}).")
+    return StaticSimulator(networks, from_tensors(networks, named), noise_sd, about["provenance"], learned_from.T)
 
 
 def static_path(robot: str) -> Path:

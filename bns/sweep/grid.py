@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from bns.errors import SpecError, unknown_name
-from bns.robots import robot_names
+from bns.robots import load_robot
 from bns.spec import FIELDS, RunSpec, checked
 from bns.sweep.combos import Parts, check_size, combinations
 from bns.sweep.yaml_lines import Located, parse_yaml, read_text
@@ -116,8 +116,10 @@ def _read_name(parts: Parts, value: Located) -> None:
 
 def _read_robot(parts: Parts, value: Located) -> None:
     robot = value.value()
-    if robot not in robot_names():
-        value.fail(unknown_name("robot", robot, robot_names()))
+    try:
+        load_robot(str(robot))
+    except SpecError as unknown:
+        value.fail(str(unknown))
     parts.robot = robot
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from bns.errors import SweepWarning
 from bns.spec import RunSpec
 from bns.store.reader import finished
 from bns.store.record import RunRecord
@@ -24,10 +25,6 @@ from bns.sweep.shard import Shard
 from bns.sweep.workers import LokyExecutor
 
 _POLL_S = 0.2
-
-
-class SweepWarning(UserWarning):
-    """A sweep goes on, but most likely not as it is meant."""
 
 
 @dataclass(frozen=True)

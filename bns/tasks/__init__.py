@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 
 from bns.errors import SpecError, unknown_name
+from bns.spec import robot_and_options
 
 UNBOUNDED = (float("inf"), float("inf"))
 
@@ -32,8 +33,8 @@ class Task:
 
 
 def task_names(robot: str) -> tuple[str, ...]:
-    """Tasks of a robot, by name."""
-    folder = resources.files(__name__) / robot
+    """Tasks of a robot, by name; its options have no part in them."""
+    folder = resources.files(__name__) / robot_and_options(robot)[0]
     if not folder.is_dir():
         raise SpecError(f"robot {robot!r} has no tasks.")
     return tuple(sorted(f.name.removesuffix(".yaml") for f in folder.iterdir() if f.name.endswith(".yaml")))
@@ -49,7 +50,7 @@ def load_task(robot: str, name: str) -> Task:
     """Read a task; SpecError for an unknown one lists those there are."""
     if name not in task_names(robot):
         raise SpecError(unknown_name(f"task of robot {robot}", name, task_names(robot)))
-    return task_of(name, yaml.safe_load((resources.files(__name__) / robot / f"{name}.yaml").read_text()))
+    return task_of(name, yaml.safe_load((resources.files(__name__) / robot_and_options(robot)[0] / f"{name}.yaml").read_text()))
 
 
 def task_of(name: str, content: dict[str, Any]) -> Task:

@@ -12,7 +12,7 @@ from bns.hardware.emulators.faults import FaultPlan, load_plan
 from bns.hardware.rig import load_rig, shipped_rig
 from bns.robots import load_robot
 from bns.spec import RunSpec
-from bns.tasks import task_names
+from bns.tasks import default_task
 from bns.trial.experiment import drive_commands
 from bns.trial.replay import replayed
 from bns.trial.session import Set, carry_out
@@ -29,11 +29,11 @@ def carried_out(options: argparse.Namespace, parameters: Mapping[str, Any]) -> s
 
 
 def spec_of(parameters: Mapping[str, Any]) -> RunSpec:
-    """The spec; the task is the robot's first where none is given."""
+    """The spec; the task is the first of the robot's study where none is given."""
     robot = load_robot(parameters["robot"]).name
     if parameters["record"] == "full":
         raise SpecError("record is 'full'; a robot drives no probes and no fittest of a generation: take evals or paths.")
-    return RunSpec(**{**parameters, "world": "robot", "task": parameters["task"] or task_names(robot)[0]})
+    return RunSpec(**{**parameters, "world": "robot", "task": parameters["task"] or default_task(robot)})
 
 
 def how_of(options: argparse.Namespace) -> Set:
@@ -51,5 +51,6 @@ def how_of(options: argparse.Namespace) -> Set:
     rig = shipped_rig(options.robot) if options.rig is None else load_rig(options.rig, options.robot)
     plan = FaultPlan() if options.faults is None else load_plan(options.faults)
     return Set(
-        rig, options.emulated, options.speed, plan, options.yes, options.resume, options.most_rounds, options.until_success
+        rig, options.emulated, options.speed, plan, options.yes, options.resume, options.most_rounds, options.until_success,
+        not options.no_figures,
     )

@@ -15,7 +15,7 @@ from bns.hardware.journal import Journal
 from bns.hardware.platform import Driven, Platform
 from bns.hardware.rig import Rig
 from bns.trial.loop import Evaluation
-from bns.trial.operator import Operator
+from bns.trial.operator import Operator, Verdict
 
 _MOST_VOID = 3
 """So many drives without a single finished command, one after the other, and the trial pauses."""
@@ -35,6 +35,8 @@ class Crew:
         self.readings: dict[str, float] = {}
         self.stops_s: list[float] = []
         self.ends: list[str] = []
+        self.marked: int | None = None
+        """How many commands were called unstable in the last evaluation; None for a robot whose commands cannot be."""
 
     def evaluate(self, number: int, controller: np.ndarray) -> Evaluation:
         """Drive a controller until there is an evaluation to keep."""
@@ -48,16 +50,33 @@ class Crew:
                 if void == _MOST_VOID:
                     raise TrialPausedError(f"{void} drives in a row ended before a command was over: {driven.ended}")
                 continue
-            answer = self._asked(number, controller, driven)
-            if answer == "next":
-                return Evaluation(controller, driven.commands, driven.poses)
-            self._journal.note("discarded", evaluation=number, why=answer)
+            verdict = self._asked(number, controller, driven)
+            if verdict.answer == "next":
+                self.marked = len(verdict.unstable) if driven.spans_s else None
+                if verdict.unstable:
+                    self._journal.note("marked", evaluation=number, unstable=verdict.unstable)
+                    self._journal.sync()
+                return Evaluation(controller, driven.commands, driven.poses, unstable=verdict.unstable)
+            self._journal.note("discarded", evaluation=number, why=verdict.answer)
 
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         """Note it, durably."""
         fitness = {name: row[name] for name in ("evaluated_fitness_world", "evaluated_goals_reached")}
         self._journal.note("evaluated", evaluation=number, rounds=rounds, **fitness)
         self._journal.sync()
+
+    def told(self) -> dict[str, str]:
+        """What a live view shows of robot and rig: heading -> text."""
+        units = {"v": "V", "c": "°C"}
+        shown = {}
+        for name, value in self.readings.items():
+            what, _, unit = name.rpartition("_")
+            shown[what.replace("_", " ")] = f"{value:.1f} {units.get(unit, unit)}"
+        if self.marked is not None:
+            shown["unstable cycles"] = str(self.marked)
+        if self.stops_s:
+            shown["last stop"] = f"{1000 * self.stops_s[-1]:.0f} ms"
+        return shown | {"ended early": str(len(self.ends))}
 
     def _drive(self, number: int, controller: np.ndarray) -> Driven:
         self.readings = self._platform.readings()
@@ -80,12 +99,12 @@ class Crew:
         self._journal.sync()
         return driven
 
-    def _asked(self, number: int, controller: np.ndarray, driven: Driven) -> str:
+    def _asked(self, number: int, controller: np.ndarray, driven: Driven) -> Verdict:
         began = time.perf_counter()
         part = f"{len(driven.commands)} of {len(controller)} commands" + (f" ({driven.ended})" if driven.ended else "")
-        answer = self._operator.accept(f"evaluation {number}: {part} in {driven.seconds:.0f} s")
+        verdict = self._operator.accept(f"evaluation {number}: {part} in {driven.seconds:.0f} s", driven.spans_s)
         self.placing_s += time.perf_counter() - began
-        return answer
+        return verdict
 
     def _ready(self, void: int) -> None:
         """See that the robot stands near enough to its start."""
@@ -108,4 +127,7 @@ class Crew:
         off_m = float(np.hypot(*(pose[:2] - self._start[:2])))
         if off_m > self._rig.placed_within_m:
             return f"The robot stands {100 * off_m:.0f} cm from its start"
+        off_rad = abs(math.remainder(pose[2] - self._start[2], 2.0 * math.pi))
+        if off_rad > self._rig.placed_within_rad:
+            return f"The robot is turned by {math.degrees(off_rad):.0f}° from its start"
         return "The drive came to nothing" if void else None

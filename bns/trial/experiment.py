@@ -11,6 +11,7 @@ from bns.errors import HardwareError
 from bns.hardware.safety import Stopping
 from bns.measurements import write_measurements
 from bns.robots import load_robot
+from bns.robots.base import on_floor
 from bns.robots.khepera import UNITS_PER_M_S
 from bns.trial.crew import Crew
 from bns.trial.folder import JOURNAL, MEASUREMENTS, measured
@@ -51,7 +52,8 @@ def drive_commands(path: Path, how: Set, results: Path, seed: int) -> str:
     journal = folder / JOURNAL
     if journal.exists():
         raise HardwareError(f"there is an experiment in {folder} already; move it away or rename {path}.")
-    start = load_robot(how.rig.robot).start_pose()[0]
+    robot = load_robot(how.rig.robot)
+    start = on_floor(robot, robot.start_pose())[0]
     with Stopping() as stopping, staged(how, seed, journal, stopping) as stage:
         crew = Crew(stage.platform, stage.operator, how.rig, start, stage.clock, stage.journal)
         try:

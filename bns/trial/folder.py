@@ -12,6 +12,7 @@ from filelock import FileLock, Timeout
 from bns.errors import HardwareError
 from bns.hardware.journal import events
 from bns.measurements import write_measurements
+from bns.robots import load_robot
 from bns.spec import RunSpec
 from bns.trial.loop import Evaluation
 
@@ -55,7 +56,7 @@ class TrialFolder:
         """Write the table of all drives in the journal; how many rows."""
         table = measured(self.journal)
         if len(table):
-            write_measurements(table, self.path / MEASUREMENTS)
+            write_measurements(table, self.path / MEASUREMENTS, load_robot(self.spec.robot).measured_columns)
         return len(table)
 
 
@@ -71,11 +72,15 @@ def past_evaluations(journal: Path) -> list[Evaluation]:
     """Evaluations of a journal in order. One that was driven again counts as driven last, up to the first that is missing."""
     driven: dict[int, dict] = {}
     rounds: dict[int, int] = {}
-    for event in events(journal, "driven", "evaluated", "discarded"):
+    unstable: dict[int, tuple[int, ...]] = {}
+    for event in events(journal, "driven", "marked", "evaluated", "discarded"):
         number = event["evaluation"]
         rounds.pop(number, None)
         if event["kind"] == "driven":
             driven[number] = event
+            unstable.pop(number, None)
+        elif event["kind"] == "marked":
+            unstable[number] = tuple(event["unstable"])
         elif event["kind"] == "discarded":
             driven.pop(number, None)
         else:
@@ -84,16 +89,23 @@ def past_evaluations(journal: Path) -> list[Evaluation]:
     while len(found) + 1 in driven:
         event, number = driven[len(found) + 1], len(found) + 1
         picked, commands = (np.asarray(event[name], np.float32) for name in ("picked", "commands"))
-        found.append(Evaluation(picked, commands, np.asarray(event["poses"], np.float64), rounds.get(number)))
+        poses = np.asarray(event["poses"], np.float64)
+        found.append(Evaluation(picked, commands, poses, rounds.get(number), unstable.get(number, ())))
     return found
 
 
 def measured(journal: Path) -> pd.DataFrame:
     """The measurements of every drive in a journal, discarded ones too; `trial` counts the drives."""
-    tables = []
-    for number, event in enumerate(events(journal, "driven"), 1):
+    tables: list[pd.DataFrame] = []
+    for event in events(journal, "driven", "marked"):
+        if event["kind"] == "marked":
+            led_here = tables[-1]["cycle"].shift(1)
+            tables[-1].loc[led_here.isin(event["unstable"]), "stable"] = 0.0
+            continue
+        if not event["rows"]:  # it ended before the robot stood at its start
+            continue
         table = pd.DataFrame(event["rows"]).astype(float)
-        table.insert(0, "trial", number)
+        table.insert(0, "trial", len(tables) + 1)
         table["evaluation"], table["session_s"] = event["evaluation"], event["session_s"] + table["t_s"]
         tables.append(table.assign(**event["readings"]))
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()

@@ -30,13 +30,15 @@ Progress = Callable[[Mapping[str, Any]], None]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What one evaluation left: the controller picked (n, c), what was carried out (k, c), tracked poses (k + 1, 3), and how
-    many rounds of training and evolution went on meanwhile (None: not known, the trial was cut off)."""
+    """What one evaluation left: the controller picked (n, c), what was carried out (k, c), tracked poses (k + 1, columns), how
+    many rounds of training and evolution went on meanwhile (None: not known, the trial was cut off), and the numbers, from 1, of
+    the commands that a person called unstable."""
 
     picked: np.ndarray
     commands: np.ndarray
     poses: np.ndarray
     rounds: int | None = None
+    unstable: tuple[int, ...] = ()
 
 
 class Driver(Protocol):
@@ -75,7 +77,6 @@ class Trial:
         self._weights = self._trainer.evolution_weights()
         self._evolver = Evolver.start(self.robot, self.task, key, spec, self._weights)
         self._recorder = Recorder(self.robot, self.task, self._world, key, spec)
-        self._start = self.robot.start_pose()[0]
         self._most_rounds, self._rounds = most_rounds, 0
 
     def run(self, driver: Driver, progress: Progress) -> TrialResult:
@@ -122,7 +123,7 @@ class Trial:
         self._rounds += 1
 
     def _learn(self, number: int, done: Evaluation, weights: np.ndarray) -> Mapping[str, Any]:
-        poses = in_task_frame(done.poses, self._start)
+        poses = self.robot.marked_unstable(in_task_frame(self.robot, done.poses), done.unstable)
         self._world.answered(poses)
         self._recorder.drive_evaluated(number, done.commands, weights)
         self._trainer.add(done.commands, poses, number)
@@ -137,4 +138,5 @@ class Trial:
             self._evolver.fittest(),
             self._recorder.last_poses,
             self._recorder.last_simulated,
+            self._trainer.data.training.in_use(),
         )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -14,14 +15,24 @@ from bns.hardware.platform import Emulation
 _PLACED_SD = np.array([0.005, 0.005, 0.03])
 
 
+Spans = Sequence[tuple[float, float]]
+
+
+class Verdict(NamedTuple):
+    """What becomes of an evaluation: `next`, `repeat` it, or `skip` it; and which commands (numbers from 1) were unstable."""
+
+    answer: str
+    unstable: tuple[int, ...] = ()
+
+
 class Operator(Protocol):
     """Asked between drives, never during one."""
 
     def place(self, start: np.ndarray, why: str) -> None:
         """See to it that the robot stands at `start` (3,); TrialPausedError if that cannot be."""
 
-    def accept(self, summary: str) -> str:
-        """What to do with the evaluation just driven: `next`, `repeat` it, or `skip` it."""
+    def accept(self, summary: str, spans_s: Spans) -> Verdict:
+        """What to do with the evaluation just driven; `spans_s`: when each command was under way that can be unstable."""
 
 
 class AtTheTerminal:
@@ -35,17 +46,32 @@ class AtTheTerminal:
         text = f"{why}.\nPut it at x {start[0]:.2f} m, y {start[1]:.2f} m, heading {np.degrees(start[2]):.0f}°"
         self._answer(f"{text}; then Enter (p: pause the trial): ", {"": "placed"})
 
-    def accept(self, summary: str) -> str:
+    def accept(self, summary: str, spans_s: Spans) -> Verdict:
         """Ask what to do."""
         words = {"": "next", "r": "repeat", "s": "skip"}
-        return self._answer(f"{summary}\nEnter: keep it; r: drive it again; s: skip it; p: pause the trial: ", words)
+        asked = f"{summary}\nEnter: keep it; r: drive it again; s: skip it; p: pause the trial"
+        if not spans_s:
+            return Verdict(self._answer(f"{asked}: ", words))
+        answer = self._answer(f"{asked}; u: keep it, some cycles were unstable: ", words | {"u": "unstable"})
+        return Verdict("next", self._unstable(len(spans_s))) if answer == "unstable" else Verdict(answer)
+
+    def _unstable(self, count: int) -> tuple[int, ...]:
+        while True:
+            given = self._asked(f"Which of the cycles 1 to {count} (rolled over, links touched, a servo did not follow)? ")
+            numbers = {int(word) for word in re.findall(r"\d+", given)}
+            if numbers and numbers <= set(range(1, count + 1)):
+                return tuple(sorted(numbers))
+            print(f"{given!r} names no cycle, or one that is not there: write numbers from 1 to {count}", file=sys.stderr)
+
+    def _asked(self, question: str) -> str:
+        try:
+            return self._ask(question).strip().lower()
+        except (EOFError, KeyboardInterrupt) as error:
+            raise TrialPausedError("paused by the operator") from error
 
     def _answer(self, question: str, words: dict[str, str]) -> str:
         while True:
-            try:
-                given = self._ask(question).strip().lower()[:1]
-            except (EOFError, KeyboardInterrupt) as error:
-                raise TrialPausedError("paused by the operator") from error
+            given = self._asked(question)[:1]
             if given == "p":
                 raise TrialPausedError("paused by the operator")
             if given in words:
@@ -60,13 +86,14 @@ class Nobody:
         """Pause."""
         raise TrialPausedError(f"{why}, and with --yes nobody can put it back. Do so, then go on with --resume")
 
-    def accept(self, summary: str) -> str:
+    def accept(self, summary: str, spans_s: Spans) -> Verdict:
         """Keep everything."""
-        return "next"
+        return Verdict("next")
 
 
 class EmulatedHands:
-    """Puts an emulated robot down, within some millimetres and degrees as hands do; keeps every evaluation."""
+    """Puts an emulated robot down, within some millimetres and degrees as hands do; keeps every evaluation,
+    and sees what was unstable."""
 
     def __init__(self, emulation: Emulation, seed: int) -> None:
         self._emulation, self._draw = emulation, np.random.default_rng([seed, 7])
@@ -75,6 +102,7 @@ class EmulatedHands:
         """Put it down."""
         self._emulation.put_down(start + _PLACED_SD * self._draw.standard_normal(3))
 
-    def accept(self, summary: str) -> str:
-        """Keep everything."""
-        return "next"
+    def accept(self, summary: str, spans_s: Spans) -> Verdict:
+        """Keep everything, and mark what was seen."""
+        seen = (number for number, span_s in enumerate(spans_s, 1) if self._emulation.unstable_between(*span_s))
+        return Verdict("next", tuple(seen))

@@ -16,14 +16,16 @@ from bns.trial.loop import TrialResult
 def report(spec: RunSpec, result: TrialResult, crew: Crew, wall_s: float, how: Any, folder: Path, figure: Path) -> str:
     """Lines for the terminal."""
     evals = result.run.tables["evals"]
-    firsts = [f"{cm} cm {_first(evals[f'evaluated_success_{cm}cm'])}" for cm in RADII_CM]
+    firsts = [f"within {cm} cm {_first(evals[f'evaluated_success_{cm}cm'])}" for cm in RADII_CM]
+    if evals[f"evaluated_success_{RADII_CM[0]}cm"][0] is None:  # goals are regions
+        firsts = [_first(evals["evaluated_success"])]
     driven_min = float(np.sum(evals["driven_ms"])) / 60_000.0
     what = f"emulated, at {how.speed:g} times its speed" if how.emulated else "robot"
     return "\n".join(
         [
             f"trial {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {what}",
             f"{len(evals['evaluation'])} evaluations, {driven_min:.1f} min of driving, {wall_s:.0f} s by the clock on the wall",
-            "all goals reached, within " + "; ".join(firsts),
+            "all goals reached: " + "; ".join(firsts),
             f"the robot waited for computations {result.waited_share:.1%} of the time; {result.rounds} rounds of training and "
             "evolution went on while it drove",
             _stops(crew.stops_s),

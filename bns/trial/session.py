@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from bns.errors import HardwareError
+from bns.errors import BnsError, HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.journal import Journal
@@ -20,6 +20,7 @@ from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
 from bns.plotting import path_figure
 from bns.robots import load_robot
+from bns.robots.base import on_floor
 from bns.single import keep_run, live_view
 from bns.spec import RunSpec
 from bns.tasks import load_task
@@ -28,6 +29,7 @@ from bns.trial.folder import TrialFolder, spec_event
 from bns.trial.loop import Trial, TrialResult
 from bns.trial.operator import AtTheTerminal, EmulatedHands, Nobody, Operator
 from bns.trial.report import report
+from bns.watch import draw, scripts
 
 SWEEP, SWEEP_EMULATED = "trials", "trials-emulated"
 MOST_ROUNDS = 50
@@ -45,6 +47,7 @@ class Set:
     resume: bool = False
     most_rounds: int = MOST_ROUNDS
     until_success: int | None = None
+    figures: bool = True
 
 
 @dataclass(frozen=True)
@@ -89,14 +92,15 @@ def carry_out(spec: RunSpec, how: Set, results: Path) -> str:
 
 def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: list, robot: Any, task: Any) -> str:
     trial = Trial(spec, "robot-emulated" if how.emulated else "robot", past, how.most_rounds, how.until_success)
-    start = robot.start_pose()[0]
+    start = on_floor(robot, robot.start_pose())[0]
     started, wall = datetime.now(UTC), time.perf_counter()
     try:
-        with Stopping() as stopping, live_view(spec) as show, staged(how, spec.seed, folder.journal, stopping) as stage:
+        with Stopping() as stopping, staged(how, spec.seed, folder.journal, stopping) as stage:
             stage.journal.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
             stage.journal.sync()
             crew = Crew(stage.platform, stage.operator, how.rig, start, stage.clock, stage.journal)
-            result = trial.run(crew, show)
+            with live_view(spec, crew.told) as show:
+                result = trial.run(crew, show)
             stage.journal.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
@@ -107,6 +111,16 @@ def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: l
         raise
     folder.write_measurements()
     return _kept(spec, how, results, folder, result, robot, task, started, time.perf_counter() - wall, crew)
+
+
+def _figures(spec: RunSpec, results: Path, folder: TrialFolder) -> str:
+    """Figures and table rows of this trial alone, on a page in its folder; what came of it, in words."""
+    page = folder.path / "figures"
+    try:
+        complaint = draw(scripts(), results, "--run", spec.run_id, "--out", str(page.absolute()), polite=False)
+    except BnsError as error:  # the package was installed without them: the trial is none the worse for it
+        complaint = str(error)
+    return f"figures: {page / 'index.html'}" if not complaint else f"no figures: {complaint}"
 
 
 def _forget_if_empty(folder: TrialFolder) -> None:
@@ -120,4 +134,5 @@ def _kept(
 ) -> str:  # fmt: skip
     keep_run(spec, result.run, results, SWEEP_EMULATED if how.emulated else SWEEP, started, wall_s)
     figure = path_figure(spec, task, robot, result.run, folder.path / "path")
-    return report(spec, result, crew, wall_s, how, folder.path, figure)
+    told = report(spec, result, crew, wall_s, how, folder.path, figure)
+    return f"{told}\n{_figures(spec, results, folder)}" if how.figures else told

@@ -6,7 +6,7 @@ import numpy as np
 
 from bns.engine.philox import Key, Purpose
 from bns.errors import SpecError
-from bns.robots.base import Robot
+from bns.robots.base import Robot, on_floor, turned
 
 
 class RobotWorld:
@@ -19,7 +19,7 @@ class RobotWorld:
         self._poses = np.empty((0, 3))
 
     def answered(self, poses: np.ndarray) -> None:
-        """The robot has driven: poses (n, 3) at the end of each command, in the task's frame."""
+        """The robot has driven: poses (n, columns) at the end of each command, in the task's frame."""
         self._poses = poses
 
     def drive(self, commands: np.ndarray, key: Key, purpose: Purpose, step: int) -> np.ndarray:
@@ -29,16 +29,14 @@ class RobotWorld:
         return self._poses
 
 
-def in_task_frame(poses: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Tracked poses (n + 1, 3) moved so that the first lies on `start` (3,); the others, (n, 3).
+def in_task_frame(robot: Robot, poses: np.ndarray) -> np.ndarray:
+    """Tracked poses (n + 1, columns) moved so that the first lies on the task's start; the others, (n, columns).
 
     An operator puts a robot down within centimetres and degrees; what the networks learn is what it did from there.
     """
-    x0, y0, heading0 = poses[0]
-    turn = start[2] - heading0
-    cos, sin = np.cos(turn), np.sin(turn)
-    dx, dy = poses[1:, 0] - x0, poses[1:, 1] - y0
-    return np.column_stack([start[0] + cos * dx - sin * dy, start[1] + sin * dx + cos * dy, poses[1:, 2] + turn])
+    was, start = (on_floor(robot, pose)[0] for pose in (poses[:1], robot.start_pose()))
+    turn_rad = start[2] - was[2]
+    return robot.moved(poses[1:], turn_rad, start[:2] - turned(was[None, :2], turn_rad)[0])
 
 
 def build(robot: Robot) -> RobotWorld:

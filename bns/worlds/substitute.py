@@ -24,7 +24,7 @@ class SubstituteWorld:
         displacements = self._robot.displacements(outputs)
         blocks = -(-displacements.shape[1] // 4)
         noise = np.hstack(list(normals(key, purpose, step, blocks, len(commands))))[:, : displacements.shape[1]]
-        return self._robot.poses(displacements + noise * self._simulator.noise_sd)
+        return self._robot.poses(displacements + noise * self._simulator.noise_sd, commands)
 
 
 def build(robot: Robot) -> SubstituteWorld:

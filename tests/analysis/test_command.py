@@ -52,6 +52,19 @@ def test_all_figures_come_with_their_captions_and_numbers(real_results, tmp_path
     ).git_sha.tolist()
 
 
+def test_one_run_alone_has_its_figures_and_its_table_rows(real_results, tmp_path, capsys):
+    run_id, seed = query(real_results, "SELECT run_id, seed FROM runs WHERE sweep = 'prototype' ORDER BY seed").iloc[1]
+    assert main(["--results", str(real_results), "--run", run_id, "--out", str(tmp_path)]) == 0
+    found = {caption["name"]: caption for caption in captions(tmp_path)}
+    assert set(found) == {"paths-khepera-infinity", "trials-khepera", "one-run-khepera"}
+    assert {caption["n"] for caption in found.values()} == {1}
+    table = found["trials-khepera"]["table"]
+    assert [row[table["columns"].index("seed")] for row in table["rows"]] == [str(seed)]
+    capsys.readouterr()
+    assert main(["--results", str(real_results), "--run", "r0", "--out", str(tmp_path)]) == 2
+    assert "there is no run r0" in capsys.readouterr().err
+
+
 def test_a_figure_drawn_again_has_the_same_bytes(real_results, tmp_path):
     for out in ("one", "two"):
         main(["--results", str(real_results), "--only", "success-by-diversity", "--out", str(tmp_path / out)])

@@ -121,6 +121,15 @@ def test_paths_show_the_last_fittest_controller_of_each_run(real_results):
     assert (x[-1], y[-1]) == (pytest.approx(100 * rows.x_m.iloc[-1]), pytest.approx(100 * rows.y_m.iloc[-1]))
 
 
+def test_a_drive_that_ended_early_says_in_which_cycle(tmp_path):
+    run = record(RunSpec(seed=0, evaluations=2, record="full"), ("evals", "paths"))
+    run.tables["evals"]["fittest_commands"][:] = 90
+    written(tmp_path, "prototype", [run])
+    store = Store(tmp_path)
+    driven = len(paths.poses(store, paths.last_successes(store))[run.spec.run_id]) - 1
+    assert paths.draw(store)[0].figure.axes[0].get_title().endswith(f"ended in cycle {driven} of 90")
+
+
 def test_paths_of_a_run_by_hand_are_shown_after_the_prototypes_and_named(tmp_path):
     both = RunSpec(seed=0, evaluations=2, record="full")
     others = [RunSpec(seed=seed, evaluations=2, record="full") for seed in range(1, 8)]

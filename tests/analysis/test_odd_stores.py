@@ -36,6 +36,9 @@ STORES = {
     "diversity unknown": lambda path: written(
         path, "grid", [with_evals(spec, diversity=np.nan, fitness_error=np.inf) for spec in specs(6)]
     ),
+    "one task is ahead": lambda path: written(
+        path, "grid", [record(spec) for spec in [*specs(6), *specs(1, task="infinity"), *specs(1, task="complex")]]
+    ),
     "goal regions": lambda path: written(path, "grid", [with_evals(spec, **NO_RADII) for spec in specs(6)]),
 }
 
@@ -48,6 +51,21 @@ def test_the_command_draws_or_explains_every_figure(tmp_path, kind, capsys):
     for name in figures():
         assert any(one == name or one.startswith(f"{name}-") for one in named), name
     assert capsys.readouterr().err == ""
+
+
+def test_a_script_that_fails_is_told_and_costs_no_other_figure(tmp_path, monkeypatch, capsys):
+    written(tmp_path / "results", "grid", [record(spec) for spec in specs(6)])
+    monkeypatch.setattr(findings, "draw", lambda store: 1 / 0)
+    assert main(["--results", str(tmp_path / "results"), "--out", str(tmp_path / "out")]) == 1
+    shown = {caption["name"]: caption for caption in captions(tmp_path / "out")}
+    assert shown["findings"]["skipped"] == "its script failed: ZeroDivisionError: division by zero"
+    assert "skipped" not in shown["success-by-mutation-khepera"]
+    told = capsys.readouterr().err
+    assert "ZeroDivisionError" in told
+    assert "error: findings (sections 4.6 and 5.9) could not be drawn; the others are" in told
+    monkeypatch.undo()
+    assert main(["--results", str(tmp_path / "results"), "--out", str(tmp_path / "out"), "--only", "findings"]) == 0
+    assert [caption["name"] for caption in captions(tmp_path / "out") if "findings" in caption["name"]] == ["findings-khepera"]
 
 
 def test_a_robot_without_goal_radii_has_its_own_success_and_no_centimetres(tmp_path):

@@ -7,7 +7,8 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from bns.engine.evolution import Population, breed, rank, tournament_cdf
+from bns.engine.breeding import breed
+from bns.engine.evolution import Population, rank, tournament_cdf
 from bns.engine.philox import Key
 from bns.engine.snn import initial_weights
 from bns.robots.khepera import ROBOT
@@ -27,6 +28,8 @@ class Ours:
         self.population = ROBOT.random_controllers(KEY, POPULATION, COMMANDS)
         self.children = Population(self.population.commands.copy(), self.population.lengths.copy())
         self.cdf = tournament_cdf(POPULATION, 0.5)
+        self.scores = ROBOT.score(self.population, weights, self.task)
+        self.order = rank(self.scores.fitness)
 
     def rollout(self) -> np.ndarray:
         """Fitness (n,)."""
@@ -38,10 +41,10 @@ class Ours:
             self.rollout()
 
     def generations(self) -> None:
-        """Score, rank, breed; always from the same parents, whose children have ten commands on average."""
+        """Breed, score and rank as a run does; always from the same parents, whose children have ten commands on average."""
         for generation in range(GENERATIONS):
-            order = rank(self.rollout())
-            breed(KEY, self.population, order, self.cdf, 0.1, ROBOT.bounds, 4, generation, self.children)
+            breed(KEY, self.population, self.order, self.cdf, 0.1, ROBOT.bounds, 4, generation, self.children)
+            rank(ROBOT.score(self.children, self.weights, self.task, None, self.scores).fitness)
 
 
 def normalised(commands: np.ndarray) -> np.ndarray:

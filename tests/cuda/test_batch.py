@@ -67,6 +67,7 @@ def test_result_is_that_of_the_loop(together):
         np.testing.assert_allclose(there.fittest, here.fittest, rtol=1e-5)
         np.testing.assert_allclose(there.world_poses, here.world_poses, rtol=1e-4)
         np.testing.assert_allclose(there.snn_poses, here.snn_poses, rtol=1e-3, atol=1e-4)
+        np.testing.assert_allclose(there.learned_from, here.learned_from, rtol=1e-6)
 
 
 def test_one_run_shows_every_evaluation_as_it_ends(monkeypatch):

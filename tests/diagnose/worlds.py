@@ -19,16 +19,16 @@ def hidden(**effects):
     return model
 
 
-def measured(model, trials=16, seed=0, noise=(0.0015, 0.005), jitter=0.004, ends_only=False, commands=5):
+def measured(model, trials=16, seed=0, noise=(0.0015, 0.005), jitter=0.004, ends_only=False, commands=5, speeds=(0.02, 0.2)):
     """A table of measurements of a model's robot: random commands, motors that vary a little, a camera at 25 Hz."""
     rng = np.random.default_rng(seed)
     return pd.concat(
-        [_trial(model, i, rng, noise, jitter, ends_only, commands) for i in range(trials)], ignore_index=True
+        [_trial(model, i, rng, noise, jitter, ends_only, commands, speeds) for i in range(trials)], ignore_index=True
     )
 
 
-def _trial(model, number, rng, noise, jitter, ends_only, commands):
-    left, right = rng.uniform(0.02, 0.2, (2, commands))
+def _trial(model, number, rng, noise, jitter, ends_only, commands, speeds):
+    left, right = rng.uniform(*speeds, (2, commands))
     duration = np.round(rng.uniform(0.4, 2.0, commands) / FRAME_S) * FRAME_S
     scatter = 1 + jitter * rng.normal(size=(2, commands))
     start = [*rng.uniform(-0.4, 0.4, 2), rng.uniform(-3, 3)]

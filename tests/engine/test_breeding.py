@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bns.engine import reference
-from bns.engine.evolution import CommandBounds, Population, breed, random_population, tournament_cdf
+from bns.engine.breeding import breed
+from bns.engine.evolution import CommandBounds, Population, random_population, tournament_cdf
 from bns.engine.philox import Key
 
 BOUNDS = CommandBounds(*(np.array(v, np.float32) for v in ([-1, 0, 10], [1, 5, 20], [0.5, 1, 3])))
@@ -45,10 +46,11 @@ def test_children_are_exactly_the_twins(n, capacity, rate, share, shortest, gene
     order = np.random.default_rng(seed).permutation(n)
     children, hits = bred(old, rate, share, shortest, generation, key, order)
     cdf = tournament_cdf(n, share)
-    slow, slow_hits = reference.breed(key, old, order.tolist(), cdf, rate, BOUNDS, shortest, generation)
+    slow, origins, slow_hits = reference.breed(key, old, order.tolist(), cdf, rate, BOUNDS, shortest, generation)
     assert len(children) == len(slow) == n
-    for i, child in enumerate(slow):
+    for i, (child, origin) in enumerate(zip(slow, origins, strict=True)):
         np.testing.assert_array_equal(children.controller(i), child)
+        np.testing.assert_array_equal(children.origin[i, : len(child)], origin)
     assert hits == slow_hits
 
 
@@ -187,3 +189,27 @@ def test_a_tournament_of_all_makes_everybody_a_child_of_the_best():
     children, _ = bred(old, share=1.0, shortest=1, order=np.roll(np.arange(50), -9))
     best = {tuple(c) for c in old.controller(9)}
     assert {tuple(c) for c in everyone(children)} <= best
+
+
+def with_what_came_before(some):
+    """Every command of every controller with the speeds of the one before, which are 0 at first."""
+    rows = []
+    for i in range(len(some)):
+        one = some.controller(i)
+        rows.append(np.hstack([np.vstack([np.zeros((1, 2), np.float32), one[:-1, :2]]), one]))
+    return np.concatenate(rows)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.1, 0.5])
+def test_an_origin_is_where_the_same_command_came_after_the_same_speeds(rate):
+    old, known = parents(100, capacity=18), []
+    for generation in range(1, 12):
+        children, _ = bred(old, rate, generation=generation)
+        origin = np.concatenate([children.origin[i, :length] for i, length in enumerate(children.lengths)])
+        np.testing.assert_array_equal(
+            with_what_came_before(children)[origin >= 0], with_what_came_before(old)[origin[origin >= 0]]
+        )
+        known.append((origin >= 0).mean())
+        old = children
+    # A command keeps its origin if none of five components mutated, unless a cut brought it a new neighbour.
+    assert (1 - rate) ** 5 * 0.85 < np.mean(known) < (1 - rate) ** 5 * 1.05 + 0.02

@@ -5,11 +5,13 @@ import pytest
 
 from bns.errors import HardwareError
 from bns.hardware.ax12_table import RAD_PER_STEP, REGISTERS
-from bns.hardware.dynamixel import Ax12Chain, ServoError
-from bns.hardware.emulators.ax12 import Bus, Servo, packet
+from bns.hardware.dynamixel import Ax12Chain
+from bns.hardware.emulators.ax12 import Bus, packet
 from bns.hardware.emulators.faults import Fault, Faults
+from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.terminal import PseudoTerminal
 from bns.hardware.journal import Journal
+from bns.hardware.servo_chain import Health, ServoError, ServoLimits, StrainWatch
 
 IDS = (1, 2, 3)
 
@@ -190,14 +192,28 @@ def test_limits_are_watched(chain, clock, fault, registers, message):
         driver.health()
 
 
-def test_a_stuck_joint_is_noticed(chain, clock):
+def test_a_stuck_joint_is_noticed_and_a_moment_s_strain_is_not(chain, clock):
     driver, *_ = chain()
     driver.arm()
-    driver.limits = driver.limits.__class__(load=0.3)
+    watch = StrainWatch(ServoLimits(load=0.3, torque=0.8, stalled_s=0.25, stuck_s=1.0))
     driver.move([1.5] * 3, [0.1] * 3)
-    clock.sleep(0.1)
-    with pytest.raises(ServoError, match="of its torque; is it stuck"):
-        driver.health()
+    for _ in range(3):
+        clock.sleep(0.1)
+        watch.look(driver.health(), clock.now_s())
+    assert not watch.stalled
+    clock.sleep(0.2)
+    watch.look(driver.health(), clock.now_s())
+    assert watch.stalled
+    clock.sleep(0.6)
+    with pytest.raises(ServoError, match=r"of its torque for 1\.. s; is it stuck"):
+        watch.look(driver.health(), clock.now_s())
+
+
+def test_strain_that_ends_is_forgotten():
+    watch, load = StrainWatch(ServoLimits(torque=1.0)), Health(0.0, -0.97, 12.0, 30.0)
+    for t_s in range(20):
+        watch.look({1: load if t_s % 2 else Health(0.0, 0.1, 12.0, 30.0)}, float(t_s))
+    assert not watch.stalled
 
 
 def test_stop_is_confirmed_by_every_servo(chain, clock):

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 from bns.errors import HardwareError
 from bns.hardware.bridge import BridgeChain
 from bns.hardware.bridge_frames import WATCHDOG_S, Frame, crc16, decoded, encoded
-from bns.hardware.dynamixel import ServoError
-from bns.hardware.emulators.ax12 import Servo
 from bns.hardware.emulators.bridge import BridgeEmulator
 from bns.hardware.emulators.faults import Fault, Faults
+from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.terminal import PseudoTerminal
 from bns.hardware.journal import Journal
+from bns.hardware.servo_chain import ServoError, ServoLimits
 
 
 @pytest.fixture
@@ -20,12 +20,12 @@ def bridge(tmp_path, clock):
     """bridge(*faults) -> driver, emulator."""
     opened = []
 
-    def build(*faults, count=3, asked=3, **registers):
+    def build(*faults, count=3, asked=3, limits=None, **registers):
         struck = Faults(tuple(faults), 1, "bridge")
         emulator = BridgeEmulator([Servo(n + 1, clock, struck, **registers) for n in range(count)], clock, struck)
         line = PseudoTerminal(emulator, tmp_path, f"bridge{len(opened)}")
         opened.extend([emulator, line])
-        driver = BridgeChain(str(line.path), asked, clock, Journal(None, clock))
+        driver = BridgeChain(str(line.path), asked, clock, Journal(None, clock), limits)
         opened.append(driver)
         return driver, emulator
 
@@ -65,8 +65,8 @@ def test_half_a_frame_waits_for_the_rest():
 
 
 def test_moving_through_the_bridge(bridge, clock):
-    driver, emulator = bridge(ccw_angle_limit=600)
-    driver.arm(0.5)
+    driver, emulator = bridge(ccw_angle_limit=600, limits=ServoLimits(torque=0.5))
+    driver.arm()
     assert driver.move([0.2, -0.2, 2.0], [1.0, 1.0, 0.0]) == pytest.approx([0.2, -0.2, 0.45], abs=0.006)
     assert [s.get("moving_speed") for s in emulator.servos] == [86, 86, 1]
     for _ in range(3):

@@ -8,7 +8,7 @@ import pytest
 
 from bns.cli import main
 from bns.errors import HardwareError
-from bns.hardware.clock import RealClock
+from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.camera import CameraEmulator
 from bns.hardware.emulators.scene import Patch, Scene, disc, flat, tag
 from bns.hardware.tracking.aruco import ArucoDetector
@@ -193,12 +193,15 @@ def test_a_stream_is_read_newest_first_and_its_end_is_noticed(scene):
         shown[0] += 0.01
         return scene.frame(worn("aruco", (shown[0], 0.0, 0.3)))
 
-    with CameraEmulator(render, rate_hz=20) as camera:
-        reader = StreamCamera(camera.address, RealClock())
+    clock = EmulatedClock(2.0)
+    with CameraEmulator(render, clock, rate_hz=20) as camera:
+        reader = StreamCamera(camera.address, clock)
         tracker = FrameTracker(reader, ArucoDetector(TRUE, 0, 0.09, HEIGHT_M).find)
-        time.sleep(1.0)
-        late = shown[0] - tracker.look().pose[0]
-        assert late < 0.065  # a buffer of old frames would lag behind by more
+        for _ in range(3):
+            clock.sleep(0.31)
+            sight = tracker.look()
+            assert abs(sight.pose[0] - shown[0]) < 0.005  # a buffer of old frames would lag behind by a centimetre and more
+            assert 0 <= clock.now_s() - sight.t_s < 1 / 20 + 0.01
         camera.close()
         deadline = time.monotonic() + 5
         while tracker.look() is not None and time.monotonic() < deadline:

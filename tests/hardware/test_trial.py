@@ -1,5 +1,6 @@
 """Whole trials on the emulated Khepera, from command to table."""
 
+import io
 import itertools
 import json
 import os
@@ -8,15 +9,18 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from rich.console import Console
 
 import bns
 from bns.cli import main
 from bns.hardware.journal import events
+from bns.single import view
 from bns.trial.folder import past_evaluations
 
 from . import soak
@@ -255,6 +259,22 @@ def test_given_commands_are_driven_and_measured(tmp_path, capsys):
     assert "already; move it away" in capsys.readouterr().err
 
 
+def test_a_filmed_robot_is_seen_where_it_is_at_any_speed(tmp_path):
+    file, rig = tmp_path / "straight.csv", tmp_path / "rig.yaml"
+    file.write_text("trial,left_m_s,right_m_s,duration_s\n1,0.1,0.1,2.0\n")
+    rig.write_text(
+        "robot: khepera\nport: x\nsurface_m: {x: [-0.9, 0.9], y: [-0.7, 0.7]}\n"
+        "tracker: {kind: colour, camera: 0, calibration: x, diameter_m: 0.04, height_m: 0.07, distance_m: 0.1}\n"
+    )
+    asked = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", "--results", tmp_path]
+    assert call(*asked, "--rig", rig, "--commands", file) == 0
+    table = pd.read_csv(tmp_path / "trials" / "experiment-straight-emulated" / "measurements.csv")
+    under_way = table[table["t_s"].between(0.6, 1.9)]
+    speed_m_s = np.polyfit(under_way["t_s"], under_way["y_m"], 1)[0]
+    assert speed_m_s == pytest.approx(0.1, abs=0.005)
+    assert np.abs(under_way["y_m"] - np.polyval(np.polyfit(under_way["t_s"], under_way["y_m"], 1), under_way["t_s"])).max() < 0.01
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -271,6 +291,23 @@ def test_bad_commands_are_named_before_anything_moves(tmp_path, capsys, text, me
     assert call(*asked) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "trials").exists()
+
+
+def test_the_live_view_shows_robot_and_rig(tmp_path, monkeypatch):
+    console, seen = Console(width=200, record=True, file=io.StringIO()), []
+
+    def watching(spec, more):
+        return nullcontext(lambda row: seen.append((spec, row, more())))
+
+    monkeypatch.setattr("bns.trial.session.live_view", watching)
+    assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path) == 0
+    console.print(view(*seen[0]))
+    shown = console.export_text()
+    for heading in ("7 cm", "20 cm", "battery", "last stop", "ended early"):
+        assert heading in shown
+    assert re.search(r"7\.9 V", shown)
+    assert re.search(r"\d+ ms", shown)
+    assert "unstable" not in shown
 
 
 def test_a_trial_can_end_with_success(tmp_path, monkeypatch, capsys):

@@ -25,7 +25,8 @@ from tests.hidden_effects.listed import (
 )  # fmt: skip
 from tests.hidden_effects.luck import luck
 from tests.hidden_effects.motion import mean_commands, move
-from tests.hidden_effects.unlisted import Backlash, StickyPatch
+from tests.hidden_effects.unlisted import Backlash, Kicks, StickyPatch, Swing
+from tests.hidden_effects.unlisted_motors import LateStart, LooseWheel, Overshoot, SpeedLag, Stalls, WeakSupply
 
 BASE_M = 0.1
 
@@ -161,3 +162,57 @@ def test_mean_commands_keep_the_integral():
     t = np.arange(0, 0.2, 0.01)
     means = mean_commands(told.edges_s, told.wheels_m_s, t)
     np.testing.assert_allclose(means.sum(axis=1)[0] * 0.01, [0.1 * 0.0333 + 0.05 * 0.0501, -0.00333 + 0.2 * 0.0501])
+
+
+def test_a_wheel_that_starts_late_loses_that_time_after_each_halt():
+    y = pose_after([LateStart(0.15)], (0.1, 0.1, 1.0), (0.05, 0.05, 1.0), (0.0, 0.0, 0.5), (0.1, 0.1, 1.0))[1]
+    assert y == pytest.approx(0.1 * 0.85 + 0.05 + 0.1 * 0.85, abs=3e-4)
+
+
+def test_overshoot_is_the_step_response_of_the_textbook():
+    frequency_hz, damping = 2.0, 0.4
+    wn = 2 * np.pi * frequency_hz
+    wd = wn * np.sqrt(1 - damping**2)
+    t = np.linspace(0.1, 1.5, 8)
+    decay = np.exp(-damping * wn * t)
+    # the integral of 1 - exp(-damping wn t) (cos wd t + damping wn / wd sin wd t)
+    lost = 2 * damping / wn - decay * (2 * damping / wn * np.cos(wd * t) + (2 * damping**2 - 1) / wd * np.sin(wd * t))
+    way = [pose_after([Overshoot(frequency_hz, damping)], (0.1, 0.1, 2.0), at=one)[1] for one in t]
+    np.testing.assert_allclose(way, 0.1 * (t - lost), atol=1.5e-4)
+
+
+def test_lag_grows_with_speed():
+    slow, fast = (pose_after([SpeedLag(0.2, 0.2)], (v, v, 3.0))[1] / v for v in (0.05, 0.2))
+    assert 3.0 - slow == pytest.approx(0.05, abs=2e-3)
+    assert 3.0 - fast == pytest.approx(0.2, abs=2e-3)
+
+
+def test_stalls_take_the_share_of_time_that_they_last():
+    turned = pose_after([Stalls(0.5, 0.2)], (0.1, 0.1, 200.0))[2] - np.pi / 2
+    assert turned * BASE_M / (0.1 * 200) == pytest.approx(1 - np.exp(-0.5 * 0.2), rel=0.25)
+
+
+def test_a_wheel_comes_loose_in_the_session():
+    command = (0.1, 0.1, 1.0)
+    assert pose_after([LooseWheel(0.1, 500.0)], command, session_s=400.0)[2] == pytest.approx(np.pi / 2)
+    turned = pose_after([LooseWheel(0.1, 500.0)], command, session_s=600.0)[2] - np.pi / 2
+    assert turned == pytest.approx(0.1 * 0.1 / BASE_M)
+
+
+def test_each_wheel_slows_the_other():
+    np.testing.assert_allclose(
+        pose_after([WeakSupply(0.1, 0.2)], (0.05, 0.1, 2.0)), arc(0.05 * 0.95, 0.1 * 0.975, 2.0), atol=1e-9
+    )
+
+
+def test_a_swing_is_over_after_its_period():
+    assert pose_after([Swing(0.1, 2.0)], (0.1, 0.1, 2.0))[2] == pytest.approx(np.pi / 2, abs=2e-4)
+    half = pose_after([Swing(0.1, 2.0)], (0.1, 0.1, 2.0), at=1.0)[2] - np.pi / 2
+    assert half == pytest.approx(0.1 * 2.0 / np.pi, abs=2e-4)
+
+
+def test_kicks_come_as_often_as_is_said():
+    told = pose_after([Kicks(0.5, 0.01)], (0.1, 0.1, 200.0))[2] - np.pi / 2
+    kicks = round(told / 0.01)
+    assert told == pytest.approx(0.01 * kicks, abs=1e-6)
+    assert 0 < abs(kicks) < 40

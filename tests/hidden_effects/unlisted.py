@@ -12,6 +12,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from tests.hidden_effects.cause import Body, Cause, Moment
+from tests.hidden_effects.unlisted_motors import MOTORS
 
 
 @dataclass
@@ -180,6 +181,31 @@ class ReverseLoss(Cause):
         return np.where(wheels < 0, wheels * (1 - self.loss), wheels)
 
 
+@dataclass
+class Swing(Cause):
+    """The turn swings with a period of its own, whenever the robot moves."""
+
+    rate_rad_s: float
+    period_s: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        phase = 2 * np.pi * (moment.session_s + moment.trial_s) / self.period_s
+        return body._replace(turn=body.turn + body.moving * self.rate_rad_s * np.sin(phase))
+
+
+@dataclass
+class Kicks(Cause):
+    """Now and then something turns the robot at once, to either side."""
+
+    rate_per_s: float
+    turn_rad: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        now = body.moving * (moment.rng.random(body.turn.shape) < self.rate_per_s * moment.step_s)
+        side = moment.rng.choice([-1.0, 1.0], body.turn.shape)
+        return body._replace(turn=body.turn + now * side * self.turn_rad / moment.step_s)
+
+
 UNLISTED: dict[str, type[Cause]] = {
     "sticky-patch": StickyPatch,
     "eccentricity": Eccentricity,
@@ -194,4 +220,7 @@ UNLISTED: dict[str, type[Cause]] = {
     "carpet-nap": CarpetNap,
     "seam": Seam,
     "reverse-loss": ReverseLoss,
+    "swing": Swing,
+    "kicks": Kicks,
+    **MOTORS,
 }

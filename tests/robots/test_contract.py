@@ -5,11 +5,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from bns.engine.evolution import Population
+from bns.engine.evolution import Population, rank, tournament_cdf
 from bns.engine.philox import Key
 from bns.engine.snn import initial_weights, predict
 from bns.errors import SpecError
 from bns.robots import load_robot, robot_names
+from bns.robots.base import Luck, on_floor
 from bns.spec import FIELDS
 from bns.tasks import load_task, task_names
 
@@ -47,6 +48,26 @@ def goal(request):
 
 def weights_of(robot, seed=0, scale=0.5):
     return initial_weights(Key(seed, 1), len(robot.networks), robot.hidden, robot.input_count) * np.float32(scale)
+
+
+def test_poses_move_as_one_body(robot):
+    points = np.array([[0.2, -0.1], [0.5, 0.3], [-0.4, 0.0]])
+    poses, shift = poses_at(robot, points), np.array([0.3, -0.2])
+    moved = robot.moved(poses, 0.6, shift)
+    before, after = on_floor(robot, poses), on_floor(robot, moved)
+    assert after[:, 2] - before[:, 2] == pytest.approx(0.6)
+    expected = before[:, :2] @ np.array([[np.cos(0.6), np.sin(0.6)], [-np.sin(0.6), np.cos(0.6)]]) + shift
+    np.testing.assert_allclose(after[:, :2], expected, atol=1e-12)
+    learned = robot.measured_displacements(poses)[1:]
+    np.testing.assert_allclose(robot.measured_displacements(moved)[1:], learned, atol=1e-9)
+
+
+def test_a_cycle_called_unstable_teaches_no_displacement(robot):
+    poses = poses_at(robot, np.array([[0.2, -0.1], [0.5, 0.3], [-0.4, 0.0]]))
+    marked = robot.marked_unstable(poses, (2,))
+    learns = robot.learnable(robot.measured_displacements(marked))
+    assert learns.all() if "stable" not in robot.networks else learns[0].tolist() == [True, False, True]
+    np.testing.assert_array_equal(robot.marked_unstable(poses, ()), poses)
 
 
 def test_defaults_name_a_robot_and_its_task():
@@ -149,6 +170,21 @@ def test_a_score_does_not_depend_on_the_neighbours(goal):
     for i, length in enumerate(noisy.lengths):
         noisy.commands[i, length:] = np.nan
     np.testing.assert_array_equal(robot.score(noisy, weights, task).fitness, together.fitness)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.1, 1.0])
+def test_what_is_taken_over_from_the_parents_is_what_would_be_computed(goal, rate):
+    robot, task = goal
+    weights, population = weights_of(robot), robot.initial_population(KEY, 60, 4, 12)
+    scores, cdf = robot.score(population, weights, task, Luck(KEY, 0)), tournament_cdf(60, 0.1)
+    for generation in range(1, 8):
+        children = Population(np.zeros_like(population.commands), population.lengths.copy())
+        robot.breed(KEY, population, rank(scores.fitness), cdf, rate, 4, generation, children)
+        luck = Luck(KEY, generation)
+        anew, scores = robot.score(children, weights, task, luck), robot.score(children, weights, task, luck, scores)
+        for computed, taken in zip(anew, scores, strict=True):
+            np.testing.assert_array_equal(computed, taken)
+        population = children
 
 
 def test_fitness_is_positive_finite_and_better_for_a_drive_through_the_goals(goal):

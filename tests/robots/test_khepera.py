@@ -63,6 +63,19 @@ def test_score_is_algorithm_2(name):
     assert scores.failures == 0
 
 
+def test_only_commands_that_are_new_are_computed():
+    """What is said to be known is believed, and of commands that changed nothing is known."""
+    weights, some = initial_weights(Key(3, 1), 3, 20), lists(6, 6, 6)
+    known = ROBOT.score(some, weights, CIRCLE)
+    child = Population(some.commands.copy(), some.lengths.copy())
+    child.origin[0, :6], child.origin[1, :6] = np.arange(6), [6, 7, 8, 9, 10, 999]
+    lost = known._replace(outputs=np.full_like(known.outputs, np.nan))
+    scores = ROBOT.score(child, weights, CIRCLE, None, lost)
+    assert np.isnan(scores.outputs[:, :11]).all()
+    np.testing.assert_array_equal(scores.outputs[:, 11:], known.outputs[:, 11:])
+    assert scores.failures == 2
+
+
 def test_one_goal_by_hand():
     # 10 cm north a command; the goal is 25 cm north: 15 and 5 cm off, the second within 7 cm, the third 5 cm beyond.
     aim = task([0, 0.25])

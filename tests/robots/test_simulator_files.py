@@ -123,3 +123,11 @@ def test_the_shipped_simulator_cannot_be_changed_by_accident():
 def test_a_robot_without_a_static_simulator_says_how_to_make_one():
     with pytest.raises(ModelError, match="make it: bns precompute --robot nothing"):
         load_static_simulator("nothing")
+
+
+def test_what_a_run_was_trained_on_comes_along(tmp_path):
+    saved = StaticSimulator(NAMES, weights(), np.empty(0), {}, X)
+    save_simulator(saved, tmp_path / "a.safetensors")
+    back = load_simulator(tmp_path / "a.safetensors")
+    np.testing.assert_array_equal(back.learned_from, X)
+    assert back.digest == StaticSimulator(NAMES, weights(), np.empty(0)).digest

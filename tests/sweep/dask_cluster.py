@@ -7,6 +7,8 @@ import socket
 import subprocess
 import sys
 import threading
+import time
+from contextlib import suppress
 from pathlib import Path
 
 from distributed import Client
@@ -26,6 +28,7 @@ class Cluster:
         """Start the scheduler, at the same address as before, and the workers."""
         port = self.address.rsplit(":", 1)[1]
         self._begin("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard", "--no-show")
+        _wait_for(int(port))  # so that no test's patience is spent on the start of a process
         if self._workers:
             options = "--nworkers", str(self._workers), "--nthreads", str(self._threads), "--no-dashboard"
             self._begin("worker", self.address, *options, "--death-timeout", "60", "--memory-limit", "0")
@@ -55,6 +58,15 @@ class Cluster:
                 start_new_session=True,
             )
         )
+
+
+def _wait_for(port: int, patience_s: float = 60.0) -> None:
+    give_up_at = time.monotonic() + patience_s
+    while time.monotonic() < give_up_at:
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1.0):
+            return
+        time.sleep(0.05)
+    raise TimeoutError(f"nothing listens at port {port} after {patience_s:.0f} s")
 
 
 class Killer(threading.Thread):

@@ -8,14 +8,14 @@ import pytest
 import sweep_jobs
 
 from bns.cli import main
-from bns.errors import SpecError, StoreError
+from bns.errors import SpecError, StoreError, SweepWarning
 from bns.store.reader import load
 from bns.store.record import RunRecord
 from bns.sweep.confirm import RANKED_BY, best, confirmation, in_turn
 from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import load_sweep, parse_sweep
 from bns.sweep.order import ordered_specs
-from bns.sweep.runner import SweepWarning, run_sweep
+from bns.sweep.runner import run_sweep
 from bns.sweep.status import sweep_status
 
 TEXT = """
@@ -151,7 +151,7 @@ def test_a_name_that_leaves_no_room_is_refused(sweep, tmp_path):
         confirmation(long, tmp_path, 1)
 
 
-@pytest.mark.filterwarnings("always::bns.sweep.runner.SweepWarning")
+@pytest.mark.filterwarnings("always::bns.errors.SweepWarning")
 def test_from_the_command_line_twice_and_dry(tmp_path, capsys):
     file, results = tmp_path / "little.yaml", tmp_path / "results"
     file.write_text(REAL)

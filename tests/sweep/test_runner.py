@@ -8,7 +8,7 @@ import pytest
 import sweep_jobs
 from sweep_jobs import make_sweep
 
-from bns.errors import ModelError, StoreError
+from bns.errors import ModelError, StoreError, SweepWarning
 from bns.spec import RunSpec
 from bns.store.reader import load
 from bns.store.record import RunRecord
@@ -18,7 +18,7 @@ from bns.sweep.executor import SerialExecutor
 from bns.sweep.grid import Sweep
 from bns.sweep.job import prepare
 from bns.sweep.order import ordered_specs
-from bns.sweep.runner import Summary, SweepWarning, run_sweep
+from bns.sweep.runner import Summary, run_sweep
 from bns.sweep.workers import LokyExecutor
 
 

@@ -10,12 +10,12 @@ import sweep_jobs
 from sweep_jobs import make_sweep
 
 import bns.store.snapshot as snapshots
-from bns.errors import SpecError, StoreError
+from bns.errors import SpecError, StoreError, SweepWarning
 from bns.store import StoreWarning, Writer, compact, load
 from bns.store.journal import journals
 from bns.sweep.executor import SerialExecutor
 from bns.sweep.order import ordered_specs
-from bns.sweep.runner import SweepWarning, run_sweep
+from bns.sweep.runner import run_sweep
 from bns.sweep.shard import Shard
 
 

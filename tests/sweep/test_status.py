@@ -10,7 +10,7 @@ import pytest
 import sweep_jobs
 from sweep_jobs import make_sweep
 
-from bns.errors import StoreError
+from bns.errors import StoreError, SweepWarning
 from bns.spec import RunSpec
 from bns.store.reader import load
 from bns.store.record import RunRecord
@@ -21,7 +21,7 @@ from bns.sweep.pace import Pace
 from bns.sweep.plan import plan, work
 from bns.sweep.progress import SweepProgress, describe_rate
 from bns.sweep.report import status_table, summed_up
-from bns.sweep.runner import Summary, SweepWarning, run_sweep
+from bns.sweep.runner import Summary, run_sweep
 from bns.sweep.status import sweep_status
 
 TEXT = """
@@ -107,7 +107,7 @@ def test_runs_of_an_earlier_file_of_that_name_are_counted_apart(tmp_path):
     assert [line[2:7] for line in lines[1:]] == [["1", "3", "1", "0", "4"], ["0", "0", "0", "0", "6"]]
 
 
-@pytest.mark.filterwarnings("ignore::bns.sweep.runner.SweepWarning")  # as they should: the files take turns
+@pytest.mark.filterwarnings("ignore::bns.errors.SweepWarning")  # as they should: the files take turns
 def test_the_file_that_was_used_last_counts_even_if_it_was_used_before(tmp_path):
     text = "name: demo\nrobot: khepera\nfixed: {evaluations: 3}\ngrid: {population_size: [10, 13]}"
     first, second = sweep_of(tmp_path), parse_sweep(text, tmp_path / "y.yaml")

@@ -8,15 +8,15 @@ import numpy as np
 from numba import cuda
 
 from bns.cuda.networks import output
-from bns.engine.evolution import winner
+from bns.engine.breeding import winner
 from bns.engine.patterns import TRAINING_SHARE
 from bns.engine.philox import Purpose, philox
 from bns.engine.snn import weight_count
-from bns.robots.khepera import (
+from bns.robots.khepera import ROBOT
+from bns.robots.khepera.rules import (
     CENTRE,
     LARGEST_HEADING_RAD,
     PER_UNIT,
-    ROBOT,
     SCALE,
     START,
     aimed,

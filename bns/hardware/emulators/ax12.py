@@ -1,19 +1,15 @@
-"""A bus of AX-12 servos at the level of bytes: control tables, status packets, error bits, motion in time, shutdown."""
+"""A bus of AX-12 servos at the level of bytes: packets, who answers them, how long that takes, what gets lost."""
 
 from __future__ import annotations
 
-import math
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from bns.hardware.ax12_table import (
     ACTION,
-    ANGLE,
     BROADCAST,
     CHECKSUM,
     INSTRUCTION,
-    OVERHEAT,
-    OVERLOAD,
     PING,
     RANGE,
     READ,
@@ -22,17 +18,14 @@ from bns.hardware.ax12_table import (
     RESET,
     SYNC_WRITE,
     TABLE_SIZE,
-    VOLTAGE,
     WRITE,
 )
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.faults import Faults
+from bns.hardware.emulators.servo import Servo
 
 _HEADER = b"\xff\xff"
-_NO_LOAD_STEPS_S = 59 * 360 / 60 * 1023 / 300  # 59 turns a minute
-_SPEED_STEPS_S = 0.111 * 360 / 60 * 1023 / 300
 _BYTE_S = 10 / 1_000_000
-_COOL_C = 30
 _HIGHEST_ID = 0xFD
 
 
@@ -52,98 +45,6 @@ def _seems_whole(answer: bytes) -> bool:
     return answer[:2] == _HEADER and answer[2] <= _HIGHEST_ID and answer[4] <= 0x7F and len(answer) >= answer[3] + 4
 
 
-class Servo:
-    """One servo: its table, and a shaft that turns in time."""
-
-    def __init__(self, number: int, clock: EmulatedClock, faults: Faults, **values: int) -> None:
-        self._clock, self._faults = clock, faults
-        self.table = bytearray(TABLE_SIZE)
-        for name, register in REGISTERS.items():
-            self.put(name, values.get(name, register.default))
-        self.put("id", number)
-        self._position, self._moved_s = float(self.get("present_position")), clock.now_s()
-        self.latched = 0
-        self.pending: tuple[int, bytes] | None = None
-
-    def get(self, name: str) -> int:
-        """Value of a register."""
-        register = REGISTERS[name]
-        return int.from_bytes(self.table[register.address : register.address + register.size], "little")
-
-    def put(self, name: str, value: int) -> None:
-        """Set a register, whether hosts may or not."""
-        register = REGISTERS[name]
-        self.table[register.address : register.address + register.size] = value.to_bytes(register.size, "little")
-
-    def update(self) -> None:
-        """Turn the shaft up to now, and see whether an alarm shuts the servo down."""
-        now_s = self._clock.now_s()
-        passed_s, self._moved_s = now_s - self._moved_s, now_s
-        aim = float(self.get("goal_position")) if self._driven() else self._position
-        speed = self._speed()
-        step = math.copysign(min(abs(aim - self._position), speed * passed_s), aim - self._position)
-        self._position += step
-        left = aim - self._position
-        self.put("present_position", round(self._position))
-        self.put("moving", int(abs(left) >= 1.0))
-        self.put("present_speed", round(min(speed / _SPEED_STEPS_S, 1023)) if abs(left) >= 1.0 else 0)
-        load = min(round(abs(left) * 1023 / (32 * 3.41)), self.get("torque_limit"))
-        self.put("present_load", load | (1024 if left < 0 else 0))
-        self._alarms(now_s)
-
-    def _driven(self) -> bool:
-        return bool(self.get("torque_enable")) and self.get("torque_limit") > 0
-
-    def _speed(self) -> float:
-        """Steps a second; a speed of 0 is as fast as the motor can."""
-        asked = self.get("moving_speed") * _SPEED_STEPS_S
-        return min(asked, _NO_LOAD_STEPS_S) if asked > 0 else _NO_LOAD_STEPS_S
-
-    def _alarms(self, now_s: float) -> None:
-        number = self.get("id")
-        if self._faults.strikes("overheat", now_s, number):
-            self.put("present_temperature", 75)
-        elif self.get("present_temperature") > _COOL_C:
-            self.put("present_temperature", _COOL_C)
-        found = 0
-        if not self.get("low_voltage_limit") <= self.get("present_voltage") <= self.get("high_voltage_limit"):
-            found |= VOLTAGE
-        if self.get("present_temperature") > self.get("temperature_limit"):
-            found |= OVERHEAT
-        if self._faults.strikes("overload", now_s, number):
-            found |= OVERLOAD
-        if found & self.get("alarm_shutdown"):
-            self.put("torque_limit", 0)
-            self.put("torque_enable", 0)
-            self.latched |= found & OVERLOAD
-        self.alarm = found
-
-    def errors(self) -> int:
-        """Error byte: alarms there are, and an overload that was not acknowledged by writing the torque limit again."""
-        return self.alarm | self.latched
-
-    def write(self, address: int, data: bytes) -> int:
-        """Write into the table; the error bits of it."""
-        last = address + len(data)
-        touched = {n: r for n, r in REGISTERS.items() if r.address < last and address < r.address + r.size}
-        if last > TABLE_SIZE or not touched:
-            return RANGE
-        trial = bytearray(self.table)
-        trial[address:last] = data
-        for name, register in touched.items():
-            value = int.from_bytes(trial[register.address : register.address + register.size], "little")
-            if not register.writable or value > register.highest:
-                return RANGE
-            if name == "goal_position" and not self.get("cw_angle_limit") <= value <= self.get("ccw_angle_limit"):
-                return ANGLE
-        self.table[:] = trial
-        if "torque_limit" in touched and not self.alarm & OVERLOAD:
-            self.latched &= ~OVERLOAD
-        if "goal_position" in touched and self.get("torque_limit") > 0:
-            self.put("torque_enable", 1)  # a goal switches the torque on by itself
-        return 0
-
-
 class Bus:
     """The far end of the line: servos that hear everything and answer what is meant for them."""
 
@@ -152,6 +53,7 @@ class Bus:
         self._clock, self._faults = clock, faults or Faults()
         self._buffer, self._garbled = b"", False
         self._lock = threading.Lock()
+        self.cut_line: Callable[[float], None] = lambda _seconds: None
 
     def receive(self, data: bytes) -> bytes:
         """Bytes in, bytes out."""
@@ -159,11 +61,19 @@ class Bus:
             self._buffer += data
             answers = b""
             while (found := self._packet()) is not None:
-                answer = self._carried_out(found)
+                answer = b"" if self._lost() else self._carried_out(found)
                 if not answer:
                     self._clock.fell_silent()
                 answers += answer
             return answers
+
+    def _lost(self) -> bool:
+        """Whether nobody on the bus hears this packet."""
+        now_s = self._clock.now_s()
+        if self._faults.strikes("hang-up", now_s):
+            self.cut_line(self._faults.length_s("hang-up"))
+            return True
+        return self._faults.strikes("lost-request", now_s)
 
     def written(self) -> None:
         """The answer is on the line; the rest of a garbled one, whose length may be wrong, is waited for in vain."""
@@ -186,7 +96,7 @@ class Bus:
     def _carried_out(self, body: bytes) -> bytes:
         number, kind, parameters = body[0], body[2], body[3:-1]
         meant = [s for s in self.servos if number in {s.get("id"), BROADCAST}]
-        for servo in self.servos:
+        for servo in meant:
             servo.update()
         if checksum(body[:-1]) != body[-1]:
             return b"".join(self._status(s, CHECKSUM) for s in meant[:1] if number != BROADCAST)

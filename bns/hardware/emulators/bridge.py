@@ -11,10 +11,12 @@ from bns.hardware.bridge_frames import (
     GOAL,
     HELLO,
     MOVE,
+    NO_ANSWER,
     REFUSED,
     SERVO,
     STATE,
     STOP,
+    TORN_S,
     VERSION,
     WATCHDOG_S,
     Frame,
@@ -22,8 +24,8 @@ from bns.hardware.bridge_frames import (
     encoded,
 )
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.ax12 import Servo
 from bns.hardware.emulators.faults import Faults
+from bns.hardware.emulators.servo import Servo
 
 _LATENCY_S = 0.004
 
@@ -33,7 +35,8 @@ class BridgeEmulator:
 
     def __init__(self, servos: Sequence[Servo], clock: EmulatedClock, faults: Faults | None = None) -> None:
         self.servos, self._clock, self._faults = list(servos), clock, faults or Faults()
-        self._buffer, self._heard_s = b"", clock.now_s()
+        self._buffer, self._heard_s, self._byte_s = b"", clock.now_s(), clock.now_s()
+        self._armed = False
         self._lock = threading.Lock()
         self._answers: dict[int, Callable[[bytes], bytes | None]] = {
             HELLO: lambda _p: bytes([VERSION, len(self.servos)]),
@@ -42,6 +45,7 @@ class BridgeEmulator:
             STATE: lambda _p: b"".join(self._state(s) for s in self.servos),
             STOP: lambda _p: self._stop().to_bytes(2, "little"),
         }
+        self.cut_line: Callable[[float], None] = lambda _seconds: None
         clock.listeners.append(self.moved_on)
 
     def moved_on(self, now_s: float) -> None:
@@ -59,10 +63,16 @@ class BridgeEmulator:
     def receive(self, data: bytes) -> bytes:
         """Bytes in, bytes out."""
         with self._lock:
-            frame, self._buffer = decoded(self._buffer + data)
+            now_s = self._clock.now_s()
+            if now_s - self._byte_s > TORN_S:
+                self._buffer = b""
+            frame, self._buffer, self._byte_s = *decoded(self._buffer + data), now_s
             if frame is None:
                 return self._nothing()
-            now_s = self._heard_s = self._clock.now_s()
+            self._heard_s = now_s
+            if self._faults.strikes("hang-up", now_s):
+                self.cut_line(self._faults.length_s("hang-up"))
+                return self._nothing()
             if self._faults.strikes("lost-request", now_s):
                 return self._nothing()
             for servo in self.servos:
@@ -85,10 +95,11 @@ class BridgeEmulator:
             servo.put("goal_position", servo.get("present_position"))
             servo.put("torque_limit", 1023 * payload[0] // 100)
             servo.put("torque_enable", 1)
+        self._armed = True
         return b""
 
     def _move(self, payload: bytes) -> bytes | None:
-        if len(payload) != GOAL.size * len(self.servos):
+        if not self._armed or len(payload) != GOAL.size * len(self.servos):
             return None
         done = b""
         for servo, (goal, speed) in zip(self.servos, GOAL.iter_unpack(payload), strict=True):
@@ -97,14 +108,15 @@ class BridgeEmulator:
             done += GOAL.pack(kept, max(1, speed))
         return done
 
-    @staticmethod
-    def _state(servo: Servo) -> bytes:
+    def _state(self, servo: Servo) -> bytes:
+        if self._faults.strikes("silent-servo", self._clock.now_s(), servo.get("id")):
+            return SERVO.pack(0, 0, 0, 0, NO_ANSWER)
         names = ("present_position", "present_load", "present_temperature", "present_voltage")
         return SERVO.pack(*(servo.get(name) for name in names), servo.errors())
 
     def _stop(self) -> int:
         """Torque off; bits of the servos that are not off, or silent."""
-        left = 0
+        left, self._armed = 0, False
         for place, servo in enumerate(self.servos):
             if self._faults.strikes("silent-servo", self._clock.now_s(), servo.get("id")):
                 left |= 1 << place

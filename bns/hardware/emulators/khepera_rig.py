@@ -12,7 +12,7 @@ from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.body import DifferentialBody
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.khepera import KheperaEmulator
-from bns.hardware.emulators.terminal import PseudoTerminal
+from bns.hardware.emulators.terminal import HangUp, PseudoTerminal
 from bns.hardware.emulators.watchers import emulated_tracker
 from bns.hardware.khepera import firmware
 from bns.hardware.rig import Rig
@@ -27,30 +27,24 @@ class EmulatedKheperaRig:
 
     def __init__(self, rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> None:
         self._clock = clock
-        self._plug_in_at_s: float | None = None
         self.body = DifferentialBody(load_model("khepera-world"), Key.of_run(seed, 0, "khepera", "emulated"), START)
         self.robot = KheperaEmulator(self.body, clock, firmware(*_FIRMWARE), plan.of("khepera"))
-        self.robot.cut_line = self._cut
         self._line = PseudoTerminal(self.robot, folder, "khepera")
+        self._hang_up = HangUp(self._line, clock)
+        self.robot.cut_line = self._hang_up.cut
         tracker, self._watcher = emulated_tracker(rig.tracker, folder, self.body.seen, clock, plan.of("tracker"), seed)
         self.rig = replace(rig, port=str(self._line.path), tracker=tracker)
-        clock.listeners.append(self._moved_on)
 
     def put_down(self, pose: np.ndarray) -> None:
         """Place the robot."""
         self.body.put_down(tuple(float(v) for v in pose), self._clock.now_s())  # type: ignore[arg-type]  # three of them
 
+    def unstable_between(self, begin_s: float, end_s: float) -> bool:
+        """Never: it stands on two wheels."""
+        return False
+
     def close(self) -> None:
         """Take it away."""
-        self._clock.listeners.remove(self._moved_on)
+        self._hang_up.close()
         self._line.close()
         self._watcher.close()
-
-    def _cut(self, for_s: float) -> None:
-        self._line.cut()
-        self._plug_in_at_s = self._clock.now_s() + for_s
-
-    def _moved_on(self, now_s: float) -> None:
-        if self._plug_in_at_s is not None and now_s >= self._plug_in_at_s:
-            self._plug_in_at_s = None
-            self._line.plug_in()

@@ -10,6 +10,8 @@ import tty
 from pathlib import Path
 from typing import Protocol, Self
 
+from bns.hardware.clock import EmulatedClock
+
 
 class Device(Protocol):
     """The far end of a serial line."""
@@ -105,3 +107,26 @@ class PseudoTerminal:
             if answer and line == self._master:
                 os.write(line, answer)
                 self._device.written()
+
+
+class HangUp:
+    """Cuts a line, and plugs it in again when the time has come."""
+
+    def __init__(self, line: PseudoTerminal, clock: EmulatedClock) -> None:
+        self._line, self._clock = line, clock
+        self._until_s: float | None = None
+        clock.listeners.append(self._moved_on)
+
+    def cut(self, for_s: float) -> None:
+        """The line is dead for so long."""
+        self._line.cut()
+        self._until_s = self._clock.now_s() + for_s
+
+    def close(self) -> None:
+        """No more."""
+        self._clock.listeners.remove(self._moved_on)
+
+    def _moved_on(self, now_s: float) -> None:
+        if self._until_s is not None and now_s >= self._until_s:
+            self._until_s = None
+            self._line.plug_in()

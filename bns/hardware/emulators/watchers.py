@@ -18,6 +18,8 @@ from bns.hardware.tracking.lens import Lens, looking_down
 from bns.hardware.tracking.wii import overhead
 
 Pose = Callable[[float], np.ndarray]
+Wears = Callable[[float], list[Patch]]
+"""Time -> the markers on a robot as they lie then."""
 YELLOW_BGR, GREEN_BGR = (30, 210, 240), (60, 180, 40)
 
 
@@ -28,28 +30,41 @@ class Device(Protocol):
         """Take it away."""
 
 
-def emulated_lens() -> Lens:
-    """A wide camera 2 m above the floor, a little tilted, with the distortion of its price."""
-    matrix = np.array([[700.0, 0.0, 640.0], [0.0, 700.0, 360.0], [0.0, 0.0, 1.0]])
-    return looking_down(matrix, np.array([-0.25, 0.08, 0.001, -0.0005, 0.0]), (1280, 720), 2.0, 0.05)
+def emulated_lens(scale: float = 1.0) -> Lens:
+    """A wide camera 2 m above the floor, a little tilted, with the distortion of its price; 1280 by 720 pixels times `scale`."""
+    matrix = np.array([[700.0 * scale, 0.0, 640.0 * scale], [0.0, 700.0 * scale, 360.0 * scale], [0.0, 0.0, 1.0]])
+    size = (round(1280 * scale), round(720 * scale))
+    return looking_down(matrix, np.array([-0.25, 0.08, 0.001, -0.0005, 0.0]), size, 2.0, 0.05)
 
 
 def emulated_tracker(
     settings: Mapping[str, Any], folder: Path, pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
 ) -> tuple[dict[str, Any], Device]:
-    """An emulated device for these tracker settings; the settings with its address, and the device."""
+    """An emulated device that watches a rigid robot; the tracker's settings with its address, and the device."""
     if settings["kind"] == "wii":
         path = folder / "wiimote"
         return {**settings, "device": str(path)}, WiiEmulator(path, pose, overhead(settings), clock, faults, seed)
-    lens, place = emulated_lens(), folder / "camera.json"
+    return emulated_camera(settings, folder, lambda now_s: worn(settings, pose(now_s)), clock, faults, seed)
+
+
+def emulated_camera(
+    settings: Mapping[str, Any],
+    folder: Path,
+    wears: Wears,
+    clock: EmulatedClock,
+    faults: Faults,
+    seed: int,
+    scale: float = 1.0,
+    rate_hz: float = 15.0,
+) -> tuple[dict[str, Any], Device]:
+    """A calibrated camera that films the markers a robot wears; the tracker's settings with its address, and the camera."""
+    lens, place = emulated_lens(scale), folder / "camera.json"
     Calibration(lens, 0.0, 0, "the emulated camera").save(place)
-    camera = CameraEmulator(_film(lens, settings, pose, clock, faults, seed))
+    camera = CameraEmulator(_film(lens, wears, clock, faults, seed), clock, rate_hz)
     return {**settings, "camera": camera.address, "calibration": str(place)}, camera
 
 
-def _film(
-    lens: Lens, settings: Mapping[str, Any], pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
-) -> Callable[[], np.ndarray | None]:
+def _film(lens: Lens, wears: Wears, clock: EmulatedClock, faults: Faults, seed: int) -> Callable[[], np.ndarray | None]:
     scene, draw = Scene(lens, seed=seed), np.random.default_rng([seed, 11])
     last: list[np.ndarray] = []
 
@@ -57,7 +72,7 @@ def _film(
         now_s = clock.now_s()
         if faults.strikes("stuck-marker", now_s):
             return last[0].copy() if last else None
-        patches = [] if faults.strikes("lost-marker", now_s) else worn(settings, pose(now_s))
+        patches = [] if faults.strikes("lost-marker", now_s) else wears(now_s)
         if faults.strikes("reflection", now_s):
             patches.append(disc(YELLOW_BGR, 0.04, draw.uniform(-0.5, 0.5), draw.uniform(-0.5, 0.5), 0.0))
         last[:] = [scene.frame(patches)]

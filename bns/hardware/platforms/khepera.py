@@ -18,15 +18,14 @@ from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
 from bns.hardware.serial_link import SerialLink
 from bns.hardware.stop import Stop
+from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import open_tracker
-from bns.hardware.tracking.sight import Sight, Tracker, unwrapped
+from bns.hardware.tracking.sight import Sight, Tracker
 from bns.robots.khepera import UNITS_PER_M_S
 
 _TICK_S = 0.1
 _HEARTBEATS = 5
 """Every so many looks the robot is asked for its speed: a dead link is noticed within half a second, not at the next command."""
-_LOOKS = 10
-_SETTLE_S = 3.0
 
 
 class KheperaPlatform:
@@ -35,10 +34,9 @@ class KheperaPlatform:
     def __init__(
         self, driver: KheperaIII, link: SerialLink, tracker: Tracker, rig: Rig, clock: Clock, journal: Journal, stopping: Stopping
     ) -> None:
-        self._driver, self._link, self._tracker, self._clock, self._journal = driver, link, tracker, clock, journal
+        self._driver, self._link, self._clock, self._journal = driver, link, clock, journal
+        self._eye = Eye(tracker, clock, journal, math.pi / 2)
         self._watch = Watch(rig.limits, clock, stopping)
-        self._heading_rad = math.pi / 2
-        self._fresh_s = 0.0
 
     @property
     def retries(self) -> int:
@@ -47,15 +45,8 @@ class KheperaPlatform:
 
     def pose(self) -> np.ndarray | None:
         """Mean of some looks at the standing robot."""
-        poses: list[np.ndarray] = []
-        for _ in range(3 * _LOOKS):
-            sight = self._look()
-            if sight is not None:
-                poses.append(sight.pose)
-            if len(poses) == _LOOKS:
-                return np.mean(poses, axis=0)
-            self._clock.sleep(_TICK_S / 5)
-        return None
+        sight = self._eye.standing()
+        return None if sight is None else sight.pose
 
     def readings(self) -> dict[str, float]:
         """Battery."""
@@ -71,7 +62,7 @@ class KheperaPlatform:
     def close(self) -> None:
         """Give port and tracker free."""
         self._link.close()
-        self._tracker.close()
+        self._eye.close()
 
     def drive(self, commands: np.ndarray) -> Driven:
         """Drive the commands back to back from where the robot stands."""
@@ -93,20 +84,6 @@ class KheperaPlatform:
         assert guard.last is not None
         seconds = self._clock.now_s() - began_s
         return Driven(drive.done(), np.array(drive.poses), drive.rows, guard.last, ended, seconds)
-
-    def _look(self) -> Sight | None:
-        """A sight newer than the last, heading unwrapped; None if there is none."""
-        try:
-            sight = self._tracker.look()
-        except HardwareError as error:
-            raise TrialPausedError(str(error)) from error
-        if sight is None or (sight.t_s <= self._fresh_s and self._clock.now_s() > sight.t_s + _TICK_S):
-            return None
-        self._fresh_s = sight.t_s
-        self._heading_rad = unwrapped(float(sight.pose[2]), self._heading_rad)
-        pose = np.array([sight.pose[0], sight.pose[1], self._heading_rad])
-        self._journal.note("seen", pose=[round(float(v), 5) for v in pose], residual_m=round(sight.residual_m, 6))
-        return Sight(sight.t_s, pose, sight.residual_m)
 
 
 class _Drive:
@@ -150,7 +127,7 @@ class _Drive:
         return sight.pose
 
     def _seen(self, left: float, right: float) -> Sight | None:
-        sight = self._on._look()
+        sight = self._on._eye.look()
         if sight is not None:
             began_s = self._clock.now_s() if self._began_s is None else self._began_s
             self.rows.append(_row(self._clock.now_s() - began_s, left, right, sight.pose))

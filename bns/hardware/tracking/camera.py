@@ -61,19 +61,20 @@ class StreamCamera:
         return self._frame
 
     def close(self) -> None:
-        """End the thread, let the camera go."""
+        """End the thread, which lets the camera go: a camera released while it is being read from takes the process with it."""
         self._open = False
         self._thread.join(timeout=5)
-        self._capture.release()
 
     def _read(self) -> None:
         while self._open:
             good, picture = self._capture.read()
             if not good:  # unplugged: the last frame must not be taken for a new one
                 self._frame = None
-                return
+                break
             self._frame = Frame(self._clock.now_s(), picture)
             self._arrived.set()
+            self._clock.arrived()
+        self._capture.release()
 
 
 class FrameTracker:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Stamps
+from bns.physics.signals import Array, Stamps
 
 
-def apply(stamps: Stamps, offset_s: float) -> Stamps:
-    """A pose stamped t was taken at t - ``offset_s``."""
+def apply(stamps: Stamps, offset_s: float | Array) -> Stamps:
+    """A pose stamped t was taken at t - ``offset_s``: one number for all, or one for each stamp."""
     return replace(stamps, t_s=stamps.t_s - offset_s)
 
 
@@ -24,4 +24,5 @@ EFFECT = Effect(
     lookalikes=("command-delay", "motor-lag"),
     apply=apply,
     rank=150,
+    may_differ=True,
 )

@@ -17,7 +17,7 @@ EFFECT = Effect(
     name="side-slip",
     stage="body",
     parameters=(
-        Parameter("slip_s", "s", -2.0, 2.0, (-0.4, 0.4), 0.0, "sideways velocity per centripetal acceleration v·omega"),
+        Parameter("slip_s", "s", -2.0, 2.0, (-1.0, 1.0), 0.0, "sideways velocity per centripetal acceleration v·omega"),
     ),
     equation="s' = s + k·v·omega, s the velocity to the right",
     residuals="The path lies outside the commanded arc, more so the faster and sharper it is; headings fit.",

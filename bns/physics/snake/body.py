@@ -36,7 +36,7 @@ class Body:
         self.parameters = parameters
         self.model = build_model(parameters)
         self.data = mujoco.MjData(self.model)
-        self._sites = [self.model.site(name).id for name in (YELLOW, GREEN)]
+        self.sites = [self.model.site(name).id for name in (YELLOW, GREEN)]
         self._angles = np.zeros(parameters.joints)
         self._waiting: list[np.ndarray] = []
         self._tail = self.model.body(f"link{int(parameters.links) - 1}").id
@@ -55,7 +55,7 @@ class Body:
 
     def markers_m(self) -> np.ndarray:
         """Where a camera above sees the markers: (2, 2), yellow and green, x and y."""
-        return self.data.site_xpos[self._sites, :2].copy()
+        return self.data.site_xpos[self.sites, :2].copy()
 
     def set_friction(self, factor: float) -> None:
         """Floor friction as a multiple of the parameter's."""
@@ -86,7 +86,7 @@ class Body:
         start = self._angles
         for step in range(1, steps + 1):
             self._angles = start + np.clip(way, -furthest * step, furthest * step)
-            self._step()
+            self.step(self._angles)
             if step % LOOK_EVERY == 0:
                 watch.look(self.data, LOOK_EVERY * p.dt_s)
                 if BLEW_UP in watch.seen:
@@ -94,8 +94,9 @@ class Body:
             if on_step is not None:
                 on_step(self.model, self.data)
 
-    def _step(self) -> None:
-        self._waiting.append(self._angles)
+    def step(self, angles: np.ndarray) -> None:
+        """One step of time with these set points of the servos (joints,), rad."""
+        self._waiting.append(angles)
         wanted, there = self._waiting.pop(0), self.data.qpos[7:]
         within = np.abs(wanted - there) < self.parameters.dead_band_rad
         self.data.ctrl[:] = np.where(within, there, wanted)

@@ -1,4 +1,4 @@
-"""Joint angles of a cycle: equations 5.1 and 5.2."""
+"""The commands of a cycle: its gait from beginning to end, checked."""
 
 from __future__ import annotations
 
@@ -6,25 +6,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bns.errors import ModelError
+from bns.robots.snake.gait import joint_angles
 
 COMMANDS_A_CYCLE = 13
 """Angle sets of a cycle, t = 0..12: the first and the last are the same (section 5.3.2)."""
-GAMMA_RAD = 2.0 * np.pi / 12.0
-"""Temporal step γ: one period of the sine in a cycle."""
 PARAMETERS = ("a_lat_rad", "a_vert_rad", "omega_rad", "alpha_rad")
 
 
 def cycle_angles(parameters: ArrayLike, joints: int = 12) -> np.ndarray:
     """Angles (13, joints), rad, of every servo at every command of one cycle.
 
-    ``parameters`` (4,): A_lateral, A_vertical, ω, α. Even joints are lateral: A_lat sin(θ + α); odd ones vertical:
-    A_vert sin θ; θ = ω n + γ t; both offsets are zero. ModelError unless 0 <= A_vert < A_lat <= π/2 (A_lat = 0 is a
-    robot that lies still) and all are finite.
+    ``parameters`` (4,): A_lateral, A_vertical, ω, α, as in `joint_angles`. ModelError unless 0 <= A_vert < A_lat <= π/2 (A_lat
+    = 0 is a robot that lies still) and all are finite.
     """
-    a_lat, a_vert, omega, alpha = _checked(parameters)
-    n = np.arange(joints)
-    theta = omega * n + GAMMA_RAD * np.arange(COMMANDS_A_CYCLE)[:, None]
-    return np.where(n % 2 == 0, a_lat * np.sin(theta + alpha), a_vert * np.sin(theta))
+    return joint_angles(_checked(parameters), np.arange(COMMANDS_A_CYCLE), joints)
 
 
 def _checked(parameters: ArrayLike) -> np.ndarray:

@@ -82,14 +82,16 @@ def _rendered(model: mujoco.MjModel) -> Draw:
 
 
 def stick_figure(model: mujoco.MjModel) -> Draw:
-    """As `camera`, with lines: from above, and from the side with the height."""
+    """As `camera`, with lines: from above, and from the side with the height; a link is the redder the further it has rolled."""
     sites = [model.site(name).id for name in ("yellow", "green")]
 
     def draw(data: mujoco.MjData) -> np.ndarray:
         figure = Figure(figsize=(WIDTH_PX / 100, HEIGHT_PX / 100), dpi=100, layout="constrained")
         above, beside = figure.subplots(2, 1, height_ratios=[4, 1], sharex=True)
         body, markers = data.xpos[1:], data.site_xpos[sites]
-        above.plot(body[:, 0], body[:, 1], "o-", color="#444444", linewidth=4)
+        above.plot(body[:, 0], body[:, 1], "-", color="#444444", linewidth=4)
+        upright = data.xmat[1:, 8]  # how far up a link's own upward axis points: 1 upright, 0 on its side, -1 on its back
+        above.scatter(body[:, 0], body[:, 1], c=-upright, cmap="YlOrRd", vmin=-1, vmax=1, edgecolors="#444444", s=45, zorder=2)
         above.scatter(markers[:, 0], markers[:, 1], c=["#e6c200", "#1a9e3b"], s=80, zorder=3)
         beside.plot(body[:, 0], body[:, 2], "o-", color="#444444")
         above.set(xlim=(-1.35, 1.35), ylim=(-0.925, 0.925), aspect="equal", ylabel="y, north (m)")

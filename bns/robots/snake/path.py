@@ -20,19 +20,30 @@ STABLE = 8
 """Column of an observation that says whether the cycle was stable."""
 
 
-def walk(displacements: np.ndarray) -> np.ndarray:
-    """Observations (n, 9) that displacements (n, 5) add up to; a cycle begins where the one before ended.
+def walk(displacements: np.ndarray, changes: np.ndarray | None = None, rigid: bool = False) -> np.ndarray:
+    """Observations (n, 9) that displacements (n, 5) add up to.
 
     Columns: yellow x, y, green x, y at the begin of the cycle, the same at its end (m), and 1 for stable or 0. Both markers'
-    frames have y from yellow to green and x to its right, as both stand at the begin of the cycle.
+    frames have y from yellow to green and x to its right, as both stand at the begin of the cycle. A cycle begins where the one
+    before ended, or where ``changes`` (n, 5), as of `posture.changes`, moved the markers. ``rigid``: both are on one body, so a
+    cycle leaves them as far apart as it found them, and a change as far as the posture puts them.
     """
     markers, rows = np.array(START_M), []
-    for moved in displacements:
-        right, along = frame(markers)
-        after = markers + np.outer(moved[[0, 2]], right) + np.outer(moved[[1, 3]], along)
-        rows.append(np.concatenate([markers.ravel(), after.ravel(), [float(moved[4] >= 0.5)]]))
-        markers = after
+    for i, moved in enumerate(displacements):
+        before = markers if changes is None else moved_on(markers, changes[i], changes[i, 4] if rigid else None)
+        markers = moved_on(before, moved, math.hypot(*(before[1] - before[0])) if rigid else None)
+        rows.append(np.concatenate([before.ravel(), markers.ravel(), [float(moved[4] >= 0.5)]]))
     return np.array(rows).reshape(-1, 9)
+
+
+def moved_on(markers: np.ndarray, moved: np.ndarray, gap_m: float | None = None) -> np.ndarray:
+    """Markers (2, 2) after displacements (>= 4,): yellow to the right and along, then green; set ``gap_m`` apart, if given,
+    with their middle and direction kept."""
+    right, along = frame(markers)
+    after: np.ndarray = markers + np.outer(moved[[0, 2]], right) + np.outer(moved[[1, 3]], along)
+    if gap_m is not None:
+        after = after.mean(axis=0) + np.outer([-0.5, 0.5], gap_m * frame(after)[1])
+    return after
 
 
 def frame(markers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

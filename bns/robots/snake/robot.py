@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 
 from bns.engine.evolution import Population, diversity
 from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import predict
-from bns.robots.base import Luck, Recipe, Scores
-from bns.robots.snake import cycles, path
+from bns.robots.base import Luck, Recipe, Scores, turned
+from bns.robots.snake import cycles, path, posture, table
 from bns.robots.snake.rollout import evaluate
 from bns.tasks import Task
 
@@ -23,9 +25,14 @@ _JOINT_SPEED_RAD_S, _SETTLE_S = 1.5, 0.05
 
 
 class Snake:
-    """Implements `bns.robots.base.Robot`: poses are observations (n, 9) as in `path.walk`."""
+    """Implements `bns.robots.base.Robot`: poses are observations (n, 9) as in `path.walk`.
+
+    What the source leaves out can be switched on: ``changes`` (from one cycle to the next the markers move as `posture` says) and
+    ``rigid`` (the markers, which are on one body, cannot drift apart).
+    """
 
     name = "snake"
+    options = ("changes", "rigid")
     networks = ("dx_yellow", "dy_yellow", "dx_green", "dy_green", "stable")
     hidden = 100
     input_count = 4
@@ -36,6 +43,14 @@ class Snake:
     radii_m: tuple[float, ...] = ()
     bounds = cycles.BOUNDS
     command_columns = cycles.COLUMNS
+    measured_columns = table.COLUMNS
+
+    def __init__(self, switched_on: tuple[str, ...] = ()) -> None:
+        self.with_changes, self.rigid = "changes" in switched_on, "rigid" in switched_on
+
+    def with_options(self, names: tuple[str, ...]) -> Snake:
+        """The snake with some of `options` switched on."""
+        return Snake(names)
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """Random cycles, as many as ``capacity`` allows up to ten; all controllers have the same number."""
@@ -73,9 +88,15 @@ class Snake:
         stable = displacements[:, 4] >= 0.5
         return np.vstack([np.tile(stable, (4, 1)), np.ones((1, len(stable)), bool)])
 
-    def poses(self, displacements: np.ndarray) -> np.ndarray:
-        """Observations (n, 9) from the start of every task."""
-        return path.walk(displacements)
+    def poses(self, displacements: np.ndarray, commands: np.ndarray | None = None) -> np.ndarray:
+        """Observations (n, 9) from the start of every task, every repeat a row; changes are asked of the commands."""
+        return path.walk(displacements, self.changes(commands) if self.with_changes else None, self.rigid)
+
+    def changes(self, commands: np.ndarray | None) -> np.ndarray:
+        """What the change into each of these cycles (n, 5) does, (n, 5) as of `posture.changes`."""
+        if commands is None:
+            raise ValueError("a snake with changes needs the cycles that displacements belong to")
+        return posture.changes(commands)
 
     def measured_displacements(self, poses: np.ndarray) -> np.ndarray:
         """What each cycle did between its own begin and end; what the change between cycles did is left out."""
@@ -93,13 +114,26 @@ class Snake:
         markers = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
         return named | dict(zip(markers, poses[:, 4:8].T, strict=True)) | {"stable": poses[:, path.STABLE] >= 0.5}
 
+    def moved(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
+        """Observations (n, 9) whose markers are turned about the origin, then shifted."""
+        markers = turned(poses[:, : path.STABLE].reshape(-1, 2), turn_rad) + shift_m
+        return np.column_stack([markers.reshape(len(poses), path.STABLE), poses[:, path.STABLE]])
+
+    def marked_unstable(self, poses: np.ndarray, commands: Sequence[int]) -> np.ndarray:
+        """Observations (n, 9) of which those of these cycles (numbers from 1) were not stable."""
+        marked = poses.copy()
+        marked[[number - 1 for number in commands], path.STABLE] = 0.0
+        return marked
+
     def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
         """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2)."""
         in_full = cycles.in_full(controller)
         outputs = predict(weights, self.inputs(in_full), self.sigmoid_output)
-        return in_full[: path.judge(self.poses(self.displacements(outputs)), task)[2]]
+        return in_full[: path.judge(self.poses(self.displacements(outputs), in_full), task)[2]]
 
-    def score(self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None) -> Scores:
+    def score(
+        self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None
+    ) -> Scores:
         """Mean fitness over ten noisy evaluations, all controllers under the same noise; without luck there is none."""
         commands = population.commands
         n, length, _ = commands.shape
@@ -110,8 +144,18 @@ class Snake:
         half = (task.region_m / 2, task.surface_m[0] / 2, task.surface_m[1] / 2)
         noise = self._noise(luck, length * cycles.MOST_REPEATS)
         repeats = np.ascontiguousarray(commands[..., cycles.REPEATS])
-        failures = evaluate(moves, repeats, noise, task.goals_m, *half, fitness, reached, used)
+        moved = self._population_changes(commands)
+        failures = evaluate(moves, moved, self.rigid, repeats, noise, task.goals_m, *half, fitness, reached, used)
         return Scores(fitness, reached, int(failures), used)
+
+    def _population_changes(self, commands: np.ndarray) -> np.ndarray:
+        """Changes into all cycles of a population (n, cycles, 5), (5, n * cycles); (5, 0) where they are ignored."""
+        if not self.with_changes:
+            return np.empty((5, 0))
+        n, length, _ = commands.shape
+        before = np.arange(-1, n * length - 1)
+        before[::length] = -1
+        return np.ascontiguousarray(posture.changes(commands.reshape(n * length, -1), before).T)
 
     @staticmethod
     def _noise(luck: Luck | None, steps: int) -> np.ndarray:
@@ -156,3 +200,8 @@ class Snake:
         """Time of the cycles: twelve steps of the joint with the longest way at the constant speed, and the pauses."""
         largest_step = 2 * math.sin(math.pi / 12) * commands[:, 0]
         return float(1000 * 12 * (largest_step / _JOINT_SPEED_RAD_S + _SETTLE_S).sum())
+
+    def measurements(self, trial: int, commands: np.ndarray, poses: np.ndarray) -> pd.DataFrame:
+        """Two rows a cycle: its parameters and the markers at its begin, the markers and its stability at its end."""
+        lasted_s = np.array([self.driven_ms(one[None]) / 1000 for one in commands.astype(np.float64)])
+        return table.cycle_table(trial, commands, poses, lasted_s, _SETTLE_S)

@@ -1,0 +1,236 @@
+// Bridge between a computer and a chain of AX-12 servos on an Arduino Mega. docs/bridge.md describes the frames.
+//
+// Computer: USB (Serial), 115200 baud. Servos: Serial1 (pins 18, 19), 1 Mbaud, half duplex through a 74LS241 or the like;
+// DIRECTION is high while the Arduino speaks. Servos carry the ids 1, 2, 3, ... from the yellow end.
+
+#include <Arduino.h>
+
+const uint8_t DIRECTION = 2;
+const uint8_t MOST_SERVOS = 16;
+const uint8_t VERSION = 1;
+const uint32_t WATCHDOG_MS = 500, TORN_MS = 50, RAMP_MS = 50, ANSWER_US = 3000;
+
+const uint8_t START = 0xA5, HELLO = 1, ARM = 2, MOVE = 3, STATE = 4, STOP = 5, ANSWER = 0x80, REFUSED = 0xFF;
+const uint8_t NO_ANSWER = 0x80;  // in a servo's error byte
+
+// Control table of the AX-12.
+const uint8_t ANGLE_LIMITS = 6, TORQUE_ENABLE = 24, GOAL = 30, TORQUE_LIMIT = 34, POSITION = 36, MOVING = 46;
+const uint8_t PING = 1, READ = 2, WRITE = 3, BROADCAST = 254, RAMP_STEPS = 4, TRIES = 3;
+
+uint8_t frame[4 + 255 + 2], servos = 0, ramp = RAMP_STEPS;
+uint16_t held = 0, low[MOST_SERVOS], high[MOST_SERVOS], torque = 0;
+uint32_t heardMs = 0, byteMs = 0, rampMs = 0;
+bool armed = false;
+
+uint16_t crc16(const uint8_t *data, uint16_t count) {
+  uint16_t value = 0xFFFF;
+  while (count--) {
+    value ^= (uint16_t)*data++ << 8;
+    for (uint8_t bit = 0; bit < 8; bit++) value = value & 0x8000 ? (value << 1) ^ 0x1021 : value << 1;
+  }
+  return value;
+}
+
+uint16_t word16(const uint8_t *bytes) { return bytes[0] | (uint16_t)bytes[1] << 8; }
+
+// ---- servos -------------------------------------------------------------------------------------------------------------
+
+void say(uint8_t id, uint8_t instruction, const uint8_t *parameters, uint8_t count) {
+  uint8_t sum = id + count + 2 + instruction;
+  while (Serial1.available()) Serial1.read();
+  digitalWrite(DIRECTION, HIGH);
+  const uint8_t head[] = {0xFF, 0xFF, id, (uint8_t)(count + 2), instruction};
+  Serial1.write(head, sizeof head);
+  for (uint8_t i = 0; i < count; i++) sum += parameters[i];
+  Serial1.write(parameters, count);
+  Serial1.write((uint8_t)~sum);
+  Serial1.flush();
+  digitalWrite(DIRECTION, LOW);
+}
+
+// A status packet with so many parameters; its error byte, or -1 if none came.
+int hear(uint8_t id, uint8_t *parameters, uint8_t count) {
+  uint8_t packet[6 + 16], got = 0;
+  for (uint32_t began = micros(); got < count + 6 && micros() - began < ANSWER_US;) {
+    if (!Serial1.available()) continue;
+    packet[got++] = Serial1.read();
+    if (got <= 2 && packet[got - 1] != 0xFF) got = 0;
+  }
+  if (got < count + 6 || packet[2] != id || packet[3] != count + 2) return -1;
+  uint8_t sum = 0;
+  for (uint8_t i = 2; i < got; i++) sum += packet[i];
+  if (sum != 0xFF) return -1;
+  for (uint8_t i = 0; i < count; i++) parameters[i] = packet[5 + i];
+  return packet[4];
+}
+
+int asked(uint8_t id, uint8_t instruction, const uint8_t *sent, uint8_t sentCount, uint8_t *back, uint8_t backCount) {
+  for (uint8_t i = 0; i < TRIES; i++) {
+    say(id, instruction, sent, sentCount);
+    int error = hear(id, back, backCount);
+    if (error >= 0) return error;
+  }
+  return -1;
+}
+
+int readTable(uint8_t id, uint8_t address, uint8_t *back, uint8_t count) {
+  const uint8_t what[] = {address, count};
+  return asked(id, READ, what, 2, back, count);
+}
+
+bool write8(uint8_t id, uint8_t address, uint8_t value) {
+  const uint8_t what[] = {address, value};
+  return asked(id, WRITE, what, 2, 0, 0) >= 0;
+}
+
+bool write16(uint8_t id, uint8_t address, uint16_t value) {
+  const uint8_t what[] = {address, (uint8_t)value, (uint8_t)(value >> 8)};
+  return asked(id, WRITE, what, 3, 0, 0) >= 0;
+}
+
+bool writeGoal(uint8_t id, uint16_t goal, uint16_t speed) {
+  const uint8_t what[] = {GOAL, (uint8_t)goal, (uint8_t)(goal >> 8), (uint8_t)speed, (uint8_t)(speed >> 8)};
+  return asked(id, WRITE, what, 5, 0, 0) >= 0;
+}
+
+void scan() {
+  uint8_t limits[4];
+  for (servos = 0; servos < MOST_SERVOS && readTable(servos + 1, ANGLE_LIMITS, limits, 4) >= 0; servos++) {
+    low[servos] = word16(limits);
+    high[servos] = word16(limits + 2);
+  }
+}
+
+// Torque off; a bit for each servo that does not say that it is off and not moving.
+uint16_t stopAll() {
+  const uint8_t off[] = {TORQUE_ENABLE, 0};
+  uint16_t left = 0;
+  armed = false;
+  ramp = RAMP_STEPS;
+  say(BROADCAST, WRITE, off, 2);
+  for (uint8_t i = 0; i < servos; i++) {
+    uint8_t on, moving;
+    bool good = write8(i + 1, TORQUE_ENABLE, 0) && readTable(i + 1, TORQUE_ENABLE, &on, 1) >= 0;
+    good = good && readTable(i + 1, MOVING, &moving, 1) >= 0;
+    if (!good || on || moving) left |= (uint16_t)1 << i;
+  }
+  return left;
+}
+
+// Torque grows in steps, so that nothing jerks; goals are where the joints are.
+bool arm(uint8_t percent) {
+  for (uint8_t i = 0; i < servos; i++) {
+    uint8_t here[2];
+    bool good = readTable(i + 1, POSITION, here, 2) >= 0 && write16(i + 1, TORQUE_LIMIT, 0);
+    if (!good || !writeGoal(i + 1, word16(here), 1)) return false;
+  }
+  torque = (uint32_t)1023 * percent / 100;
+  ramp = 0;
+  armed = true;
+  return true;
+}
+
+void grow() {
+  if (!armed || ramp >= RAMP_STEPS || (ramp && millis() - rampMs < RAMP_MS)) return;
+  rampMs = millis();
+  ramp++;
+  for (uint8_t i = 0; i < servos; i++) {
+    write16(i + 1, TORQUE_LIMIT, (uint32_t)torque * ramp / RAMP_STEPS);
+    write8(i + 1, TORQUE_ENABLE, 1);
+  }
+}
+
+// ---- frames -------------------------------------------------------------------------------------------------------------
+
+void answer(uint8_t kind, uint8_t sequence, const uint8_t *payload, uint8_t count) {
+  static uint8_t out[4 + 255 + 2];
+  out[0] = START;
+  out[1] = count;
+  out[2] = kind;
+  out[3] = sequence;
+  for (uint8_t i = 0; i < count; i++) out[4 + i] = payload[i];
+  const uint16_t crc = crc16(out + 1, 3 + count);
+  out[4 + count] = crc;
+  out[5 + count] = crc >> 8;
+  Serial.write(out, 6 + count);
+}
+
+// Answers a question; false if it makes no sense or a servo did not take it.
+bool understood(uint8_t kind, uint8_t sequence, uint8_t *payload, uint8_t count) {
+  static uint8_t back[7 * MOST_SERVOS];
+  if (kind == HELLO && count == 0) {
+    if (!armed) scan();
+    const uint8_t who[] = {VERSION, servos};
+    answer(kind | ANSWER, sequence, who, 2);
+  } else if (kind == ARM && count == 1 && payload[0] <= 100) {
+    if (!arm(payload[0])) return false;
+    answer(kind | ANSWER, sequence, back, 0);
+  } else if (kind == MOVE && count == 4 * servos && armed) {
+    for (uint8_t i = 0; i < servos; i++) {
+      const uint16_t goal = constrain(word16(payload + 4 * i), low[i], high[i]);
+      const uint16_t speed = constrain(word16(payload + 4 * i + 2), 1, 1023);
+      if (!writeGoal(i + 1, goal, speed)) return false;
+      const uint8_t set[] = {(uint8_t)goal, (uint8_t)(goal >> 8), (uint8_t)speed, (uint8_t)(speed >> 8)};
+      memcpy(payload + 4 * i, set, 4);
+    }
+    answer(kind | ANSWER, sequence, payload, count);
+  } else if (kind == STATE && count == 0) {
+    for (uint8_t i = 0; i < servos; i++) {
+      uint8_t now[8] = {0};  // position, speed, load, voltage, temperature
+      const int error = readTable(i + 1, POSITION, now, 8);
+      const uint8_t told[] = {now[0], now[1], now[4], now[5], now[7], now[6], error < 0 ? NO_ANSWER : (uint8_t)error};
+      memcpy(back + 7 * i, told, 7);
+    }
+    answer(kind | ANSWER, sequence, back, 7 * servos);
+  } else if (kind == STOP && count == 0) {
+    const uint16_t left = stopAll();
+    const uint8_t bits[] = {(uint8_t)left, (uint8_t)(left >> 8)};
+    answer(kind | ANSWER, sequence, bits, 2);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+void drop(uint16_t count) {
+  held -= count;
+  memmove(frame, frame + count, held);
+}
+
+// Takes whole, good frames out of what has come; bytes before a start byte and starts with a wrong checksum are passed over.
+void listen() {
+  while (Serial.available() && held < sizeof frame) {
+    frame[held++] = Serial.read();
+    byteMs = millis();
+  }
+  if (held && millis() - byteMs > TORN_MS) drop(1);  // its rest does not come any more
+  while (held) {
+    const uint16_t whole = held > 1 ? 6 + frame[1] : 6;
+    if (frame[0] != START) {
+      drop(1);
+    } else if (held < whole) {
+      return;
+    } else if (crc16(frame + 1, whole - 3) != word16(frame + whole - 2)) {
+      drop(1);
+    } else {
+      heardMs = millis();
+      if (!understood(frame[2], frame[3], frame + 4, frame[1])) answer(REFUSED, frame[3], frame, 0);
+      drop(whole);
+    }
+  }
+}
+
+void setup() {
+  pinMode(DIRECTION, OUTPUT);
+  digitalWrite(DIRECTION, LOW);
+  Serial.begin(115200);
+  Serial1.begin(1000000);
+  scan();
+  stopAll();  // whatever was on before this start
+}
+
+void loop() {
+  listen();
+  grow();
+  if (armed && millis() - heardMs > WATCHDOG_MS) stopAll();
+}

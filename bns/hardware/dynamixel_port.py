@@ -1,0 +1,45 @@
+"""The Dynamixel SDK's port on a trial's clock: time-outs in its time, reads that sleep."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from dynamixel_sdk import PortHandler
+
+from bns.hardware.clock import Clock
+
+_SLICE_S = 0.002
+
+
+class ClockedPort(PortHandler):
+    """The SDK's port, with time-outs on the trial's clock."""
+
+    def __init__(self, port: str, clock: Clock) -> None:
+        super().__init__(port)
+        self._clock = clock
+        self._silent: Callable[[], bool] = lambda: False
+        self._late: Callable[[], bool] = lambda: False
+
+    def setupPort(self, cflag_baud: int) -> bool:  # noqa: N802  # the SDK's name
+        """Open it. A read sleeps until bytes are there: the SDK's own spins, and holds up whatever computes meanwhile."""
+        opened: bool = super().setupPort(cflag_baud)
+        self.ser.timeout = _SLICE_S
+        return opened
+
+    def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802  # the SDK's name
+        """As the SDK has it: the time of the bytes, twice the adapter's latency, and a little."""
+        super().setPacketTimeout(packet_length)
+        self._late = self._clock.in_vain(self.packet_timeout / 1000.0)
+
+    def clearPort(self) -> None:  # noqa: N802  # the SDK's name
+        """Throw away what came too late; the SDK's own only waits until everything is sent."""
+        self.ser.reset_input_buffer()
+        self._silent = self._clock.in_vain(math.inf)  # from before the question on: an answer can be quick
+
+    def isPacketTimeout(self) -> bool:  # noqa: N802  # the SDK's name
+        """Whether to give up."""
+        late = self._late()
+        if self._silent() and not late:
+            self._clock.waited(self.packet_timeout / 1000.0)
+        return late or self._silent()

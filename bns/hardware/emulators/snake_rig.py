@@ -1,0 +1,74 @@
+"""A whole emulated rig: a snake of servos on a bus or behind a bridge, under a camera that films its markers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.emulators.ax12 import Bus
+from bns.hardware.emulators.bridge import BridgeEmulator
+from bns.hardware.emulators.faults import FaultPlan
+from bns.hardware.emulators.scene import Patch, disc
+from bns.hardware.emulators.servo import Servo
+from bns.hardware.emulators.snake_body import SnakeBody
+from bns.hardware.emulators.terminal import HangUp, PseudoTerminal
+from bns.hardware.emulators.watchers import GREEN_BGR, YELLOW_BGR, emulated_camera
+from bns.hardware.rig import Rig
+from bns.hardware.snake_settings import snake_settings
+from bns.physics.snake.parameters import shipped_parameters
+from bns.physics.snake_drive import START_HEADING_RAD, START_M
+
+_SCALE, _RATE_HZ = 0.5, 5.0
+"""640 by 360 pixels, five frames a second: enough for a robot that moves some centimetres in that time."""
+
+
+class EmulatedSnakeRig:
+    """Implements `bns.hardware.platform.Emulation`."""
+
+    def __init__(self, rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> None:
+        settings, faults = snake_settings(rig.driver), plan.of("snake")
+        self._clock = clock
+        self.body = SnakeBody(shipped_parameters(), seed)
+        self.body.lay(START_M, START_HEADING_RAD, 0.0)
+        self.servos = [Servo(n, clock, faults, self.body.joint(place)) for place, n in enumerate(settings.ids)]
+        self.body.servos = self.servos
+        device = BridgeEmulator(self.servos, clock, faults) if settings.wiring == "bridge" else Bus(self.servos, clock, faults)
+        self._line = PseudoTerminal(device, folder, "snake")
+        self._hang_up = HangUp(self._line, clock)
+        device.cut_line = self._hang_up.cut
+        self._bridge = device if isinstance(device, BridgeEmulator) else None
+        tracker, self._camera = emulated_camera(
+            rig.tracker, folder, lambda now_s: self._worn(rig.tracker, now_s), clock, plan.of("tracker"), seed, _SCALE, _RATE_HZ
+        )
+        self.rig = replace(rig, port=str(self._line.path), tracker=tracker)
+
+    def put_down(self, pose: np.ndarray) -> None:
+        """Lay the robot down, straight."""
+        self.body.lay(tuple(pose[:2]), float(pose[2]), self._clock.now_s())
+
+    def unstable_between(self, begin_s: float, end_s: float) -> bool:
+        """Whether somebody who watched would call what it did in that time unstable."""
+        return any(begin_s < t_s <= end_s for t_s, _ in self.body.unstable)
+
+    def close(self) -> None:
+        """Take it away."""
+        self._hang_up.close()
+        if self._bridge is not None:
+            self._bridge.close()
+        self._line.close()
+        self._camera.close()
+
+    def _worn(self, settings: Mapping[str, Any], now_s: float) -> list[Patch]:
+        """The markers are balls, alike from everywhere, on the tops of their links: a link that lies on its side hides them."""
+        places, up = self.body.markers(now_s)
+        diameter_m = float(settings["diameter_m"])
+        return [
+            disc(colour, diameter_m, x, y, z)
+            for (x, y, z), top, colour in zip(places.tolist(), up, (YELLOW_BGR, GREEN_BGR), strict=True)
+            if top > 0.0
+        ]

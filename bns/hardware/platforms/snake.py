@@ -1,0 +1,112 @@
+"""A snake of servos on its rig: cycles driven posture by posture, watched, and stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from bns.errors import HardwareError, TrialPausedError
+from bns.hardware.bridge import BridgeChain
+from bns.hardware.clock import Clock, EmulatedClock
+from bns.hardware.dynamixel import Ax12Chain
+from bns.hardware.emulators.faults import FaultPlan
+from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
+from bns.hardware.journal import Journal
+from bns.hardware.platform import Driven
+from bns.hardware.rig import Rig
+from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
+from bns.hardware.servo_chain import ServoChain, ServoError
+from bns.hardware.snake_drive import SnakeDrive
+from bns.hardware.snake_settings import SnakeSettings, snake_settings
+from bns.hardware.stop import Stop
+from bns.hardware.tracking.eye import Eye
+from bns.hardware.tracking.kinds import open_tracker
+
+
+class SnakePlatform:
+    """Implements `bns.hardware.platform.Platform`. Commands are cycles (n, 5), poses observations (n, 9) of the robot module."""
+
+    def __init__(
+        self, chain: ServoChain, eye: Eye, rig: Rig, settings: SnakeSettings, clock: Clock, journal: Journal, stopping: Stopping
+    ) -> None:
+        self._chain, self._eye, self._settings = chain, eye, settings
+        self._clock, self._journal = clock, journal
+        self._watch = Watch(rig.limits, clock, stopping)
+
+    @property
+    def retries(self) -> int:
+        """How often a question was asked again so far."""
+        return self._chain.retries
+
+    def pose(self) -> np.ndarray | None:
+        """Middle between the markers and the direction from yellow to green."""
+        sight = self._eye.standing()
+        return None if sight is None else sight.pose
+
+    def readings(self) -> dict[str, float]:
+        """Lowest voltage and highest temperature of the servos."""
+        try:
+            found = self._chain.health().values()
+        except ServoError as error:
+            raise TrialPausedError(f"the servos are not fit to drive: {error}") from error
+        return {"battery_v": min(h.voltage_v for h in found), "temperature_c": max(h.temperature_c for h in found)}
+
+    def stop(self) -> Stop:
+        """Torque off, confirmed."""
+        return self._chain.stop()
+
+    def close(self) -> None:
+        """Give port and tracker free."""
+        self._chain.close()
+        self._eye.close()
+
+    def drive(self, commands: np.ndarray) -> Driven:
+        """Straighten the robot, then drive the cycles one after the other."""
+        drive, ended = SnakeDrive(self._chain, self._eye, self._watch, self._settings, self._clock, self._journal), ""
+        guard = StopsAtTheEnd(self.stop)
+        began_s = self._clock.now_s()
+        self._watch.begin()
+        with guard:
+            try:
+                drive.straighten()
+                for cycle in commands.astype(np.float64):
+                    drive.carry_out(cycle)
+            except DriveEnded as end:
+                ended = str(end)
+            except ServoError as error:
+                raise TrialPausedError(f"the servos failed: {error}") from error
+        assert guard.last is not None
+        seconds = self._clock.now_s() - began_s
+        return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, drive.spans_s)
+
+
+def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: Journal) -> ServoChain:
+    """The servos as a rig's settings say that they are wired; HardwareError names who is missing."""
+    if settings.wiring == "bridge":
+        return BridgeChain(port, len(settings.ids), clock, journal, settings.limits)
+    return Ax12Chain(port, settings.ids, clock, journal, settings.limits)
+
+
+def open_platform(rig: Rig, clock: Clock, journal: Journal, stopping: Stopping) -> SnakePlatform:
+    """Open port and tracker, and make sure before anything else that the servos are limp, fit and all there."""
+    settings = snake_settings(rig.driver)
+    if rig.tracker["kind"] != "colour":
+        raise HardwareError(f"the snake's ends are told apart by colour; its tracker is {rig.tracker['kind']}, not kind: colour.")
+    chain = open_chain(rig.port, settings, clock, journal)
+    try:
+        with StopsAtTheEnd(chain.stop):
+            chain.health()
+        eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0)
+    except ServoError as error:
+        chain.close()
+        raise HardwareError(f"the servos are not fit to drive: {error}. See to it, then try again.") from error
+    except BaseException:
+        chain.close()
+        raise
+    return SnakePlatform(chain, eye, rig, settings, clock, journal, stopping)
+
+
+def emulate(rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> EmulatedSnakeRig:
+    """An emulated robot under an emulated camera, their ports in `folder`."""
+    return EmulatedSnakeRig(rig, folder, clock, plan, seed)

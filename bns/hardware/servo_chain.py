@@ -1,0 +1,94 @@
+"""What all chains of servos have in common, however wired: what a servo says, what it must keep, what a driver can do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from bns.hardware.stop import Stop
+
+STILL_STEPS = 1
+"""A joint within so many steps of where it was at the last look stands still; the reading of a still one jumps by one."""
+
+
+class ServoError(Exception):
+    """A servo that does not answer, or answers with an alarm."""
+
+
+@dataclass(frozen=True)
+class Health:
+    """What a servo says of itself; load is a share of the highest torque, with the sign of its direction."""
+
+    position_rad: float
+    load: float
+    voltage_v: float
+    temperature_c: float
+
+
+@dataclass(frozen=True)
+class ServoLimits:
+    """What a servo must keep while it works; `torque` is the share of the highest that it is given, `load` of that one.
+
+    A servo at that load for `stalled_s` does not follow any more; for `stuck_s`, it has to be stopped.
+    """
+
+    temperature_c: float = 65.0
+    low_v: float = 9.0
+    high_v: float = 13.0
+    load: float = 0.95
+    torque: float = 0.8
+    stalled_s: float = 0.25
+    stuck_s: float = 1.0
+
+    def check(self, found: Mapping[int, Health]) -> None:
+        """ServoError if a servo is too hot, or has too much or too little voltage."""
+        for number, health in found.items():
+            if health.temperature_c > self.temperature_c:
+                raise ServoError(f"servo {number} is at {health.temperature_c:.0f} °C; let it cool below {self.temperature_c:g}")
+            if not self.low_v <= health.voltage_v <= self.high_v:
+                allowed = f"{self.low_v:g} to {self.high_v:g}"
+                raise ServoError(f"servo {number} has {health.voltage_v:.1f} V, not {allowed}; see to the supply")
+
+
+class ServoChain(Protocol):
+    """A driver of a chain: servos in the order of the joints."""
+
+    retries: int
+    limits: ServoLimits
+
+    def arm(self) -> None:
+        """Torque on without a jerk: goals are where the joints are, and the torque grows in steps to its limit."""
+
+    def move(self, angles_rad: Sequence[float], speeds_rad_s: Sequence[float]) -> list[float]:
+        """Set goals and speeds of all joints; the angles really sent, after clipping, once all confirmed them."""
+
+    def health(self) -> Mapping[int, Health]:
+        """What every servo says, in the order of the joints; ServoError if one reports an alarm or is beyond its limits."""
+
+    def stop(self, patience_s: float = 5.0) -> Stop:
+        """Torque off, confirmed by every servo. Never raises."""
+
+    def close(self) -> None:
+        """Give the port free."""
+
+
+class StrainWatch:
+    """How long each servo has been at the limit of its torque, from one look to the next."""
+
+    def __init__(self, limits: ServoLimits) -> None:
+        self._limits = limits
+        self._since_s: dict[int, float] = {}
+        self.stalled = False
+        """Whether a servo did not follow any more since this was last set to False."""
+
+    def look(self, found: Mapping[int, Health], now_s: float) -> None:
+        """Take in what the servos say; ServoError if one has been stuck for too long."""
+        strained = [n for n, health in found.items() if abs(health.load) > self._limits.load * self._limits.torque]
+        self._since_s = {number: self._since_s.get(number, now_s) for number in strained}
+        for number, since_s in self._since_s.items():
+            lasted_s = now_s - since_s
+            self.stalled |= lasted_s > self._limits.stalled_s
+            if lasted_s > self._limits.stuck_s:
+                load = abs(found[number].load)
+                raise ServoError(f"servo {number} has used {load:.0%} of its torque for {lasted_s:.1f} s; is it stuck?")

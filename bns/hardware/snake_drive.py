@@ -1,0 +1,135 @@
+"""One drive of the snake: servos armed, body straightened, cycles gone through posture by posture, all of it watched."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bns.errors import TrialPausedError
+from bns.hardware.ax12_table import RAD_PER_STEP
+from bns.hardware.clock import Clock
+from bns.hardware.journal import Journal
+from bns.hardware.safety import OutOfSight, Watch
+from bns.hardware.servo_chain import ServoChain, StrainWatch
+from bns.hardware.snake_settings import SnakeSettings
+from bns.hardware.tracking.eye import Eye
+from bns.hardware.tracking.sight import Sight
+from bns.physics.snake.gait import PARAMETERS, cycle_angles
+
+_TICK_S = 0.15
+_STRAIGHTENING_RAD_S = 0.5
+_MARKERS = ("yellow", "green")
+_PLACES = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
+_NOTHING = dict.fromkeys(("cycle", *PARAMETERS, "stable"), math.nan)
+
+
+class SnakeDrive:
+    """Rows and observations are gathered as it goes on. A cycle that ends out of sight counts as unstable: a robot on its back
+    hides its markers."""
+
+    def __init__(
+        self, chain: ServoChain, eye: Eye, watch: Watch, settings: SnakeSettings, clock: Clock, journal: Journal
+    ) -> None:
+        self._chain, self._eye, self._watch, self._settings = chain, eye, watch, settings
+        self._clock, self._journal = clock, journal
+        self._strain = StrainWatch(settings.limits)
+        self._angles = np.zeros(len(settings.ids))
+        self._markers = np.full(4, math.nan)
+        self._began_s = 0.0
+        self._cycles: list[np.ndarray] = []
+        self._observations: list[np.ndarray] = []
+        self.rows: list[dict[str, float]] = []
+        self.spans_s: list[tuple[float, float]] = []
+        """When each cycle began and ended, by the trial's clock."""
+
+    def done(self) -> np.ndarray:
+        """Cycles carried out (k, 5)."""
+        return np.array(self._cycles, np.float32).reshape(-1, 5)
+
+    def observed(self) -> np.ndarray:
+        """(k + 1, 9): the markers at the start, then at the begin and end of each cycle, and whether it was stable."""
+        return np.array(self._observations).reshape(-1, 9)
+
+    def straighten(self) -> None:
+        """Torque on, slowly straight; where the markers are then is where the drive starts."""
+        self._chain.arm()
+        here = np.array([health.position_rad for health in self._chain.health().values()])
+        self._go_to(np.zeros(len(here)), float(np.abs(here).max()), _STRAIGHTENING_RAD_S)
+        start = self._eye.standing()
+        if start is None:
+            raise TrialPausedError("the camera does not see both markers: are they lit, on top, in its picture? Try: bns track")
+        self._watch.begin()
+        self._began_s = self._clock.now_s()
+        self._markers = np.concatenate([start.points[name] for name in _MARKERS])
+        self.rows = [self._row()]
+        self._observations = [np.concatenate([self._markers, self._markers, [1.0]])]
+
+    def carry_out(self, cycle: np.ndarray) -> None:
+        """One cycle: up to its first posture, then through it; ServoError, DriveEnded, TrialPausedError."""
+        angles, began_s = cycle_angles(cycle[:4], len(self._angles)), self._clock.now_s()
+        told = dict(zip(PARAMETERS, cycle[:4].tolist(), strict=True))
+        self._journal.note("command", **told)
+        first = len(self.rows)
+        self.rows[-1] |= {"cycle": float(len(self._cycles) + 1), **told}
+        self._strain.stalled, before = False, self._markers
+        try:
+            self._posture(angles[0])
+            before = self._seen()
+            for target in angles[1:]:
+                self._posture(target)
+            after, stable = self._seen(), not self._strain.stalled
+        except OutOfSight:
+            self._over(cycle, before, self._markers, False, began_s, first)
+            raise
+        self._over(cycle, before, after, stable, began_s, first)
+
+    def _over(
+        self, cycle: np.ndarray, before: np.ndarray, after: np.ndarray, stable: bool, began_s: float, first: int
+    ) -> None:
+        self._cycles.append(cycle)
+        self._observations.append(np.concatenate([before, after, [float(stable)]]))
+        self.spans_s.append((began_s, self._clock.now_s()))
+        for row in self.rows[first:]:
+            row["stable"] = float(stable)
+        self.rows[-1] |= dict.fromkeys(("cycle", *PARAMETERS), math.nan)
+
+    def _posture(self, target: np.ndarray) -> None:
+        self._go_to(target, float(np.abs(target - self._angles).max()), self._settings.joint_speed_rad_s)
+
+    def _go_to(self, target: np.ndarray, way_rad: float, speed_rad_s: float) -> None:
+        """Every joint at the same speed until the one with the longest way is there, and a pause."""
+        asked_s = self._clock.now_s()
+        sent = np.array(self._chain.move(target.tolist(), [speed_rad_s] * len(target)))
+        short = int(np.argmax(np.abs(sent - target)))
+        if abs(sent[short] - target[short]) > 1.5 * RAD_PER_STEP:
+            raise TrialPausedError(
+                f"joint {short + 1} was to go to {math.degrees(target[short]):.0f}° and was only told "
+                f"{math.degrees(sent[short]):.0f}°: widen the angle limits in its servo"
+            )
+        self._angles, end_s = target, asked_s + way_rad / speed_rad_s + self._settings.settle_s
+        while (left_s := end_s - self._clock.now_s()) > 0:
+            self._clock.sleep(min(_TICK_S, left_s))
+            self._look()
+
+    def _look(self) -> Sight | None:
+        """Look at servos and markers; a row if there is something new to see."""
+        self._strain.look(self._chain.health(), self._clock.now_s())
+        sight = self._eye.look()
+        if sight is not None:
+            self._markers = np.concatenate([sight.points[name] for name in _MARKERS])
+            if self.rows:
+                here = {name: self.rows[-1][name] for name in ("cycle", *PARAMETERS)}
+                self.rows.append(self._row() | here)
+        self._watch.check(sight)
+        return sight
+
+    def _seen(self) -> np.ndarray:
+        """Where the markers are now; if they are not seen just then, the posture is held until they are, or the drive ends."""
+        while self._look() is None:
+            self._clock.sleep(_TICK_S / 2)
+        return self._markers
+
+    def _row(self) -> dict[str, float]:
+        t_s = self._clock.now_s() - self._began_s
+        return {"t_s": t_s, **_NOTHING, **dict(zip(_PLACES, self._markers.tolist(), strict=True))}

@@ -1,0 +1,53 @@
+"""A tracker looked through during a trial: fresh sights only, headings unwrapped, everything seen noted in the journal."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.errors import HardwareError, TrialPausedError
+from bns.hardware.clock import Clock
+from bns.hardware.journal import Journal
+from bns.hardware.tracking.sight import Sight, Tracker, unwrapped
+
+_FRESH_S = 0.1
+_LOOKS, _BETWEEN_S = 10, 0.02
+
+
+class Eye:
+    """`heading_rad` is where the robot looks first, give or take half a turn."""
+
+    def __init__(self, tracker: Tracker, clock: Clock, journal: Journal, heading_rad: float) -> None:
+        self._tracker, self._clock, self._journal = tracker, clock, journal
+        self._heading_rad, self._newest_s = heading_rad, -1.0
+
+    def look(self) -> Sight | None:
+        """A sight newer than the last; None if there is none. TrialPausedError if the tracker's device is gone."""
+        try:
+            sight = self._tracker.look()
+        except HardwareError as error:
+            raise TrialPausedError(str(error)) from error
+        if sight is None or (sight.t_s <= self._newest_s and self._clock.now_s() > sight.t_s + _FRESH_S):
+            return None
+        self._newest_s = sight.t_s
+        self._heading_rad = unwrapped(float(sight.pose[2]), self._heading_rad)
+        pose = np.array([sight.pose[0], sight.pose[1], self._heading_rad])
+        points = {name: [round(float(v), 5) for v in place] for name, place in sight.points.items()}
+        self._journal.note("seen", pose=[round(float(v), 5) for v in pose], residual_m=round(sight.residual_m, 6), points=points)
+        return Sight(sight.t_s, pose, sight.residual_m, sight.points)
+
+    def standing(self) -> Sight | None:
+        """Mean of some looks at a robot that stands; None if it is not seen often enough."""
+        seen: list[Sight] = []
+        for _ in range(5 * _LOOKS):
+            sight = self.look()
+            if sight is not None:
+                seen.append(sight)
+            if len(seen) == _LOOKS:
+                points = {name: np.mean([s.points[name] for s in seen], axis=0) for name in sight.points} if sight else {}
+                return Sight(seen[-1].t_s, np.mean([s.pose for s in seen], axis=0), seen[-1].residual_m, points)
+            self._clock.sleep(_BETWEEN_S)
+        return None
+
+    def close(self) -> None:
+        """Give the tracker's device free."""
+        self._tracker.close()

@@ -1,0 +1,27 @@
+"""The tracker's clock and the robot's do not run at the same rate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Stamps
+
+
+def apply(stamps: Stamps, rate: float) -> Stamps:
+    """A pose stamped t, counted from the trial's first row, was taken at t·(1 - ``rate``)."""
+    return replace(stamps, t_s=stamps.t_s * (1.0 - rate))
+
+
+EFFECT = Effect(
+    name="clock-drift",
+    stage="clock",
+    parameters=(
+        Parameter("rate", "1", -0.2, 0.2, (-0.02, 0.02), 0.0, "seconds that the tracker's clock gains in a second"),
+    ),
+    equation="pose'(t) = pose(t - rate·t)",
+    residuals="The track runs ahead of the commands or falls behind, more so the later in the trial; changes of speed show it.",
+    lookalikes=("clock-offset", "speed-gain"),
+    apply=apply,
+    rank=151,
+)

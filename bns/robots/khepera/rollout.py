@@ -1,0 +1,190 @@
+"""Compiled: algorithm 2 for whole populations."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from bns.engine.evolution import Population
+from bns.engine.jit import exact, fast
+from bns.engine.snn import INPUTS, predict_into
+from bns.robots.khepera.rules import (
+    CENTRE,
+    LARGEST_HEADING_RAD,
+    PER_UNIT,
+    SCALE,
+    START,
+    aimed,
+    at_rest,
+    fitness_of,
+    normalised,
+    step_of,
+    unbranched_sine,
+)
+
+NOTHING = np.empty((3, 0), np.float32)
+"""Outputs of no command."""
+
+
+@fast
+def _gather(commands, lengths, origin, centre, per_unit, X, source):  # type: ignore[no-untyped-def]  # compiled
+    """Of all commands of all controllers, side by side: their origins and their inputs, which are previous left and right (0 at
+    first), left, right, duration."""
+    n = 0
+    for i in range(lengths.size):
+        left, right = at_rest(centre, per_unit)
+        for j in range(lengths[i]):
+            X[0, n], X[1, n] = left, right
+            left, right, duration = normalised(commands[i, j], centre, per_unit)
+            X[2, n], X[3, n], X[4, n] = left, right, duration
+            source[n] = origin[i, j]
+            n += 1
+
+
+@exact
+def _new(source, known, which):  # type: ignore[no-untyped-def]  # compiled
+    """Which commands' origin is not among the `known` ones, and how many: without a branch, which would be guessed wrongly."""
+    count = 0
+    for c in range(source.size):
+        which[count] = c
+        count += int(not 0 <= source[c] < known)
+    return count
+
+
+@exact
+def _columns(X, which):  # type: ignore[no-untyped-def]  # compiled
+    some = np.empty((X.shape[0], which.size), np.float32)
+    for r in range(X.shape[0]):
+        row, kept = X[r], some[r]
+        for m in range(which.size):
+            kept[m] = row[np.uint64(which[m])]
+    return some
+
+
+@exact
+def _complete(outputs, known, source, fresh, which):  # type: ignore[no-untyped-def]  # compiled
+    """Outputs of all commands: the known ones from where they come from, the fresh ones where they belong."""
+    for net in range(outputs.shape[0]):
+        row, old, made = outputs[net], known[net], fresh[net]
+        for c in range(source.size):
+            row[c] = old[np.uint64(max(source[c], 0))]
+        for m in range(which.size):
+            row[np.uint64(which[m])] = made[m]
+
+
+@fast
+def _directions(heading, sine, cosine):  # type: ignore[no-untyped-def]  # compiled
+    for c in range(heading.size):
+        sine[c] = unbranched_sine(heading[c])
+        cosine[c] = unbranched_sine(heading[c] + math.pi / 2)
+
+
+@exact
+def _headings(turns, starts, lengths, scale, heading, astray):  # type: ignore[no-untyped-def]  # compiled
+    """Heading at the start of every command; infinite in `astray` for controllers that one leads out of bounds, 0 for others."""
+    for i in range(lengths.size):
+        angle, furthest = START[2], 0.0
+        for c in range(starts[i], starts[i] + lengths[i]):
+            heading[c] = angle
+            furthest = max(furthest, abs(angle))
+            angle += turns[c] * scale
+        astray[i] = np.inf if furthest > LARGEST_HEADING_RAD else 0.0
+
+
+@exact
+def _steps(outputs, scale, sine, cosine):  # type: ignore[no-untyped-def]  # compiled
+    """Steps in the world, in place of the directions: x in `cosine`, y in `sine`; apart from the walk, so that it vectorises."""
+    to_right, forward = outputs[0], outputs[1]
+    for c in range(sine.size):
+        right, ahead = to_right[c] * scale[0], forward[c] * scale[1]
+        cosine[c], sine[c] = step_of(right, ahead, sine[c], cosine[c])
+
+
+@exact
+def _walk(outputs, lengths, scale, goals, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+    """Algorithm 2 for every controller; how many could not be computed."""
+    count, starts = outputs.shape[1], np.cumsum(lengths) - lengths
+    heading, step_y, step_x = np.empty(count), np.empty(count), np.empty(count)
+    astray = np.empty(lengths.size)
+    _headings(outputs[2], starts, lengths, scale[2], heading, astray)
+    _directions(heading, step_y, step_x)
+    _steps(outputs, scale, step_y, step_x)
+    failures = 0
+    for i in range(lengths.size):
+        x, y, total, goal = START[0], START[1], astray[i], 0
+        for c in range(starts[i], starts[i] + lengths[i]):
+            x += step_x[c]
+            y += step_y[c]
+            goal, distance = aimed(x, y, goal, goals)
+            total += distance
+        reached[i] = goal
+        fitness[i] = fitness_of(total, goal, goals)
+        failures += fitness[i] == 0.0
+    return failures
+
+
+@exact
+def _outputs(commands, lengths, origin, known, weights, centre, per_unit):  # type: ignore[no-untyped-def]  # compiled
+    """Outputs (networks, commands) of the networks for all commands; only those that are not known are computed."""
+    total = lengths.sum()
+    X, source, which = np.empty((INPUTS, total), np.float32), np.empty(total, np.int32), np.empty(total, np.int32)
+    _gather(commands, lengths, origin, centre, per_unit, X, source)
+    new = total if known.shape[1] == 0 else _new(source, known.shape[1], which)
+    fresh = np.empty((weights.shape[0], new), np.float32)
+    if new == total:
+        predict_into(weights, X, total, fresh)
+        return fresh
+    predict_into(weights, _columns(X, which[:new]), new, fresh)
+    outputs = np.empty((weights.shape[0], total), np.float32)
+    _complete(outputs, known, source, fresh, which[:new])
+    return outputs
+
+
+@exact
+def _rolled_out(commands, lengths, origin, known, weights, centre, per_unit, scale, goals, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+    outputs = _outputs(commands, lengths, origin, known, weights, centre, per_unit)
+    return outputs, _walk(outputs, lengths, scale, goals, fitness, reached)
+
+
+class Rollout(NamedTuple):
+    """Per controller fitness (n,), 0 where the arithmetic failed, and goals reached (n,); how many failed; what the networks
+    said of all commands, (networks, commands)."""
+
+    fitness: np.ndarray
+    reached: np.ndarray
+    failures: int
+    outputs: np.ndarray
+
+
+def roll_out(population: Population, weights: np.ndarray, goals_m: np.ndarray, known: np.ndarray | None) -> Rollout:
+    """Algorithm 2 on networks (3, W).
+
+    known (3, commands): what the same networks said of all commands of the generation that this one was bred from. An output
+    does not depend on where in a batch its command stands, so taking it over and computing it anew give the same number.
+    """
+    fitness, reached = np.empty(len(population)), np.empty(len(population), np.int32)
+    outputs, failures = _rolled_out(
+        population.commands,
+        population.lengths,
+        population.origin,
+        NOTHING if known is None else known,
+        weights,
+        CENTRE,
+        PER_UNIT,
+        SCALE,
+        goals_m,
+        fitness,
+        reached,
+    )
+    return Rollout(fitness, reached, int(failures), outputs)
+
+
+def inputs(commands: np.ndarray) -> np.ndarray:
+    """Inputs (5, n) of the networks for one controller's commands (n, 3)."""
+    n = len(commands)
+    X, origin = np.empty((INPUTS, n), np.float32), np.empty((1, n), np.int32)
+    lengths, one = np.array([n], np.int32), np.ascontiguousarray(commands[None], np.float32)
+    _gather(one, lengths, origin, CENTRE, PER_UNIT, X, origin[0])
+    return X

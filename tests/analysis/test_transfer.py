@@ -1,0 +1,82 @@
+"""Controllers taken to another world, and back to their own."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.store import NoDataError, Store
+from analysis.transfer import SUCCESSES, described, first_success, summary, transferred
+from bns.loop import run
+from bns.robots import load_robot
+from bns.spec import RunSpec
+from bns.store.record import RunRecord
+from bns.store.writer import Writer
+from bns.worlds import build_world
+
+ROBOT = load_robot("khepera")
+SMALL = {"population_size": 20, "training_iterations_per_evaluation": 20, "generations_per_evaluation": 2, "evaluations": 3}
+ROW = {
+    "status": "ok",
+    "error": None,
+    "started_at": pd.Timestamp.now("UTC").to_pydatetime(),
+    "wall_s": 1.0,
+    "cpu_s": 1.0,
+    "peak_memory_mib": 1.0,
+    "attempts": 1,
+}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("results")
+    for sweep, record in (("with", "paths"), ("without", "evals")):
+        with Writer(folder, sweep) as writer:
+            for seed in range(2):
+                spec = RunSpec(world="physics", seed=seed, record=record, **SMALL)
+                result = run(spec)
+                writer.append(RunRecord(spec, ROW | {"world_digest": result.world_digest}, result.tables))
+    return folder
+
+
+def test_a_sweep_taken_to_its_own_world_gives_its_own_numbers(results):
+    store = Store(results)
+    drives = transferred(store, ["with"], build_world("physics", ROBOT), ROBOT)
+    own = store.query("SELECT * FROM evals WHERE sweep = 'with' ORDER BY seed, evaluation")
+    for name in ("seed", "evaluation", "fitness_world", "fitness_error", *SUCCESSES):
+        np.testing.assert_array_equal(drives[name].to_numpy(), own[name].to_numpy(), err_msg=name)
+
+
+def test_another_world_gives_others(results):
+    store = Store(results)
+    own, other = (transferred(store, ["with"], build_world(world, ROBOT), ROBOT) for world in ("physics", "substitute"))
+    assert (own.fitness_simulation == other.fitness_simulation).all()
+    assert (own.fitness_world != other.fitness_world).any()
+
+
+def test_sweeps_without_paths_are_refused(results):
+    with pytest.raises(NoDataError, match="The sweep without has no runs of khepera with paths"):
+        transferred(Store(results), ["without"], build_world("physics", ROBOT), ROBOT)
+
+
+def drives(first):
+    """Runs of four evaluations that succeed from ``first`` on (5: never), fitness error 0.1 times the seed."""
+    rows = [
+        {"sweep": "s", "task": "circle", "seed": seed, "evaluation": e, "fitness_error": 0.1 * seed}
+        | dict.fromkeys(SUCCESSES, e >= begin)
+        for seed, begin in enumerate(first)
+        for e in range(1, 5)
+    ]
+    return pd.DataFrame(rows)
+
+
+def test_the_summary_counts_what_was_planted():
+    table = summary(drives([1, 2, 2, 3, 5, 5]))
+    row = table.iloc[0]
+    assert (row.runs, row.never, row.evaluations_needed) == (6, 2, 3)
+    assert row.success_7cm == pytest.approx(4 / 6)
+    assert row.success_7cm_low < 4 / 6 < row.success_7cm_high
+    assert row.fitness_error == pytest.approx(0.25)
+    assert row.evaluations_needed_low <= 3
+    assert np.isinf(row.evaluations_needed_high)
+    assert list(first_success(drives([1, 5]))) == [1, np.inf]
+    assert "| circle | mine | 6 | 67% (" in described(table, {"s": "mine"})

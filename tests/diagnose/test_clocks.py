@@ -1,0 +1,121 @@
+"""Clocks that differ from trial to trial: found, judged on poses that did not set them, written down."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.cli import main
+from bns.diagnose.clocks import with_clocks_set, without_clocks
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.noise import weights
+from bns.diagnose.own_clocks import every_other_block, own_clocks, with_own_clocks
+from bns.diagnose.search import problem_for
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.wheels import WheelPredictor
+from bns.errors import ModelError
+from bns.measurements import write_measurements
+from bns.physics.model import load_model, parse_model
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+LATE_S = np.random.default_rng(5).uniform(-0.25, 0.25, 12)
+
+
+def apart(late_s, **effects):
+    """Trials of a robot, each stamped by a clock of its own."""
+    trials = [measured(hidden(clock_offset={"offset_s": s}, **effects), trials=1, seed=i) for i, s in enumerate(late_s)]
+    return pd.concat([t.assign(trial=i) for i, t in enumerate(trials)], ignore_index=True)
+
+
+@pytest.fixture(scope="module")
+def predictor():
+    return WheelPredictor(tracks_of(apart(LATE_S, wheelbase={"factor": 1.05})))
+
+
+def test_clocks_and_what_they_hide_are_found(predictor):
+    found = diagnose(predictor, NOMINAL)
+    answer = found.as_json()
+    assert set(answer["effects"]) == {"clock-offset", "wheelbase"}
+    own = np.array(found.model.differing.own)
+    np.testing.assert_allclose(own, LATE_S, atol=0.012)
+    factor = answer["parameters"]["wheelbase"]["factor"]
+    assert factor["low"] < 1.05 < factor["high"]
+    assert answer["parameters"]["clock-offset"]["between_trials_s"]["value"] == pytest.approx(LATE_S.std(ddof=1), rel=0.1)
+    assert answer["error"]["1s"]["after"] < 0.5 * answer["error"]["1s"]["before"]
+    assert any("a value of its own in every trial" in note for note in answer["notes"])
+
+
+def test_one_clock_for_all_is_not_called_many():
+    common = WheelPredictor(tracks_of(apart(np.full(10, 0.1))))
+    problem = problem_for(common, NOMINAL)
+    assert own_clocks(problem, problem.fit(NOMINAL)) is None
+
+
+def test_clocks_are_eliminated_as_from_the_whole_system(predictor):
+    """Slow twin: shared numbers and all clocks solved for at once."""
+    turned = NOMINAL.with_effect("wheelbase", factor=1.02).with_effect("clock-offset", offset_s=0.0)
+    model = with_own_clocks(turned, "clock-offset")
+    problem = problem_for(predictor, NOMINAL)
+    fit = problem.fit(model, rounds=0)
+    white, trial = fit.white, predictor.tracks.trial
+    changed = fit.model.with_values({"wheelbase": {"factor": 1.0201}})
+    column = (problem.white(changed) - white)[..., None] / 1e-4
+    slopes = without_clocks(problem, fit.model, white, column)
+    clock = (problem.white(fit.model.with_own(np.array(fit.model.differing.own) + 1e-3)) - white) / 1e-3
+    each = clock[:, :, None] * (trial[:, None] == np.arange(len(LATE_S)))[:, None, :]
+    whole = np.concatenate([column, each], axis=2) * np.sqrt(weights(white))[:, None, None]
+    curvature = np.einsum("kcp,kcq->pq", whole, whole)
+    together = curvature[0, 0] - curvature[0, 1:] @ np.linalg.solve(curvature[1:, 1:], curvature[1:, 0])
+    alone = np.einsum("kcp,kcq,k->pq", slopes.jacobian, slopes.jacobian, weights(white))[0, 0]
+    assert alone == pytest.approx(together, rel=1e-3)
+
+
+def test_a_clock_is_set_by_its_own_trial_alone(predictor):
+    problem = problem_for(predictor, NOMINAL)
+    begun = problem.fit(with_own_clocks(NOMINAL.with_effect("clock-offset", offset_s=0.0), "clock-offset"), rounds=0).model
+    one = np.array(begun.differing.own)
+    one[0] += 0.05
+    again = with_clocks_set(problem, begun.with_own(one))
+    np.testing.assert_allclose(again.differing.own[1:], begun.differing.own[1:], atol=2e-3)
+    np.testing.assert_allclose(again.differing.own[0], begun.differing.own[0], atol=0.02)  # the valley is flat there
+
+
+def test_blocks_share_every_trial_evenly(predictor):
+    even = every_other_block(predictor.tracks)
+    shares = [even[predictor.tracks.trial == i].mean() for i in range(len(LATE_S))]
+    np.testing.assert_allclose(shares, 0.5, atol=0.05)
+
+
+def test_added_by_command_and_compared(tmp_path, capsys):
+    data, model = tmp_path / "m.parquet", tmp_path / "mended.yaml"
+    write_measurements(apart(LATE_S[:8]), data)
+    arguments = ["--model", "khepera", "--data", str(data), "-o", str(model)]
+    assert main(["add", "clock-offset", "--per-trial", *arguments]) == 0
+    mended = load_model(model)
+    assert mended.differing.effect.name == "clock-offset"
+    assert not mended.differing.own
+    assert "one value a trial" in mended.differing.reason
+    capsys.readouterr()
+    assert main(["compare", str(data), "--model", str(model)]) == 0
+    after = capsys.readouterr().out
+    assert main(["compare", str(data), "--model", "khepera"]) == 0
+    before = capsys.readouterr().out
+
+    def one_second(text):
+        return float(next(line for line in text.splitlines() if line.startswith("  1s")).split()[1])
+
+    assert one_second(after) < 0.5 * one_second(before)
+
+
+def test_per_trial_is_refused_where_it_makes_no_sense(tmp_path, capsys):
+    effect = "{name: wheelbase, per_trial: VALUE, values: {factor: 1.1}, basis: guess, reason: r}"
+    wheelbase = f"base: differential-drive\nwheelbase_m: 0.1\neffects:\n  - {effect}\n"
+    with pytest.raises(ModelError, match=r"wheelbase has one value for all trials; per_trial goes with clock-offset alone"):
+        parse_model(wheelbase.replace("VALUE", "true"), "m")
+    with pytest.raises(ModelError, match="per_trial of wheelbase in model m is 'maybe'; it must be true or false"):
+        parse_model(wheelbase.replace("VALUE", "maybe"), "m")
+    data = tmp_path / "m.parquet"
+    write_measurements(measured(NOMINAL, trials=8), data)
+    arguments = ["--model", "khepera", "--data", str(data), "-o", str(tmp_path / "n.yaml")]
+    assert main(["add", "wheelbase", "--per-trial", *arguments]) == 2
+    assert "--per-trial goes with clock-offset" in capsys.readouterr().err
+    assert not (tmp_path / "n.yaml").exists()

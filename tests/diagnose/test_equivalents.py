@@ -1,0 +1,49 @@
+"""Two effects that do together what one does are named; others are not."""
+
+import pytest
+
+from bns.diagnose.candidates import listed
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.equivalents import longer
+from bns.diagnose.search import problem_for
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.wheels import WheelPredictor
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def longer_than(model, names):
+    predictor = WheelPredictor(tracks_of(measured(model, seed=5)))
+    problem = problem_for(predictor, model)
+    others = [effect for name, effect in listed(NOMINAL).items() if name not in names]
+    return longer(problem, problem.fit(model), names, others)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "pair"),
+    [
+        ("speed_gain", {"gain": 1.05}, {"wheelbase", "camera-scale"}),
+        ("wheelbase", {"factor": 0.95}, {"speed-gain", "camera-scale"}),
+        ("camera_scale", {"factor": 0.94}, {"speed-gain", "wheelbase"}),
+    ],
+)
+def test_any_of_gain_base_and_scale_is_both_others(name, value, pair):
+    found = longer_than(hidden(**{name: value}), [name.replace("_", "-")])
+    assert [set(names) for names in found] == [pair]
+
+
+def test_beside_another_effect_that_one_stays():
+    found = longer_than(hidden(speed_gain={"gain": 1.06}, motor_lag={"tau_s": 0.08}), ["speed-gain", "motor-lag"])
+    assert [set(names) for names in found] == [{"wheelbase", "camera-scale", "motor-lag"}]
+
+
+@pytest.mark.parametrize("name", ["motor_lag", "side_slip", "yaw_bias"])
+def test_what_is_like_no_pair_has_none(name):
+    values = {"motor_lag": {"tau_s": 0.09}, "side_slip": {"slip_s": 0.08}, "yaw_bias": {"rate_rad_s": 0.04}}
+    assert longer_than(hidden(**{name: values[name]}), [name.replace("_", "-")]) == []
+
+
+def test_a_diagnosis_says_so_in_a_note():
+    table = measured(hidden(camera_scale={"factor": 0.95}), trials=16, seed=5)
+    found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
+    assert found.effects == ("camera-scale",)
+    assert any("would explain as much, with one effect more" in note and "wheelbase" in note for note in found.notes)

@@ -1,0 +1,41 @@
+"""Whether a model is of the robot that was measured is judged by factors alone, never by what an effect does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.diagnose.fitting_robot import check_same_robot
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.wheels import WheelPredictor
+from bns.errors import DataError
+from bns.physics.differential_drive import track
+
+from .worlds import FRAME_S, NOMINAL, hidden
+
+
+def predictor(model):
+    """A converged run: each trial drives nearly the same turns, a strong one and a weak one back, by turns."""
+    rng, tables = np.random.default_rng(0), []
+    for trial in range(12):
+        left = np.tile([0.03, 0.08], 3) + rng.normal(0, 0.001, 6)
+        right = np.tile([0.12, 0.055], 3)
+        seen = track(model, [left], [right], [np.ones(6)], dense_dt_s=FRAME_S)
+        force = np.minimum((seen.t_s[0] + 1e-9).astype(int), 5)
+        columns = {"t_s": seen.t_s[0], "left_m_s": left[force], "right_m_s": right[force]}
+        poses = dict(zip(("x_m", "y_m", "heading_rad"), seen.poses[0].T, strict=True))
+        tables.append(pd.DataFrame({"trial": trial, **columns, **poses}))
+    return WheelPredictor(tracks_of(pd.concat(tables, ignore_index=True)))
+
+
+@pytest.mark.parametrize("tau_s", [0.1, 0.25, 0.4, 0.6, 0.9])
+def test_motors_that_follow_late_are_no_other_robot(tau_s):
+    check_same_robot(predictor(hidden(motor_lag={"tau_s": tau_s})), NOMINAL)
+
+
+@pytest.mark.parametrize("factor", [0.45, 2.0, 4.0])
+def test_another_wheelbase_is_another_robot(factor):
+    other = replace(NOMINAL, wheelbase_m=factor * NOMINAL.wheelbase_m)
+    with pytest.raises(DataError, match=r"A wheelbase of 0.088\d* m would fit: --wheelbase 0.088"):
+        check_same_robot(predictor(NOMINAL), other)

@@ -1,0 +1,127 @@
+"""Networks that are wrong for a planted reason: thin data, an effect that no input tells of, both, neither."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bns.cli import main
+from bns.diagnose.network_errors import nearness, why_wrong
+from bns.diagnose.networks import NetworkPredictor
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.unseen import Commands, explained
+from bns.engine.philox import Key
+from bns.engine.rprop import Rprop
+from bns.engine.snn import initial_weights
+from bns.errors import DataError
+from bns.measurements import write_measurements
+from bns.robots import load_robot
+from bns.robots.simulator import StaticSimulator, load_simulator, save_simulator
+from tests.diagnose.worlds import hidden, measured
+
+ROBOT = load_robot("khepera")
+COMMANDS = 10
+
+
+def slow_only(inputs):
+    return (inputs[2] < 0) & (inputs[3] < 0.2)
+
+
+def trained(world, path, kept=None, trials=60, iterations=600):
+    """Networks trained on random commands in a world, or on those of them that ``kept`` chooses."""
+    table, inputs, targets = measured(world, trials, seed=1, ends_only=True, commands=COMMANDS), [], []
+    for _, rows in table.groupby("trial"):
+        pose = rows[["x_m", "y_m", "heading_rad"]].to_numpy()
+        step, heading = np.diff(pose, axis=0), pose[:-1, 2]
+        right = step[:, 0] * np.sin(heading) - step[:, 1] * np.cos(heading)
+        ahead = step[:, 0] * np.cos(heading) + step[:, 1] * np.sin(heading)
+        speeds = 144_010 * rows[["left_m_s", "right_m_s"]].to_numpy()[:-1]
+        inputs.append(ROBOT.inputs(np.column_stack([speeds, 1e3 * np.diff(rows.t_s)])))
+        targets.append(ROBOT.targets(np.column_stack([right, ahead, step[:, 2]])))
+    X, Y = np.concatenate(inputs, axis=1), np.concatenate(targets, axis=1)
+    if kept is not None:
+        X, Y = np.ascontiguousarray(X[:, kept(X)]), np.ascontiguousarray(Y[:, kept(X)])
+    rule = Rprop.start(initial_weights(Key(0, 1), 3, ROBOT.hidden, ROBOT.input_count), "rprop+", ROBOT.sigmoid_output)
+    rule.train(X, Y, X.shape[1], iterations)
+    save_simulator(StaticSimulator(ROBOT.networks, rule.weights, np.empty(0), {}, X), path)
+    return path
+
+
+def asked(world, networks: Path, trials=40):
+    return why_wrong(NetworkPredictor(tracks_of(measured(world, trials, seed=2, ends_only=True, commands=COMMANDS)), networks))
+
+
+LAG = {"motor_lag": {"tau_s": 0.6}}
+SLOPE = {"floor_slope": {"x_m_s": 0.006, "y_m_s": 0.0}}
+
+
+@pytest.mark.parametrize(
+    ("effects", "kept", "verdict", "variable"),
+    [
+        ({}, None, ("neither",), None),
+        ({}, slow_only, ("thin-data",), None),
+        (LAG, None, ("inputs-cannot-know",), "wheel_difference_kept_m_s"),
+        (SLOPE, None, ("inputs-cannot-know",), "heading_rad"),
+        (SLOPE, slow_only, ("thin-data", "inputs-cannot-know"), "heading_rad"),
+    ],
+)
+def test_the_planted_reason_is_named(tmp_path, effects, kept, verdict, variable):
+    world = hidden(**effects)
+    why = asked(world, trained(world, tmp_path / "n.safetensors", kept))
+    assert why.verdict == verdict
+    assert [one.variable for one in why.unseen[:1]] == ([variable] if variable else [])
+    assert sum(why.share.values()) == pytest.approx(1.0)
+    assert (why.share["thin data"] > 0.8) == (kept is not None)
+
+
+def test_in_words_numbers_and_a_figure(tmp_path, capsys):
+    world = hidden(**SLOPE)
+    networks = trained(world, tmp_path / "n.safetensors")
+    write_measurements(measured(world, 40, seed=2, ends_only=True, commands=COMMANDS), tmp_path / "m.csv")
+    given = [str(tmp_path / "m.csv"), "--model", str(networks), "--figures", str(tmp_path / "f")]
+    assert main(["compare", *given]) == 0
+    said = capsys.readouterr().out
+    assert "why the networks are wrong: inputs-cannot-know" in said
+    assert "follows heading halfway through the command" in said
+    assert (tmp_path / "f" / "network-errors.png").is_file()
+    assert main(["compare", *given[:3], "--json"]) == 0
+    causes = json.loads(capsys.readouterr().out)["causes"]
+    assert causes["verdict"] == ["inputs-cannot-know"]
+    assert causes["unseen"][0]["variable"] == "heading_rad"
+
+
+def test_few_commands_among_the_patterns_are_no_verdict(tmp_path):
+    networks = trained(hidden(), tmp_path / "n.safetensors", iterations=50)
+    why = asked(hidden(), networks, trials=2)
+    assert why.verdict == ("insufficient-data",)
+    assert why.as_json()["share"] == {}
+
+
+def test_networks_without_their_patterns_are_refused_by_name(tmp_path):
+    saved = load_simulator(trained(hidden(), tmp_path / "n.safetensors", trials=3, iterations=5))
+    save_simulator(StaticSimulator(saved.networks, saved.weights, np.empty(0)), tmp_path / "bare.safetensors")
+    with pytest.raises(DataError, match=r"come with 0 training patterns.*--save-snn"):
+        asked(hidden(), tmp_path / "bare.safetensors", trials=2)
+
+
+def test_distance_is_the_mean_of_the_three_nearest_distinct_patterns():
+    patterns = np.array([[0.0] * 5, [0.0] * 5, [1.0, 0, 0, 0, 0], [0, 2.0, 0, 0, 0], [9.0] * 5])
+    distance, _ = nearness(np.zeros((1, 5)), patterns)
+    assert distance == pytest.approx([1.0])  # 0, 1 and 2; the repeated pattern counts once
+
+
+def drifting(seed, slope):
+    """Commands whose error follows time by ``slope``, and nothing else."""
+    rng = np.random.default_rng(seed)
+    t, luck = rng.uniform(0, 1, 300), rng.normal(size=(300, 3))
+    error, variables = luck + slope * (t[:, None] - 0.5), {"t": t, "u": rng.normal(size=300)}
+    return Commands(np.repeat(np.arange(30), 10), np.ones(300), np.ones((300, 3)), error, variables)
+
+
+def test_a_planted_variable_is_found_with_its_share_and_luck_is_not():
+    named, alone, share = explained(drifting(0, 4.0))
+    assert [one.variable for one in named] == ["t"] == [alone[0].variable]
+    assert share == pytest.approx(16 / 12 / (16 / 12 + 1), abs=0.08)
+    for seed in range(5):
+        assert explained(drifting(seed, 0.0))[0] == []

@@ -1,0 +1,247 @@
+"""The next experiment: rivals that commands can tell apart are, those that none can are said to be; files that a trial reads."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.cli import main
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.limits import arena_of, bounds_of
+from bns.diagnose.planned import foreseen, planned_tracks
+from bns.diagnose.power import Expected, decided, minutes_needed, power
+from bns.diagnose.proposal import propose
+from bns.diagnose.proposal_words import proposal_text
+from bns.diagnose.rivals import contests_of, rivals_of
+from bns.diagnose.separation import Apart, Stage, apart
+from bns.diagnose.sequences import Arena, Bounds, Sequences, drawn, extreme, uniform, varied
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.wheels import WheelPredictor
+from bns.errors import DataError
+from bns.measurements import write_measurements
+from bns.physics.differential_drive import simulate
+from bns.trial.experiment import read_commands
+from tests.diagnose.worlds import BASE_M, NOMINAL, hidden, measured
+
+ARENA = Arena(-0.8, 0.8, -0.6, 0.6, (0.0, 0.0, np.pi / 2))
+BOUNDS = Bounds(-0.2, 0.2, 0.4, 3.0, 12.0)
+DELAYED = hidden(command_delay={"delay_s": 0.12})
+DEAD = hidden(dead_zone={"width_m_s": 0.006})
+
+
+def found_in(model, **how):
+    predictor = WheelPredictor(tracks_of(measured(model, **how)))
+    return diagnose(predictor, NOMINAL), predictor
+
+
+@pytest.fixture(scope="module")
+def narrow():
+    """A dead zone seen at hardly any difference of speeds: it might be a gain as well."""
+    return found_in(DEAD, trials=12, ends_only=True, speeds=(0.085, 0.115), seed=4)
+
+
+def path_of(plan, trial, model=NOMINAL):
+    used = plan.duration_s[trial] > 0
+    parts = (plan.left_m_s[trial][used], plan.right_m_s[trial][used], plan.duration_s[trial][used])
+    return simulate(model, *([p] for p in parts), start=ARENA.start)[0]
+
+
+@pytest.mark.parametrize("kind", [uniform, extreme])
+def test_sequences_stay_inside_arena_and_bounds(kind):
+    rng = np.random.default_rng(1)
+    plan = drawn(rng, 30, BOUNDS, ARENA, BASE_M, kind(BOUNDS))
+    for one in (plan, varied(rng, plan, BOUNDS, kind(BOUNDS))):
+        used = one.duration_s > 0
+        assert (np.abs(one.left_m_s) <= 0.2).all()
+        assert (one.duration_s[used] >= 0.4 - 1e-9).all()
+        assert (one.lasting_s <= 12.5).all()
+        assert np.allclose(one.duration_s / 0.04, np.round(one.duration_s / 0.04))
+    assert np.median(plan.lasting_s) > 10
+    for trial in range(len(plan)):
+        poses = path_of(plan, trial)
+        assert ARENA.holds(poses[:, 0], poses[:, 1], 0.0).all()
+
+
+def test_the_same_seed_draws_the_same_sequences_and_another_seed_others():
+    a, b, c = (drawn(np.random.default_rng(s), 4, BOUNDS, ARENA, BASE_M, uniform(BOUNDS)) for s in (1, 1, 2))
+    assert np.array_equal(a.left_m_s, b.left_m_s)
+    assert not np.array_equal(a.left_m_s, c.left_m_s)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        hidden(motor_lag={"tau_s": 0.1}),
+        hidden(tether_pull={"anchor_x_m": 0.4, "anchor_y_m": 0.3, "pull_per_s": 0.02}),
+        hidden(floor_slope={"x_m_s": 0.004, "y_m_s": -0.003}),
+    ],
+    ids=lambda m: m.effects[0].effect.name,
+)
+def test_foreseen_tracks_are_those_of_the_simulation(model):
+    plan = drawn(np.random.default_rng(3), 5, BOUNDS, ARENA, BASE_M, uniform(BOUNDS))
+    seen = foreseen(model, planned_tracks(plan, ARENA.start, 0.04, np.zeros(5))).tracks
+    for trial in range(5):
+        last = seen.pose[seen.first[trial + 1] - 1]
+        assert np.abs(last - path_of(plan, trial, model)[-1]).max() < 1e-3
+
+
+def test_separation_is_what_a_real_refit_leaves(narrow):
+    d, _ = narrow
+    a, b = rivals_of(d)[:2]
+    near = replace(BOUNDS, slowest_m_s=0.06, fastest_m_s=0.14)
+    plan = drawn(np.random.default_rng(5), 12, near, ARENA, BASE_M, uniform(near))
+    stage = Stage(d.found.problem, ARENA, None, lambda p: np.zeros(len(p)), ((0, 1),))
+    found, _ = apart([a, b], plan, stage)
+    one = found[(0, 1)][0]
+    # nothing known of the rival's numbers, all of the true ones
+    free = replace(one, prior=1e-9 * np.eye(len(one.prior)), spread=np.zeros_like(one.spread))
+    from bns.diagnose.fit import Problem
+    from bns.diagnose.noise import filter_for
+
+    predictor = foreseen(a.fit.model, planned_tracks(plan, ARENA.start, None, np.zeros(12)))
+    problem = Problem(predictor, filter_for(predictor, predictor.steps(a.fit.model), d.found.problem.following.noise))
+    left = 2 * problem.fit(b.fit.model).loss
+    assert free.total() == pytest.approx(left, rel=0.1)
+    assert free.each().sum() == pytest.approx(free.total(), rel=0.01)
+    known = replace(one, spread=free.spread)
+    assert known.total() > free.total()  # what was known before helps to tell them apart
+    assert one.each().sum() <= one.total() + 1e-6
+
+
+def test_an_explanation_is_not_driven_apart_from_itself(narrow):
+    d, _ = narrow
+    a = rivals_of(d)[0]
+    plan = drawn(np.random.default_rng(5), 12, BOUNDS, ARENA, BASE_M, extreme(BOUNDS))
+    found, _ = apart([a, a], plan, Stage(d.found.problem, ARENA, None, lambda p: np.zeros(len(p)), ((0, 1),)))
+    assert found[(0, 1)][0].total() < 1e-3
+    assert found[(0, 1)][0].each().max() < 1e-3
+
+
+def test_an_experiment_decides_in_half_the_time_of_random_commands(narrow):
+    d, predictor = narrow
+    assert d.verdict == "tie"
+    arena = arena_of(predictor.tracks, "1.6x1.2", "0,0,90")
+    proposal = propose(d, arena, bounds_of(predictor.tracks, NOMINAL, None), 4)
+    contest = next(c for c in proposal.contests if "dead-zone" in {c.first, c.second})
+    assert not contest.alike
+    assert contest.times_faster > 2
+    for trial in range(len(proposal.plan)):
+        poses = path_of(proposal.plan, trial, DEAD)
+        assert ARENA.holds(poses[:, 0], poses[:, 1], 0.0).all()
+    assert "times as long" in proposal_text(proposal)
+
+
+def test_what_is_the_same_from_outside_is_said_to_be_so():
+    d, predictor = found_in(DELAYED, trials=12)
+    assert d.verdict == "tie"
+    proposal = propose(d, arena_of(predictor.tracks, None, None), bounds_of(predictor.tracks, NOMINAL, None), 5)
+    [contest] = [c for c in proposal.contests if {c.first, c.second} == {"command-delay", "clock-offset"}]
+    assert contest.alike
+    assert any("LED" in other for other in contest.other_measurements)
+    assert "no sequence of commands tells them apart" in proposal_text(proposal)
+    assert len(proposal.plan) == 0
+    assert proposal.power == 0
+
+
+def test_after_a_clear_verdict_only_the_accepted_one_is_contested():
+    d, _ = found_in(hidden(turn_slip={"slip_s": 0.12}), trials=12, seed=2)
+    rivals = rivals_of(d)
+    assert rivals[0].names == ("turn-slip",)
+    assert len(rivals) > 1
+    assert contests_of(d, rivals) == tuple((0, i) for i in range(1, len(rivals)))
+
+
+def test_power_grows_with_trials_and_is_small_where_nothing_separates():
+    old, new, none = np.zeros(10), np.full(30, 3.0), np.zeros(30)
+    chances = [power(Expected(old, new[:n], old, new[:n])) for n in (2, 8, 30)]
+    assert chances[0] < chances[1] < chances[2]
+    assert chances[2] > 0.9
+    assert power(Expected(old, none + 1e-12, old, new)) < 0.1
+    both = [Expected(old, new, old, new, chance=0.7), Expected(old, none + 1e-12, old, new, chance=0.3)]
+    assert 0.6 < decided(both) < 0.75
+    assert minutes_needed(0.0, 10, 1.0) == np.inf
+
+
+def test_a_pair_without_numbers_separates_by_its_error_alone():
+    none = np.zeros((0, 0))
+    one = Apart(np.array([1.0, 2.0]), np.zeros((2, 0)), np.zeros((2, 0, 0)), none, none, 0)
+    assert one.total() == 3.0
+    assert one.each().tolist() == [1.0, 2.0]
+
+
+def test_a_trial_file_is_written_that_a_trial_reads(tmp_path, capsys):
+    data, out = tmp_path / "d.csv", tmp_path / "next.csv"
+    write_measurements(measured(DEAD, trials=12, ends_only=True, speeds=(0.085, 0.115), seed=4), data)
+    arguments = ["propose", str(data), "--model", "khepera", "--minutes", "3", "--arena", "1.6x1.2", "--start=0,0,90"]
+    assert main([*arguments, "-o", str(out)]) == 0
+    assert f"--commands {out}" in capsys.readouterr().out
+    trials = read_commands(out)
+    table = pd.read_csv(out)
+    assert len(trials) == table["trial"].nunique()
+    assert (table[["left_m_s", "right_m_s"]] >= 0.0207).all(axis=None)  # a Khepera's least speed, and what was seen
+    assert table["duration_s"].sum() == pytest.approx(180, rel=0.2)
+    assert main([*arguments, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["trials"] == len(trials)
+    assert 0 <= told["power"] <= 1
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["--minutes", "0"], "above 0"),
+        (["--minutes", "nan"], "above 0"),
+        (["-o", "commands.txt"], "ends in .csv"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_before_the_work(tmp_path, more, message, capsys):
+    assert main(["propose", str(tmp_path / "none.csv"), "--model", "khepera", *more]) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arena", "start", "speeds", "message"),
+    [
+        ("2", None, None, "width x height"),
+        ("0.01x3", None, None, "width x height"),
+        (None, "1,2", None, "X,Y,DEGREES"),
+        (None, "99,0,0", None, "outside of the arena"),
+        (None, None, "0.3,0.1", "LOW,HIGH"),
+    ],
+)
+def test_limits_that_make_no_sense_are_refused(narrow, arena, start, speeds, message):
+    tracks = narrow[1].tracks
+    with pytest.raises(DataError, match=message):
+        (arena_of(tracks, arena, start), bounds_of(tracks, NOMINAL, speeds))
+
+
+def test_no_rivals_no_experiment():
+    d, predictor = found_in(NOMINAL, trials=4)
+    with pytest.raises(DataError, match="insufficient-data"):
+        propose(d, arena_of(predictor.tracks, None, None), bounds_of(predictor.tracks, NOMINAL, None), 5)
+
+
+def test_an_arena_too_small_for_any_trial_is_refused(narrow):
+    d, _ = narrow
+    tight = Arena(-0.06, 0.06, -0.06, 0.06, (0.0, 0.0, 0.0))
+    with pytest.raises(DataError, match="stays inside the arena"):
+        propose(d, tight, Bounds(0.15, 0.2, 1.0, 3.0, 12.0), 5)
+
+
+def test_measurements_of_two_files_are_taken_together(tmp_path):
+    from bns.diagnose.intake import load_measured
+
+    first, second = tmp_path / "a.csv", tmp_path / "b.csv"
+    for path, seed in ((first, 1), (second, 2)):
+        write_measurements(measured(NOMINAL, trials=3, seed=seed), path)
+    both, alone = load_measured(first, more=[second]), load_measured(first)
+    assert both.tracks.names == ("0", "1", "2", "1-b: 0", "1-b: 1", "1-b: 2")
+    assert both.digest != alone.digest
+    assert np.allclose(both.tracks.pose[: len(alone.tracks.pose)], alone.tracks.pose)
+
+
+def test_sequences_of_different_lengths_are_joined():
+    short, long = (Sequences(*(np.ones((1, n)) for _ in range(3))) for n in (1, 3))
+    assert short.joined(long).lasting_s.tolist() == [1.0, 3.0]

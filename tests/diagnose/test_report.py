@@ -1,0 +1,171 @@
+"""The page as a reader finds it: every verdict said plainly, alone from the file system, on a wide and on a narrow screen."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from functools import cache
+
+import pytest
+
+from bns.cli import main
+from bns.diagnose.plain import PLAIN, figures_in_words
+from bns.measurements import write_measurements
+from bns.physics.effects import all_effects
+from bns.physics.formula import formula_effect
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+NARROWEST = 500
+"""Some builds of Chromium make no narrower window."""
+QUIET = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync", "--hide-scrollbars", "--enable-logging=stderr"),
+)
+# What the browser is asked for: pictures that did not load, sideways scrolling, whether the slider and the list of trials work.
+PROBE = """<script>window.addEventListener("load", () => {
+  const at = id => document.getElementById(id), told = () => at("now").textContent;
+  const broken = [...document.images].filter(image => !image.naturalWidth).length;
+  const wide = document.documentElement.scrollWidth > document.documentElement.clientWidth;
+  const lost = [...document.querySelectorAll("nav a")].filter(a => !document.querySelector(a.getAttribute("href"))).length;
+  const last = told(), bottom = at("verdict").getBoundingClientRect().bottom;
+  at("time").value = 0;
+  at("time").dispatchEvent(new Event("input"));
+  const first = told();
+  at("trial").value = 1;
+  at("trial").dispatchEvent(new Event("change"));
+  document.title = JSON.stringify({broken, wide, lost, first, last, other: told(), bottom,
+    rows: at("poses").rows.length, lines: at("floor").querySelectorAll("path").length});
+});</script></head>"""
+WORLDS = {
+    "none": (NOMINAL, {}),
+    "effects": (hidden(turn_slip={"slip_s": 0.12}), {}),
+    "tie": (hidden(dead_zone={"width_m_s": 0.006}), {"speeds": (0.085, 0.115)}),
+    "unlisted": (NOMINAL.with_active(formula_effect("nap", "k * v * sin(heading)", "v"), (0.3,)), {"trials": 24}),
+    "insufficient-data": (NOMINAL, {"trials": 4}),
+}
+
+
+@pytest.fixture(scope="module")
+def page_of(tmp_path_factory):
+    """The page of a verdict, made when it is first asked for."""
+    folder = tmp_path_factory.mktemp("pages")
+
+    @cache
+    def made(verdict):
+        model, how = WORLDS[verdict]
+        data, out = folder / f"{verdict}.csv", folder / f"{verdict}.html"
+        write_measurements(measured(model, **({"trials": 12, "ends_only": True, "seed": 4} | how)), data)
+        assert main(["report", str(data), "--model", "khepera", "--minutes", "2", "-o", str(out)]) == 0
+        return out
+
+    return made
+
+
+def first_screen(page):
+    return html.unescape(re.sub(r"<[^>]+>", " ", page.read_text().partition("<nav>")[0].partition("</style>")[2]))
+
+
+def browse(page, width, profile):
+    command = [BROWSER, *QUIET, f"--user-data-dir={profile}", f"--window-size={width},900", "--dump-dom", page.as_uri()]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+
+
+@pytest.mark.parametrize("verdict", WORLDS)
+def test_every_verdict_has_a_page_that_needs_nothing_else(page_of, verdict):
+    text = page_of(verdict).read_text()
+    assert f"verdict: {verdict}" in text
+    assert len(text) < 5e6
+    assert not re.search(r'(src|href)="(?!#|data:)', text)
+    assert "url(" not in text
+    sections = set(re.findall(r'<section id="(\w+)">', text))
+    assert {"paths", "error", "where", "next", "details"} <= sections
+    assert ("ranking" in sections) == (verdict != "insufficient-data")
+    assert set(re.findall(r'href="#(\w+)"', text)) == sections
+
+
+@pytest.mark.parametrize(
+    ("verdict", "said"),
+    [
+        ("none", "Nothing is missing"),
+        ("effects", "turning costs forward speed"),
+        ("tie", "a part of every wheel's speed is lost to friction, or that"),
+        ("unlisted", "none of the known effects"),
+        ("insufficient-data", "do not suffice"),
+    ],
+)
+def test_the_first_screen_says_it_plainly(page_of, verdict, said):
+    assert said in first_screen(page_of(verdict))
+
+
+def test_the_first_screen_has_the_effects_size_and_its_uncertainty_with_units(page_of):
+    told = first_screen(page_of("effects"))
+    size, low, high = re.search(r"turn-slip\s+([0-9.]+) s/rad.*?certainty ([0-9.]+) to ([0-9.]+) s/rad", told, re.S).groups()
+    assert float(low) < float(size) < float(high)
+    assert float(low) < 0.12 < float(high)
+    assert re.search(r"predictions a \w+ ahead are [0-9.]+ mm off instead of [0-9.]+ mm", told)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; apt-get install chromium")
+@pytest.mark.parametrize(("verdict", "width"), [("effects", 1280), ("effects", 400), ("none", 400)])
+def test_a_browser_shows_it_without_an_error_and_the_slider_moves(page_of, tmp_path, verdict, width):
+    probed = tmp_path / "probed.html"
+    probed.write_text(page_of(verdict).read_text().replace("</head>", PROBE))
+    done = browse(probed, width, tmp_path / "profile")
+    assert "CONSOLE" not in done.stderr
+    found = json.loads(html.unescape(re.search(r"<title>(.*?)</title>", done.stdout)[1]))
+    assert (found["broken"], found["wide"], found["lost"]) == (0, False, 0)
+    assert found["first"].startswith("0.0 s: model as it was 0 mm off")
+    assert len({found["first"], found["last"], found["other"]}) == 3
+    assert found["rows"] > 3
+    assert found["lines"] == (4 if verdict == "effects" else 3)  # the scale, and one a path
+    assert found["bottom"] < 900
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [(["-o", "a.pdf"], "ends in .html"), (["-o", "gone/a.html"], "a folder that is there"), (["--minutes", "-1"], "above 0")],
+)
+def test_what_cannot_be_asked_is_refused_and_nothing_written(tmp_path, monkeypatch, arguments, message, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", "none.csv", "--model", "khepera", *arguments]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_letters_that_mean_something_to_a_browser_do_no_harm(tmp_path):
+    data, out = tmp_path / "a<b>&.csv", tmp_path / "page.html"
+    table = measured(NOMINAL, trials=3, ends_only=True)
+    table["trial"] = "</script><b>" + table["trial"].astype(str)
+    write_measurements(table, data)
+    assert main(["report", str(data), "--model", "khepera", "-o", str(out)]) == 0
+    text = out.read_text()
+    assert "a&lt;b&gt;&amp;.csv" in text
+    assert "</script><b>" not in text
+
+
+def test_single_poses_have_a_page_that_says_what_is_wrong(tmp_path):
+    data, out = tmp_path / "single.csv", tmp_path / "page.html"
+    table = measured(NOMINAL, trials=10, ends_only=True)
+    write_measurements(table.groupby("trial").head(1), data)
+    assert main(["report", str(data), "--model", "khepera", "-o", str(out)]) == 0
+    assert "single tracked pose" in first_screen(out)
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        ((0.0903, 0.0896, 0.0911, "s"), ("90.3 ms", "89.6 to 91.1 ms")),
+        ((-0.03, -0.04, -0.02, "rad"), ("-1.7°", "-2.3 to -1.1°")),
+        ((1.06, 1.055, 1.065, "1"), ("1.060", "1.055 to 1.065")),
+        ((0.5, None, None, "m"), ("500 mm", "")),
+    ],
+)
+def test_numbers_are_rounded_to_what_is_known_of_them(number, said):
+    assert figures_in_words(*number) == said
+
+
+def test_every_listed_effect_is_described_in_everyday_words():
+    assert set(PLAIN) <= set(all_effects())
+    assert all(word not in text for text in PLAIN.values() for word in ("omega", "residual", "parameter"))

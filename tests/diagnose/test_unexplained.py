@@ -1,0 +1,143 @@
+"""What is left is seen: moments that stand out, what follows an event, what brakes the robot whichever way it goes."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.outbreaks import FAR, TRIALS, WIDTH, outbreaks
+from bns.diagnose.search import problem_for
+from bns.diagnose.structure import SHARE, nudge
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.unexplained import unexplained
+from bns.diagnose.wheels import RECENT_S, WheelPredictor
+from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
+
+KICK_S, KICK_RAD = 1.6, 0.15
+
+
+def kicked(table, trials):
+    """From `KICK_S` on these trials go on as if the robot had been turned on the spot."""
+    table = table.copy()
+    for trial in trials:
+        after = (table.trial == trial) & (table.t_s > KICK_S)
+        x, y = table.loc[after, "x_m"], table.loc[after, "y_m"]
+        x0, y0 = x.iloc[0], y.iloc[0]
+        cos, sin = np.cos(KICK_RAD), np.sin(KICK_RAD)
+        table.loc[after, "x_m"] = x0 + cos * (x - x0) - sin * (y - y0)
+        table.loc[after, "y_m"] = y0 + sin * (x - x0) + cos * (y - y0)
+        table.loc[after, "heading_rad"] += KICK_RAD
+    return table
+
+
+def found_in(table):
+    predictor = WheelPredictor(tracks_of(table))
+    problem = problem_for(predictor, NOMINAL)
+    return outbreaks(problem, problem.fit(NOMINAL))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_honest_scatter_does_not_stand_out(seed):
+    assert found_in(measured(NOMINAL, seed=seed, jitter=0.008)) == []
+
+
+def test_lost_and_mistaken_markers_do_not_stand_out():
+    table = measured(NOMINAL, trials=30, seed=4)
+    rng = np.random.default_rng(0)
+    hit = rng.random(len(table)) < 0.01
+    table.loc[hit, ["x_m", "y_m"]] += rng.uniform(-0.3, 0.3, (hit.sum(), 2))
+    table = table.drop(index=rng.choice(len(table), 60, replace=False))
+    assert found_in(table) == []
+
+
+@pytest.mark.parametrize("frames", [3, 6, 14])
+def test_a_marker_that_is_mistaken_for_some_frames_does_not_stand_out(frames):
+    table = measured(NOMINAL, trials=20, seed=3, commands=8)
+    for trial in range(0, 20, 3):
+        rows = table.index[table.trial == trial][30 + trial :][:frames]
+        table.loc[rows, ["x_m", "y_m"]] += [0.11, -0.07]
+    assert found_in(table) == []
+
+
+def test_trials_with_a_kick_are_named_with_the_moment():
+    trials = [2, 5, 6, 11]
+    found = found_in(kicked(measured(NOMINAL, seed=3), trials))
+    assert {int(o.trial) for o in found} == set(trials)
+    assert all(abs(o.t_s - KICK_S) <= (WIDTH + 1) * FRAME_S and o.size > FAR for o in found)
+    assert [o.size for o in found] == sorted((o.size for o in found), reverse=True)
+
+
+def test_a_kick_or_two_say_nothing_of_the_model():
+    assert found_in(kicked(measured(NOMINAL, seed=3), range(TRIALS - 1))) == []
+
+
+def test_poses_at_commands_ends_have_no_moments():
+    assert found_in(measured(NOMINAL, seed=3, ends_only=True)) == []
+
+
+def test_a_diagnosis_says_where_to_look():
+    table = kicked(measured(NOMINAL, trials=20, seed=3), [1, 8, 9, 15])
+    found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
+    assert found.verdict == "unlisted"
+    assert {o["trial"] for o in found.as_json()["outbreaks"]} == {"1", "8", "9", "15"}
+    assert any(note.startswith("4 of 20 trials have moments over 6 times") for note in found.notes)
+
+
+def loudest(table):
+    predictor = WheelPredictor(tracks_of(table))
+    problem = problem_for(predictor, NOMINAL)
+    return unexplained(problem, problem.fit(NOMINAL), ()).rhythm
+
+
+@pytest.mark.parametrize("jitter", [0.002, 0.02])
+def test_motors_that_vary_have_no_rhythm(jitter):
+    assert loudest(measured(NOMINAL, trials=30, seed=2, jitter=jitter)) is None
+
+
+def test_a_heading_that_swings_with_a_period_has_a_rhythm():
+    table = measured(NOMINAL, trials=30, seed=2)
+    phase = 2 * np.pi * (table.t_s + 0.37 * table.trial) / 1.5
+    rhythm = loudest(table.assign(heading_rad=table.heading_rad + 0.02 * np.sin(phase)))
+    assert (rhythm.direction, rhythm.scale) == ("heading", "within")
+
+
+def variables_of(left_m_s, command_s=0.4):
+    """Of one trial of these left speeds in turn; the right wheel stands."""
+    t = np.arange(0, len(left_m_s) * command_s + 1e-9, FRAME_S)
+    force = np.minimum((t / command_s + 1e-9).astype(int), len(left_m_s) - 1)
+    rows = {"trial": 0, "t_s": t, "left_m_s": np.array(left_m_s)[force], "right_m_s": 0.0}
+    table = pd.DataFrame(rows | {"x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0})
+    predictor = WheelPredictor(tracks_of(table))
+    return {name: values[0] for name, values in predictor.variables().items()}, predictor.grid.node_s[0][:-1]
+
+
+def test_a_reversal_is_fresh_and_fades():
+    seen, at_s = variables_of([0.1, 0.05, -0.1, 0.0, -0.1, 0.1])
+    turned = seen["left_reversed"]
+    assert (turned[at_s < 0.8 - 1e-6] == 0).all()  # faster or slower is no reversal
+    first = np.argmin(np.abs(at_s - 0.8))
+    assert turned[first] == pytest.approx(-np.exp(-FRAME_S / 2 / RECENT_S))
+    later = np.argmin(np.abs(at_s - 1.6))  # after a halt the same way again: no new reversal
+    assert -0.01 < turned[later] < 0
+    again = np.argmin(np.abs(at_s - 2.0))
+    assert turned[again] == pytest.approx(np.exp(-FRAME_S / 2 / RECENT_S))
+    assert (seen["right_reversed"] == 0).all()
+
+
+def test_a_change_of_command_is_fresh_and_fades():
+    seen, at_s = variables_of([0.1, 0.04])
+    change = seen["left_change_m_s"]
+    second = np.argmin(np.abs(at_s - 0.4))
+    assert change[0] == pytest.approx(0.1 * np.exp(-FRAME_S / 2 / RECENT_S))
+    assert change[second] == pytest.approx(-0.06 * np.exp(-FRAME_S / 2 / RECENT_S))
+    assert seen["just_started"][0] == pytest.approx(np.exp(-FRAME_S / 2 / RECENT_S))
+    assert seen["just_started"][second] < 0.1
+
+
+def test_a_share_of_the_motion_scales_ways_and_turns_alike():
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=3)))
+    everywhere = np.ones_like(predictor.grid.step_s)
+    before = predictor.steps(NOMINAL).body
+    after = predictor.steps(NOMINAL.with_active(nudge(SHARE, everywhere, 0 * everywhere), (-0.2,))).body
+    assert after[:, 2] == pytest.approx(0.8 * before[:, 2])
+    assert np.hypot(*after[:, :2].T) == pytest.approx(0.8 * np.hypot(*before[:, :2].T), abs=2e-6)

@@ -1,0 +1,214 @@
+"""The snake on its emulated rig: drives against the physics model, whole trials, what goes wrong."""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+import bns
+from bns.cli import main
+from bns.errors import HardwareError, TrialPausedError
+from bns.hardware.doctor import examine
+from bns.hardware.emulators.faults import Fault, FaultPlan
+from bns.hardware.journal import Journal, events
+from bns.hardware.platforms import snake
+from bns.hardware.rig import shipped_rig
+from bns.hardware.safety import Stopping
+from bns.hardware.snake_settings import snake_settings
+from bns.physics.snake.body import Body
+from bns.physics.snake.parameters import shipped_parameters
+from bns.robots import load_robot
+from bns.trial.folder import measured, past_evaluations
+
+from . import soak
+
+GENTLE = [0.5, 0.1, 0.6, 0.7, 1.0]
+ROLLING = [1.45, 1.3, 0.2, 1.5, 1.0]
+TRIAL = ["trial", "--robot", "snake", "--emulated", "--yes", "--speed", "inf", *soak.QUICK, *soak.KINDS["snake"].options]
+
+
+@pytest.fixture
+def rigged(tmp_path, clock):
+    """rigged(*faults, **driver) -> platform, emulation, journal."""
+    opened = []
+
+    def build(*faults, stopping=None, **driver):
+        rig = shipped_rig("snake")
+        rig = replace(rig, driver={**rig.driver, **driver})
+        emulation = snake.emulate(rig, Path(tempfile.mkdtemp(dir=tmp_path)), clock, FaultPlan(faults, 1), 0)
+        opened.append(emulation)
+        journal = Journal(tmp_path / f"snake{len(opened)}.jsonl", clock)
+        platform = snake.open_platform(emulation.rig, clock, journal, stopping or Stopping())
+        opened.extend([journal, platform])
+        return SimpleNamespace(platform=platform, emulation=emulation, journal=journal)
+
+    yield build
+    for each in reversed(opened):
+        each.close()
+
+
+def torques(rigged):
+    return [servo.get("torque_enable") for servo in rigged.emulation.servos]
+
+
+@pytest.mark.parametrize("wiring", ["bus", "bridge"])
+def test_an_emulated_drive_is_that_of_the_physics_model(rigged, wiring):
+    on = rigged(wiring=wiring)
+    driven = on.platform.drive(np.array([GENTLE, GENTLE], np.float32))
+    body = Body(shipped_parameters())
+    body.lay_straight((0.30, 0.0))
+    for seen in driven.poses[1:]:
+        true = body.drive_cycle(GENTLE[:4])
+        np.testing.assert_allclose(seen[:4], true.before_m.ravel(), atol=0.02)
+        np.testing.assert_allclose(seen[4:8], true.after_m.ravel(), atol=0.02)
+    assert driven.poses[:, 8].all()
+    assert np.hypot(*(driven.poses[-1, 4:6] - driven.poses[0, 4:6])) > 0.1
+    assert len(driven.spans_s) == len(driven.commands) == 2
+    assert driven.stop.confirmed
+    assert driven.stop.acknowledged_s <= 0.2
+    assert not any(torques(on))
+
+
+def test_a_robot_that_rolls_over_is_stopped_and_its_cycle_is_unstable(rigged):
+    on = rigged()
+    driven = on.platform.drive(np.array([GENTLE, ROLLING, GENTLE], np.float32))
+    assert "has not seen the robot" in driven.ended
+    assert driven.poses[:, 8].tolist() == [1.0, 1.0, 0.0]
+    assert len(driven.commands) == 2
+    assert [on.emulation.unstable_between(*span) for span in driven.spans_s] == [False, True]
+    assert not any(torques(on))
+    assert on.platform.pose() is None
+    on.emulation.put_down(np.array([0.1, 0.2, 0.3]))
+    np.testing.assert_allclose(on.platform.pose(), [0.1, 0.2, 0.3], atol=0.01)
+
+
+def test_arming_does_not_move_the_robot(rigged, clock):
+    on = rigged()
+    before = on.platform.pose()
+    on.platform._chain.arm()
+    clock.sleep(0.5)
+    assert all(torques(on))
+    np.testing.assert_allclose(on.platform.pose(), before, atol=0.002)
+    assert on.platform.stop().confirmed
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        (Fault("overload", at_s=3.0, for_s=0.5, servo=4), "servo 4: overload"),
+        (Fault("overheat", at_s=3.0, for_s=5.0, servo=7), "servo 7: overheated"),
+        (Fault("silent-servo", at_s=3.0, for_s=1.5, servo=12), "servo 12: .*asked 6 times"),
+        (Fault("hang-up", at_s=3.0, for_s=1.0), "the port is gone"),
+    ],
+)
+def test_servos_that_fail_pause_the_trial_with_the_robot_stopped(rigged, fault, message):
+    on = rigged(fault)
+    with pytest.raises(TrialPausedError, match=f"the servos failed: {message}"):
+        on.platform.drive(np.array([GENTLE] * 3, np.float32))
+    assert not any(torques(on))
+
+
+def test_a_limit_in_a_servo_that_cuts_the_gait_is_named(rigged):
+    on = rigged()
+    on.emulation.servos[2].put("ccw_angle_limit", 530)
+    with pytest.raises(TrialPausedError, match=r"joint 3 was to go to 2\d° and was only told 5°: widen the angle limits"):
+        on.platform.drive(np.array([GENTLE], np.float32))
+    assert not any(torques(on))
+
+
+def examined(rigged, clock, tmp_path, **driver):
+    on = rigged(**driver)
+    on.platform._chain.close()
+    return on, lambda: [str(found) for found in examine(on.emulation.rig, clock, tmp_path)]
+
+
+@pytest.mark.parametrize("wiring", ["bus", "bridge"])
+def test_the_doctor_asks_the_servos(rigged, clock, tmp_path, wiring):
+    on, said = examined(rigged, clock, tmp_path, wiring=wiring)
+    assert f"ok   12 servos answer ({wiring}), 12.0 V or more, 30 °C or less" in said()
+    on.emulation.servos[4].put("present_voltage", 80)
+    assert any("servo 5 has 8.0 V, not 9 to 13; see to the supply" in found and found.startswith("BAD") for found in said())
+
+
+@pytest.mark.parametrize(
+    ("driver", "message"),
+    [
+        ({"wiring": "radio"}, "unknown wiring of the snake 'radio'"),
+        ({"ids": [1, 2, 3]}, "give 12 different whole numbers"),
+        ({"ids": [1] * 12}, "give 12 different whole numbers"),
+        ({"torque": 2.0}, "torque is 2; it is a share"),
+        ({"joint_speed_rad_s": 0}, "joint_speed_rad_s is 0; it must be a number above 0"),
+        ({"sped": 1}, "unknown setting 'sped'"),
+    ],
+)
+def test_driver_settings_that_make_no_sense(driver, message):
+    with pytest.raises(HardwareError, match=message):
+        snake_settings(driver)
+
+
+def call(*arguments):
+    return main([str(a) for a in arguments])
+
+
+def test_from_command_to_table_and_replay(tmp_path, capsys):
+    asked = [option for option in TRIAL if option != "--no-figures"]
+    assert call(*asked, "--evaluations", 2, "--results", tmp_path) == 0
+    said = capsys.readouterr().out
+    assert "snake, two-regions, seed 0, emulated" in said
+    assert "stops: 2 confirmed" in said
+    [journal] = (tmp_path / "trials").glob("*/journal.jsonl")
+    table = pd.read_csv(journal.parent / "measurements.csv")
+    assert set(load_robot("snake").measured_columns) <= set(table)
+    assert {"session_s", "battery_v", "temperature_c"} <= set(table)
+    for number, drive in table.groupby("trial"):
+        assert (drive["t_s"].diff().dropna() > 0).all()
+        assert drive["cycle"].dropna().diff().dropna().between(0, 1).all()
+        assert np.isnan(drive["cycle"].iloc[-1])
+        assert np.hypot(drive["yellow_x_m"] - drive["green_x_m"], drive["yellow_y_m"] - drive["green_y_m"]).max() < 0.75
+        kept = past_evaluations(journal)[number - 1]
+        assert len(kept.commands) == drive["cycle"].max()
+    marked = {e["evaluation"]: e["unstable"] for e in events(journal, "marked")}
+    assert {n: list(e.unstable) for n, e in enumerate(past_evaluations(journal), 1) if e.unstable} == marked
+    assert (journal.parent / "path.png").exists()
+    assert f"figures: {journal.parent / 'figures' / 'index.html'}" in said
+    assert {"paths-snake-two-regions.png", "trials-snake.png"} <= {f.name for f in (journal.parent / "figures").iterdir()}
+
+    assert call("trial", "--replay", journal, "--results", tmp_path) == 0
+    rows = bns.load(tmp_path)
+    first, again = (rows[rows["sweep"] == s].reset_index(drop=True) for s in ("trials-emulated", "trials-replayed"))
+    same = [c for c in rows.columns if c not in {"run_id", "sweep"} and not c.endswith("_s")]
+    pd.testing.assert_frame_equal(first[same], again[same])
+
+
+def test_a_pause_is_gone_on_with(tmp_path, capsys):
+    plan = tmp_path / "faults.yaml"
+    plan.write_text(yaml.safe_dump({"faults": [{"kind": "hang-up", "at_s": 3, "for_s": 1}]}))
+    asked = [*TRIAL, "--evaluations", 1, "--results", tmp_path, "--seed", 1]
+    assert call(*asked, "--faults", plan) == 3
+    assert "the servos failed: the port is gone" in capsys.readouterr().err
+    assert call(*asked, "--resume") == 0
+
+
+def test_a_robot_that_is_lost_while_it_straightens_has_driven_nothing(rigged, clock, tmp_path):
+    on = rigged(Fault("lost-marker", at_s=3.0, for_s=60.0))
+    on.platform._chain.arm()
+    on.platform._chain.move([1.0, 0.0] * 6, [1.0] * 12)  # bent, so that straightening takes time
+    clock.sleep(3.0 - clock.now_s())
+    driven = on.platform.drive(np.array([GENTLE], np.float32))
+    assert "has not seen the robot" in driven.ended
+    assert (len(driven.commands), len(driven.poses), driven.rows) == (0, 0, [])
+    assert not any(torques(on))
+    on.journal.note("driven", evaluation=1, rows=driven.rows, session_s=0.0, readings={})
+    on.journal.sync()
+    assert measured(tmp_path / "snake1.jsonl").empty
+
+
+def test_ten_trials_with_faults_at_random(tmp_path):
+    ends = [soak.judged(seed, tmp_path, "snake") for seed in range(10)]
+    assert set(ends) <= {"done", "paused, gone on with", "stop not confirmed, and shouted", "refused before it moved"}
+    assert ends.count("done") >= 2
