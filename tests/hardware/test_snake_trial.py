@@ -56,6 +56,15 @@ def torques(rigged):
     return [servo.get("torque_enable") for servo in rigged.emulation.servos]
 
 
+@pytest.mark.parametrize(("x", "y", "heading"), [(1.3, 0.9, 0.0), (1.3, 0.9, 1.57), (-1.3, -0.9, 0.8), (-1.3, 0.9, 3.1)])
+def test_the_camera_sees_the_robot_everywhere_on_the_surface(rigged, x, y, heading):
+    on = rigged(wiring="bridge")
+    on.emulation.put_down(np.array([x, y, heading]))
+    seen = on.platform.pose()
+    np.testing.assert_allclose(seen[:2], [x, y], atol=0.01)
+    assert np.cos(seen[2] - heading) > np.cos(0.02)
+
+
 @pytest.mark.parametrize("wiring", ["bus", "bridge"])
 def test_an_emulated_drive_is_that_of_the_physics_model(rigged, wiring):
     on = rigged(wiring=wiring)
