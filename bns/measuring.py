@@ -160,8 +160,7 @@ def _ready(options: argparse.Namespace, networks: bool = False) -> tuple[Measure
     from bns.diagnose.fitting_robot import check_named_robot, check_same_robot
     from bns.diagnose.intake import load_measured
     from bns.diagnose.networks import NetworkPredictor
-    from bns.diagnose.tracks import slimmed
-    from bns.diagnose.wheels import WheelPredictor
+    from bns.diagnose.wheels import WheelPredictor, predictor_for_search
     from bns.diagnose.words import findings_text
     from bns.physics.model import Model
 
@@ -175,11 +174,10 @@ def _ready(options: argparse.Namespace, networks: bool = False) -> tuple[Measure
         print(findings_text(measured.findings, most), file=sys.stderr)
     if of_networks:
         return measured, NetworkPredictor(measured.tracks, Path(options.model)), model
-    tracks = measured.tracks if networks else slimmed(measured.tracks)
-    if len(tracks.t_s) < len(measured.tracks.t_s):
-        print(f"{len(tracks.t_s)} of {len(measured.tracks.t_s)} poses are used, evenly chosen; all commands are", file=sys.stderr)
-        measured = replace(measured, tracks=tracks)
-    predictor = WheelPredictor(tracks)
+    predictor = WheelPredictor(measured.tracks) if networks else predictor_for_search(measured.tracks)
+    used, there = len(predictor.tracks.t_s), len(measured.tracks.t_s)
+    if used < there:
+        print(f"{used} of {there} poses are used, evenly chosen; all commands are", file=sys.stderr)
     check_named_robot(measured.robot, model)
     check_same_robot(predictor, model)
     return measured, predictor, model

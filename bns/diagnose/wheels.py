@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.predictor import Steps
-from bns.diagnose.tracks import Array, Tracks
+from bns.diagnose.tracks import Array, Tracks, slimmed
 from bns.engine.pose_filter import followed
 from bns.physics.differential_drive import taken_at
 from bns.physics.grid import Grid
@@ -14,6 +14,7 @@ from bns.physics.model import Model
 from bns.physics.motion import body_motion, flow_of
 from bns.physics.signals import Conditions, View
 
+_COARSE_S = 0.1
 _TAIL_S = 1.0
 """The last command is taken to go on this long: poses may be stamped early."""
 
@@ -118,6 +119,12 @@ class WheelPredictor:
         velocity = np.array([flow.x_m_s, flow.y_m_s]) - flow.return_per_s * where
         out: Array = velocity * moving_s[:, None]
         return out
+
+
+def predictor_for_search(tracks: Tracks) -> WheelPredictor:
+    """A predictor that answers fast enough to be asked thousands of times: of many poses some, and then in coarser steps."""
+    slim = slimmed(tracks)
+    return WheelPredictor(slim) if slim is tracks else WheelPredictor(slim, dt_s=_COARSE_S)
 
 
 def _grid_of(tracks: Tracks, dt_s: float) -> Grid:
