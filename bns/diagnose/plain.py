@@ -107,7 +107,7 @@ def certainty(d: Diagnosis) -> str:
         return d.notes[0] if d.notes else ""
     trials = len(found.problem.predictor.tracks)
     if d.verdict == "none":
-        return f"None of the known effects earns anything on trials that it was not fitted to ({trials} trials)."
+        return f"No known effect earns anything on trials that it was not fitted to ({trials} trials)."
     if d.verdict == "insufficient-data":
         return next((n for n in d.notes if "more would" in n), "") or f"{trials} trials hint at something, and do not settle it."
     if d.verdict == "unlisted":
