@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
@@ -23,7 +25,7 @@ def success_by(store: Store, parameter: str, name: str) -> list[Drawn]:
 
 @style()
 def _draw(store: Store, chosen: Selection, parameter: str, name: str) -> Drawn:
-    rows, thin = thick_enough(by_value(store, chosen, parameter))
+    rows, thin, least = thick_enough(by_value(store, chosen, parameter))
     rows = rows.assign(**dict(zip(("low", "high"), wilson(rows.successes, rows.runs), strict=True)))
     tasks, n = [task for task in chosen.tasks if task in set(rows.task)], chosen.n - thin
     looks = dict(zip(sorted(rows.value.unique()), ordered_styles(rows.value.nunique()), strict=True))
@@ -35,7 +37,7 @@ def _draw(store: Store, chosen: Selection, parameter: str, name: str) -> Drawn:
         below.legend(*ax.get_legend_handles_labels(), loc="upper center", title=TITLES[parameter])
     axes[0, 0].set_ylabel("successful runs (%)")
     said, what = coverage(store, chosen.sweeps, n), criterion(store, chosen)
-    too_few = (f"{counted(thin, 'run')} in curves of fewer than {FEWEST} not drawn",) if thin else ()
+    too_few = (f"{counted(thin, 'run')} in curves of fewer than {least} not drawn",) if thin else ()
     note(figure, "; ".join((f"Success: {what}", *said.sentences, *too_few, f"bands: {INTERVALS}")) + ".")
     shows = (
         f"Share of runs whose fittest controller, driven in the world after each evaluation, {what}, by {TITLES[parameter]}; "
@@ -55,12 +57,15 @@ def _draw(store: Store, chosen: Selection, parameter: str, name: str) -> Drawn:
     )
 
 
-def thick_enough(rows: pd.DataFrame) -> tuple[pd.DataFrame, int]:
-    """The curves to draw, and how many runs stand in the others."""
+def thick_enough(rows: pd.DataFrame) -> tuple[pd.DataFrame, int, int]:
+    """The curves to draw, how many runs stand in the others, and the least that a curve must have.
+
+    Beside a curve of many runs one of a tenth as many is left out: it jumps, and its band covers the panel.
+    """
     runs = rows.groupby(["task", "value"]).runs.transform("max")
-    thick = runs >= FEWEST if (runs >= FEWEST).any() else runs > 0
-    left_out = rows[~thick].groupby(["task", "value"]).runs.max().sum()
-    return rows[thick], int(left_out)
+    least = max(FEWEST, math.ceil(runs.max() / 10)) if (runs >= FEWEST).any() else 1
+    left_out = rows[runs < least].groupby(["task", "value"]).runs.max().sum()
+    return rows[runs >= least], int(left_out), least
 
 
 def _panel(ax: Axes, rows: pd.DataFrame, looks: dict[float, dict[str, str]], parameter: str) -> None:

@@ -196,8 +196,7 @@ def ready(options: argparse.Namespace, *, slim: bool = True) -> tuple[Measured, 
     """
     from bns.diagnose.cycles import CycleTracks
     from bns.diagnose.fitting_robot import check_named_robot, check_same_robot
-    from bns.diagnose.tracks import slimmed
-    from bns.diagnose.wheels import WheelPredictor
+    from bns.diagnose.wheels import WheelPredictor, predictor_for_search
 
     if _networks(options) is not None:
         raise ModelError(f"{options.model} holds networks, which have no effects: they can be compared, not diagnosed.")
@@ -209,11 +208,11 @@ def ready(options: argparse.Namespace, *, slim: bool = True) -> tuple[Measured, 
             f"{options.data} holds cycles and markers, and the model {options.model} drives wheels; "
             "compare them with networks: --model snake, or a file (.safetensors) of bns run --robot snake --save-snn FILE."
         )
-    tracks = slimmed(measured.tracks) if slim else measured.tracks
-    if len(tracks.t_s) < len(measured.tracks.t_s):
-        print(f"{len(tracks.t_s)} of {len(measured.tracks.t_s)} poses are used, evenly chosen; all commands are", file=sys.stderr)
-        measured = replace(measured, tracks=tracks)
-    predictor = WheelPredictor(tracks)
+    predictor = predictor_for_search(measured.tracks) if slim else WheelPredictor(measured.tracks)
+    used, there = len(predictor.tracks.t_s), len(measured.tracks.t_s)
+    if used < there:
+        print(f"{used} of {there} poses are used, evenly chosen; all commands are", file=sys.stderr)
+        measured = replace(measured, tracks=predictor.tracks)
     check_same_robot(predictor, model)
     return measured, predictor, model
 

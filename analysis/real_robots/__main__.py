@@ -34,7 +34,8 @@ def _run(options: argparse.Namespace) -> int:
     tables = {name: table_of(case, options.data) for name, case in chosen.items()}
     for name, case in chosen.items():
         answer = diagnosed(case, tables[name], options.out)
-        errors = ", ".join(f"{h} {1e3 * e['before']:.3g} -> {1e3 * e['after']:.3g} mm" for h, e in answer["error"].items())
+        known = {h: e for h, e in answer["error"].items() if e["after"] is not None}
+        errors = ", ".join(f"{h} {1e3 * e['before']:.3g} -> {1e3 * e['after']:.3g} mm" for h, e in known.items())
         print(f"{name}: {answer['verdict']}: {', '.join(answer['effects']) or 'nothing listed'}; {errors}", flush=True)
     answers = {n: json.loads(p.read_text()) for n in everything if (p := options.out / f"{n}.json").is_file()}
     print(error_figure(answers, {n: c.title for n, c in everything.items()}, options.out / "real-error"))

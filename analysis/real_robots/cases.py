@@ -9,14 +9,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import yaml
 
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.folds import errors_at_horizons
 from bns.diagnose.intake import Measured, load_measured
-from bns.diagnose.tracks import slimmed
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.wheels import predictor_for_search
 from bns.diagnose.words import diagnosis_text
 from bns.errors import DataError
 from bns.physics.model import Model
@@ -35,12 +35,16 @@ class Case:
     wheelbase_m: float
     mapping: Mapping[str, Any]
     rows: Mapping[str, str]
+    every: int = 1
 
 
 def cases() -> dict[str, Case]:
     """Name -> case, in the order of robots.yaml."""
     tree = yaml.safe_load((resources.files("analysis.real_robots") / "robots.yaml").read_text(encoding="utf-8"))
-    return {name: Case(name, *(entry[k] for k in _KEYS), entry.get("rows", {})) for name, entry in tree.items()}
+    return {
+        name: Case(name, *(entry[k] for k in _KEYS), rows=entry.get("rows", {}), every=entry.get("every", 1))
+        for name, entry in tree.items()
+    }
 
 
 def table_of(case: Case, data: Path) -> pd.DataFrame:
@@ -51,7 +55,8 @@ def table_of(case: Case, data: Path) -> pd.DataFrame:
     table = pd.read_parquet(path)
     for column, value in case.rows.items():
         table = table[table[column] == value]
-    return with_start(table.reset_index(drop=True))
+    chosen = table["trial"].unique()[:: case.every]
+    return with_start(table[table["trial"].isin(chosen)].reset_index(drop=True))
 
 
 def with_start(table: pd.DataFrame) -> pd.DataFrame:
@@ -79,10 +84,15 @@ def measured(case: Case, table: pd.DataFrame, folder: Path) -> Measured:
 def diagnosed(case: Case, table: pd.DataFrame, folder: Path) -> dict[str, Any]:
     """The diagnosis as JSON, with the error (m, at every horizon) of the model as drawn; kept in ``folder``, in words too."""
     log = measured(case, table, folder)
-    predictor = WheelPredictor(slimmed(log.tracks))
+    predictor = predictor_for_search(log.tracks)
     found = diagnose(predictor, Model(wheelbase_m=case.wheelbase_m, name="differential-drive"))
     drawn = errors_at_horizons(predictor, predictor.steps(Model(wheelbase_m=case.drawn_m)))
-    answer = {**found.as_json(), "drawn": dict(drawn), "trials": len(log.tracks), "findings": len(log.findings)}
+    answer = {
+        **found.as_json(),
+        "drawn": {h: v for h, v in drawn.items() if np.isfinite(v)},
+        "trials": len(log.tracks),
+        "findings": len(log.findings),
+    }
     differing = found.model.differing if found.model else None
     answer["clocks_s"] = list(differing.own) if differing else []
     (folder / f"{case.name}.json").write_text(json.dumps(answer, indent=1), encoding="utf-8")

@@ -57,10 +57,10 @@ def designed(
     rivals: Sequence[Rival],
     stage: Stage,
     bounds: Bounds,
-    trials: int,
+    seconds: float,
     tick: Callable[[str], None] = lambda _: None,
 ) -> Pool:
-    """``trials`` trials, the most telling first; fewer where nothing stays inside the arena."""
+    """Trials that last ``seconds`` together, the most telling first; none where nothing stays inside the arena."""
     base_m = rivals[0].fit.model.wheelbase_m
     tick("random trials")
     pool = random_pool(rng, rivals, stage, bounds, POOL // 2)
@@ -69,20 +69,20 @@ def designed(
         if not len(pool.plan):
             break
         tick(f"generation {generation + 1} of {GENERATIONS}")
-        best = np.unique(chosen(pool, min(trials, POOL // 8)))
+        best = np.unique(chosen(pool, min(seconds, POOL / 8 * bounds.trial_s)))
         parents = pool.plan.only(np.resize(best, POOL // 2))
         pool = pool.joined(looked_at(rivals, varied(rng, parents, bounds, extreme(bounds)), stage))
-    return pool.only(chosen(pool, trials))
+    return pool.only(chosen(pool, seconds))
 
 
-def chosen(pool: Pool, trials: int) -> NDArray[np.int64]:
-    """Which trials, one after the other, each the one that adds most a minute to what is there already."""
+def chosen(pool: Pool, seconds: float) -> NDArray[np.int64]:
+    """Which trials, until so many seconds are full: one after the other, each the one that adds most a minute."""
     lasts = pool.plan.lasting_s
     directions = [one for both in pool.found.values() for one in both] if len(lasts) else []
     sums = [tuple(np.zeros_like(part[0]) for part in (d.square, d.pull, d.give)) for d in directions]
     times = np.zeros(len(lasts), dtype=np.int64)
     out: list[int] = []
-    while len(out) < trials and (times < MOST_TIMES).any():
+    while lasts[out].sum() < seconds * (1 - 1e-9) and (times < MOST_TIMES).any():
         worth = np.zeros(len(lasts))
         for d, (s, g, m) in zip(directions, sums, strict=True):
             worth += _worth(d.of(s + d.square, g + d.pull, m + d.give)) - _worth(d.of(s[None], g[None], m[None]))

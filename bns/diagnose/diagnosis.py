@@ -67,7 +67,7 @@ class Diagnosis:
             "ties": ties_of(found) if found else [],
             "explanations": [list(found.accepted), *map(list, found.rivals)] if found else [],
             "ranking": [_ranked(c) for c in (found.steps[0].ranking if found else ())],
-            "error": self.error or {},
+            "error": {h: {name: _plain(v) for name, v in e.items()} for h, e in (self.error or {}).items()},
             "formula": self._formula(),
             "patterns": [_pattern(p) for p in self.patterns],
             "outbreaks": [vars(o) for o in self.rest.outbreaks],

@@ -71,8 +71,8 @@ def load_mapping(path: Path) -> dict[str, Any]:
         raise DataError(f"The mapping {path} does not read: {fault}.") from fault
     if not isinstance(tree, dict) or not isinstance(tree.get("columns"), dict) or set(tree) - {"columns", "repeated_poses"}:
         raise DataError(
-            f"The mapping {path} must have the key columns, with an entry for each column of the table, and may have "
-            "repeated_poses; nothing else."
+            f"The mapping {path} must have the one key columns, with an entry for each column of the table; "
+            "repeated_poses may stand beside it."
         )
     if tree.get("repeated_poses", "kept") not in REPEATED:
         raise DataError(f"{path}: " + unknown_name("word for repeated_poses", tree["repeated_poses"], REPEATED))
@@ -103,7 +103,7 @@ def applied(table: pd.DataFrame, mapping: Mapping[str, Any]) -> pd.DataFrame:
         if source not in table.columns:
             raise DataError("The mapping asks for an " + unknown_name("column", source, map(str, table.columns)))
         out[name] = _converted(name, table[source], entry)
-    used = {entry["from"] for entry in mapping["columns"].values()} - set(mapping["columns"])
+    used = {entry["from"] for entry in mapping["columns"].values()} - set(mapping["columns"]) - set(COLUMNS)
     out = out.drop(columns=list(used))
     if "trial" not in out.columns:
         out.insert(0, "trial", 0)

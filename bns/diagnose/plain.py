@@ -107,11 +107,12 @@ def certainty(d: Diagnosis) -> str:
         return d.notes[0] if d.notes else ""
     trials = len(found.problem.predictor.tracks)
     if d.verdict == "none":
-        return f"None of the known effects earns anything on trials that it was not fitted to ({trials} trials)."
+        return f"No known effect earns anything on trials that it was not fitted to ({trials} trials)."
     if d.verdict == "insufficient-data":
         return next((n for n in d.notes if "more would" in n), "") or f"{trials} trials hint at something, and do not settle it."
-    if not d.effects:
-        return f"Predictions go wrong in a pattern that is not luck, over {trials} trials."
+    if d.verdict == "unlisted":
+        left = next((n for n in d.notes if n.startswith(("Left unexplained", "What is not foreseen"))), "")
+        return f"Over {trials} trials predictions still go wrong in a pattern that is not luck. {left}".strip()
     chance = next(c.evidence.p_value for s in found.steps for c in s.ranking if c.name in d.effects)
     better = float((found.problem.fit(without_last(found)).held_out > found.fit.held_out).mean())
     luck = "less than one in ten thousand" if chance < 1e-4 else f"about {chance:.1g}"

@@ -110,7 +110,6 @@ def propose(
         why = "; ".join(d.notes) or "no effect comes near to explaining anything"
         raise DataError(f"There are no two explanations that an experiment could tell apart (verdict {d.verdict}): {why}")
     assert d.found is not None
-    trials = max(round(60 * minutes / bounds.trial_s), 2)
     stage = Stage(
         d.found.problem,
         arena,
@@ -119,14 +118,14 @@ def propose(
         contests_of(d, rivals),
     )
     rng = np.random.default_rng(seed)
-    best = designed(rng, rivals, stage, bounds, trials, tick)
+    best = designed(rng, rivals, stage, bounds, 60 * minutes, tick)
     if not len(best.plan):
         raise DataError(
             f"No trial of {bounds.trial_s:g} s stays inside the arena from its start at x = {arena.start[0]:.2f}, y = "
             f"{arena.start[1]:.2f} m. Give a larger one (--arena 2x1.5) or another start (--start 0,0,90)."
         )
     tick("random commands, for comparison")
-    plain = random_pool(rng, rivals, stage, bounds, trials)
+    plain = random_pool(rng, rivals, stage, bounds, len(best.plan))
     tick("power")
     contests = _contests(d, rivals, best, plain, stage)
     told = any(not c.alike for c in contests)

@@ -131,7 +131,7 @@ def _formula(d: Diagnosis) -> dict[str, str] | None:
     if d.formula is None:
         return None
     values = ", ".join(f"{name} = {value:.3g}" for name, value in d.formula.values.items())
-    return {"on": d.formula.on, "term": d.formula.term, "values": values}
+    return {"on": d.formula.on, "term": d.formula.term, "numbers": values}
 
 
 def _rivals(m: Material) -> list[dict[str, str]]:

@@ -39,8 +39,9 @@ def improvement_text(d: Diagnosis) -> str:
         return ""
     e = d.error["1s"] if np.isfinite(d.error["1s"]["before"]) else d.error["command"]
     ahead = "a second" if e is d.error["1s"] else "a command"
+    known = "With it" if d.verdict != "unlisted" else "With the known effects alone"
     return (
-        f"With it, predictions {ahead} ahead are {_mm(e['after'])} mm off instead of {_mm(e['before'])} mm "
+        f"{known}, predictions {ahead} ahead are {_mm(e['after'])} mm off instead of {_mm(e['before'])} mm "
         f"(noise alone: {_mm(e['noise_floor'])} mm)."
     )
 

@@ -16,6 +16,8 @@ from bns.diagnose.tracks import Array
 from bns.physics.model import Model
 
 MOST_TRIALS, MOST_POSES = 24, 160
+_STRANGE = 6.0
+"""Trials whose error is so many times the median's come last: their first pose was a mistaken marker, not the model's fault."""
 
 
 def shown_paths(predictor: Predictor, model: Model, d: Diagnosis) -> list[dict[str, Any]]:
@@ -32,8 +34,10 @@ def shown_paths(predictor: Predictor, model: Model, d: Diagnosis) -> list[dict[s
     elif d.formula is not None and d.found is not None:
         following = problem_for(predictor, d.formula.fit.model).following
         after = laid_paths(tracks, held_out_steps(predictor, following, d.formula.fit.model))
-    off = _mean_error(predictor, before) - (_mean_error(predictor, after) if after is not None else 0.0)
-    order = np.argsort(-off, kind="stable")
+    off = _mean_error(predictor, before)
+    strange = off > _STRANGE * np.median(off)
+    better = off - (_mean_error(predictor, after) if after is not None else 0.0)
+    order = np.lexsort([-better, strange])
     count = min(len(order), MOST_TRIALS)
     chosen = order[np.unique(np.linspace(0, len(order) - 1, count).round().astype(int))]
     return [_trial(predictor, int(trial), before, after) for trial in chosen]

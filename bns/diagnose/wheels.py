@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bns.diagnose.horizons import HORIZONS, windows
 from bns.diagnose.predictor import Steps
-from bns.diagnose.tracks import Array, Tracks
+from bns.diagnose.tracks import Array, Tracks, slimmed
 from bns.engine.pose_filter import followed
 from bns.physics.differential_drive import taken_at
 from bns.physics.grid import Grid
@@ -19,6 +19,7 @@ from bns.physics.signals import Conditions, View
 
 RECENT_S = 0.15
 """How fast an event fades in the variables that say what has just happened: soon it does nothing any more."""
+_COARSE_S = 0.1
 _TAIL_S = 1.0
 """What the last row says, a command or none, is in force this long: poses may be stamped early."""
 
@@ -138,6 +139,12 @@ class WheelPredictor:
         velocity = np.array([flow.x_m_s, flow.y_m_s]) - flow.return_per_s * where
         out: Array = velocity * moving_s[:, None]
         return out
+
+
+def predictor_for_search(tracks: Tracks) -> WheelPredictor:
+    """A predictor that answers fast enough to be asked thousands of times: of many poses some, and then in coarser steps."""
+    slim = slimmed(tracks)
+    return WheelPredictor(slim) if slim is tracks else WheelPredictor(slim, dt_s=_COARSE_S)
 
 
 def _grid_of(tracks: Tracks, dt_s: float) -> Grid:

@@ -82,6 +82,8 @@ class SnakeDrive:
         except OutOfSight:
             self._over(cycle, before, self._markers, False, began_s, first)
             raise
+        finally:
+            self.rows[-1] |= dict.fromkeys(("cycle", *PARAMETERS), math.nan)  # nothing is in force any more
         self._over(cycle, before, after, stable, began_s, first)
 
     def _over(
@@ -92,7 +94,6 @@ class SnakeDrive:
         self.spans_s.append((began_s, self._clock.now_s()))
         for row in self.rows[first:]:
             row["stable"] = float(stable)
-        self.rows[-1] |= dict.fromkeys(("cycle", *PARAMETERS), math.nan)
 
     def _posture(self, target: np.ndarray) -> None:
         self._go_to(target, float(np.abs(target - self._angles).max()), self._settings.joint_speed_rad_s)

@@ -164,6 +164,14 @@ def test_curves_of_a_few_runs_are_left_out_beside_thicker_ones_and_stated(tmp_pa
     assert "2 runs in curves of fewer than 5 not drawn" in drawn.missing
 
 
+def test_curves_of_a_tenth_of_the_runs_are_left_out_beside_thick_ones(tmp_path):
+    few = [spec for spec in specs(6, task="complex") if spec.mutation_rate == 0.1]
+    written(tmp_path, "one", [record(spec) for spec in (*specs(70), *few)])
+    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    assert set(curves(drawn.figure)) == {"10 % (n = 70)", "50 % (n = 70)"}
+    assert "6 runs in curves of fewer than 7 not drawn" in drawn.missing
+
+
 def test_runs_of_another_length_are_left_out_and_named(tmp_path):
     written(tmp_path, "one", [record(spec) for spec in specs(3)])
     written(tmp_path, "two", [record(spec) for spec in specs(2, generations_per_evaluation=7)])

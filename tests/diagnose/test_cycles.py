@@ -24,6 +24,7 @@ from bns.robots.snake.table import COLUMNS, GAIT
 
 ROBOT, SAVED, BARE = load_robot("snake"), load_static_simulator("snake"), Model(wheelbase_m=1.0, name="snake")
 TRIALS, CYCLES = 8, 4
+QUICK = ("--training-iterations-per-evaluation", "20")
 
 
 def told():
@@ -160,7 +161,7 @@ def test_what_is_left_out_is_named():
 
 def test_a_run_of_the_snake_leaves_measurements_that_networks_are_held_against(tmp_path, capsys):
     rows, nets = tmp_path / "run.csv", tmp_path / "nets.safetensors"
-    small = ["--population-size", "8", "--evaluations", "3", "--generations-per-evaluation", "1", "--max-commands", "4"]
+    small = ["--population-size", "8", "--evaluations", "3", "--generations-per-evaluation", "1", "--max-commands", "4", *QUICK]
     run = ["run", "--robot", "snake", "--task", "two-regions", *small, "--results", str(tmp_path / "r")]
     assert main([*run, "--measurements", str(rows), "--save-snn", str(nets)]) == 0
     assert tuple(pd.read_csv(rows).columns) == COLUMNS

@@ -64,8 +64,7 @@ def test_what_holds_a_trial_out_is_close_to_a_fit_without_it():
     problem = problem_for(predictor, model)
     fit = problem.fit(model)
     for trial in (0, 5):
-        counted = np.ones(8)
-        counted[trial] = 0.0
+        counted = (problem.frame_trial != trial).astype(float)
         without = Problem(predictor, problem.following, counted).fit(model)
         truly = problem.per_trial(huber(problem.white(without.model)))[trial]
         assert fit.held_out[trial] == pytest.approx(truly, rel=2e-3)

@@ -10,7 +10,11 @@ from functools import cache
 import pytest
 
 from bns.cli import main
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.plain import PLAIN, figures_in_words
+from bns.diagnose.shown_paths import shown_paths
+from bns.diagnose.tracks import tracks_of
+from bns.diagnose.wheels import WheelPredictor
 from bns.measurements import write_measurements
 from bns.physics.effects import all_effects
 from bns.physics.formula import formula_effect
@@ -79,6 +83,7 @@ def test_every_verdict_has_a_page_that_needs_nothing_else(page_of, verdict):
     assert len(text) < 5e6
     assert not re.search(r'(src|href)="(?!#|data:)', text)
     assert "url(" not in text
+    assert not re.search(r"object at 0x|\bNone\b|\bnan\b", first_screen(page_of(verdict)))
     sections = set(re.findall(r'<section id="(\w+)">', text))
     assert {"paths", "error", "where", "next", "details"} <= sections
     assert ("ranking" in sections) == (verdict != "insufficient-data")
@@ -97,6 +102,17 @@ def test_every_verdict_has_a_page_that_needs_nothing_else(page_of, verdict):
 )
 def test_the_first_screen_says_it_plainly(page_of, verdict, said):
     assert said in first_screen(page_of(verdict))
+
+
+def test_a_trial_that_begins_at_a_mistaken_marker_is_shown_last():
+    table = measured(hidden(turn_slip={"slip_s": 0.12}), trials=12, ends_only=True, seed=2)
+    first = table.groupby("trial", sort=False).head(1).index[5]
+    table.loc[first, "heading_rad"] += 1.5
+    predictor = WheelPredictor(tracks_of(table))
+    shown = shown_paths(predictor, NOMINAL, Diagnosis("none", None))
+    assert shown[-1]["name"] == "5"
+    assert len(shown) == 12
+    assert len(shown[0]["measured"]) == 2 * len(shown[0]["t"])
 
 
 def test_the_first_screen_has_the_effects_size_and_its_uncertainty_with_units(page_of):

@@ -57,6 +57,11 @@ class CameraEmulator:
     def __exit__(self, *_error: object) -> None:
         self.close()
 
+    def film(self) -> None:
+        """One frame now: what it shows has changed by other hands than time's."""
+        with self._filming:
+            self._film()
+
     def _moved_on(self, now_s: float) -> None:
         """Called by the clock."""
         with self._filming:

@@ -17,14 +17,20 @@ from bns.hardware.emulators.scene import Patch, disc
 from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.snake_body import SnakeBody
 from bns.hardware.emulators.terminal import HangUp, PseudoTerminal
-from bns.hardware.emulators.watchers import GREEN_BGR, YELLOW_BGR, emulated_camera
+from bns.hardware.emulators.watchers import GREEN_BGR, YELLOW_BGR, emulated_camera, emulated_lens
 from bns.hardware.rig import Rig
 from bns.hardware.snake_settings import snake_settings
+from bns.hardware.tracking.lens import Lens
 from bns.physics.snake.parameters import shipped_parameters
 from bns.physics.snake_drive import START_HEADING_RAD, START_M
 
-_SCALE, _RATE_HZ = 0.5, 5.0
-"""640 by 360 pixels, five frames a second: enough for a robot that moves some centimetres in that time."""
+_RATE_HZ = 5.0
+"""Enough for a robot that moves some centimetres in that time."""
+
+
+def lens() -> Lens:
+    """High enough to see both ends of a robot whose middle is anywhere on the surface; 768 by 432 pixels."""
+    return emulated_lens(0.6, 3.0, 0.02)
 
 
 class EmulatedSnakeRig:
@@ -43,13 +49,14 @@ class EmulatedSnakeRig:
         device.cut_line = self._hang_up.cut
         self._bridge = device if isinstance(device, BridgeEmulator) else None
         tracker, self._camera = emulated_camera(
-            rig.tracker, folder, lambda now_s: self._worn(rig.tracker, now_s), clock, plan.of("tracker"), seed, _SCALE, _RATE_HZ
+            rig.tracker, folder, lambda now_s: self._worn(rig.tracker, now_s), clock, plan.of("tracker"), seed, lens(), _RATE_HZ
         )
         self.rig = replace(rig, port=str(self._line.path), tracker=tracker)
 
     def put_down(self, pose: np.ndarray) -> None:
         """Lay the robot down, straight."""
         self.body.lay(tuple(pose[:2]), float(pose[2]), self._clock.now_s())
+        self._camera.film()
 
     def unstable_between(self, begin_s: float, end_s: float) -> bool:
         """Whether somebody who watched would call what it did in that time unstable."""

@@ -30,11 +30,11 @@ class Device(Protocol):
         """Take it away."""
 
 
-def emulated_lens(scale: float = 1.0) -> Lens:
-    """A wide camera 2 m above the floor, a little tilted, with the distortion of its price; 1280 by 720 pixels times `scale`."""
+def emulated_lens(scale: float = 1.0, height_m: float = 2.0, tilt_rad: float = 0.05) -> Lens:
+    """A wide camera above the floor, a little tilted, with the distortion of its price; 1280 by 720 pixels times `scale`."""
     matrix = np.array([[700.0 * scale, 0.0, 640.0 * scale], [0.0, 700.0 * scale, 360.0 * scale], [0.0, 0.0, 1.0]])
     size = (round(1280 * scale), round(720 * scale))
-    return looking_down(matrix, np.array([-0.25, 0.08, 0.001, -0.0005, 0.0]), size, 2.0, 0.05)
+    return looking_down(matrix, np.array([-0.25, 0.08, 0.001, -0.0005, 0.0]), size, height_m, tilt_rad)
 
 
 def emulated_tracker(
@@ -54,11 +54,11 @@ def emulated_camera(
     clock: EmulatedClock,
     faults: Faults,
     seed: int,
-    scale: float = 1.0,
+    lens: Lens | None = None,
     rate_hz: float = 15.0,
-) -> tuple[dict[str, Any], Device]:
+) -> tuple[dict[str, Any], CameraEmulator]:
     """A calibrated camera that films the markers a robot wears; the tracker's settings with its address, and the camera."""
-    lens, place = emulated_lens(scale), folder / "camera.json"
+    lens, place = lens or emulated_lens(), folder / "camera.json"
     Calibration(lens, 0.0, 0, "the emulated camera").save(place)
     camera = CameraEmulator(_film(lens, wears, clock, faults, seed), clock, rate_hz)
     return {**settings, "camera": camera.address, "calibration": str(place)}, camera

@@ -36,11 +36,12 @@ class Eye:
         return Sight(sight.t_s, pose, sight.residual_m, sight.points)
 
     def standing(self) -> Sight | None:
-        """Mean of some looks at a robot that stands; None if it is not seen often enough."""
+        """Mean of some looks, from now on, at a robot that stands; None if it is not seen often enough."""
         seen: list[Sight] = []
+        began_s = self._clock.now_s()
         for _ in range(5 * _LOOKS):
             sight = self.look()
-            if sight is not None:
+            if sight is not None and sight.t_s >= began_s:  # an older one may be from before it was put there
                 seen.append(sight)
             if len(seen) == _LOOKS:
                 points = {name: np.mean([s.points[name] for s in seen], axis=0) for name in sight.points} if sight else {}

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.engine.evolution import Population
-from bns.engine.jit import exact, fast
+from bns.engine.jit import copy_items, exact, fast
 from bns.engine.snn import INPUTS, predict_into
 from bns.robots.khepera.rules import (
     CENTRE,
@@ -19,7 +19,6 @@ from bns.robots.khepera.rules import (
     aimed,
     at_rest,
     fitness_of,
-    normalised,
     step_of,
     unbranched_sine,
 )
@@ -28,19 +27,32 @@ NOTHING = np.empty((3, 0), np.float32)
 """Outputs of no command."""
 
 
+@exact
+def _side_by_side(lists, lengths, origin, commands, source):  # type: ignore[no-untyped-def]  # compiled
+    """All commands of all controllers, list after list and nothing between, into `commands`, and their origins into `source`."""
+    longest, width, n = origin.shape[1], lists.shape[2], 0
+    every, every_origin = lists.reshape(-1), origin.reshape(-1)
+    for i in range(lengths.size):
+        copy_items(commands, n * width, every, i * longest * width, lengths[i] * width)
+        copy_items(source, n, every_origin, i * longest, lengths[i])
+        n += lengths[i]
+
+
 @fast
-def _gather(commands, lengths, origin, centre, per_unit, X, source):  # type: ignore[no-untyped-def]  # compiled
-    """Of all commands of all controllers, side by side: their origins and their inputs, which are previous left and right (0 at
-    first), left, right, duration."""
+def _normalise(commands, lengths, centre, per_unit, X):  # type: ignore[no-untyped-def]  # compiled
+    """Inputs of commands side by side: previous left and right (0 at first), left, right, duration."""
+    last_left, last_right, left, right, duration = X[0], X[1], X[2], X[3], X[4]
+    for c in range(left.size):
+        left[c] = (commands[3 * c] - centre[0]) * per_unit[0]
+        right[c] = (commands[3 * c + 1] - centre[1]) * per_unit[1]
+        duration[c] = (commands[3 * c + 2] - centre[2]) * per_unit[2]
+    for c in range(1, left.size):
+        last_left[c], last_right[c] = left[c - 1], right[c - 1]
     n = 0
     for i in range(lengths.size):
-        left, right = at_rest(centre, per_unit)
-        for j in range(lengths[i]):
-            X[0, n], X[1, n] = left, right
-            left, right, duration = normalised(commands[i, j], centre, per_unit)
-            X[2, n], X[3, n], X[4, n] = left, right, duration
-            source[n] = origin[i, j]
-            n += 1
+        if lengths[i] > 0:
+            last_left[n], last_right[n] = at_rest(centre, per_unit)
+        n += lengths[i]
 
 
 @exact
@@ -129,8 +141,10 @@ def _walk(outputs, lengths, scale, goals, fitness, reached):  # type: ignore[no-
 def _outputs(commands, lengths, origin, known, weights, centre, per_unit):  # type: ignore[no-untyped-def]  # compiled
     """Outputs (networks, commands) of the networks for all commands; only those that are not known are computed."""
     total = lengths.sum()
+    side_by_side = np.empty(total * commands.shape[2], np.float32)
     X, source, which = np.empty((INPUTS, total), np.float32), np.empty(total, np.int32), np.empty(total, np.int32)
-    _gather(commands, lengths, origin, centre, per_unit, X, source)
+    _side_by_side(commands, lengths, origin, side_by_side, source)
+    _normalise(side_by_side, lengths, centre, per_unit, X)
     new = total if known.shape[1] == 0 else _new(source, known.shape[1], which)
     fresh = np.empty((weights.shape[0], new), np.float32)
     if new == total:
@@ -183,8 +197,6 @@ def roll_out(population: Population, weights: np.ndarray, goals_m: np.ndarray, k
 
 def inputs(commands: np.ndarray) -> np.ndarray:
     """Inputs (5, n) of the networks for one controller's commands (n, 3)."""
-    n = len(commands)
-    X, origin = np.empty((INPUTS, n), np.float32), np.empty((1, n), np.int32)
-    lengths, one = np.array([n], np.int32), np.ascontiguousarray(commands[None], np.float32)
-    _gather(one, lengths, origin, CENTRE, PER_UNIT, X, origin[0])
+    X, lengths = np.empty((INPUTS, len(commands)), np.float32), np.array([len(commands)], np.int32)
+    _normalise(np.ascontiguousarray(commands, np.float32).ravel(), lengths, CENTRE, PER_UNIT, X)
     return X
