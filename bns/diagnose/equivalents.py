@@ -32,10 +32,13 @@ def longer(problem: Problem, fit: Fit, accepted: Sequence[str], others: Sequence
     """Sets of one effect more than ``accepted`` that these tracks cannot tell from it; names in the order of the replaced one."""
     found = []
     for name in accepted:
-        for pair in _promising(problem, fit, name, others):
-            model = fit.model.without(name)
+        pairs = _promising(problem, fit, name, others)
+        if not pairs:
+            continue
+        model = fit.model.without(name)
+        without = problem.fit(model)
+        for pair in pairs:
             tried = problem.fit(_with(model, pair))
-            without = problem.fit(model)
             if alike(tried, fit, without) and not any(veto_of(tried, effect.name) for effect in pair):
                 found.append(tuple(n for one in accepted for n in ((e.name for e in pair) if one == name else (one,))))
     return found

@@ -104,13 +104,13 @@ def _bump(problem: Problem, fit: Fit, on: str) -> Formula | None:
     """A round patch of floor: where, how wide, how strong."""
     pose = problem.predictor.tracks.pose
     (x0, x1), (y0, y1) = np.quantile(pose[:, 0], [0.05, 0.95]), np.quantile(pose[:, 1], [0.05, 0.95])
-    best = None
+    best, left = None, _weighted(fit, fit.white)
     for cx in np.linspace(x0, x1, 5):
         for cy in np.linspace(y0, y1, 5):
             for width in (0.1, 0.3):
                 term = f"k * {_CARRIERS[on][0]} * exp(-((x - {cx:.3g})**2 + (y - {cy:.3g})**2) / {2 * width**2:.3g})"
                 column = _weighted(fit, _column(problem, fit, formula_effect(NAME, term, on)))
-                pull, size = float(column @ _weighted(fit, fit.white)), max(float(column @ column), 1e-300)
+                pull, size = float(column @ left), max(float(column @ column), 1e-300)
                 if best is None or pull**2 / size > best[0]:
                     best = (pull**2 / size, -pull / size, cx, cy, width)
     assert best is not None

@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import TypeVar
 
 import numpy as np
@@ -247,10 +247,10 @@ class Search:
     def _rivals(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[tuple[str, ...], Fit]]:
         """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one."""
         rivals: list[tuple[tuple[str, ...], Fit]] = []
+        without = cache(lambda name: problem.fit(fit.model.without(name)))
         for name, other, tried in self._exchanges(problem, fit, accepted):
-            without = problem.fit(fit.model.without(name))
             # at a bound it may be: a tether from ever farther away is a slope
-            if alike(tried, fit, without) and not veto_of(tried, other, bounds=False):
+            if alike(tried, fit, without(name)) and not veto_of(tried, other, bounds=False):
                 rivals.append((tuple(other if a == name else a for a in accepted), tried))
         return rivals
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +13,23 @@ from bns.diagnose.predictor import Steps
 from bns.diagnose.tracks import Array, Tracks, slimmed
 from bns.engine.pose_filter import followed
 from bns.physics.differential_drive import taken_at
+from bns.physics.effect import Effect
 from bns.physics.grid import Grid
-from bns.physics.model import Model
+from bns.physics.model import ActiveEffect, Model
 from bns.physics.motion import body_motion, flow_of
-from bns.physics.signals import Conditions, View
+from bns.physics.signals import Body, Conditions, View
 
 RECENT_S = 0.15
 """How fast an event fades in the variables that say what has just happened: soon it does nothing any more."""
 _COARSE_S = 0.1
 _TAIL_S = 1.0
 """What the last row says, a command or none, is in force this long: poses may be stamped early."""
+_KEPT = 500_000
+"""Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
+_MOVING = ("wheel", "body")
+
+Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
+"""Effects that act, their values, and those of each trial."""
 
 
 class WheelPredictor:
@@ -40,12 +48,26 @@ class WheelPredictor:
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
         way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[:, 0]
         self.way_m = self._since_previous(way)
+        # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
+        kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
+        self._body, self._at = lru_cache(kept)(self._driven), lru_cache(kept)(self._followed)
 
     def steps(self, model: Model) -> Steps:
         """Displacement of the tracked point since the frame before, in the frame of the robot there."""
-        grid, tracks = self.grid, self.tracks
-        body = body_motion(model, grid, self.conditions, self._place)
-        at = followed(
+        at = self._at(model.wheelbase_m, _chain(model, (*_MOVING, "clock")))
+        view = View(at[:, :3])
+        for active in model.at("measure"):
+            view = active.effect.apply(view, **active.by_name)
+        return Steps(self._in_robot_frame(view.poses), self._drift(model, self._since_previous(at[:, 3])))
+
+    def _driven(self, wheelbase_m: float, chain: Chain) -> Body:
+        return body_motion(_model_of(wheelbase_m, chain), self.grid, self.conditions, self._place)
+
+    def _followed(self, wheelbase_m: float, chain: Chain) -> Array:
+        """`followed` at the frames; read-only, for many models share it."""
+        model, grid, tracks = _model_of(wheelbase_m, chain), self.grid, self.tracks
+        body = self._body(wheelbase_m, _chain(model, _MOVING))
+        at: Array = followed(
             grid.step_s,
             body.forward_m_s,
             body.sideways_m_s,
@@ -54,10 +76,8 @@ class WheelPredictor:
             tracks.trial,
             taken_at(model, tracks.t_s, tracks.trial),
         )
-        view = View(at[:, :3])
-        for active in model.at("measure"):
-            view = active.effect.apply(view, **active.by_name)
-        return Steps(self._in_robot_frame(view.poses), self._drift(model, self._since_previous(at[:, 3])))
+        at.flags.writeable = False
+        return at
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Back to back within each trial."""
@@ -139,6 +159,14 @@ class WheelPredictor:
         velocity = np.array([flow.x_m_s, flow.y_m_s]) - flow.return_per_s * where
         out: Array = velocity * moving_s[:, None]
         return out
+
+
+def _chain(model: Model, stages: Sequence[str]) -> Chain:
+    return tuple((a.effect, a.values, a.own) for a in model.effects if a.effect.stage in stages)
+
+
+def _model_of(wheelbase_m: float, chain: Chain) -> Model:
+    return Model(wheelbase_m, tuple(ActiveEffect(e, values, per_trial=bool(own), own=own) for e, values, own in chain))
 
 
 def predictor_for_search(tracks: Tracks) -> WheelPredictor:

@@ -1,11 +1,17 @@
 """What is in force when: after the last row, its command goes on; where that row has none, the robot stands."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from bns.diagnose import wheels
 from bns.diagnose.tracks import tracks_of
 from bns.diagnose.wheels import WheelPredictor
+from bns.physics.formula import formula_effect
+from bns.physics.motion import body_motion
+from tests.diagnose.worlds import NOMINAL, measured
 
 
 def trial(name, left_m_s, step_s=0.5):
@@ -27,3 +33,47 @@ def test_what_the_last_row_says_is_in_force_after_it(left_m_s, after_m_s):
     assert set(grid.left_m_s[0][lasting & (middle > 0.5) & (middle < 1.0)]) == {0.05}
     assert set(grid.left_m_s[0][lasting & (middle > 1.0)]) == {after_m_s}
     assert (grid.left_m_s[1][grid.step_s[1] > 0] == 0.02).all()
+
+
+def asked_about():
+    """Models that differ in one stage each, and a wheelbase."""
+    model = NOMINAL.with_effect("speed-gain", gain=0.9).with_effect("clock-offset", offset_s=-0.04)
+    clocks = replace(model, effects=tuple(replace(a, per_trial=a.effect.name == "clock-offset") for a in model.effects))
+    return [
+        model,
+        model.with_effect("camera-scale", factor=1.1),
+        model.with_effect("marker-offset", forward_m=0.02, left_m=-0.01),
+        model.with_effect("clock-offset", offset_s=0.06),
+        clocks.with_own([0.02, -0.05, 0.1]),
+        clocks.with_own([0.02, 0.05, 0.1]),
+        model.with_effect("side-slip", slip_s=0.1),
+        model.with_effect("speed-gain", gain=1.1),
+        replace(model, wheelbase_m=2 * model.wheelbase_m),
+        model.with_effect("floor-slope", x_m_s=0.003, y_m_s=0.0),
+        model.with_active(formula_effect("own", "k * v * abs(w)", "v"), (0.3,)),
+        model.with_active(formula_effect("own", "k * abs(w)", "v"), (0.3,)),
+    ]
+
+
+def test_a_predictor_that_remembers_answers_as_a_new_one():
+    tracks = tracks_of(measured(NOMINAL, trials=3, seed=4))
+    models, asked = asked_about(), WheelPredictor(tracks)
+    fresh = [WheelPredictor(tracks).steps(model) for model in models]
+    assert len({f.body.tobytes() + f.drift_m.tobytes() for f in fresh}) == len(models)
+    for _ in range(2):
+        for model, expected in zip(models, fresh, strict=True):
+            steps = asked.steps(model)
+            np.testing.assert_array_equal(steps.body, expected.body)
+            np.testing.assert_array_equal(steps.drift_m, expected.drift_m)
+
+
+def test_what_a_camera_does_is_worked_out_without_driving_again(monkeypatch):
+    drives = []
+    monkeypatch.setattr(wheels, "body_motion", lambda *given: drives.append(given) or body_motion(*given))
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=3, seed=4)))
+    model = NOMINAL.with_effect("camera-scale", factor=1.1).with_effect("clock-offset", offset_s=0.0)
+    for seen in (model, model.with_effect("camera-scale", factor=1.2), model.with_effect("clock-offset", offset_s=0.1)):
+        predictor.steps(seen)
+    assert len(drives) == 1
+    predictor.steps(model.with_effect("wheelbase", factor=1.1))
+    assert len(drives) == 2
