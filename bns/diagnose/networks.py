@@ -41,7 +41,7 @@ class NetworkPredictor(WheelPredictor):
         self.node = nodes[nodes >= 0]
         """How many commands had ended at each frame, (frames,)."""
         self.learned_from = saved.learned_from
-        self._networks = self._driven(saved, self.node)
+        self._networks = self._by_networks(saved, self.node)
 
     @property
     def robot(self) -> Robot:
@@ -68,7 +68,7 @@ class NetworkPredictor(WheelPredictor):
         with_effects, without = super().steps(model), super().steps(plain)
         return Steps(self._networks + with_effects.body - without.body, with_effects.drift_m - without.drift_m)
 
-    def _driven(self, saved: StaticSimulator, nodes: NDArray[np.int64]) -> Array:
+    def _by_networks(self, saved: StaticSimulator, nodes: NDArray[np.int64]) -> Array:
         """Displacement since the frame before, (frames, 3): forward, left, turn."""
         tracks, poses = self.tracks, np.empty((len(nodes), 3))
         for trial in range(len(tracks)):

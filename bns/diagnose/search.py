@@ -38,6 +38,8 @@ TIE_Z = 2.0
 """Two explanations whose held-out losses differ by fewer standard errors than this cannot be told apart."""
 TIE_SHARE = 0.005
 """... nor those whose difference is a smaller share than this of what either earns."""
+SIGNS_Z = 4.0
+"""... unless nearly all trials are against one of them: this many standard errors of a fair coin."""
 SCREEN = 0.15
 """An effect is tried in another one's place if its best start alone does this share of the other's work."""
 CLOCKS_CHANCE = 0.01
@@ -259,7 +261,14 @@ def alike(tried: Fit, fit: Fit, without: Fit) -> bool:
     """Whether ``tried`` cannot be told from ``fit``, an explanation that both put in the place of nothing (``without``)."""
     worth = held_out_gain(without.held_out, fit.held_out)[0]
     lost, se = held_out_gain(tried.held_out, fit.held_out)
-    return bool(lost < TIE_Z * se or lost < TIE_SHARE * worth)
+    return bool(lost < TIE_SHARE * worth or (lost < TIE_Z * se and not _mostly_worse(tried, fit)))
+
+
+def _mostly_worse(tried: Fit, fit: Fit) -> bool:
+    """Whether so many trials lose that it cannot be luck: a few wild ones that make the mean uncertain do not hide it."""
+    trials = len(fit.held_out)
+    worse = int((tried.held_out > fit.held_out).sum())
+    return bool(2 * worse - trials > SIGNS_Z * np.sqrt(trials))
 
 
 def _differing(model: Model) -> str:
