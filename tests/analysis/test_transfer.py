@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from analysis.store import NoDataError, Store
-from analysis.transfer import SUCCESSES, described, first_success, summary, transferred
+from analysis.transfer import SUCCESSES, described, first_success, main, summary, transferred
+from analysis.transfer_figure import transfer_figure
 from bns.loop import run
 from bns.robots import load_robot
 from bns.spec import RunSpec
@@ -29,9 +30,9 @@ ROW = {
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results")
-    for sweep, record in (("with", "paths"), ("without", "evals")):
+    for sweep, record, seeds in (("with", "paths", 2), ("without", "evals", 2), ("more", "paths", 1)):
         with Writer(folder, sweep) as writer:
-            for seed in range(2):
+            for seed in range(seeds):
                 spec = RunSpec(world="physics", seed=seed, record=record, **SMALL)
                 result = run(spec)
                 writer.append(RunRecord(spec, ROW | {"world_digest": result.world_digest}, result.tables))
@@ -80,3 +81,32 @@ def test_the_summary_counts_what_was_planted():
     assert np.isinf(row.evaluations_needed_high)
     assert list(first_success(drives([1, 5]))) == [1, np.inf]
     assert "| circle | mine | 6 | 67% (" in described(table, {"s": "mine"})
+
+
+def test_the_command_writes_tables_and_a_figure(results, tmp_path, capsys):
+    where = ["--to", "physics", "--results", str(results), "--out", str(tmp_path / "out")]
+    assert main(["with=mine", "--reference", "more=beside", *where]) == 0
+    said = capsys.readouterr().out
+    assert "| mine | 2 |" in said
+    assert "| beside | 1 |" in said
+    drives = pd.read_csv(tmp_path / "out" / "transfer.csv")
+    assert len(drives) == 3 * SMALL["evaluations"]
+    assert (tmp_path / "out" / "transfer.png").is_file()
+
+
+def test_references_are_thin_and_have_no_band(tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr("analysis.transfer_figure.save", lambda figure, stem: (figures.append(figure), stem))
+    both = pd.concat([drives([1, 2, 5]), drives([1, 1]).assign(sweep="r")], ignore_index=True)
+    transfer_figure(both, {"s": "mine"}, {"r": "beside"}, tmp_path / "f")
+    for ax in figures[0].axes:
+        thick, thin = ax.get_lines()
+        assert thick.get_linewidth() > thin.get_linewidth()
+        assert len(ax.collections) == 1
+    assert figures[0].axes[0].get_lines()[0].get_ydata() == pytest.approx([(4 + 3 + 0) / 12])  # the mean of one block
+
+
+def test_a_sweep_that_is_missing_is_one_line_and_exit_2(results, tmp_path, capsys):
+    assert main(["nothing", "--to", "physics", "--results", str(results), "--out", str(tmp_path)]) == 2
+    assert "The sweep nothing has no runs of khepera with paths" in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())

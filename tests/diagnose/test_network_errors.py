@@ -1,7 +1,7 @@
 """Networks that are wrong for a planted reason: thin data, an effect that no input tells of, both, neither."""
 
 import json
-from pathlib import Path
+from functools import cache
 
 import numpy as np
 import pytest
@@ -28,10 +28,22 @@ def slow_only(inputs):
     return (inputs[2] < 0) & (inputs[3] < 0.2)
 
 
-def trained(world, path, kept=None, trials=60, iterations=600):
-    """Networks trained on random commands in a world, or on those of them that ``kept`` chooses."""
-    table, inputs, targets = measured(world, trials, seed=1, ends_only=True, commands=COMMANDS), [], []
-    for _, rows in table.groupby("trial"):
+WORLDS = {
+    "plain": hidden(),
+    "lag": hidden(motor_lag={"tau_s": 0.6}),
+    "slope": hidden(floor_slope={"x_m_s": 0.006, "y_m_s": 0.0}),
+}
+
+
+@cache
+def driven(world, trials, seed):
+    return measured(WORLDS[world], trials, seed=seed, ends_only=True, commands=COMMANDS)
+
+
+def patterns(world):
+    """Inputs (5, n) and targets (3, n) of random commands in a world."""
+    inputs, targets = [], []
+    for _, rows in driven(world, 60, 1).groupby("trial"):
         pose = rows[["x_m", "y_m", "heading_rad"]].to_numpy()
         step, heading = np.diff(pose, axis=0), pose[:-1, 2]
         right = step[:, 0] * np.sin(heading) - step[:, 1] * np.cos(heading)
@@ -39,36 +51,36 @@ def trained(world, path, kept=None, trials=60, iterations=600):
         speeds = 144_010 * rows[["left_m_s", "right_m_s"]].to_numpy()[:-1]
         inputs.append(ROBOT.inputs(np.column_stack([speeds, 1e3 * np.diff(rows.t_s)])))
         targets.append(ROBOT.targets(np.column_stack([right, ahead, step[:, 2]])))
-    X, Y = np.concatenate(inputs, axis=1), np.concatenate(targets, axis=1)
+    return np.concatenate(inputs, axis=1), np.concatenate(targets, axis=1)
+
+
+@cache
+def trained(world, kept=None):
+    """Networks trained on random commands in a world, or on those of them that ``kept`` chooses."""
+    X, Y = patterns(world)
     if kept is not None:
         X, Y = np.ascontiguousarray(X[:, kept(X)]), np.ascontiguousarray(Y[:, kept(X)])
     rule = Rprop.start(initial_weights(Key(0, 1), 3, ROBOT.hidden, ROBOT.input_count), "rprop+", ROBOT.sigmoid_output)
-    rule.train(X, Y, X.shape[1], iterations)
-    save_simulator(StaticSimulator(ROBOT.networks, rule.weights, np.empty(0), {}, X), path)
-    return path
+    rule.train(X, Y, X.shape[1], 600)
+    return StaticSimulator(ROBOT.networks, rule.weights, np.empty(0), {}, X)
 
 
-def asked(world, networks: Path, trials=40):
-    return why_wrong(NetworkPredictor(tracks_of(measured(world, trials, seed=2, ends_only=True, commands=COMMANDS)), networks))
-
-
-LAG = {"motor_lag": {"tau_s": 0.6}}
-SLOPE = {"floor_slope": {"x_m_s": 0.006, "y_m_s": 0.0}}
+def asked(world, networks, trials=40):
+    return why_wrong(NetworkPredictor(tracks_of(driven(world, trials, 2)), networks, ROBOT))
 
 
 @pytest.mark.parametrize(
-    ("effects", "kept", "verdict", "variable"),
+    ("world", "kept", "verdict", "variable"),
     [
-        ({}, None, ("neither",), None),
-        ({}, slow_only, ("thin-data",), None),
-        (LAG, None, ("inputs-cannot-know",), "wheel_difference_kept_m_s"),
-        (SLOPE, None, ("inputs-cannot-know",), "heading_rad"),
-        (SLOPE, slow_only, ("thin-data", "inputs-cannot-know"), "heading_rad"),
+        ("plain", None, ("neither",), None),
+        ("plain", slow_only, ("thin-data",), None),
+        ("lag", None, ("inputs-cannot-know",), "wheel_difference_kept_m_s"),
+        ("slope", None, ("inputs-cannot-know",), "heading_rad"),
+        ("slope", slow_only, ("thin-data", "inputs-cannot-know"), "heading_rad"),
     ],
 )
-def test_the_planted_reason_is_named(tmp_path, effects, kept, verdict, variable):
-    world = hidden(**effects)
-    why = asked(world, trained(world, tmp_path / "n.safetensors", kept))
+def test_the_planted_reason_is_named(world, kept, verdict, variable):
+    why = asked(world, trained(world, kept))
     assert why.verdict == verdict
     assert [one.variable for one in why.unseen[:1]] == ([variable] if variable else [])
     assert sum(why.share.values()) == pytest.approx(1.0)
@@ -76,9 +88,9 @@ def test_the_planted_reason_is_named(tmp_path, effects, kept, verdict, variable)
 
 
 def test_in_words_numbers_and_a_figure(tmp_path, capsys):
-    world = hidden(**SLOPE)
-    networks = trained(world, tmp_path / "n.safetensors")
-    write_measurements(measured(world, 40, seed=2, ends_only=True, commands=COMMANDS), tmp_path / "m.csv")
+    networks = tmp_path / "n.safetensors"
+    save_simulator(trained("slope"), networks)
+    write_measurements(driven("slope", 40, 2), tmp_path / "m.csv")
     given = [str(tmp_path / "m.csv"), "--model", str(networks), "--figures", str(tmp_path / "f")]
     assert main(["compare", *given]) == 0
     said = capsys.readouterr().out
@@ -91,18 +103,17 @@ def test_in_words_numbers_and_a_figure(tmp_path, capsys):
     assert causes["unseen"][0]["variable"] == "heading_rad"
 
 
-def test_few_commands_among_the_patterns_are_no_verdict(tmp_path):
-    networks = trained(hidden(), tmp_path / "n.safetensors", iterations=50)
-    why = asked(hidden(), networks, trials=2)
+def test_few_commands_among_the_patterns_are_no_verdict():
+    why = asked("plain", trained("plain"), trials=2)
     assert why.verdict == ("insufficient-data",)
     assert why.as_json()["share"] == {}
 
 
 def test_networks_without_their_patterns_are_refused_by_name(tmp_path):
-    saved = load_simulator(trained(hidden(), tmp_path / "n.safetensors", trials=3, iterations=5))
+    saved = trained("plain")
     save_simulator(StaticSimulator(saved.networks, saved.weights, np.empty(0)), tmp_path / "bare.safetensors")
     with pytest.raises(DataError, match=r"come with 0 training patterns.*--save-snn"):
-        asked(hidden(), tmp_path / "bare.safetensors", trials=2)
+        asked("plain", load_simulator(tmp_path / "bare.safetensors"), trials=2)
 
 
 def test_distance_is_the_mean_of_the_three_nearest_distinct_patterns():
