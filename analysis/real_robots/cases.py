@@ -13,9 +13,13 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from analysis.intervals import bootstrap
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.folds import errors_at_horizons
+from bns.diagnose.folds import counted, errors_at_horizons, held_out_steps
+from bns.diagnose.horizons import HORIZONS, errors_of
 from bns.diagnose.intake import Measured, load_measured
+from bns.diagnose.predictor import Predictor, Steps
+from bns.diagnose.search import Found
 from bns.diagnose.wheels import predictor_for_search
 from bns.diagnose.words import diagnosis_text
 from bns.errors import DataError
@@ -92,9 +96,27 @@ def diagnosed(case: Case, table: pd.DataFrame, folder: Path) -> dict[str, Any]:
         "drawn": {h: v for h, v in drawn.items() if np.isfinite(v)},
         "trials": len(log.tracks),
         "findings": len(log.findings),
+        "intervals": intervals(predictor, found.found) if found.found else {},
     }
     differing = found.model.differing if found.model else None
     answer["clocks_s"] = list(differing.own) if differing else []
     (folder / f"{case.name}.json").write_text(json.dumps(answer, indent=1), encoding="utf-8")
     (folder / f"{case.name}.txt").write_text(diagnosis_text(found) + "\n", encoding="utf-8")
     return answer
+
+
+def intervals(predictor: Predictor, found: Found) -> dict[str, dict[str, list[float]]]:
+    """95 % intervals of the held-out errors (m), before and after, at every horizon that the log has; the trial is the unit."""
+    models = {"before": found.nominal.model, "after": found.fit.model}
+    steps = {name: held_out_steps(predictor, found.problem.following, model) for name, model in models.items()}
+    known = [h for h in HORIZONS if len(predictor.windows(h)[0])]
+    return {h: {name: error_interval(predictor, s, h) for name, s in steps.items()} for h in known}
+
+
+def error_interval(predictor: Predictor, steps: Steps, horizon: str) -> list[float]:
+    """Ends of the bootstrap interval of `position_error`, whole trials drawn."""
+    errors, trials = errors_of(predictor, steps, horizon), len(predictor.tracks)
+    position, kept = errors.position_m, counted(errors.position_m)
+    sums = np.bincount(errors.trial[kept], position[kept] ** 2, trials)
+    counts = np.bincount(errors.trial[kept], minlength=trials).astype(float)
+    return [float(np.sqrt(end)) for end in bootstrap(sums, counts)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bns.diagnose.fit import Problem
 from bns.diagnose.horizons import HORIZONS, Errors, errors_of
@@ -35,12 +36,18 @@ def held_out_steps(predictor: Predictor, following: Filter, model: Model) -> Ste
     return Steps(body, drift)
 
 
+def counted(position_m: Array) -> NDArray[np.bool_]:
+    """Windows that count: those beyond six times the median are marker faults, not the model's; (windows,)."""
+    kept: NDArray[np.bool_] = position_m <= 6 * max(float(np.median(position_m)), 1e-12)
+    return kept
+
+
 def position_error(errors: Errors) -> float:
-    """Root mean square distance, robust: windows beyond six times the median are marker faults, not the model's."""
+    """Root mean square distance of the windows that count."""
     position: Array = errors.position_m
     if not len(position):
         return float("nan")
-    kept = position[position <= 6 * max(float(np.median(position)), 1e-12)]
+    kept = position[counted(position)]
     return float(np.sqrt((kept * kept).mean()))
 
 

@@ -190,11 +190,11 @@ class Search:
         return e.p_value < self.level and e.z > MIN_Z and e.gain > max(bar, least)
 
     def _swapped(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[Problem, Fit, tuple[str, ...]]:
-        """Exchange an accepted effect for another one while that makes the held-out loss smaller."""
+        """Exchange an accepted effect for one that has earned its place too, while that makes the held-out loss smaller."""
         for _ in range(len(accepted) if len(accepted) > 1 else 0):
             best, new = fit, accepted
             for name, other, tried in self._exchanges(problem, fit, accepted):
-                if tried.held_out.sum() < best.held_out.sum() - 0.5 and not veto_of(tried, other):
+                if tried.held_out.sum() < best.held_out.sum() - 0.5 and self._may_stay(problem, tried, other):
                     best, new = tried, tuple(other if a == name else a for a in accepted)
             if new == accepted:
                 break
@@ -208,11 +208,17 @@ class Search:
         """Drop what no longer earns its place."""
         for name in accepted[:-1]:
             without = problem.fit(fit.model.without(name))
-            earned = problem.evidence(without, fit)
-            if not self._earned(Candidate(name, fit, earned), without, 0.0):
+            if not self._earned_over(problem, without, fit, name):
                 accepted = tuple(a for a in accepted if a != name)
                 problem, fit = self._settled(without.model, problem.following.noise)
         return problem, fit, accepted
+
+    def _may_stay(self, problem: Problem, fit: Fit, name: str) -> bool:
+        """Whether that effect of a fit would be taken as a newcomer: few trials that gain much do not bring one in."""
+        return not veto_of(fit, name) and self._earned_over(problem, problem.fit(fit.model.without(name)), fit, name)
+
+    def _earned_over(self, problem: Problem, without: Fit, fit: Fit, name: str) -> bool:
+        return self._earned(Candidate(name, fit, problem.evidence(without, fit)), without, 0.0)
 
     def _exchanges(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
         """Every accepted effect exchanged for every other one that might do the same."""

@@ -5,7 +5,9 @@ import re
 import numpy as np
 import pytest
 
+from bns.diagnose.candidates import fit_with
 from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.search import Search
 from bns.diagnose.tracks import tracks_of
 from bns.diagnose.wheels import WheelPredictor
 from bns.physics.decoys import DECOYS
@@ -88,3 +90,15 @@ def test_decoys_move_the_robot_but_mean_nothing():
         model = NOMINAL.with_active(decoy, (0.1,))
         assert isinstance(model.effects[0], ActiveEffect)
         assert np.abs(predictor.steps(model).body - still).max() > 1e-5
+
+
+@pytest.mark.parametrize(("late", "stays"), [((3, 5, 12), False), (range(16), True)])
+def test_a_few_late_trials_do_not_bring_a_clock_in_by_exchange(late, stays):
+    table = measured(NOMINAL, seed=11)
+    seen, shifted = ["x_m", "y_m", "heading_rad"], table["trial"].isin(late)
+    table.loc[shifted, seen] = table[shifted].groupby("trial")[seen].shift(3).bfill()
+    search = Search(WheelPredictor(tracks_of(table)), NOMINAL)
+    problem, fit = search._settled(NOMINAL)
+    tried = fit_with(problem, fit, search.catalogue["clock-offset"])
+    assert tried.held_out.sum() < fit.held_out.sum() - 0.5
+    assert search._may_stay(problem, tried, "clock-offset") is stays
