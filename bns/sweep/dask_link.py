@@ -114,7 +114,10 @@ class DaskLink:
         self._client = self._cluster = None
 
     def _connect(self, timeout_s: float) -> None:
-        self._client = Client(self.address, timeout=timeout_s, set_as_default=False)
+        try:
+            self._client = Client(self.address, timeout=timeout_s, set_as_default=False)
+        except AssertionError:  # distributed gives its own thread ten seconds to start, on a busy machine too few
+            self._client = Client(self.address, timeout=timeout_s, set_as_default=False)
         self._client.subscribe_topic("all", self._note)
         if self._cluster is not None:
             self._client.register_plugin(LeavesSignals())

@@ -18,6 +18,7 @@ from dask_cluster import Cluster
 
 from bns.errors import ClusterError
 from bns.store import load
+from bns.sweep import dask_link
 from bns.sweep.dask_job import LeavesSignals
 from bns.sweep.dask_workers import DaskExecutor, DaskWarning
 from bns.sweep.executor import SerialExecutor
@@ -97,6 +98,21 @@ def test_no_scheduler_is_explained():
         DaskExecutor("tcp://127.0.0.1:9", patience_s=2).__enter__()
     with pytest.raises(ClusterError, match=r"no Dask scheduler answers at nonsense"):
         DaskExecutor("nonsense:x:y").__enter__()
+
+
+def test_a_client_whose_thread_starts_too_late_is_tried_again(cluster, monkeypatch):
+    tried, client = [], dask_link.Client
+
+    def slow(*arguments, **options):
+        tried.append(arguments)
+        if len(tried) == 1:
+            raise AssertionError
+        return client(*arguments, **options)
+
+    monkeypatch.setattr(dask_link, "Client", slow)
+    with DaskExecutor(cluster.address) as executor:
+        assert executor.free == 1
+    assert len(tried) == 2
 
 
 def test_scheduler_without_workers_is_explained():
