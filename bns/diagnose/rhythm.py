@@ -22,8 +22,6 @@ LEAST_ALIKE, LEAST_OPPOSED, LEAST_BETWEEN, LEAST_Z = 0.06, 0.10, 0.33, 4.5
 """Smaller correlations, or less certain ones, are those of honest robots. Inside commands these reach +0.04 for a jitter of
 0.2 to 4 %, but -0.07 too: the filter takes what stays the same through a command for steps at random, and corrects too much. From
 one command to the next they reach +0.32 (a robot whose clock is 0.12 s late)."""
-SETTLED_S = 0.2
-"""So long into a command a robot that follows late still does the one before: not counted where commands are compared."""
 _CLIP = 4.0
 _DIRECTIONS = ("forward", "left", "heading")
 
@@ -51,22 +49,20 @@ def rhythms(problem: Problem, fit: Fit) -> list[Rhythm]:
     """Every direction and time scale, the largest in proportion to its threshold first."""
     found = []
     for index, direction in enumerate(_DIRECTIONS):
-        trials, settled = (list(_by_command(problem, fit, index, after_s)) for after_s in (0.0, SETTLED_S))
+        trials = list(_by_command(problem, fit, index))
         for lag in LAGS:
             found.append(_pooled(direction, "within", lag, [_within(commands, lag) for commands in trials]))
-        found.append(_pooled(direction, "between", 1, [_between(commands) for commands in settled]))
+        found.append(_pooled(direction, "between", 1, [_between(commands) for commands in trials]))
     return sorted(found, key=lambda r: (not r.loud, -abs(r.z)))
 
 
-def _by_command(problem: Problem, fit: Fit, direction: int, after_s: float) -> Iterator[list[Array]]:
-    """For each trial the unforeseen of its commands, frame by frame, from ``after_s`` into each command on."""
+def _by_command(problem: Problem, fit: Fit, direction: int) -> Iterator[list[Array]]:
+    """For each trial the unforeseen of its commands, frame by frame."""
     tracks = problem.predictor.tracks
     for trial, (a, b) in enumerate(pairwise(tracks.first)):
         white = np.clip(fit.white[a + 1 : b, direction], -_CLIP, _CLIP)
-        ends, t_s = np.cumsum(tracks.duration_s[trial]), tracks.t_s[a + 1 : b] - 1e-9
-        command = np.searchsorted(ends, t_s)
-        settled = t_s - np.concatenate([[0.0], ends])[command] > after_s - 2e-9
-        yield [white[(command == c) & settled] for c in np.unique(command)]
+        command = np.searchsorted(np.cumsum(tracks.duration_s[trial]), tracks.t_s[a + 1 : b] - 1e-9)
+        yield [white[command == c] for c in np.unique(command)]
 
 
 def _within(commands: list[Array], lag: int) -> tuple[float, float]:
