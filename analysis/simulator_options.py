@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from analysis.drawn import Drawn
 from analysis.store import NoDataError, Store
-from bns.diagnose.cycle_networks import CyclePredictor
-from bns.diagnose.cycles import CycleTracks
-from bns.diagnose.horizons import errors_of
-from bns.diagnose.intake import load_measured
-from bns.physics.model import Model
 from bns.plotting import OKABE_ITO, lettered, note, panels, style
-from bns.robots import load_robot, robot_names
-from bns.robots.simulator import load_static_simulator
-from bns.robots.snake.robot import Snake
 from bns.spec import OPTION_MARK
-from bns.validation import measurements_path
 
 NAME = "simulator-options"
 PAPER = "beyond the source"
@@ -28,41 +17,19 @@ _AS_SOURCE = "the simulator as in the source"
 
 
 def draw(store: Store) -> list[Drawn]:
-    tables = {name: measurements_path(store.results, name) for name in robot_names()}
-    found = {name: path for name, path in tables.items() if path.is_file()}
+    from analysis.option_errors import driven_tables  # noqa: PLC0415  # brings the compiler, for which no other figure waits
+
+    found = driven_tables(store.results)
     if not found:
         raise NoDataError("no random controllers were driven to hold a simulator against; run bns validate --robot snake")
     return [_draw(name, path) for name, path in found.items()]
 
 
-def variants(robot: str) -> list[str]:
-    """The robot without options, with each, with all, as a spec names them."""
-    options = load_robot(robot).options
-    chosen = [one for many in range(len(options) + 1) for one in combinations(sorted(options), many)]
-    return [OPTION_MARK.join([robot, *names]) for names in chosen]
-
-
-def errors(robot: str, tracks: CycleTracks) -> pd.DataFrame:
-    """A row an option and horizon: root mean square errors of the middle (m, with standard error), of the direction (rad) and of
-    the distance between the markers (m)."""
-    rows = []
-    for name in variants(robot):
-        variant = load_robot(name)
-        assert isinstance(variant, Snake)
-        predictor = CyclePredictor(tracks, load_static_simulator(robot), variant)
-        steps = predictor.steps(Model(wheelbase_m=1.0, name=name))
-        for horizon in predictor.horizons:
-            found = errors_of(predictor, steps, horizon).summary(len(tracks))
-            if found["windows"]:
-                gap = float(np.sqrt(np.mean(predictor.gap_errors(horizon) ** 2)))
-                rows.append({"simulator": name, "horizon": horizon, **found, "gap_m": gap})
-    return pd.DataFrame(rows)
-
-
 @style()
 def _draw(robot: str, path: Path) -> Drawn:
-    tracks = load_measured(path).tracks
-    assert isinstance(tracks, CycleTracks)
+    from analysis.option_errors import errors, tracks_of  # noqa: PLC0415
+
+    tracks = tracks_of(path)
     data = errors(robot, tracks)
     kinds = (
         ("position_m", 100.0, "where the middle is", "cm"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from analysis.transfer import main as transfer
+from analysis.transfer.__main__ import main as transfer
 from bns.cli import main as bns
 
 ROOT = Path(__file__).parent.parent

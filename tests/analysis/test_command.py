@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +17,8 @@ from analysis.store import Store
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store import Writer, query
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_wilson_agrees_with_the_formula_by_hand():
@@ -151,3 +156,9 @@ def test_a_compaction_under_way_does_not_disturb_a_figure(tmp_path):
     assert compact(tmp_path).files_after < 4
     assert store.query("SELECT count(*) AS n FROM evals").n[0] == before == 12
     assert store.query("SELECT count(*) AS n FROM kept").n[0] == 8
+
+
+def test_figures_are_listed_without_waiting_for_the_compiler():
+    listing = "import sys; from analysis.__main__ import figures; assert len(figures()) > 15; print('numba' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", listing], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.strip() == "False"

@@ -5,8 +5,9 @@ import pandas as pd
 import pytest
 
 from analysis.store import NoDataError, Store
-from analysis.transfer import SUCCESSES, described, first_success, main, summary, transferred
-from analysis.transfer_figure import transfer_figure
+from analysis.transfer.__main__ import main
+from analysis.transfer.drives import SUCCESSES, described, first_success, summary, transferred
+from analysis.transfer.figure import transfer_figure
 from bns.loop import run
 from bns.robots import load_robot
 from bns.spec import RunSpec
@@ -96,7 +97,7 @@ def test_the_command_writes_tables_and_a_figure(results, tmp_path, capsys):
 
 def test_references_are_thin_and_have_no_band(tmp_path, monkeypatch):
     figures = []
-    monkeypatch.setattr("analysis.transfer_figure.save", lambda figure, stem: (figures.append(figure), stem))
+    monkeypatch.setattr("analysis.transfer.figure.save", lambda figure, stem: (figures.append(figure), stem))
     both = pd.concat([drives([1, 2, 5]), drives([1, 1]).assign(sweep="r")], ignore_index=True)
     transfer_figure(both, {"s": "mine"}, {"r": "beside"}, tmp_path / "f")
     for ax in figures[0].axes:

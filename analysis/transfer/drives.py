@@ -1,4 +1,4 @@
-"""Controllers that were evolved in one world, driven in another: ``python -m analysis.transfer SWEEP ... --to WORLD``.
+"""Controllers that were evolved in one world, driven in another, and what became of them.
 
 Of every run with recorded paths the fittest controller after each evaluation is driven once in the world WORLD, with the luck
 that the run's own world had: a sweep that is transferred to its own world gives its own numbers again.
@@ -6,25 +6,17 @@ that the run's own world had: a sweep that is transferred to its own world gives
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from analysis.intervals import band, resampled, wilson
 from analysis.store import NoDataError, Store
-from analysis.transfer_figure import transfer_figure
 from bns.engine.philox import Key, Purpose
-from bns.errors import BnsError
 from bns.recorder import RADII_CM
-from bns.robots import load_robot
 from bns.robots.base import Robot
-from bns.store.files import publish
 from bns.tasks import load_task
-from bns.worlds import build_world
 from bns.worlds.base import World
 
 SUCCESSES = tuple(f"success_{cm}cm" for cm in RADII_CM)
@@ -135,45 +127,3 @@ def described(table: pd.DataFrame, labels: Mapping[str, str]) -> str:
 
 def _whole(value: float) -> str:
     return "never" if np.isinf(value) else f"{value:.0f}"
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Table on stdout; transfer.csv, transfer-summary.csv and transfer.png in a folder. 0, or 2 with one line on stderr."""
-    wanted = _parser().parse_args(arguments)
-    compared = _labels(wanted.sweeps)
-    labels = compared | _labels(wanted.reference)
-    try:
-        robot = load_robot(wanted.robot)
-        drives = transferred(Store(wanted.results), list(labels), build_world(wanted.to, robot), robot)
-        table = summary(drives)
-        for name, frame in (("transfer.csv", drives), ("transfer-summary.csv", table)):
-            publish(frame.to_csv(index=False).encode(), wanted.out / f".{name}.part", wanted.out / name)
-        picture = transfer_figure(drives, compared, _labels(wanted.reference), wanted.out / "transfer", robot.name)
-    except BnsError as fault:
-        print(f"error: {fault}", file=sys.stderr)
-        return fault.exit_code
-    print(f"{described(table, labels)}\nfigure: {picture}")
-    return 0
-
-
-def _labels(sweeps: Sequence[str]) -> dict[str, str]:
-    """What to call each sweep: what stands behind its ``=``, or its name."""
-    parts = [one.partition("=") for one in sweeps]
-    return {sweep: label or sweep for sweep, _, label in parts}
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m analysis.transfer", description="Drive stored controllers in another world.")
-    parser.add_argument("sweeps", nargs="+", metavar="SWEEP[=LABEL]", help="sweeps with record: paths, and what to call them")
-    parser.add_argument(
-        "--reference", action="append", default=[], metavar="SWEEP[=LABEL]", help="drawn thin, without its interval (repeatable)"
-    )
-    parser.add_argument("--to", required=True, metavar="WORLD", help="substitute, physics or a model file (.yaml)")
-    parser.add_argument("--robot", default="khepera", help="(default: khepera)")
-    parser.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="folder of the results (results)")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of tables and figure")
-    return parser
-
-
-if __name__ == "__main__":
-    sys.exit(main())
