@@ -136,15 +136,19 @@ def _mutate(children, origin, lengths, rate, low, high, span, step, k0, k1):  # 
             m += 1
     draws, places = np.empty((COMPONENTS, total), np.uint32), np.empty(total, np.int64)
     _draws(slot, individual, Purpose.MUTATION, step, k0, k1, draws)
-    threshold = mutation_threshold(rate)
+    threshold, capacity = mutation_threshold(rate), origin.shape[1]
+    every, every_origin = children.reshape(-1), origin.reshape(-1)
     for c in range(COMPONENTS):
-        for h in range(_hits(draws[c], threshold, places)):
-            m = places[h]
-            i, j = individual[m], slot[m]
-            children[i, j, c] = mutated(children[i, j, c], draws[c, m], threshold, low[c], high[c], span[c])
-            origin[i, j] = -1
-            if c < SPEEDS and j + 1 < lengths[i]:
-                origin[i, j + 1] = -1
+        row, least, most, most_moved = draws[c], low[c], high[c], span[c]
+        for h in range(_hits(row, threshold, places)):
+            drawn = np.uint64(places[h])  # without a sign no place is counted from the end
+            whose, which = np.int64(individual[drawn]), np.int64(slot[drawn])
+            command = whose * capacity + which
+            at = np.uint64(command * COMPONENTS + c)
+            every[at] = mutated(every[at], row[drawn], threshold, least, most, most_moved)
+            every_origin[np.uint64(command)] = -1
+            if c < SPEEDS and which + 1 < lengths[whose]:
+                every_origin[np.uint64(command + 1)] = -1
 
 
 @exact

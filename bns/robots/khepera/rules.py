@@ -9,6 +9,10 @@ import numpy as np
 from bns.engine.jit import inline
 
 GOAL_RADIUS_M = 0.07
+SQUARED_REACH_M2 = math.nextafter(GOAL_RADIUS_M**2, 0.0)
+while math.sqrt(math.nextafter(SQUARED_REACH_M2, 1.0)) <= GOAL_RADIUS_M:
+    SQUARED_REACH_M2 = math.nextafter(SQUARED_REACH_M2, 1.0)
+"""The largest number whose root is not above GOAL_RADIUS_M: to compare squares with it is to compare distances, bit for bit."""
 MISSED_GOAL_M = 10.0
 """Penalty for a goal not reached, in metres of distance: more than any path on the surface adds up to, so that one goal
 more always outweighs a shorter path. The source says "a large constant"."""
@@ -65,16 +69,29 @@ def step_of(right, ahead, sine, cosine):  # type: ignore[no-untyped-def]  # comp
 
 
 @inline
+def aim_of(goal, goals):  # type: ignore[no-untyped-def]  # compiled
+    """Where the goal is that is next to be reached; after the last, the last."""
+    aim = min(goal, goals.shape[0] - 1)
+    return goals[aim, 0], goals[aim, 1]
+
+
+@inline
+def squared_distance(x, y, aim_x, aim_y):  # type: ignore[no-untyped-def]  # compiled
+    """Square of the distance between two places."""
+    ahead, aside = x - aim_x, y - aim_y
+    return ahead * ahead + aside * aside
+
+
+@inline
 def aimed(x, y, goal, goals):  # type: ignore[no-untyped-def]  # compiled
     """The goal that a position leaves to be reached, and the distance to it or, after the last, to the last (algorithm 2)."""
-    last = goals.shape[0] - 1
-    aim = min(goal, last)
-    distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
-    if goal <= last and distance <= GOAL_RADIUS_M:
+    aim_x, aim_y = aim_of(goal, goals)
+    squared = squared_distance(x, y, aim_x, aim_y)
+    if squared <= SQUARED_REACH_M2 and goal < goals.shape[0]:
         goal += 1
-        aim = min(goal, last)
-        distance = math.sqrt((x - goals[aim, 0]) ** 2 + (y - goals[aim, 1]) ** 2)
-    return goal, distance
+        aim_x, aim_y = aim_of(goal, goals)
+        squared = squared_distance(x, y, aim_x, aim_y)
+    return goal, math.sqrt(squared)
 
 
 @inline
