@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from analysis.coverage import coverage
 from analysis.drawn import Drawn
-from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
+from analysis.intervals import mean_interval
 from analysis.store import NoDataError, Store
 from analysis.words import each, task_order, task_title
 from bns.plotting import note, ordered_styles, panels, style
@@ -20,21 +20,34 @@ NAME = "budget"
 PAPER = "choice of defaults, not in the source"
 TITLE = "How much evolution and training an evaluation gets"
 SWEEP = "budget"
+LATE = 0.3
+"""Share of a run's evaluations that count: one alone depends on its luck more than on what is compared."""
+MEANS = "Student's 95 % intervals of the mean"
 RUNS = 1000
 """The core-hours are those of this many runs."""
 
 
+NEAR_CM = (10, 7)
+"""Within these radii success is shown, a row each."""
+
+
 def cells(store: Store) -> pd.DataFrame:
-    """Of each task, generations and iterations: runs, successes at the last evaluation, CPU seconds a run."""
-    return store.query(f"""
-        WITH last AS (SELECT evals.run_id, success_7cm, cpu_s FROM evals JOIN runs USING (run_id, sweep)
-                      WHERE sweep = '{SWEEP}' AND status = 'ok' AND evaluation = evaluations)
+    """Of each task, generations and iterations: runs, CPU seconds a run, and within each radius the share of late evaluations
+    with success: its mean over runs, and the ends of Student's 95 % interval of that mean, in percent."""
+    shares = ", ".join(f"100 * avg(success_{cm}cm::INT) AS share_{cm}" for cm in NEAR_CM)
+    means = ", ".join(f"avg(share_{cm}) AS share_{cm}, stddev_samp(share_{cm}) AS spread_{cm}" for cm in NEAR_CM)
+    rows = store.query(f"""
+        WITH late AS (SELECT run_id, sweep, any_value(cpu_s) AS cpu_s, {shares} FROM evals JOIN runs USING (run_id, sweep)
+                      WHERE sweep = '{SWEEP}' AND status = 'ok' AND success_7cm IS NOT NULL
+                            AND evaluation > {1 - LATE} * evaluations GROUP BY ALL)
         SELECT robot, task, generations_per_evaluation AS generations,
-               training_iterations_per_evaluation AS iterations, count(*) AS runs,
-               count(*) FILTER (last.success_7cm) AS successes, median(last.cpu_s) AS cpu_s,
-               quantile_cont(last.cpu_s, 0.1) AS cpu_low_s, quantile_cont(last.cpu_s, 0.9) AS cpu_high_s
-        FROM runs JOIN last USING (run_id) WHERE sweep = '{SWEEP}' AND last.success_7cm IS NOT NULL
-        GROUP BY ALL ORDER BY ALL""")
+               training_iterations_per_evaluation AS iterations, count(*) AS runs, {means}, median(late.cpu_s) AS cpu_s,
+               quantile_cont(late.cpu_s, 0.1) AS cpu_low_s, quantile_cont(late.cpu_s, 0.9) AS cpu_high_s
+        FROM runs JOIN late USING (run_id, sweep) GROUP BY ALL ORDER BY ALL""")
+    for cm in NEAR_CM:
+        low, high = mean_interval(rows[f"share_{cm}"], rows[f"spread_{cm}"], rows.runs)
+        rows[f"low_{cm}"], rows[f"high_{cm}"] = low.clip(0, 100), high.clip(0, 100)
+    return rows
 
 
 @style()
@@ -45,27 +58,32 @@ def draw(store: Store) -> list[Drawn]:
     tasks = sorted(set(zip(rows.robot, rows.task, strict=True)), key=lambda pair: task_order(*pair))
     looks = dict(zip(sorted(rows.iterations.unique()), ordered_styles(rows.iterations.nunique()), strict=True))
     columns = sorted(rows.generations.unique())
-    figure, axes = panels(len(tasks), 5.0, rows_each=2, ratios=(1, 1))
-    for (robot, task), (above, below) in zip(tasks, axes, strict=True):
+    figure, axes = panels(len(tasks), 6.4, rows_each=len(NEAR_CM) + 1)
+    for (robot, task), (*above, below) in zip(tasks, axes, strict=True):
         here = rows[rows.task == task]
-        _success(above, here, looks, columns)
-        _cost(below, here, looks, columns)
-        above.set_title(task_title(robot, task))
-    _share_costs(axes[:, 1])
-    axes[0, 0].set_ylabel("successful runs, 7 cm (%)")
+        for cm, ax in zip(NEAR_CM, above, strict=True):
+            _lines(ax, here, looks, columns, f"share_{cm}", f"low_{cm}", f"high_{cm}")
+            ax.set_ylim(-2, 102)
+        below.set_yscale("log")
+        _lines(below, here, looks, columns, "cpu_s", "cpu_low_s", "cpu_high_s")
+        below.set_xlabel("generations an evaluation")
+        above[0].set_title(task_title(robot, task))
+    _share_costs(axes[:, -1])
+    for cm, ax in zip(NEAR_CM, axes[0], strict=False):
+        ax.set_ylabel(f"success within\n{cm} cm (%)")
     handles, labels = max((ax.get_legend_handles_labels() for ax in axes[:, 0]), key=lambda pair: len(pair[1]))
     figure.legend(handles, labels, loc="outside upper center", ncols=4, title="training iterations an evaluation")
     n, runs_each = int(rows.runs.sum()), each(rows.runs.min(), rows.runs.max())
     said = coverage(store, (SWEEP,), n)
     note(
         figure,
-        "; ".join((*said.sentences, f"{runs_each} a point")) + f". Bars above: {INTERVALS}; below: "
-        "median, 10 to 90 % of the runs.",
+        "; ".join((*said.sentences, f"{runs_each} a point")) + ". Success: share of the last "
+        f"{LATE:.0%} of the evaluations; bars: {MEANS}, of the CPU time 10 to 90 % of the runs.",
     )
     shows = (
-        f"Above: share of runs whose fittest controller visits all goals within 7 cm at the last evaluation "
-        f"(95 % Wilson intervals: {INDEPENDENCE}). Below: CPU time of a run (median, 10 to 90 %). By generations and training "
-        f"iterations after each evaluation; {runs_each} a point, n = {n:,} runs of {SWEEP}."
+        f"Above: share of the last {LATE:.0%} of a run's evaluations after which its fittest controller visits all goals within "
+        f"{' and '.join(map(str, NEAR_CM))} cm, mean over runs ({MEANS}). Below: CPU time of a run (median, 10 to 90 %). By "
+        f"generations and training iterations after each evaluation; {runs_each} a point, n = {n:,} runs of {SWEEP}."
     )
     return [Drawn(NAME, TITLE, figure, shows, n, (SWEEP,), said.missing, data=rows)]
 
@@ -78,19 +96,6 @@ def _lines(ax: Axes, rows: pd.DataFrame, looks: dict, columns: list[int], value:
         ax.plot(x, line[value], label=f"{iterations:,}", **looks[iterations])
     ax.set_xticks(range(len(columns)), [f"{g:,}" for g in columns])
     ax.set_xlim(-0.5, len(columns) - 0.5)
-    ax.set_xlabel("generations an evaluation")
-
-
-def _success(ax: Axes, rows: pd.DataFrame, looks: dict, columns: list[int]) -> None:
-    low, high = wilson(rows.successes, rows.runs)
-    shares = rows.assign(share=100 * rows.successes / rows.runs, low=100 * low, high=100 * high)
-    _lines(ax, shares, looks, columns, "share", "low", "high")
-    ax.set_ylim(-2, 102)
-
-
-def _cost(ax: Axes, rows: pd.DataFrame, looks: dict, columns: list[int]) -> None:
-    ax.set_yscale("log")
-    _lines(ax, rows, looks, columns, "cpu_s", "cpu_low_s", "cpu_high_s")
 
 
 def _share_costs(axes: Sequence[Axes]) -> None:

@@ -105,10 +105,21 @@ def test_budget_shows_success_and_median_cost_of_each_cell_and_what_is_missing(r
     drawn = budget.draw(Store(real_results))[0]
     runs = load(real_results, "runs", where={"sweep": "budget"})
     cost = runs.groupby(["training_iterations_per_evaluation", "generations_per_evaluation"]).cpu_s.median()
-    lines = {line.get_label(): line.get_ydata() for line in drawn.figure.axes[1].get_lines()}
+    lines = {line.get_label(): line.get_ydata() for line in drawn.figure.axes[2].get_lines()}
     for iterations in (10, 20):
         assert lines[str(iterations)] == pytest.approx(cost[iterations].to_numpy())
     assert drawn.missing == ("7 of 8 runs so far",)
+
+
+def test_budget_counts_the_late_evaluations_of_each_run(tmp_path):
+    runs = [record(RunSpec(seed=seed, evaluations=10), ("evals",)) for seed in range(3)]
+    for run, late in zip(runs, (0, 1, 3), strict=True):
+        run.tables["evals"]["success_7cm"][:] = [True] * 7 + [True] * late + [False] * (3 - late)
+        run.tables["evals"]["success_10cm"][:] = True
+    written(tmp_path, "budget", runs)
+    cell = budget.cells(Store(tmp_path)).iloc[0]
+    assert (cell.runs, cell.share_7, cell.share_10) == (3, pytest.approx(100 * 4 / 9), 100)
+    assert cell.low_7 == 0 < cell.share_7 < cell.high_7 == 100  # Student: 44 ± 126
 
 
 def test_paths_show_the_last_fittest_controller_of_each_run(real_results):
@@ -240,7 +251,7 @@ def test_why_there_is_nothing_to_compare_is_said(tmp_path, module):
 
 def test_captions_say_what_the_intervals_take_for_granted(real_results, texts):
     store = Store(real_results)
-    for module in (success_by_mutation, success_by_diversity, budget):
+    for module in (success_by_mutation, success_by_diversity):
         drawn = module.draw(store)[0]
         assert "pointwise; runs taken as independent, though combinations share their seeds" in drawn.shows
         assert any("pointwise 95 % Wilson intervals" in text.replace("\n", " ") for text, _ in texts(drawn.figure))
