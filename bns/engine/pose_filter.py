@@ -26,13 +26,13 @@ def followed(
     moving: Array,
     trial: NDArray[np.int64],
     t_s: Array,
-) -> Array:
-    """East, north (m), heading (rad) and time in motion (s) at the times of frames, (frames, 4), from (0, 0, 0) at rest.
+) -> tuple[Array, Array]:
+    """Poses (frames, 3) at the times of frames, from (0, 0, 0) at rest, and for how long the robot was in motion (s), (frames,).
 
     Velocities are (trials, steps), means over each step, driven as arcs; ``trial`` (frames,) never falls. Between the ends of a
     step the path is taken as straight; beyond the ends of the grid it is held.
     """
-    out = np.empty((len(t_s), 4))
+    poses, moved_s = np.empty((len(t_s), 3)), np.empty(len(t_s))
     row, k, begun, ended = -1, 0, 0.0, 0.0
     x0 = y0 = h0 = m0 = x1 = y1 = h1 = m1 = 0.0
     for i in range(len(t_s)):
@@ -59,8 +59,23 @@ def followed(
         share = 0.0
         if ended > begun:
             share = min(max((t_s[i] - begun) / (ended - begun), 0.0), 1.0)
-        out[i, 0], out[i, 1] = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
-        out[i, 2], out[i, 3] = h0 + share * (h1 - h0), m0 + share * (m1 - m0)
+        poses[i, 0], poses[i, 1] = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+        poses[i, 2], moved_s[i] = h0 + share * (h1 - h0), m0 + share * (m1 - m0)
+    return poses, moved_s
+
+
+@exact
+def displacements(poses: Array, is_first: NDArray[np.bool_]) -> Array:
+    """What each frame's pose (frames, 3) is from the one before, in the robot's frame there: forward, left, turn; (frames, 3).
+
+    Zeros where a trial begins.
+    """
+    out = np.zeros((len(poses), 3))
+    for k in range(1, len(poses)):
+        if not is_first[k]:
+            dx, dy = poses[k, 0] - poses[k - 1, 0], poses[k, 1] - poses[k - 1, 1]
+            c, s = np.cos(poses[k - 1, 2]), np.sin(poses[k - 1, 2])
+            out[k, 0], out[k, 1], out[k, 2] = c * dx + s * dy, c * dy - s * dx, poses[k, 2] - poses[k - 1, 2]
     return out
 
 
