@@ -69,8 +69,9 @@ def result_of(world: World, record: Record) -> Result:
 
 
 def _report(results: Sequence[Result], folder: Path) -> None:
-    print(table(results))
-    print(mistakes(results))
+    said = f"{table(results)}\n{mistakes(results)}".rstrip()
+    print(said)
+    (folder / "table.txt").write_text(said + "\n")
     summary = [
         {
             "world": one.world.name,
