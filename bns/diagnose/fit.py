@@ -51,6 +51,11 @@ class Fit:
         """Sum over the trials, as fitted."""
         return float(self.losses.sum())
 
+    @property
+    def slopes(self) -> dict[Free, Array]:
+        """Slopes of the innovations along every number, (frames, 3) each."""
+        return dict(zip(self.free, np.moveaxis(self.jacobian, 2, 0), strict=True))
+
     def se(self, index: int) -> float:
         """Standard error of a number."""
         return float(np.sqrt(max(self.covariance[index, index], 0.0)))
@@ -124,7 +129,7 @@ class Problem:
     def stepped(self, model: Model, base: Fit) -> Begun:
         """One undamped step of least squares in all numbers, with the slopes of ``base`` for those that it has too."""
         free, at = self.free(model), self._point(model)
-        slopes = self._slopes(at, free, dict(zip(base.free, np.moveaxis(base.jacobian, 2, 0), strict=True)))
+        slopes = self._slopes(at, free, base.slopes)
         there = self._moved(model, free, slopes, _damped_step(*normal(slopes.jacobian, at.white), 1e-9), 0.0)
         return Begun(there, self.loss(there), dict(zip(free, np.moveaxis(slopes.jacobian, 2, 0), strict=True)))
 

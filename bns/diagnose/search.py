@@ -198,18 +198,18 @@ class Search:
     ) -> tuple[Problem, Fit, tuple[str, ...]]:
         """Drop what no longer earns its place."""
         for name in accepted[:-1]:
-            without = problem.fit(fit.model.without(name))
-            if not self._earned_over(problem, without, fit, name):
+            lacking = without(problem, fit, name)
+            if not self._earned_over(problem, lacking, fit, name):
                 accepted = tuple(a for a in accepted if a != name)
-                problem, fit = self._settled(without.model, problem.following.noise)
+                problem, fit = self._settled(lacking.model, problem.following.noise)
         return problem, fit, accepted
 
     def _may_stay(self, problem: Problem, fit: Fit, name: str) -> bool:
         """Whether that effect of a fit would be taken as a newcomer: few trials that gain much do not bring one in."""
-        return not veto_of(fit, name) and self._earned_over(problem, problem.fit(fit.model.without(name)), fit, name)
+        return not veto_of(fit, name) and self._earned_over(problem, without(problem, fit, name), fit, name)
 
-    def _earned_over(self, problem: Problem, without: Fit, fit: Fit, name: str) -> bool:
-        return self._earned(Candidate(name, fit, problem.evidence(without, fit)), without, 0.0)
+    def _earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:
+        return self._earned(Candidate(name, fit, problem.evidence(lacking, fit)), lacking, 0.0)
 
     def _exchanges(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
         """Every accepted effect exchanged for every other one that might do the same."""
@@ -219,27 +219,29 @@ class Search:
         for name in accepted:
             model = fit.model.without(name)
             loose = problem_for(self.predictor, model)
-            without = loose.fit(model)
+            lacking, reached = loose.fit(model), loose.loss(fit.model)
             others = [effect for other, effect in self.catalogue.items() if other not in accepted]
-            fits = each(partial(self._in_place, problem, loose, without, loose.loss(fit.model)), others)
+            fits = each(partial(self._in_place, problem, fit, loose, lacking, reached), others)
             found += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
         self._exchanged = (problem, accepted, found)
         return found
 
-    def _in_place(self, problem: Problem, loose: Problem, without: Fit, reached: float, effect: Effect) -> Fit | None:
-        """The fit with the effect in the place of one that was taken away; None if it does next to nothing of its work.
+    def _in_place(
+        self, problem: Problem, fit: Fit, loose: Problem, lacking: Fit, reached: float, effect: Effect
+    ) -> Fit | None:
+        """The fit with the effect in the place of one that was taken away (``lacking``); None if it does too little of its work.
 
         First under the noise of the model without either (``loose``): under the small noise of a good model, one that is far off
         pulls on nothing. ``reached``: the loss there with what was taken away.
         """
-        start = best_start(loose, without, effect)
-        if without.loss - start.loss < SCREEN * (without.loss - reached):
+        start = best_start(loose, lacking, effect)
+        if lacking.loss - start.loss < SCREEN * (lacking.loss - reached):
             return None
         self.tick(effect.name)
         fitted = loose.fit(start.model, known=start.slopes)
-        if fitted.loss - reached > max(BEHIND * (without.loss - reached), BEHIND_LOSS):
+        if fitted.loss - reached > max(BEHIND * (lacking.loss - reached), BEHIND_LOSS):
             return None
-        return problem.fit(fitted.model)
+        return problem.fit(fitted.model, known=fit.slopes)
 
     def _rivals(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[tuple[str, ...], Fit]]:
         """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one.
@@ -247,17 +249,22 @@ class Search:
         What comes in must have earned its place: where trials disagree, much that earns nothing certain is no worse for certain.
         """
         rivals: list[tuple[tuple[str, ...], Fit]] = []
-        without = cache(lambda name: problem.fit(fit.model.without(name)))
+        lacking = cache(partial(without, problem, fit))
         for name, other, tried in self._exchanges(problem, fit, accepted):
             # at a bound it may be: a tether from ever farther away is a slope
-            may = not veto_of(tried, other, bounds=False) and self._earned_over(problem, without(name), tried, other)
-            if may and alike(tried, fit, without(name)):
+            may = not veto_of(tried, other, bounds=False) and self._earned_over(problem, lacking(name), tried, other)
+            if may and alike(tried, fit, lacking(name)):
                 rivals.append((tuple(other if a == name else a for a in accepted), tried))
         return rivals
 
 
 def _differing(model: Model) -> str:
     return model.differing.effect.name if model.differing else ""
+
+
+def without(problem: Problem, fit: Fit, name: str) -> Fit:
+    """The fit that lacks an effect."""
+    return problem.fit(fit.model.without(name), known=fit.slopes)
 
 
 def problem_for(predictor: Predictor, model: Model, start: Array | None = None) -> Problem:

@@ -56,11 +56,11 @@ class WheelPredictor:
 
     def steps(self, model: Model) -> Steps:
         """Displacement of the tracked point since the frame before, in the frame of the robot there."""
-        poses, moved_s = self._at(model.wheelbase_m, _chain(model, (*_MOVING, "clock")))
+        poses, sums = self._at(model.wheelbase_m, _chain(model, (*_MOVING, "clock")))
         view = View(poses)
         for active in model.at("measure"):
             view = active.effect.apply(view, **active.by_name)
-        return Steps(displacements(view.poses, self.tracks.is_first), self._drift(model, moved_s))
+        return Steps(displacements(view.poses, self.tracks.is_first), self._drift(model, poses, sums))
 
     def _turned(self, wheelbase_m: float, chain: Chain) -> Body:
         return replace(wheel_motion(_model_of(wheelbase_m, chain), self.grid, self.conditions), place=self._place)
@@ -73,7 +73,7 @@ class WheelPredictor:
         """`followed` at the frames; read-only, for many models share it."""
         model, grid, tracks = _model_of(wheelbase_m, chain), self.grid, self.tracks
         body = self._body(wheelbase_m, _chain(model, _MOVING))
-        poses, moved_s = followed(
+        poses, sums = followed(
             grid.step_s,
             body.forward_m_s,
             body.sideways_m_s,
@@ -82,8 +82,8 @@ class WheelPredictor:
             tracks.trial,
             taken_at(model, tracks.t_s, tracks.trial),
         )
-        poses.flags.writeable = moved_s.flags.writeable = False
-        return poses, moved_s
+        poses.flags.writeable = sums.flags.writeable = False
+        return poses, sums
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Back to back within each trial."""
@@ -148,18 +148,22 @@ class WheelPredictor:
         change[self.tracks.is_first] = 0.0
         return change
 
-    def _drift(self, model: Model, moved_s: Array) -> Array:
-        """What the floor adds in the world's frame, midway between where the robot was seen (millimetres do not matter there).
+    def _drift(self, model: Model, path: Array, sums: Array) -> Array:
+        """What the floor adds in the world's frame between where the robot was seen (millimetres do not matter there).
 
-        Midway, for a robot gets far between poses at the ends of commands: at either end a pull would pass for a wrong scale.
+        A robot gets far between poses at the ends of commands: it is taken to be midway, and off that line as its path is.
         """
         flow = flow_of(model)
         if (flow.x_m_s, flow.y_m_s, flow.return_per_s) == (0.0, 0.0, 0.0):
-            return np.zeros((len(moved_s), 2))
-        seen = self.tracks.pose[:, :2]
-        where = (seen + np.roll(seen, 1, axis=0)) / 2
-        velocity = np.array([flow.x_m_s, flow.y_m_s]) - flow.return_per_s * where
-        out: Array = velocity * self._since_previous(moved_s)[:, None]
+            return np.zeros((len(path), 2))
+        time_s, *where = self._since_previous(sums).T
+        way, before, seen = self._since_previous(path), np.roll(path, 1, axis=0), self.tracks.pose
+        bent = np.stack(where, axis=1) - time_s[:, None] * (before + way / 2)[:, :2]
+        turned = np.roll(seen[:, 2], 1) - before[:, 2]
+        cos, sin = np.cos(turned), np.sin(turned)
+        bent = np.stack([cos * bent[:, 0] - sin * bent[:, 1], sin * bent[:, 0] + cos * bent[:, 1]], axis=1)
+        midway = (seen + np.roll(seen, 1, axis=0))[:, :2] / 2
+        out: Array = np.array([flow.x_m_s, flow.y_m_s]) * time_s[:, None] - flow.return_per_s * (midway * time_s[:, None] + bent)
         return out
 
 
