@@ -19,6 +19,7 @@ from bns.diagnose.intake import Measured
 from bns.diagnose.own_clocks import with_own_clocks
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.search import problem_for
+from bns.diagnose.threads import one_thread_each
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.effects import all_effects, effect_in_file, effect_named
@@ -53,6 +54,7 @@ def effect_from(text: str, term: str | None = None, on: str | None = None) -> tu
     return effect_named(text), {}
 
 
+@one_thread_each()
 def add_effects(
     predictor: Predictor,
     model: Model,

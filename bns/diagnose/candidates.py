@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
-from bns.diagnose.fit import Fit, Problem
+from bns.diagnose.fit import Begun, Fit, Problem
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
@@ -32,18 +33,18 @@ def fit_with(problem: Problem, base: Fit, effect: Effect) -> Fit:
 
     An effect that earns next to nothing there is not followed further: the answer would be the same.
     """
-    start, loss = best_start(problem, base.model, effect)
-    hopeless = base.loss - loss < NOTHING * base.loss / len(base.losses)
-    return problem.fit(start, rounds=0 if hopeless else None)
+    start = best_start(problem, base, effect)
+    hopeless = base.loss - start.loss < NOTHING * base.loss / len(base.losses)
+    return problem.fit(start.model, 0 if hopeless else None, start.slopes)
 
 
-def best_start(problem: Problem, model: Model, effect: Effect) -> tuple[Model, float]:
-    """The model with the effect at the most promising of its starts, one step of least squares taken; and its loss."""
-    starts = [model.with_active(effect, values) for values in _starts(effect)]
+def best_start(problem: Problem, base: Fit, effect: Effect) -> Begun:
+    """The fitted model with the effect at the most promising of its starts, one step of least squares taken."""
+    starts = [base.model.with_active(effect, values) for values in _starts(effect)]
     losses = [problem.loss(start) for start in starts]
     best = int(np.argmin(losses))
-    stepped = problem.stepped(starts[best])
-    return min(((starts[best], losses[best]), stepped), key=lambda found: found[1])
+    stepped = problem.stepped(starts[best], base)
+    return stepped if stepped.loss < losses[best] else replace(stepped, model=starts[best], loss=losses[best])
 
 
 def _starts(effect: Effect) -> Iterator[tuple[float, ...]]:

@@ -49,12 +49,20 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
         good = forward_in_time(str(trial), rows, findings)
         good = _without_jumps(str(trial), good, findings)
         _gaps_and_losses(str(trial), good, findings)
-        kept.append(good)
+        if _tracked(good).any():
+            kept.append(good)
+        else:
+            findings.append(Finding(str(trial), int(rows.index[0]), "no pose was tracked in it; the trial is left out"))
     usable = pd.concat(kept) if kept else table
-    if usable.empty or not usable[list(POSE)].notna().all(axis=1).any():
+    if not _tracked(usable).any():
         raise DataError("There is no tracked pose in these measurements: every x_m, y_m or heading_rad is empty.")
     _units(usable)
     return usable.reset_index(drop=True), findings
+
+
+def _tracked(rows: pd.DataFrame) -> pd.Series[bool]:
+    """Which rows hold a whole pose."""
+    return rows[list(POSE)].notna().all(axis=1)
 
 
 def check_columns(table: pd.DataFrame, columns: Sequence[str]) -> None:

@@ -15,6 +15,7 @@ from bns.diagnose.own_clocks import steps_of
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.search import problem_for
 from bns.diagnose.structure import Pattern, patterns
+from bns.diagnose.threads import one_thread_each
 from bns.diagnose.tracks import Array
 from bns.errors import DataError
 from bns.physics.model import Model
@@ -76,6 +77,7 @@ class Comparison:
         }
 
 
+@one_thread_each()
 def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
     """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands."""
     tracks = predictor.tracks

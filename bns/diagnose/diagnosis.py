@@ -19,6 +19,7 @@ from bns.diagnose.notes import notes_on
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.search import FALSE_ALARM, MIN_GAIN, Candidate, Found, Search
 from bns.diagnose.structure import Pattern, patterns
+from bns.diagnose.threads import one_thread_each
 from bns.diagnose.tracks import Tracks
 from bns.diagnose.unexplained import Unexplained, unexplained
 from bns.physics.effect import Effect
@@ -88,6 +89,7 @@ class Diagnosis:
         }
 
 
+@one_thread_each()
 def diagnose(
     predictor: Predictor,
     model: Model,

@@ -7,13 +7,16 @@ Which pairs might do it is read from the tracks' own sensitivities; those are th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 
+from bns.diagnose.alike import alike
 from bns.diagnose.fit import Fit, Problem
 from bns.diagnose.noise import weights
-from bns.diagnose.search import alike, veto_of
+from bns.diagnose.search import veto_of
+from bns.diagnose.threads import each
 from bns.diagnose.tracks import Array
 from bns.physics.effect import Effect
 from bns.physics.model import Model
@@ -37,8 +40,7 @@ def longer(problem: Problem, fit: Fit, accepted: Sequence[str], others: Sequence
             continue
         model = fit.model.without(name)
         without = problem.fit(model)
-        for pair in pairs:
-            tried = problem.fit(_with(model, pair))
+        for pair, tried in zip(pairs, each(partial(_fitted, problem, model), pairs), strict=True):
             if alike(tried, fit, without) and not any(veto_of(tried, effect.name) for effect in pair):
                 found.append(tuple(n for one in accepted for n in ((e.name for e in pair) if one == name else (one,))))
     return found
@@ -51,7 +53,9 @@ def _promising(problem: Problem, fit: Fit, name: str, others: Sequence[Effect]) 
     done = ((fit.white - white) * root).ravel()
     own = fit.jacobian[..., [i for i, number in enumerate(fit.free) if number.effect != name]] * root[..., None]
     given = own.reshape(len(done), -1)
-    columns = {e.name: np.stack(list(_columns(problem, base, white, root, e)), axis=1) for e in others if _smooth(e)}
+    smooth = [effect for effect in others if _smooth(effect)]
+    added = each(lambda e: np.stack(list(_columns(problem, base, white, root, e)), axis=1), smooth)
+    columns = {effect.name: column for effect, column in zip(smooth, added, strict=True)}
     left_alone = {n: _left(done, [given, c]) for n, c in columns.items()}
     pairs = []
     for a, b in combinations([e for e in others if e.name in columns and left_alone[e.name] > ALONE], 2):
@@ -84,8 +88,8 @@ def _left(done: Array, parts: Sequence[Array]) -> float:
     return 1.0 - explained / max(float(done @ done), 1e-300)
 
 
-def _with(model: Model, effects: Sequence[Effect]) -> Model:
-    """Effects added where they do next to nothing."""
+def _fitted(problem: Problem, model: Model, effects: Sequence[Effect]) -> Fit:
+    """The fit with effects that begin where they do next to nothing."""
     for effect in effects:
         model = model.with_active(effect, tuple(effect.neutral.values()))
-    return model
+    return problem.fit(model)

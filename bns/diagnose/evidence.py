@@ -11,6 +11,8 @@ from bns.diagnose.tracks import Array
 
 FLIPS = 20_000
 _SEED = 20_250_101
+MIN_Z = 2.5
+"""Least gain that counts, in its standard errors: it must be earned in many trials, not in a few."""
 
 
 @dataclass(frozen=True)

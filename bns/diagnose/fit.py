@@ -7,7 +7,7 @@ comes from one Newton step without it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,27 +16,18 @@ from scipy.stats import t as student
 
 from bns.diagnose.clocks import Slopes, with_clocks_begun, without_clocks
 from bns.diagnose.evidence import Evidence, held_out_gain, sign_flip_p
-from bns.diagnose.noise import Filter, huber, weights
+from bns.diagnose.free import Free, increment, inside, moved_by
+from bns.diagnose.noise import Filter, huber
+from bns.diagnose.normal import Normal, normal, normal_by_trial, stepped
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.tracks import Array
-from bns.physics.effect import Parameter
 from bns.physics.model import Model
 
 _ROUNDS = 25
 _SETTLED = 1e-2
 """A step that lowers the loss by less than this ends the search: numbers are then within a tenth of their standard error."""
-
-
-@dataclass(frozen=True)
-class Free:
-    """One number that is fitted: which effect's, and which."""
-
-    effect: str
-    parameter: Parameter
-
-    def of(self, model: Model) -> float:
-        """Its value in a model."""
-        return model.values_of(self.effect)[self.parameter.name]
+_TRUSTED = 0.75
+"""Slopes serve for another step if the last one earned this share of what they foretold."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +51,11 @@ class Fit:
         """Sum over the trials, as fitted."""
         return float(self.losses.sum())
 
+    @property
+    def slopes(self) -> dict[Free, Array]:
+        """Slopes of the innovations along every number, (frames, 3) each."""
+        return dict(zip(self.free, np.moveaxis(self.jacobian, 2, 0), strict=True))
+
     def se(self, index: int) -> float:
         """Standard error of a number."""
         return float(np.sqrt(max(self.covariance[index, index], 0.0)))
@@ -69,6 +65,24 @@ class Fit:
         freedom = max(len(self.losses) - len(self.free), 1)
         half = float(student.ppf((1 + share) / 2, freedom)) * self.se(index)
         return float(self.values[index] - half), float(self.values[index] + half)
+
+
+@dataclass(frozen=True)
+class Begun:
+    """Where a fit may begin: a model, its loss, and slopes of its numbers nearby, (frames, 3) each."""
+
+    model: Model
+    loss: float
+    slopes: Mapping[Free, Array]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A model, its whitened innovations (frames, 3) and its loss."""
+
+    model: Model
+    white: Array
+    loss: float
 
 
 class Problem:
@@ -112,50 +126,61 @@ class Problem:
             if not (p.column and p.column not in columns) and not (p.instead_of and p.instead_of in columns)
         )
 
-    def stepped(self, model: Model) -> tuple[Model, float]:
-        """One undamped step of least squares in all numbers; the model there and its loss."""
-        free = self.free(model)
-        white = self.white(model)
-        slopes = self._slopes(model, free, white)
-        there = self._moved(model, free, slopes, _damped_step(*_normal(slopes.jacobian, white), 1e-9), 0.0)
-        return there, self.loss(there)
+    def stepped(self, model: Model, base: Fit) -> Begun:
+        """One undamped step of least squares in all numbers, with the slopes of ``base`` for those that it has too."""
+        free, at = self.free(model), self._point(model)
+        slopes = self._slopes(at, free, base.slopes)
+        there = self._moved(model, free, slopes, _damped_step(*normal(slopes.jacobian, at.white), 1e-9), 0.0)
+        return Begun(there, self.loss(there), dict(zip(free, np.moveaxis(slopes.jacobian, 2, 0), strict=True)))
 
-    def fit(self, model: Model, rounds: int | None = None) -> Fit:
-        """Levenberg-Marquardt from the values the model has, within the bounds of every number; ``rounds`` 0 keeps them."""
+    def fit(self, model: Model, rounds: int | None = None, known: Mapping[Free, Array] | None = None) -> Fit:
+        """Levenberg-Marquardt from the values the model has, within the bounds of every number; ``rounds`` 0 keeps them.
+
+        Slopes serve for further steps while the loss falls nearly as they foretell, those ``known`` from nearby for the first.
+        """
         model = with_clocks_begun(self, model, self._trials)
-        free = self.free(model)
-        white = self.white(model)
-        loss, damping = float(huber(white).sum()), 1e-3
-        slopes = self._slopes(model, free, white)
+        free, at, damping = self.free(model), self._point(model), 1e-3
+        slopes, fresh = self._slopes(at, free, known), not known
         for _ in range(_ROUNDS if rounds is None and (free or model.differing) else 0):
-            curvature, gradient = _normal(slopes.jacobian, white)
-            moved = False
-            for _ in range(8):
-                step = _damped_step(curvature, gradient, damping)
-                trial_model = self._moved(model, free, slopes, step, damping)
-                trial_white = self.white(trial_model)
-                trial_loss = float(huber(trial_white).sum())
-                if np.isfinite(trial_loss) and trial_loss <= loss:
-                    moved = True
-                    break
-                damping *= 10
-            if not moved:
+            pull = normal(slopes.jacobian, at.white)
+            foretold = _foretold(_damped_step(*pull, damping), *pull)
+            done = foretold < _SETTLED and model.differing is None
+            found, gain = None if done else self._lower(at, free, slopes, pull, damping), 0.0
+            if found is not None:
+                gain, at, damping = at.loss - found[0].loss, *found
+            if gain < _SETTLED and fresh:
+                fresh = found is None
                 break
-            gain, loss = loss - trial_loss, trial_loss
-            model, white, damping = trial_model, trial_white, max(damping / 10, 1e-9)
-            slopes = self._slopes(model, free, white)
-            if gain < _SETTLED:
-                break
-        return self._concluded(model, free, white, slopes.jacobian)
+            fresh = found is None or model.differing is not None or gain < _TRUSTED * foretold
+            if fresh:
+                slopes = self._slopes(at, free)
+        if not fresh and rounds is None:
+            slopes = self._slopes(at, free)
+        return self._concluded(at.model, free, at.white, slopes.jacobian)
+
+    def _point(self, model: Model) -> _Point:
+        white = self.white(model)
+        return _Point(model, white, float(huber(white).sum()))
+
+    def _lower(
+        self, at: _Point, free: Sequence[Free], slopes: Slopes, pull: tuple[Array, Array], damping: float
+    ) -> tuple[_Point, float] | None:
+        """Where a step leads that does not raise the loss, and the damping for the next; None if there is none."""
+        for _ in range(8):
+            step = _damped_step(*pull, damping)
+            there = self._point(self._moved(at.model, free, slopes, step, damping))
+            if np.isfinite(there.loss) and there.loss <= at.loss:
+                return there, max(damping / 10, 1e-9)
+            damping *= 10
+        return None
 
     def _moved(self, model: Model, free: Sequence[Free], slopes: Slopes, step: Array, damping: float) -> Model:
         return slopes.moved(moved_by(model, free, step), step, damping)
 
     def _concluded(self, model: Model, free: tuple[Free, ...], white: Array, jacobian: Array) -> Fit:
-        weighted = jacobian * weights(white)[:, None, None]
-        gradients = self.per_trial(np.einsum("kcp,kc->kp", weighted, white))
-        curvatures = self.per_trial(np.einsum("kcp,kcq->kpq", weighted, jacobian))
-        inner = _inside(model, free, gradients.sum(axis=0))
+        by_trial = self.normal(jacobian, white)
+        gradients, curvatures = by_trial.gradients, by_trial.curvatures
+        inner = inside(model, free, gradients.sum(axis=0))
         total = curvatures.sum(axis=0)
         covariance = np.zeros_like(total)
         keep = np.ix_(inner, inner)
@@ -165,32 +190,19 @@ class Problem:
             centred = gradients[:, inner] - gradients[:, inner].mean(axis=0)
             spare = trials / max(trials - fitted, 1)
             covariance[keep] = bread @ (centred.T @ centred) @ bread * spare
-        held_out = np.empty(trials)
-        first = self.predictor.tracks.first
-        for i in range(trials):
-            rows = slice(first[i], first[i + 1])
-            step = np.zeros(len(free))
-            if fitted:
-                others = (total - curvatures[i])[keep]
-                # without this trial the others' gradients no longer cancel: they sum to minus this one's
-                step[inner] = np.linalg.pinv(others) @ (gradients[i] - gradients.sum(axis=0))[inner]
-            held_out[i] = huber(white[rows] + jacobian[rows] @ step).sum()
+        steps = np.zeros((trials, len(free)))
+        if fitted:
+            others = (total - curvatures)[:, inner][:, :, inner]
+            # without this trial the others' gradients no longer cancel: they sum to minus this one's
+            pulls = (gradients - gradients.sum(axis=0))[:, inner]
+            steps[:, inner] = (np.linalg.pinv(others) @ pulls[..., None])[..., 0]
+        held_out = self.per_trial(huber(stepped(self.predictor.tracks.first, jacobian, white, steps)))
         values = np.array([f.of(model) for f in free])
         return Fit(model, free, values, covariance, self.per_trial(huber(white)), held_out, white, jacobian)
 
-    def chance(self, base: Fit, columns: Array) -> float:
-        """`sign_flip_p` of an addition with the Jacobian ``columns`` (frames, 3, k) to a fitted model.
-
-        What the model's own numbers could do as well is taken out of the columns first.
-        """
-        joint = np.concatenate([base.jacobian, columns], axis=2)
-        weighted = joint * weights(base.white)[:, None, None]
-        scores = self.per_trial(np.einsum("kcp,kc->kp", weighted, base.white))
-        curvature = np.einsum("kcp,kcq->pq", weighted, joint)
-        own = base.jacobian.shape[2]
-        shared = np.linalg.pinv(curvature[:own, :own], hermitian=True) @ curvature[:own, own:]
-        left = curvature[own:, own:] - curvature[own:, :own] @ shared
-        return sign_flip_p(scores[:, own:] - scores[:, :own] @ shared, left)
+    def normal(self, jacobian: Array, white: Array) -> Normal:
+        """The normal equations of every trial."""
+        return normal_by_trial(self.predictor.tracks.first, jacobian, white)
 
     def evidence(self, base: Fit, added: Fit) -> Evidence:
         """What ``added`` earns over ``base``, a model with fewer effects fitted to the same problem."""
@@ -199,37 +211,39 @@ class Problem:
         new = [j for j, f in enumerate(added.free) if (f.effect, f.parameter.name) not in known]
         # a number with no influence here has no column
         new = [j for j in new if np.abs(added.jacobian[..., j]).max() > 0]
-        chance = self.chance(base, added.jacobian[..., new]) if new and gain > 0 else 1.0
-        return Evidence(gain, se, chance)
+        if not new or gain <= 0:
+            return Evidence(gain, se, 1.0)
+        joint = np.concatenate([base.jacobian, added.jacobian[..., new]], axis=2)
+        return Evidence(gain, se, chance(self.normal(joint, base.white), base.jacobian.shape[2]))
 
-    def _slopes(self, model: Model, free: Sequence[Free], white: Array) -> Slopes:
-        out = np.zeros((*white.shape, len(free)))
+    def _slopes(self, at: _Point, free: Sequence[Free], known: Mapping[Free, Array] | None = None) -> Slopes:
+        """By differences, but for numbers whose slopes are known; clocks of trials shift those, and all are worked out anew."""
+        known = known if known and at.model.differing is None else {}
+        out = np.zeros((*at.white.shape, len(free)))
         for j, number in enumerate(free):
-            small = _increment(number, number.of(model))
-            changed = moved_by(model, free, small * np.eye(len(free))[j])
-            out[..., j] = (self.white(changed) - white) / small
-        return without_clocks(self, model, white, out)
+            if number in known:
+                out[..., j] = known[number]
+                continue
+            small = increment(number, number.of(at.model))
+            changed = moved_by(at.model, free, small * np.eye(len(free))[j])
+            out[..., j] = (self.white(changed) - at.white) / small
+        return without_clocks(self, at.model, at.white, out)
 
 
-def moved_by(model: Model, free: Sequence[Free], step: Array) -> Model:
-    """The model with its free numbers moved, held within their bounds."""
-    values = {f.effect: dict(model.values_of(f.effect)) for f in free}
-    for number, change in zip(free, step, strict=True):
-        p = number.parameter
-        values[number.effect][p.name] = float(np.clip(number.of(model) + change, p.low, p.high))
-    return model.with_values(values)
+def chance(joint: Normal, own: int) -> float:
+    """`sign_flip_p` of an addition to a fitted model, whose own numbers are the first ``own`` of the normal equations.
+
+    What these could do as well is taken out of the others first.
+    """
+    scores, curvature = joint.gradients, joint.curvatures.sum(axis=0)
+    shared = np.linalg.pinv(curvature[:own, :own], hermitian=True) @ curvature[:own, own:]
+    left = curvature[own:, own:] - curvature[own:, :own] @ shared
+    return sign_flip_p(scores[:, own:] - scores[:, :own] @ shared, left)
 
 
-def _increment(number: Free, value: float) -> float:
-    """A step for differences, turned round at the upper bound."""
-    p = number.parameter
-    scale = 1e-3 * abs(value) if np.isinf(p.neutral) else 1e-3 * (p.plausible[1] - p.plausible[0])
-    return -scale if value + scale > p.high else scale
-
-
-def _normal(jacobian: Array, white: Array) -> tuple[Array, Array]:
-    weighted = jacobian * weights(white)[:, None, None]
-    return np.einsum("kcp,kcq->pq", weighted, jacobian), np.einsum("kcp,kc->p", weighted, white)
+def _foretold(step: Array, curvature: Array, gradient: Array) -> float:
+    """By how much a step lowers the loss, by the slopes."""
+    return float(-(gradient @ step) - step @ curvature @ step / 2)
 
 
 def _damped_step(curvature: Array, gradient: Array, damping: float) -> Array:
@@ -239,12 +253,3 @@ def _damped_step(curvature: Array, gradient: Array, damping: float) -> Array:
     scale[scale <= 0] = 1.0
     solved = np.linalg.lstsq(curvature + damping * np.diag(scale), gradient, rcond=None)[0]
     return np.asarray(-solved, dtype=np.float64)
-
-
-def _inside(model: Model, free: Sequence[Free], gradient: Array) -> np.ndarray:
-    """Numbers that are not pressed against a bound."""
-    pressed = [
-        (f.of(model) <= f.parameter.low and slope > 0) or (f.of(model) >= f.parameter.high and slope < 0)
-        for f, slope in zip(free, gradient, strict=True)
-    ]
-    return ~np.array(pressed, dtype=bool)

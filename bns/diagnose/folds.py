@@ -12,6 +12,7 @@ from bns.diagnose.horizons import HORIZONS, Errors, errors_of
 from bns.diagnose.noise import Filter
 from bns.diagnose.own_clocks import steps_of
 from bns.diagnose.predictor import Predictor, Steps
+from bns.diagnose.threads import each
 from bns.diagnose.tracks import Array
 from bns.physics.model import Model
 
@@ -27,11 +28,14 @@ def held_out_steps(predictor: Predictor, following: Filter, model: Model) -> Ste
     if not model.effects or trials < 2:
         return predictor.steps(model)
     fold = np.arange(trials) % min(FOLDS, trials)
-    body, drift = np.zeros((len(predictor.tracks.t_s), 3)), np.zeros((len(predictor.tracks.t_s), 2))
-    for one in np.unique(fold):
-        frames = (fold == one)[predictor.tracks.trial]
+    held_out = [(fold == one)[predictor.tracks.trial] for one in np.unique(fold)]
+
+    def predicted(frames: NDArray[np.bool_]) -> Steps:
         fitted = Problem(predictor, following, (~frames).astype(float)).fit(model).model
-        steps = steps_of(predictor, following, fitted)
+        return steps_of(predictor, following, fitted)
+
+    body, drift = np.zeros((len(predictor.tracks.t_s), 3)), np.zeros((len(predictor.tracks.t_s), 2))
+    for frames, steps in zip(held_out, each(predicted, held_out), strict=True):
         body[frames], drift[frames] = steps.body[frames], steps.drift_m[frames]
     return Steps(body, drift)
 

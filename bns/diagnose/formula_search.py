@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from sklearn.linear_model import orthogonal_mp
@@ -17,6 +18,7 @@ from bns.diagnose.evidence import Evidence
 from bns.diagnose.fit import Fit, Problem
 from bns.diagnose.noise import weights
 from bns.diagnose.structure import SHARE, Pattern
+from bns.diagnose.threads import each
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.formula import formula_effect
@@ -63,8 +65,8 @@ class Formula:
 
 def best_formula(problem: Problem, fit: Fit, found: Sequence[Pattern]) -> Formula | None:
     """The formula that earns most along the patterns that were found; None if none earns anything."""
-    tried = [f for pattern in found[:3] for f in _tried(problem, fit, pattern)]
-    return max((f for f in tried if f.evidence.gain > 0), key=lambda f: f.evidence.gain, default=None)
+    tried = each(partial(_tried, problem, fit), found[:3])
+    return max((f for of_one in tried for f in of_one if f.evidence.gain > 0), key=lambda f: f.evidence.gain, default=None)
 
 
 def _tried(problem: Problem, fit: Fit, pattern: Pattern) -> list[Formula]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bns.diagnose.predictor import Steps
 from bns.diagnose.tracks import Array, Tracks
 from bns.diagnose.wheels import WheelPredictor
+from bns.engine.pose_filter import displacements
 from bns.engine.snn import predict
 from bns.errors import DataError
 from bns.physics.model import Model
@@ -58,7 +59,7 @@ class NetworkPredictor(WheelPredictor):
 
     def measured(self) -> Array:
         """As the networks' own steps: forward, left and turn since the frame before as tracked, (frames, 3)."""
-        seen, told = self._in_robot_frame(self.tracks.pose), self._networks
+        seen, told = displacements(self.tracks.pose, self.tracks.is_first), self._networks
         turn = told[:, 2] + (seen[:, 2] - told[:, 2] + np.pi) % (2 * np.pi) - np.pi
         return np.column_stack([seen[:, :2], turn])
 
@@ -74,7 +75,7 @@ class NetworkPredictor(WheelPredictor):
         for trial in range(len(tracks)):
             frames = slice(tracks.first[trial], tracks.first[trial + 1])
             poses[frames] = self._path(saved, trial)[nodes[frames]]
-        return self._in_robot_frame(poses)
+        return displacements(poses, self.tracks.is_first)
 
     def _path(self, saved: StaticSimulator, trial: int) -> Array:
         """Pose at the begin and after every command of a trial, (commands + 1, 3)."""

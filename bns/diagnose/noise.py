@@ -22,14 +22,18 @@ _HIGH = np.array([0.3, 0.5, 0.5, 0.5, 3.0])
 
 def huber(white: Array) -> Array:
     """Loss of every frame: half the squared length, linear beyond `HUBER`; (frames,)."""
-    length = np.sqrt((white * white).sum(axis=1))
+    length = _length(white)
     return np.where(length <= HUBER, length * length / 2, HUBER * length - HUBER * HUBER / 2)
 
 
 def weights(white: Array) -> Array:
     """What a frame counts in a step of least squares under `huber`; (frames,), at most 1."""
-    length = np.sqrt((white * white).sum(axis=1))
+    length = _length(white)
     return HUBER / np.maximum(length, HUBER)
+
+
+def _length(white: Array) -> Array:
+    return np.sqrt(np.asarray(np.einsum("kc,kc->k", white, white), dtype=np.float64))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.search import TIE_SHARE, TIE_Z
+from bns.diagnose.alike import TIE_SHARE, TIE_Z, matters
 from bns.diagnose.tracks import Array
 
 DRAWS = 2000
@@ -35,9 +35,9 @@ class Expected:
         return Expected(self.old, self.new[:trials], self.worth_old, self.worth_new[:trials], self.scatter, self.chance)
 
 
-def told_apart(gain: Array, se: Array, worth: float) -> NDArray[np.bool_]:
+def told_apart(gain: Array, se: Array, worth: float, trials: int) -> NDArray[np.bool_]:
     """The diagnosis' own criterion: is a gain over a rival (a trial, with its standard error) more than a tie?"""
-    return np.asarray((gain >= TIE_Z * se) & (gain >= TIE_SHARE * worth))
+    return np.asarray((gain >= TIE_Z * se) & matters(gain, worth, trials))
 
 
 def power(expected: Expected, seed: int = 0) -> float:
@@ -54,7 +54,7 @@ def power(expected: Expected, seed: int = 0) -> float:
         return 0.0
     mean, se = gains.mean(axis=1), gains.std(axis=1, ddof=1) / np.sqrt(trials)
     worth = (expected.worth_old.sum() + expected.worth_new.sum() / 2) / trials
-    return float(told_apart(mean, se, worth).mean())
+    return float(told_apart(mean, se, worth, trials).mean())
 
 
 def decided(both: Sequence[Expected]) -> float:

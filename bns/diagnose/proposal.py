@@ -15,6 +15,7 @@ from bns.diagnose.power import Expected, blocked, decided, minutes_needed, scatt
 from bns.diagnose.rivals import Rival, contests_of, rivals_of, without_last
 from bns.diagnose.separation import Apart, Pair, Stage, apart, separation
 from bns.diagnose.sequences import Arena, Bounds, Sequences
+from bns.diagnose.threads import one_thread_each
 from bns.diagnose.tracks import Array
 from bns.diagnose.witness import witnesses
 from bns.errors import DataError
@@ -94,6 +95,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
+@one_thread_each()
 def propose(
     d: Diagnosis,
     arena: Arena,

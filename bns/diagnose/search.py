@@ -6,42 +6,34 @@ or beyond what is plausible is a veto with its reason.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import TypeVar
 
 import numpy as np
 
+from bns.diagnose.alike import alike
 from bns.diagnose.candidates import best_start, fit_with, listed
-from bns.diagnose.evidence import Evidence, held_out_gain
+from bns.diagnose.evidence import MIN_Z, Evidence
 from bns.diagnose.fit import Fit, Problem
 from bns.diagnose.noise import estimate_noise, filter_for
 from bns.diagnose.own_clocks import OwnClocks, judged, own_clocks, with_one_clock
 from bns.diagnose.predictor import Predictor
+from bns.diagnose.threads import each
 from bns.diagnose.tracks import Array
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
-T = TypeVar("T")
-
 FALSE_ALARM = 0.05
 """Chance of any false alarm over the whole catalogue."""
 MIN_GAIN = 0.001
 """Least gain that counts, as a share of the loss: honest robots vary by fractions of a percent from trial to trial."""
-MIN_Z = 2.5
-"""Least gain that counts, in its standard errors: it must be earned in many trials, not in a few."""
-TIE_Z = 2.0
-"""Two explanations whose held-out losses differ by fewer standard errors than this cannot be told apart."""
-TIE_SHARE = 0.005
-"""... nor those whose difference is a smaller share than this of what either earns."""
-SIGNS_Z = 4.0
-"""... unless nearly all trials are against one of them: this many standard errors of a fair coin."""
 SCREEN = 0.15
-"""An effect is tried in another one's place if its best start alone does this share of the other's work."""
+"""An effect is tried in another one's place if its best start alone does this share of the other's work ..."""
+BEHIND, BEHIND_LOSS = 0.5, 20.0
+"""... and no longer if, fitted, it leaves more than this share of that work undone, and more than this loss: three
+standard errors, were it noise alone."""
 CLOCKS_CHANCE = 0.01
 """Chance of a false alarm about clocks that differ from trial to trial."""
 MOST = 6
@@ -90,7 +82,6 @@ class Search:
         tick: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.predictor, self.model, self.tick = predictor, model.arranged(), tick
-        self.jobs = min(os.cpu_count() or 1, 8)
         self._extra = extra
         self.catalogue = listed(self.model, extra)
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
@@ -173,7 +164,7 @@ class Search:
 
     def _round(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> Step:
         left = [effect for name, effect in self.catalogue.items() if name not in accepted]
-        tried = self._all(partial(self._tried, problem, fit), [*DECOYS, *left])
+        tried = each(partial(self._tried, problem, fit), [*DECOYS, *left])
         bar = max(c.evidence.gain for c in tried[: len(DECOYS)])
         ranking = sorted(tried[len(DECOYS) :], key=lambda c: -c.evidence.gain)
         allowed = [c for c in ranking if self._earned(c, fit, bar) and not c.veto]
@@ -207,18 +198,18 @@ class Search:
     ) -> tuple[Problem, Fit, tuple[str, ...]]:
         """Drop what no longer earns its place."""
         for name in accepted[:-1]:
-            without = problem.fit(fit.model.without(name))
-            if not self._earned_over(problem, without, fit, name):
+            lacking = without(problem, fit, name)
+            if not self._earned_over(problem, lacking, fit, name):
                 accepted = tuple(a for a in accepted if a != name)
-                problem, fit = self._settled(without.model, problem.following.noise)
+                problem, fit = self._settled(lacking.model, problem.following.noise)
         return problem, fit, accepted
 
     def _may_stay(self, problem: Problem, fit: Fit, name: str) -> bool:
         """Whether that effect of a fit would be taken as a newcomer: few trials that gain much do not bring one in."""
-        return not veto_of(fit, name) and self._earned_over(problem, problem.fit(fit.model.without(name)), fit, name)
+        return not veto_of(fit, name) and self._earned_over(problem, without(problem, fit, name), fit, name)
 
-    def _earned_over(self, problem: Problem, without: Fit, fit: Fit, name: str) -> bool:
-        return self._earned(Candidate(name, fit, problem.evidence(without, fit)), without, 0.0)
+    def _earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:
+        return self._earned(Candidate(name, fit, problem.evidence(lacking, fit)), lacking, 0.0)
 
     def _exchanges(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
         """Every accepted effect exchanged for every other one that might do the same."""
@@ -228,57 +219,52 @@ class Search:
         for name in accepted:
             model = fit.model.without(name)
             loose = problem_for(self.predictor, model)
-            without = loose.fit(model)
+            lacking, reached = loose.fit(model), loose.loss(fit.model)
             others = [effect for other, effect in self.catalogue.items() if other not in accepted]
-            fits = self._all(partial(self._in_place, problem, loose, without, loose.loss(fit.model)), others)
+            fits = each(partial(self._in_place, problem, fit, loose, lacking, reached), others)
             found += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
         self._exchanged = (problem, accepted, found)
         return found
 
-    def _in_place(self, problem: Problem, loose: Problem, without: Fit, reached: float, effect: Effect) -> Fit | None:
-        """The fit with the effect in the place of one that was taken away; None if it does next to nothing of its work.
+    def _in_place(
+        self, problem: Problem, fit: Fit, loose: Problem, lacking: Fit, reached: float, effect: Effect
+    ) -> Fit | None:
+        """The fit with the effect in the place of one that was taken away (``lacking``); None if it does too little of its work.
 
         First under the noise of the model without either (``loose``): under the small noise of a good model, one that is far off
         pulls on nothing. ``reached``: the loss there with what was taken away.
         """
-        start, loss = best_start(loose, without.model, effect)
-        if without.loss - loss < SCREEN * (without.loss - reached):
+        start = best_start(loose, lacking, effect)
+        if lacking.loss - start.loss < SCREEN * (lacking.loss - reached):
             return None
         self.tick(effect.name)
-        return problem.fit(loose.fit(start).model)
-
-    def _all(self, work: Callable[[Effect], T], effects: Sequence[Effect]) -> list[T]:
-        """In threads: the kernels let go of the interpreter. The order of the answers is that of the effects."""
-        with ThreadPoolExecutor(self.jobs) as pool:
-            return list(pool.map(work, effects))
+        fitted = loose.fit(start.model, known=start.slopes)
+        if fitted.loss - reached > max(BEHIND * (lacking.loss - reached), BEHIND_LOSS):
+            return None
+        return problem.fit(fitted.model, known=fit.slopes)
 
     def _rivals(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[tuple[str, ...], Fit]]:
-        """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one."""
+        """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one.
+
+        What comes in must have earned its place: where trials disagree, much that earns nothing certain is no worse for certain.
+        """
         rivals: list[tuple[tuple[str, ...], Fit]] = []
-        without = cache(lambda name: problem.fit(fit.model.without(name)))
+        lacking = cache(partial(without, problem, fit))
         for name, other, tried in self._exchanges(problem, fit, accepted):
             # at a bound it may be: a tether from ever farther away is a slope
-            if alike(tried, fit, without(name)) and not veto_of(tried, other, bounds=False):
+            may = not veto_of(tried, other, bounds=False) and self._earned_over(problem, lacking(name), tried, other)
+            if may and alike(tried, fit, lacking(name)):
                 rivals.append((tuple(other if a == name else a for a in accepted), tried))
         return rivals
 
 
-def alike(tried: Fit, fit: Fit, without: Fit) -> bool:
-    """Whether ``tried`` cannot be told from ``fit``, an explanation that both put in the place of nothing (``without``)."""
-    worth = held_out_gain(without.held_out, fit.held_out)[0]
-    lost, se = held_out_gain(tried.held_out, fit.held_out)
-    return bool(lost < TIE_SHARE * worth or (lost < TIE_Z * se and not _mostly_worse(tried, fit)))
-
-
-def _mostly_worse(tried: Fit, fit: Fit) -> bool:
-    """Whether so many trials lose that it cannot be luck: a few wild ones that make the mean uncertain do not hide it."""
-    trials = len(fit.held_out)
-    worse = int((tried.held_out > fit.held_out).sum())
-    return bool(2 * worse - trials > SIGNS_Z * np.sqrt(trials))
-
-
 def _differing(model: Model) -> str:
     return model.differing.effect.name if model.differing else ""
+
+
+def without(problem: Problem, fit: Fit, name: str) -> Fit:
+    """The fit that lacks an effect."""
+    return problem.fit(fit.model.without(name), known=fit.slopes)
 
 
 def problem_for(predictor: Predictor, model: Model, start: Array | None = None) -> Problem:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from bns.diagnose.fit import Fit, Problem
-from bns.diagnose.noise import filter_for, huber, weights
+from bns.diagnose.noise import filter_for, huber
 from bns.diagnose.planned import foreseen, planned_tracks
 from bns.diagnose.rivals import Rival
 from bns.diagnose.sequences import Arena, Sequences
@@ -161,11 +161,11 @@ def curvature_of(fit: Fit) -> Array:
 def _sums(problem: Problem, other: tuple[Array, Array], true: tuple[Array, Array], of_other: Fit, of_true: Fit) -> Apart:
     error = other[0] - true[0]
     jacobian = np.concatenate([other[1], true[1]], axis=2)
-    weighted = jacobian * weights(error)[:, None, None]
+    pulls = problem.normal(jacobian, error)
     return Apart(
         problem.per_trial(2 * huber(error)),  # the diagnosis counts a large error linearly, and so must who foresees it
-        problem.per_trial(np.einsum("kcp,kc->kp", weighted, error)),
-        problem.per_trial(np.einsum("kcp,kcq->kpq", weighted, jacobian)),
+        pulls.gradients,
+        pulls.curvatures,
         block_diag(curvature_of(of_other), curvature_of(of_true)),
         of_true.covariance,
         len(of_other.free),

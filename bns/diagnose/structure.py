@@ -12,9 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bns.diagnose.evidence import Evidence, held_out_gain
-from bns.diagnose.fit import Fit, Problem
-from bns.diagnose.noise import huber, weights
+from bns.diagnose.evidence import MIN_Z, Evidence, held_out_gain
+from bns.diagnose.fit import Fit, Problem, chance
+from bns.diagnose.noise import huber
+from bns.diagnose.normal import Normal, stepped
+from bns.diagnose.threads import each
 from bns.diagnose.tracks import Array
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Body
@@ -49,19 +51,21 @@ class Pattern:
 def patterns(problem: Problem, fit: Fit) -> list[Pattern]:
     """Every variable with every velocity, the best first."""
     variables = problem.predictor.variables()
-    found = []
-    for variable, basis in curves(variables):
-        for channel in (*CHANNELS, *WORLD) if variable == "place" else CHANNELS:
-            columns = _columns(problem, fit, channel, basis, variables["heading_rad"])
-            earned = _earned(problem, fit, columns)
-            found.append(Pattern(variable, channel, earned, earned.gain / float(fit.losses.mean())))
-    return sorted(found, key=lambda p: -p.evidence.gain)
+    headings, usual = variables["heading_rad"], float(fit.losses.mean())
+
+    def seen(tried: tuple[str, list[Array], str]) -> Pattern:
+        variable, basis, channel = tried
+        earned = _earned(problem, fit, _columns(problem, fit, channel, basis, headings))
+        return Pattern(variable, channel, earned, earned.gain / usual)
+
+    tried = [(v, basis, c) for v, basis in curves(variables) for c in (*CHANNELS, *(WORLD if v == "place" else ()))]
+    return sorted(each(seen, tried), key=lambda p: -p.evidence.gain)
 
 
 def remaining(found: list[Pattern]) -> list[Pattern]:
-    """The patterns that cannot be luck and are large enough to matter."""
+    """The patterns that cannot be luck, are earned in many trials and are large enough to matter."""
     level = CHANCE / max(len(found), 1)
-    return [p for p in found if p.evidence.p_value < level and p.share > LEAST]
+    return [p for p in found if p.evidence.p_value < level and p.evidence.z > MIN_Z and p.share > LEAST]
 
 
 def curves(variables: Mapping[str, Array]) -> Iterator[tuple[str, list[Array]]]:
@@ -126,25 +130,24 @@ def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headi
 
 
 def _earned(problem: Problem, fit: Fit, columns: Array) -> Evidence:
-    gain, se = max((_gain(problem, fit, columns, penalty) for penalty in PENALTIES), key=lambda found: found[0])
-    return Evidence(gain, se, problem.chance(fit, columns) if gain > 0 else 1.0)
+    joint = np.concatenate([fit.jacobian, columns], axis=2)
+    pulls = problem.normal(joint, fit.white)
+    gain, se = max((_gain(problem, fit, joint, pulls, penalty) for penalty in PENALTIES), key=lambda found: found[0])
+    return Evidence(gain, se, chance(pulls, fit.jacobian.shape[2]) if gain > 0 else 1.0)
 
 
-def _gain(problem: Problem, fit: Fit, columns: Array, penalty: float) -> tuple[float, float]:
+def _gain(problem: Problem, fit: Fit, joint: Array, pulls: Normal, penalty: float) -> tuple[float, float]:
     """Held-out gain of a linear addition to a fitted model, each trial judged by a fit to the others.
 
     The model's own numbers move along with it. ``penalty``: how many typical trials speak for the addition being nothing.
     """
-    joint = np.concatenate([fit.jacobian, columns], axis=2)
-    weighted = joint * weights(fit.white)[:, None, None]
-    gradients = problem.per_trial(np.einsum("kcp,kc->kp", weighted, fit.white))
-    curvatures = problem.per_trial(np.einsum("kcp,kcq->kpq", weighted, joint))
+    gradients, curvatures = pulls.gradients, pulls.curvatures
     total, trials, own = curvatures.sum(axis=0), len(curvatures), fit.jacobian.shape[2]
     scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
     ridge = np.full(len(total), penalty / trials)
     ridge[:own] = 1e-9
     others = (total - curvatures) / np.outer(scale, scale) + np.diag(ridge)
-    pulls = (gradients.sum(axis=0) - gradients) / scale
-    steps = -np.linalg.solve(others, pulls[..., None])[..., 0] / scale
-    moved = fit.white + np.einsum("kcp,kp->kc", joint, steps[problem.predictor.tracks.trial])
+    against = (gradients.sum(axis=0) - gradients) / scale
+    steps = -np.linalg.solve(others, against[..., None])[..., 0] / scale
+    moved = stepped(problem.predictor.tracks.first, joint, fit.white, steps)
     return held_out_gain(fit.held_out, problem.per_trial(huber(moved)))

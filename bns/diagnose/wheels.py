@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -11,12 +12,12 @@ from numpy.typing import NDArray
 from bns.diagnose.horizons import HORIZONS, windows
 from bns.diagnose.predictor import Steps
 from bns.diagnose.tracks import Array, Tracks, slimmed
-from bns.engine.pose_filter import followed
+from bns.engine.pose_filter import displacements, followed
 from bns.physics.differential_drive import taken_at
 from bns.physics.effect import Effect
 from bns.physics.grid import Grid
 from bns.physics.model import ActiveEffect, Model
-from bns.physics.motion import body_motion, flow_of
+from bns.physics.motion import flow_of, wheel_motion, with_body_effects
 from bns.physics.signals import Body, Conditions, View
 
 RECENT_S = 0.15
@@ -46,28 +47,33 @@ class WheelPredictor:
         self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
         zero = np.zeros_like(self.grid.step_s)
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
-        way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[:, 0]
+        way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[0][:, 0]
         self.way_m = self._since_previous(way)
         # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
         kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
+        self._wheels = lru_cache(kept)(self._turned)
         self._body, self._at = lru_cache(kept)(self._driven), lru_cache(kept)(self._followed)
 
     def steps(self, model: Model) -> Steps:
         """Displacement of the tracked point since the frame before, in the frame of the robot there."""
-        at = self._at(model.wheelbase_m, _chain(model, (*_MOVING, "clock")))
-        view = View(at[:, :3])
+        poses, sums = self._at(model.wheelbase_m, _chain(model, (*_MOVING, "clock")))
+        view = View(poses)
         for active in model.at("measure"):
             view = active.effect.apply(view, **active.by_name)
-        return Steps(self._in_robot_frame(view.poses), self._drift(model, self._since_previous(at[:, 3])))
+        return Steps(displacements(view.poses, self.tracks.is_first), self._drift(model, poses, sums))
+
+    def _turned(self, wheelbase_m: float, chain: Chain) -> Body:
+        return replace(wheel_motion(_model_of(wheelbase_m, chain), self.grid, self.conditions), place=self._place)
 
     def _driven(self, wheelbase_m: float, chain: Chain) -> Body:
-        return body_motion(_model_of(wheelbase_m, chain), self.grid, self.conditions, self._place)
+        model = _model_of(wheelbase_m, chain)
+        return with_body_effects(model, self._wheels(wheelbase_m, _chain(model, ("wheel",))))
 
-    def _followed(self, wheelbase_m: float, chain: Chain) -> Array:
+    def _followed(self, wheelbase_m: float, chain: Chain) -> tuple[Array, Array]:
         """`followed` at the frames; read-only, for many models share it."""
         model, grid, tracks = _model_of(wheelbase_m, chain), self.grid, self.tracks
         body = self._body(wheelbase_m, _chain(model, _MOVING))
-        at: Array = followed(
+        poses, sums = followed(
             grid.step_s,
             body.forward_m_s,
             body.sideways_m_s,
@@ -76,8 +82,8 @@ class WheelPredictor:
             tracks.trial,
             taken_at(model, tracks.t_s, tracks.trial),
         )
-        at.flags.writeable = False
-        return at
+        poses.flags.writeable = sums.flags.writeable = False
+        return poses, sums
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Back to back within each trial."""
@@ -142,22 +148,22 @@ class WheelPredictor:
         change[self.tracks.is_first] = 0.0
         return change
 
-    def _in_robot_frame(self, poses: Array) -> Array:
-        change = self._since_previous(poses)
-        before = np.roll(poses[:, 2], 1)
-        cos, sin = np.cos(before), np.sin(before)
-        forward = cos * change[:, 0] + sin * change[:, 1]
-        left = cos * change[:, 1] - sin * change[:, 0]
-        return np.stack([forward, left, change[:, 2]], axis=1)
+    def _drift(self, model: Model, path: Array, sums: Array) -> Array:
+        """What the floor adds in the world's frame between where the robot was seen (millimetres do not matter there).
 
-    def _drift(self, model: Model, moving_s: Array) -> Array:
-        """What the floor adds in the world's frame, taken where the robot was seen (millimetres do not matter there)."""
+        A robot gets far between poses at the ends of commands: it is taken to be midway, and off that line as its path is.
+        """
         flow = flow_of(model)
         if (flow.x_m_s, flow.y_m_s, flow.return_per_s) == (0.0, 0.0, 0.0):
-            return np.zeros((len(moving_s), 2))
-        where = np.roll(self.tracks.pose[:, :2], 1, axis=0)
-        velocity = np.array([flow.x_m_s, flow.y_m_s]) - flow.return_per_s * where
-        out: Array = velocity * moving_s[:, None]
+            return np.zeros((len(path), 2))
+        time_s, *where = self._since_previous(sums).T
+        way, before, seen = self._since_previous(path), np.roll(path, 1, axis=0), self.tracks.pose
+        bent = np.stack(where, axis=1) - time_s[:, None] * (before + way / 2)[:, :2]
+        turned = np.roll(seen[:, 2], 1) - before[:, 2]
+        cos, sin = np.cos(turned), np.sin(turned)
+        bent = np.stack([cos * bent[:, 0] - sin * bent[:, 1], sin * bent[:, 0] + cos * bent[:, 1]], axis=1)
+        midway = (seen + np.roll(seen, 1, axis=0))[:, :2] / 2
+        out: Array = np.array([flow.x_m_s, flow.y_m_s]) * time_s[:, None] - flow.return_per_s * (midway * time_s[:, None] + bent)
         return out
 
 

@@ -26,24 +26,25 @@ def followed(
     moving: Array,
     trial: NDArray[np.int64],
     t_s: Array,
-) -> Array:
-    """East, north (m), heading (rad) and time in motion (s) at the times of frames, (frames, 4), from (0, 0, 0) at rest.
+) -> tuple[Array, Array]:
+    """Poses (frames, 3) at the times of frames, from (0, 0, 0) at rest; and sums over the time in motion, (frames, 3).
 
-    Velocities are (trials, steps), means over each step, driven as arcs; ``trial`` (frames,) never falls. Between the ends of a
-    step the path is taken as straight; beyond the ends of the grid it is held.
+    The sums are of 1, x and y: how long the robot was in motion (s), and where (m s). Velocities are (trials, steps), means over
+    each step, driven as arcs; ``trial`` (frames,) never falls. Between the ends of a step the path is taken as straight; beyond
+    the ends of the grid it is held.
     """
-    out = np.empty((len(t_s), 4))
+    poses, sums = np.empty((len(t_s), 3)), np.empty((len(t_s), 3))
     row, k, begun, ended = -1, 0, 0.0, 0.0
-    x0 = y0 = h0 = m0 = x1 = y1 = h1 = m1 = 0.0
+    x0 = y0 = h0 = m0 = px0 = py0 = x1 = y1 = h1 = m1 = px1 = py1 = 0.0
     for i in range(len(t_s)):
         if trial[i] != row or t_s[i] < begun:
             row, k, begun, ended = trial[i], 0, 0.0, 0.0
-            x1 = y1 = h1 = m1 = 0.0
-            x0, y0, h0, m0 = x1, y1, h1, m1
+            x1 = y1 = h1 = m1 = px1 = py1 = 0.0
+            x0, y0, h0, m0, px0, py0 = x1, y1, h1, m1, px1, py1
         while ended < t_s[i] and k < step_s.shape[1]:
             h = step_s[row, k]
             if h > 0.0:
-                x0, y0, h0, m0, begun = x1, y1, h1, m1, ended
+                x0, y0, h0, m0, px0, py0, begun = x1, y1, h1, m1, px1, py1, ended
                 turned = yaw_rad_s[row, k] * h
                 half = turned / 2.0
                 chord = h
@@ -54,13 +55,31 @@ def followed(
                 y1 = y0 + forward_m_s[row, k] * s - sideways_m_s[row, k] * c
                 h1 = h0 + turned
                 m1 = m0 + moving[row, k] * h
+                px1 = px0 + (m1 - m0) * (x0 + x1) / 2.0
+                py1 = py0 + (m1 - m0) * (y0 + y1) / 2.0
                 ended = begun + h
             k += 1
         share = 0.0
         if ended > begun:
             share = min(max((t_s[i] - begun) / (ended - begun), 0.0), 1.0)
-        out[i, 0], out[i, 1] = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
-        out[i, 2], out[i, 3] = h0 + share * (h1 - h0), m0 + share * (m1 - m0)
+        dx, dy, dm = share * (x1 - x0), share * (y1 - y0), share * (m1 - m0)
+        poses[i, 0], poses[i, 1], poses[i, 2] = x0 + dx, y0 + dy, h0 + share * (h1 - h0)
+        sums[i, 0], sums[i, 1], sums[i, 2] = m0 + dm, px0 + dm * (x0 + dx / 2.0), py0 + dm * (y0 + dy / 2.0)
+    return poses, sums
+
+
+@exact
+def displacements(poses: Array, is_first: NDArray[np.bool_]) -> Array:
+    """What each frame's pose (frames, 3) is from the one before, in the robot's frame there: forward, left, turn; (frames, 3).
+
+    Zeros where a trial begins.
+    """
+    out = np.zeros((len(poses), 3))
+    for k in range(1, len(poses)):
+        if not is_first[k]:
+            dx, dy = poses[k, 0] - poses[k - 1, 0], poses[k, 1] - poses[k - 1, 1]
+            c, s = np.cos(poses[k - 1, 2]), np.sin(poses[k - 1, 2])
+            out[k, 0], out[k, 1], out[k, 2] = c * dx + s * dy, c * dy - s * dx, poses[k, 2] - poses[k - 1, 2]
     return out
 
 

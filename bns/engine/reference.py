@@ -258,3 +258,11 @@ def innovations(
         state = state + gain @ off
         spread = (np.eye(3) - gain) @ spread
     return white, logdet
+
+
+def displacements(poses: np.ndarray, is_first: np.ndarray) -> np.ndarray:
+    """Twin of `pose_filter.displacements`, with complex numbers."""
+    place = poses[:, 0] + 1j * poses[:, 1]
+    way = np.diff(place, prepend=place[:1]) * np.exp(-1j * np.roll(poses[:, 2], 1))
+    out = np.stack([way.real, way.imag, np.diff(poses[:, 2], prepend=poses[:1, 2])], axis=1)
+    return np.where(is_first[:, None], 0.0, out)

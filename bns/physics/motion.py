@@ -29,10 +29,19 @@ def body_motion(
     model: Model, grid: Grid, conditions: Conditions = NO_CONDITIONS, place: Array | None = None
 ) -> Body:
     """Velocities of the body under the model's ``wheel`` and ``body`` effects; ``place`` as in `Body`."""
+    return with_body_effects(model, replace(wheel_motion(model, grid, conditions), place=place))
+
+
+def wheel_motion(model: Model, grid: Grid, conditions: Conditions = NO_CONDITIONS) -> Body:
+    """Velocities of a body whose wheels turn under the model's ``wheel`` effects and do not slip."""
     wheels = Wheels(grid.step_s, grid.left_m_s, grid.right_m_s, model.wheelbase_m, conditions)
     for active in model.at("wheel"):
         wheels = active.effect.apply(wheels, **active.by_name)
-    body = replace(_body(wheels), place=place)
+    return _body(wheels)
+
+
+def with_body_effects(model: Model, body: Body) -> Body:
+    """What the model's ``body`` effects make of it."""
     for active in model.at("body"):
         body = active.effect.apply(body, **active.by_name)
     return body

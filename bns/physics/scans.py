@@ -25,6 +25,33 @@ def first_order(target: Array, step_s: Array, tau_s: float) -> Array:
 
 
 @exact
+def delayed(target: Array, step_s: Array, delay_s: float) -> Array:
+    """Mean over each step of target(t - delay), 0 before the start: the way of the target ``delay_s`` ago, differenced; exact."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        now = way = then = 0.0
+        k = 0
+        begun = -delay_s  # at a time ago: which step that was in (k), when it began (now), the way until then
+        for i in range(target.shape[1]):
+            h = step_s[row, i]
+            if h == 0.0:
+                continue
+            ended = begun + h
+            while k < target.shape[1] and now + step_s[row, k] < ended:
+                way += target[row, k] * step_s[row, k]
+                now += step_s[row, k]
+                k += 1
+            at = way
+            if ended > now and k < target.shape[1]:
+                at += target[row, k] * (ended - now)
+            if ended <= 0.0:
+                at = 0.0
+            mean[row, i] = (at - then) / h
+            then, begun = at, ended
+    return mean
+
+
+@exact
 def rate_limited(target: Array, step_s: Array, limit: float) -> Array:
     """Mean over each step of w, which follows the target with |dw/dt| <= limit, from 0; exact."""
     mean = np.zeros_like(target)

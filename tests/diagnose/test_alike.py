@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bns.diagnose.search import alike
+from bns.diagnose.alike import alike
 
 RNG = np.random.default_rng(0)
 FIT = SimpleNamespace(held_out=RNG.normal(10, 1, 60))
@@ -20,7 +20,7 @@ def test_losses_that_go_either_way_are_a_tie():
 
 
 def test_a_loss_that_is_nothing_beside_what_is_earned_is_a_tie_though_all_trials_show_it():
-    assert alike(losing(np.full(60, 0.1)), FIT, WITHOUT)
+    assert alike(losing(np.full(60, 0.08)), FIT, WITHOUT)
 
 
 def test_clear_losses_are_no_tie():
@@ -38,3 +38,9 @@ def test_a_few_trials_that_alone_are_against_it_leave_a_tie():
     losses = np.zeros(60)
     losses[:2] = 500.0
     assert alike(losing(losses), FIT, WITHOUT)
+
+
+def test_losses_that_are_small_in_all_are_a_tie_though_every_trial_shows_them():
+    little = SimpleNamespace(held_out=FIT.held_out + 1)  # what either earns is little too
+    assert alike(losing(np.full(60, 0.04)), FIT, little)
+    assert not alike(losing(np.full(60, 0.06)), FIT, little)

@@ -93,3 +93,11 @@ def test_tracks_hold_commands_as_they_were_in_force(table):
     some = tracks.only(np.array([2, 0]))
     assert some.names == ("2", "0")
     np.testing.assert_array_equal(some.pose[: some.first[1]], tracks.pose[tracks.first[2] :])
+
+
+@pytest.mark.parametrize("gone", [0, 1, 2])
+def test_a_trial_without_a_tracked_pose_is_left_out_and_said_to_be(table, gone):
+    usable, findings = checked(table.assign(x_m=table.x_m.where(table.trial != gone)))
+    assert [f.trial for f in findings if "the trial is left out" in f.text] == [str(gone)]
+    assert len(tracks_of(usable)) == 2
+    assert gone not in set(usable.trial)

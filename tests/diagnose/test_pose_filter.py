@@ -6,7 +6,7 @@ import pytest
 from bns.diagnose.tracks import tracks_of
 from bns.diagnose.wheels import WheelPredictor
 from bns.engine import reference
-from bns.engine.pose_filter import filter_gains, innovations
+from bns.engine.pose_filter import displacements, filter_gains, innovations
 from bns.physics.differential_drive import track
 from tests.diagnose.worlds import FRAME_S, NOMINAL, hidden, measured
 
@@ -33,6 +33,14 @@ def test_innovations_equal_a_filter_written_with_matrices():
     np.testing.assert_allclose(logdet, slow_logdet, atol=1e-4)
 
 
+def test_displacements_equal_their_twin(followed_world):
+    tracks = followed_world[0].tracks
+    found = displacements(tracks.pose, tracks.is_first)
+    np.testing.assert_allclose(found, reference.displacements(tracks.pose, tracks.is_first), atol=1e-15)
+    assert (found[tracks.is_first] == 0).all()
+    assert np.abs(found).max(axis=0).min() > 1e-3
+
+
 def test_a_true_model_leaves_white_noise():
     predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=12, jitter=0.0, noise=(0.002, 0.008))))
     steps = predictor.steps(NOMINAL)
@@ -43,6 +51,15 @@ def test_a_true_model_leaves_white_noise():
     assert np.abs(white.mean(axis=0)).max() < 0.06
     assert np.abs(white.std(axis=0) - 1).max() < 0.06
     assert np.abs(np.corrcoef(white[1:, 0], white[:-1, 0])[0, 1]) < 0.06
+
+
+def led_by(predictor, model):
+    """Where a model's steps lead from every pose but the last, (frames - 1, 3)."""
+    steps, pose = predictor.steps(model), predictor.tracks.pose
+    cos, sin = np.cos(pose[:-1, 2]), np.sin(pose[:-1, 2])
+    east = pose[:-1, 0] + cos * steps.body[1:, 0] - sin * steps.body[1:, 1] + steps.drift_m[1:, 0]
+    north = pose[:-1, 1] + sin * steps.body[1:, 0] + cos * steps.body[1:, 1] + steps.drift_m[1:, 1]
+    return np.stack([east, north, pose[:-1, 2] + steps.body[1:, 2]], axis=1)
 
 
 @pytest.mark.parametrize(
@@ -62,12 +79,17 @@ def test_steps_are_those_of_the_simulated_drive(effects):
     model = hidden(**effects)
     table = measured(model, trials=1, noise=(0.0, 0.0), jitter=0.0)
     predictor = WheelPredictor(tracks_of(table))
-    steps, pose = predictor.steps(model), predictor.tracks.pose
-    cos, sin = np.cos(pose[:-1, 2]), np.sin(pose[:-1, 2])
-    east = pose[:-1, 0] + cos * steps.body[1:, 0] - sin * steps.body[1:, 1] + steps.drift_m[1:, 0]
-    north = pose[:-1, 1] + sin * steps.body[1:, 0] + cos * steps.body[1:, 1] + steps.drift_m[1:, 1]
-    np.testing.assert_allclose(np.stack([east, north], 1), pose[1:, :2], atol=6e-5)
-    np.testing.assert_allclose(pose[:-1, 2] + steps.body[1:, 2], pose[1:, 2], atol=1e-4)
+    led, pose = led_by(predictor, model), predictor.tracks.pose
+    np.testing.assert_allclose(led[:, :2], pose[1:, :2], atol=6e-5)
+    np.testing.assert_allclose(led[:, 2], pose[1:, 2], atol=1e-4)
+
+
+def test_a_pull_is_that_of_the_way_between_poses_however_far_apart_they_are():
+    model = hidden(tether_pull={"anchor_x_m": 0.4, "anchor_y_m": 0.3, "pull_per_s": 0.02})
+    predictor = WheelPredictor(tracks_of(measured(model, trials=4, noise=(0.0, 0.0), jitter=0.0, ends_only=True)))
+    within = ~predictor.tracks.is_first[1:]
+    # at the place midway it would be 0.8 mm, at the earlier pose 4 mm
+    assert np.abs(led_by(predictor, model) - predictor.tracks.pose[1:])[within].max() < 1e-4
 
 
 def test_a_marker_mistaken_at_the_start_does_not_lose_the_trial(followed_world):

@@ -102,3 +102,26 @@ def test_a_few_late_trials_do_not_bring_a_clock_in_by_exchange(late, stays):
     tried = fit_with(problem, fit, search.catalogue["clock-offset"])
     assert tried.held_out.sum() < fit.held_out.sum() - 0.5
     assert search._may_stay(problem, tried, "clock-offset") is stays
+
+
+@pytest.mark.parametrize(("name", "values", "rivals"), [("turn-slip", {"slip_s": 0.0}, 0), ("camera-scale", {"factor": 1.0}, 1)])
+def test_a_rival_must_have_earned_its_place(monkeypatch, name, values, rivals):
+    table = measured(hidden(camera_scale={"factor": 1.05}), seed=11)
+    search = Search(WheelPredictor(tracks_of(table)), NOMINAL)
+    problem, fit = search._settled(NOMINAL.with_effect("camera-scale", factor=1.05))
+    tried = problem.fit(NOMINAL.with_effect(name, **values))
+    monkeypatch.setattr("bns.diagnose.search.alike", lambda *_: True)
+    monkeypatch.setattr(search, "_exchanges", lambda *_: [("camera-scale", name, tried)])
+    assert len(search._rivals(problem, fit, ("camera-scale",))) == rivals
+
+
+def test_slopes_of_a_smaller_model_lead_to_the_same_fit():
+    table = measured(hidden(motor_lag={"tau_s": 0.08}, wheelbase={"factor": 1.04}), trials=8, seed=5)
+    search = Search(WheelPredictor(tracks_of(table)), NOMINAL)
+    problem, base = search._settled(NOMINAL.with_effect("wheelbase", factor=1.0))
+    start = base.model.with_effect("motor-lag", tau_s=0.03).arranged()
+    anew, known = problem.fit(start), problem.fit(start, known=base.slopes)
+    assert known.loss == pytest.approx(anew.loss, abs=0.02)
+    errors = np.sqrt(np.diag(anew.covariance))
+    assert (np.abs(known.values - anew.values) < 0.3 * errors).all()  # a loss of a hundredth is as good as settled
+    np.testing.assert_allclose(np.sqrt(np.diag(known.covariance)), errors, rtol=0.05)

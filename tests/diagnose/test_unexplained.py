@@ -5,9 +5,10 @@ import pandas as pd
 import pytest
 
 from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.evidence import Evidence
 from bns.diagnose.outbreaks import FAR, TRIALS, WIDTH, outbreaks
 from bns.diagnose.search import problem_for
-from bns.diagnose.structure import SHARE, nudge
+from bns.diagnose.structure import SHARE, Pattern, nudge, remaining
 from bns.diagnose.tracks import tracks_of
 from bns.diagnose.unexplained import unexplained
 from bns.diagnose.wheels import RECENT_S, WheelPredictor
@@ -141,3 +142,12 @@ def test_a_share_of_the_motion_scales_ways_and_turns_alike():
     after = predictor.steps(NOMINAL.with_active(nudge(SHARE, everywhere, 0 * everywhere), (-0.2,))).body
     assert after[:, 2] == pytest.approx(0.8 * before[:, 2])
     assert np.hypot(*after[:, :2].T) == pytest.approx(0.8 * np.hypot(*before[:, :2].T), abs=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("se", "chance", "share", "stays"),
+    [(0.2, 1e-4, 0.01, True), (0.5, 1e-4, 0.01, False), (0.2, 0.1, 0.01, False), (0.2, 1e-4, 0.001, False)],
+)
+def test_a_pattern_must_be_earned_in_many_trials_and_large(se, chance, share, stays):
+    found = Pattern("speed_m_s", "yaw_rad_s", Evidence(1.0, se, chance), share)
+    assert remaining([found]) == ([found] if stays else [])

@@ -10,7 +10,6 @@ from bns.diagnose import wheels
 from bns.diagnose.tracks import tracks_of
 from bns.diagnose.wheels import WheelPredictor
 from bns.physics.formula import formula_effect
-from bns.physics.motion import body_motion
 from tests.diagnose.worlds import NOMINAL, measured
 
 
@@ -67,9 +66,15 @@ def test_a_predictor_that_remembers_answers_as_a_new_one():
             np.testing.assert_array_equal(steps.drift_m, expected.drift_m)
 
 
+def counted(monkeypatch, name):
+    """Calls of a function of the predictor's."""
+    calls, real = [], getattr(wheels, name)
+    monkeypatch.setattr(wheels, name, lambda *given: calls.append(given) or real(*given))
+    return calls
+
+
 def test_what_a_camera_does_is_worked_out_without_driving_again(monkeypatch):
-    drives = []
-    monkeypatch.setattr(wheels, "body_motion", lambda *given: drives.append(given) or body_motion(*given))
+    drives = counted(monkeypatch, "with_body_effects")
     predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=3, seed=4)))
     model = NOMINAL.with_effect("camera-scale", factor=1.1).with_effect("clock-offset", offset_s=0.0)
     for seen in (model, model.with_effect("camera-scale", factor=1.2), model.with_effect("clock-offset", offset_s=0.1)):
@@ -77,3 +82,14 @@ def test_what_a_camera_does_is_worked_out_without_driving_again(monkeypatch):
     assert len(drives) == 1
     predictor.steps(model.with_effect("wheelbase", factor=1.1))
     assert len(drives) == 2
+
+
+def test_what_the_body_does_is_worked_out_without_turning_the_wheels_again(monkeypatch):
+    turns = counted(monkeypatch, "wheel_motion")
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=3, seed=4)))
+    model = NOMINAL.with_effect("motor-lag", tau_s=0.1)
+    for slipping in (model, model.with_effect("side-slip", slip_s=0.1), model.with_effect("turn-slip", slip_s=0.1)):
+        predictor.steps(slipping)
+    assert len(turns) == 1
+    predictor.steps(model.with_effect("motor-lag", tau_s=0.2))
+    assert len(turns) == 2

@@ -14,7 +14,7 @@ from rich.progress import track
 
 from tests.hidden_effects.acceptable import acceptable
 from tests.hidden_effects.answer import read
-from tests.hidden_effects.asking import ONE_THREAD, Record, answers
+from tests.hidden_effects.asking import Record, answers, shares
 from tests.hidden_effects.figure import confusion
 from tests.hidden_effects.heldout import ratios
 from tests.hidden_effects.judge import WRONG, coverage, judge, said
@@ -34,7 +34,7 @@ def main(arguments: list[str] | None = None) -> int:
         for world in _shown(chosen, len(chosen)):
             write(world, options.write, acceptable(world))
         return 0
-    os.environ.update(ONE_THREAD)
+    os.environ.update(shares(options.jobs))
     found = answers(chosen, options.results / "answers", options.jobs, options.fresh)
     results = [result_of(world, record) for world, record in _shown(found, len(chosen))]
     _report(results, options.results)
@@ -69,8 +69,9 @@ def result_of(world: World, record: Record) -> Result:
 
 
 def _report(results: Sequence[Result], folder: Path) -> None:
-    print(table(results))
-    print(mistakes(results))
+    said = f"{table(results)}\n{mistakes(results)}".rstrip()
+    print(said)
+    (folder / "table.txt").write_text(said + "\n")
     summary = [
         {
             "world": one.world.name,

@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import io
 import json
+import os
 import tempfile
 import time
 import traceback
@@ -23,7 +24,12 @@ from tests.hidden_effects.world import World, write
 Record = dict[str, Any]
 ASKED = ("diagnose", "physics", "engine")
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-"""Set before workers are started: worlds are asked side by side, one core each."""
+"""For libraries that would start threads of their own in every worker."""
+
+
+def shares(jobs: int) -> dict[str, str]:
+    """Set before workers are started: worlds are asked side by side, each on its share of the cores."""
+    return {**ONE_THREAD, "LOKY_MAX_CPU_COUNT": str(max((os.cpu_count() or 1) // jobs, 1))}
 
 
 def answers(

@@ -110,7 +110,7 @@ def decided(d: Diagnosis, case: Case, table: pd.DataFrame) -> bool:
     worth = held_out_gain(nothing.held_out, best.held_out)[0]
     others = [refitted(problem, problem.fit(r.fit.model), r.names, effects) for r in rivals if r.names != (case.truth,)]
     gains = [held_out_gain(other.held_out, best.held_out) for other in others]
-    return all(bool(told_apart(np.array(gain), np.array(se), worth)) for gain, se in gains)
+    return all(bool(told_apart(np.array(gain), np.array(se), worth, len(best.held_out))) for gain, se in gains)
 
 
 def minutes_until_decided(d: Diagnosis, case: Case, old: pd.DataFrame, new: pd.DataFrame, plan: Sequences) -> float:
