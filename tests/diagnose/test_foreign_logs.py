@@ -10,6 +10,7 @@ import yaml
 
 from bns.cli import main
 from bns.diagnose.checks import checked
+from bns.diagnose.drafting import drafted
 from bns.diagnose.fitting_robot import check_same_robot
 from bns.diagnose.folds import errors_at_horizons
 from bns.diagnose.importing import applied
@@ -24,6 +25,8 @@ from tests.diagnose.worlds import BASE_M, NOMINAL, hidden, measured
 
 SLIPPING = hidden(turn_slip={"slip_s": 0.12})
 TURNS = [f"pose.orientation.{axis}" for axis in "xyzw"]
+PLACES = ("pose.position.x", "pose.position.y")
+MILLIMETRES = {"X [mm]": [1, 2], "Y [mm]": [1, 2]}
 ROS = {
     "columns": {
         "t_s": {"from": "stamp", "unit": "ns"},
@@ -199,6 +202,52 @@ def test_what_does_not_fit_a_log_is_said(bag, tmp_path, change, message):
 def test_mappings_that_are_wrong_say_where(tmp_path, change, message):
     with pytest.raises(DataError, match=message):
         mapped(tmp_path, **change)
+
+
+@pytest.mark.parametrize(
+    ("columns", "drafted_"),
+    [
+        (
+            {"Time (ms)": [0, 40], "yaw_deg": [0, 90], **{f"{name} mm/s": [1, 2] for name in ("vLeft", "vRight")}, **MILLIMETRES},
+            {
+                "t_s": {"from": "Time (ms)", "unit": "ms"},
+                "left_m_s": {"from": "vLeft mm/s", "unit": "mm/s"},
+                "right_m_s": {"from": "vRight mm/s", "unit": "mm/s"},
+                "x_m": {"from": "X [mm]", "unit": "mm"},
+                "y_m": {"from": "Y [mm]", "unit": "mm"},
+                "heading_rad": {"from": "yaw_deg", "unit": "deg"},
+            },
+        ),
+        (
+            {"stamp": [0, 40_000_000], **{name: [0, 1] for name in (*PLACES, *TURNS, "linear.x", "angular.z")}},
+            {**ROS["columns"], "forward_m_s": {"from": "linear.x"}, "turn_rad_s": {"from": "angular.z"}},
+        ),
+        (
+            {"run": ["a", "a"], "when": [0, 1], "timestamp": ["2026-05-31T12:00", "2026-05-31T12:01"], "heading": [10, 350]},
+            {
+                "trial": {"from": "run"},
+                "t_s": {"from": "timestamp", "unit": "date"},
+                "heading_rad": {"from": "heading", "unit": "deg"},
+            },
+        ),
+        ({"a1": [0, 1]}, {}),
+    ],
+)
+def test_a_mapping_is_drafted_from_the_names(columns, drafted_):
+    draft = yaml.safe_load(drafted(pd.DataFrame(columns)))
+    assert draft["columns"] == drafted_
+    assert ("wheelbase_m" in draft) == ("turn_rad_s" in drafted_)
+    assert ("trials" in draft) == ("trial" not in drafted_)
+
+
+def test_a_log_without_a_mapping_is_answered_with_a_draft(bag, capsys):
+    folder, _ = bag
+    (folder / "odom.csv.import.yaml").unlink()
+    assert main(["import", str(folder / "odom.csv"), "-o", str(folder / "m.csv")]) == 2
+    said = capsys.readouterr().err
+    assert "to be checked line by line" in said
+    assert "unit: quaternion" in said
+    assert not (folder / "m.csv").exists()
 
 
 @pytest.mark.parametrize("separator", [";", "\t"])
