@@ -77,6 +77,7 @@ closing-the-gap: setup ## from a run on a robot to a mended model, and how contr
 
 propose-benchmark: setup ## robot time until confusable explanations are told apart: proposed commands against random ones
 	$(BIN)/python -m tests.hidden_effects.proposing --results "$(RESULTS)/propose" $(if $(ONLY),--only "$(ONLY)")
+	$(BIN)/python -m tests.hidden_effects.deciding --results "$(RESULTS)/deciding" $(if $(ONLY),--only "$(ONLY)")
 
 real-robots: setup ## what a plain model lacks on logs of real robots: numbers and a figure; DATA=folder that holds them
 	$(BIN)/python -m analysis.real_robots --data "$(or $(DATA),../shared/data)" --out "$(RESULTS)/real-robots" $(if $(ONLY),--only "$(ONLY)")

@@ -87,8 +87,10 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
 def import_(options: argparse.Namespace) -> int:
     """A log as a table of measurements; the mapping is kept beside it."""
     from bns.diagnose.checks import checked
-    from bns.diagnose.importing import applied, load_mapping, mapping_beside
+    from bns.diagnose.drafting import drafted
+    from bns.diagnose.importing import applied
     from bns.diagnose.intake import read_table
+    from bns.diagnose.mapping import load_mapping, mapping_beside
     from bns.diagnose.words import findings_text
     from bns.measurements import write_measurements
 
@@ -97,10 +99,10 @@ def import_(options: argparse.Namespace) -> int:
     if mapping is None:
         raise DataError(
             f"There is no mapping beside {options.data}, which has the columns {', '.join(map(str, table.columns))}. Write "
-            f"{options.data.name}.import.yaml with an entry such as x_m: {{from: COLUMN, unit: cm}} for each column under "
-            "the key columns, or give such a file with --map."
+            f"{options.data.name}.import.yaml, or give such a file with --map; docs/logs.md has all that may stand in it. "
+            f"A beginning, guessed from the names, to be checked line by line:\n\n{drafted(table)}"
         )
-    table = applied(table, mapping)
+    table = applied(table, mapping, options.data.parent, read_table)
     checked_table, findings = checked(table)
     write_measurements(table, options.output)
     if options.map:

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.importing import repeated
+from bns.diagnose.topics import without_commands
 from bns.errors import DataError
 from bns.measurements import COLUMNS, COMMANDS, POSE
 
@@ -24,6 +25,7 @@ _NEAR_S = 0.4
 _LONG_STEP_S = 30.0
 _FINER = ((1e6, "nanoseconds"), (3e3, "microseconds"), (0.0, "milliseconds"))
 """A step between rows above so many seconds was written in such a unit."""
+_UNTOLD_RATIO = 1.5
 _DEGREES_AT_LEAST = 150.0
 """Radians a metre: a wheelbase of under a centimetre, or degrees."""
 
@@ -198,6 +200,13 @@ def _units(table: pd.DataFrame) -> None:
     ways = np.array(list(_driven(table)))
     speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
     ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
+    untold = without_commands(table)
+    if untold > 0.5 and ratio > _UNTOLD_RATIO:
+        raise DataError(
+            f"In {untold:.0%} of the rows with a pose no command is in force, yet the robot goes {ratio:.1f} times as far as "
+            "commanded. Have commands rows of their own? `hold_commands_s: .inf` in the mapping of `bns import` keeps each until "
+            "the next."
+        )
     if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
         raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
     if speed > 20:

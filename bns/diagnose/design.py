@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bns.diagnose.power import Past
 from bns.diagnose.rivals import Rival
 from bns.diagnose.separation import Apart, Pair, Stage, apart
-from bns.diagnose.sequences import Bounds, Sequences, drawn, extreme, uniform, varied
+from bns.diagnose.sequences import Bounds, Sequences, brief, drawn, extreme, uniform, varied
 from bns.diagnose.tracks import Array
 
 POOL = 200
 GENERATIONS = 4
 MOST_TIMES = 3
 """A trial is driven this often at most: a world that is like neither rival shows in many different trials, not in one."""
+PLACING_S = 10.0
+"""What placing the robot for a trial is reckoned at when trials of different lengths are weighed."""
 SCALE, ENOUGH, URGENT = 8.0, 20.0, 4.0
 """Separation from which on more of it counts less and less; separation that nearly decides, and how much reaching it counts: a
 pair that is decided must not take the time of one that is not."""
@@ -58,42 +61,65 @@ def designed(
     stage: Stage,
     bounds: Bounds,
     seconds: float,
+    past: Mapping[Pair, Past],
     tick: Callable[[str], None] = lambda _: None,
 ) -> Pool:
     """Trials that last ``seconds`` together, the most telling first; none where nothing stays inside the arena."""
     base_m = rivals[0].fit.model.wheelbase_m
     tick("random trials")
     pool = random_pool(rng, rivals, stage, bounds, POOL // 2)
-    pool = pool.joined(looked_at(rivals, drawn(rng, POOL, bounds, stage.arena, base_m, extreme(bounds)), stage))
+    corners = drawn(rng, POOL, bounds, stage.arena, base_m, extreme(bounds), brief(rng, bounds, POOL))
+    pool = pool.joined(looked_at(rivals, corners, stage))
     for generation in range(GENERATIONS):
         if not len(pool.plan):
             break
         tick(f"generation {generation + 1} of {GENERATIONS}")
-        best = np.unique(chosen(pool, min(seconds, POOL / 8 * bounds.trial_s)))
+        best = np.unique(chosen(pool, min(seconds, POOL / 8 * bounds.trial_s), past))
         parents = pool.plan.only(np.resize(best, POOL // 2))
         pool = pool.joined(looked_at(rivals, varied(rng, parents, bounds, extreme(bounds)), stage))
-    return pool.only(chosen(pool, seconds))
+    return pool.only(chosen(pool, seconds, past))
 
 
-def chosen(pool: Pool, seconds: float) -> NDArray[np.int64]:
-    """Which trials, until so many seconds are full: one after the other, each the one that adds most a minute."""
+def chosen(pool: Pool, seconds: float, past: Mapping[Pair, Past]) -> NDArray[np.int64]:
+    """Which trials, until so many seconds are full: one by one, always the one that adds most a minute, placing included."""
     lasts = pool.plan.lasting_s
-    directions = [one for both in pool.found.values() for one in both] if len(lasts) else []
-    sums = [tuple(np.zeros_like(part[0]) for part in (d.square, d.pull, d.give)) for d in directions]
+    directions = [(one, past[pair]) for pair, both in pool.found.items() for one in both] if len(lasts) else []
+    sums = [_Sums(*(np.zeros_like(part[:1]) for part in (d.square, d.pull, d.give))) for d, _ in directions]
     times = np.zeros(len(lasts), dtype=np.int64)
     out: list[int] = []
     while lasts[out].sum() < seconds * (1 - 1e-9) and (times < MOST_TIMES).any():
         worth = np.zeros(len(lasts))
-        for d, (s, g, m) in zip(directions, sums, strict=True):
-            worth += _worth(d.of(s + d.square, g + d.pull, m + d.give)) - _worth(d.of(s[None], g[None], m[None]))
-        worth = np.where(times < MOST_TIMES, worth / lasts, -np.inf)
+        more = [so_far.with_each(d) for (d, _), so_far in zip(directions, sums, strict=True)]
+        for (_, before), each, so_far in zip(directions, more, sums, strict=True):
+            worth += _worth(before.telling(each.total, each.squares)) - _worth(before.telling(so_far.total, so_far.squares))
+        worth = np.where(times < MOST_TIMES, worth / (lasts + PLACING_S), -np.inf)
         best = int(np.argmax(worth))
         times[best] += 1
         out.append(best)
-        sums = [
-            (s + d.square[best], g + d.pull[best], m + d.give[best]) for d, (s, g, m) in zip(directions, sums, strict=True)
-        ]
+        sums = [each.only(best) for each in more]
     return np.array(out, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """What sets of trials do in one direction, (sets, ...): the sums of `Apart`, the separation of all, the squares of what each
+    trial added to it."""
+
+    square: Array
+    pull: Array
+    give: Array
+    total: Array = field(default_factory=lambda: np.zeros(1))
+    squares: Array = field(default_factory=lambda: np.zeros(1))
+
+    def with_each(self, d: Apart) -> _Sums:
+        """This one set, with each of the trials."""
+        sums = (self.square + d.square, self.pull + d.pull, self.give + d.give)
+        total = d.of(*sums)
+        return _Sums(*sums, total, self.squares + (total - self.total) ** 2)
+
+    def only(self, chosen: int) -> _Sums:
+        """One of the sets."""
+        return _Sums(*(np.asarray(part[chosen])[None] for part in (self.square, self.pull, self.give, self.total, self.squares)))
 
 
 def _worth(separation: Array) -> Array:

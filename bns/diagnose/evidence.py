@@ -46,13 +46,13 @@ def sign_flip_p(scores: Array, curvature: Array) -> float:
     likely to pull the other way: the statistic g' H^-1 g of the sum g is held against itself with the signs of
     whole trials drawn by lot. Exact whatever the scatter inside and between trials, heavy tails included.
     """
-    root = np.linalg.pinv(curvature, hermitian=True)
-    total = scores.sum(axis=0)
-    seen = float(total @ root @ total)
+    sizes, directions = np.linalg.eigh(np.linalg.pinv(curvature, hermitian=True))
+    apart = scores @ (directions * np.sqrt(np.maximum(sizes, 0.0)))  # in these the statistic is a plain sum of squares
+    seen = float((apart.sum(axis=0) ** 2).sum())
     if not np.isfinite(seen) or seen <= 0:
         return 1.0
-    sums = _signs(len(scores)) @ scores
-    by_luck = ((sums @ root) * sums).sum(axis=1)
+    sums = _signs(len(scores)) @ apart
+    by_luck = np.einsum("fk,fk->f", sums, sums)
     return float((1 + np.count_nonzero(by_luck >= seen * (1 - 1e-9))) / (1 + FLIPS))
 
 

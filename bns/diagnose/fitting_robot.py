@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bns.diagnose.horizons import windows
 from bns.diagnose.predictor import Predictor
-from bns.diagnose.tracks import Array
+from bns.diagnose.tracks import Array, Tracks
 from bns.errors import DataError
 from bns.physics.model import Model
 from bns.robots import robot_names
@@ -15,6 +16,9 @@ _FACTOR = 1.8
 _EXPLAINED = 0.25
 """Another robot it is if turns that are scaled leave less than this share of the deviation."""
 _FEWEST = 5
+_CLEAR_M, _ARC_RAD = 0.02, 1.2
+_TOGETHER, _TURNED_RAD = 0.8, 1.05
+"""Directions agree if their mean is longer than this; a camera that is askew by less is an effect (`camera-rotation`)."""
 
 
 def check_named_robot(robot: str, model: Model) -> None:
@@ -37,7 +41,7 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
     predicted = turn[end] - turn[start]
     heading = tracks.pose[end, 2] - tracks.pose[start, 2]
     # where the model says that the turn is small enough, it can be told from one more round
-    clear = (np.abs(predicted) < 1.2) & (np.abs(predicted) > 0.05)
+    clear = (np.abs(predicted) < _ARC_RAD) & (np.abs(predicted) > 0.05)
     seen = (heading + np.pi) % (2 * np.pi) - np.pi
     if clear.sum() >= _FEWEST:
         ratio = _scale(seen[clear], predicted[clear])
@@ -63,6 +67,39 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
                 f"The robot goes {ratio:.2g} times as far as commanded. Are the speeds in m/s, "
                 "the positions in m, the times in s? `bns import` turns other units into these."
             )
+    arcs = np.abs(predicted) < _ARC_RAD
+    _check_directions(tracks, start[arcs], end[arcs], np.cumsum(steps[:, 0]))
+
+
+def _check_directions(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.int64], forward_m: Array) -> None:
+    """DataError if the robot goes another way than it faces, by a right angle or mirrored: along an arc, than it faces halfway.
+
+    ``forward_m`` (frames,): how far it was driven forwards; windows that hardly were say nothing about directions.
+    """
+    driven = forward_m[end] - forward_m[start]
+    clear = np.abs(driven) > _CLEAR_M
+    if clear.sum() < _FEWEST:
+        return
+    start, end, driven = start[clear], end[clear], driven[clear]
+    went = (tracks.pose[end, :2] - tracks.pose[start, :2]) * np.sign(driven)[:, None]
+    way = np.exp(1j * np.arctan2(went[:, 1], went[:, 0]))
+    turned = (tracks.pose[end, 2] - tracks.pose[start, 2] + np.pi) % (2 * np.pi) - np.pi
+    faces = np.exp(1j * (tracks.pose[start, 2] + turned / 2))
+    beside, mirrored = complex((way / faces).mean()), complex((way * faces).mean())
+    if abs(beside) > _TOGETHER and abs(np.angle(beside)) > _TURNED_RAD:
+        degrees = np.degrees(np.angle(beside))
+        square = 90 * round(degrees / 90)
+        right = f"zero_deg: {square if abs(degrees - square) < 20 else round(degrees)}"
+        raise DataError(
+            f"Driving ahead the robot goes {abs(degrees):.0f}° to the {'left' if degrees > 0 else 'right'} of where "
+            "heading_rad points: positions and headings are in different frames, or the speeds have the other sign. "
+            f"`{right}` in the entry heading_rad of the mapping of `bns import` turns the headings."
+        )
+    if abs(mirrored) > _TOGETHER and abs(beside) < 0.5:
+        raise DataError(
+            "Positions are mirrored against headings: x_m must run east, y_m north, heading_rad counter-clockwise from x. "
+            "`scale: -1` in the entry y_m (or x_m) of the mapping of `bns import` turns one of them round."
+        )
 
 
 def _scale(seen: Array, predicted: Array) -> float:

@@ -1,110 +1,41 @@
-"""A user's own columns, units and conventions, turned into the table of measurements.
-
-The mapping is a small YAML, kept beside the data as ``DATA.import.yaml``, so that the data stay as they were logged:
-
-    columns:
-      t_s: {from: time_ms, unit: ms}
-      x_m: {from: X, unit: cm}
-      heading_rad: {from: yaw, unit: deg, clockwise: true, zero_deg: 90}
-    repeated_poses: lost
-
-The last line is for a tracker that is slower than the log: a pose that repeats the one before it while the robot is told to move
-was not measured anew, and counts as lost.
-"""
+"""A log under a mapping: a user's own columns, units and conventions turned into the table of measurements."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import yaml
 
+from bns.diagnose.mapping import UNITS
+from bns.diagnose.splitting import split
+from bns.diagnose.topics import held, merged, wheels_from_body
 from bns.errors import DataError, unknown_name
 from bns.measurements import COLUMNS, COMMANDS, POSE
 
-UNITS: Mapping[str, tuple[str, float]] = {
-    "s": ("s", 1.0),
-    "ms": ("s", 1e-3),
-    "us": ("s", 1e-6),
-    "ns": ("s", 1e-9),
-    "m": ("m", 1.0),
-    "cm": ("m", 1e-2),
-    "mm": ("m", 1e-3),
-    "in": ("m", 0.0254),
-    "rad": ("rad", 1.0),
-    "deg": ("rad", math.pi / 180),
-    "m/s": ("m/s", 1.0),
-    "cm/s": ("m/s", 1e-2),
-    "mm/s": ("m/s", 1e-3),
-}
-"""Unit -> what it measures in SI units, and its size."""
-_SI = {
-    "t_s": "s",
-    "left_m_s": "m/s",
-    "right_m_s": "m/s",
-    "x_m": "m",
-    "y_m": "m",
-    "heading_rad": "rad",
-    "session_s": "s",
-    "before_left_m_s": "m/s",
-    "before_right_m_s": "m/s",
-}
-REPEATED = ("kept", "lost")
-_KEYS = ("from", "unit", "scale", "offset", "clockwise", "zero_deg")
+Reader = Callable[[Path], pd.DataFrame]
 
 
-def mapping_beside(data: Path) -> dict[str, Any] | None:
-    """The mapping kept beside a data file; None if there is none."""
-    path = data.with_name(data.name + ".import.yaml")
-    return load_mapping(path) if path.is_file() else None
+def applied(
+    table: pd.DataFrame, mapping: Mapping[str, Any], folder: Path | None = None, read: Reader | None = None
+) -> pd.DataFrame:
+    """The table under its new names and in SI units; columns that no entry names are kept.
 
-
-def load_mapping(path: Path) -> dict[str, Any]:
-    """A mapping file, checked; DataError with the key that is wrong."""
-    try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as fault:
-        raise DataError(f"The mapping {path} does not read: {fault}.") from fault
-    if not isinstance(tree, dict) or not isinstance(tree.get("columns"), dict) or set(tree) - {"columns", "repeated_poses"}:
-        raise DataError(
-            f"The mapping {path} must have the one key columns, with an entry for each column of the table; "
-            "repeated_poses may stand beside it."
-        )
-    if tree.get("repeated_poses", "kept") not in REPEATED:
-        raise DataError(f"{path}: " + unknown_name("word for repeated_poses", tree["repeated_poses"], REPEATED))
-    for name, entry in tree["columns"].items():
-        _check_entry(path, name, entry)
-    return tree
-
-
-def _check_entry(path: Path, name: str, entry: Any) -> None:
-    if not isinstance(entry, dict) or "from" not in entry:
-        raise DataError(f"{path}: {name} is {entry!r}; write {{from: COLUMN, unit: UNIT}}.")
-    for key in entry:
-        if key not in _KEYS:
-            raise DataError(f"{path}: {name}: " + unknown_name("key", key, _KEYS))
-    unit = entry.get("unit")
-    if unit is not None and unit not in UNITS:
-        raise DataError(f"{path}: {name}: " + unknown_name("unit", unit, UNITS))
-    if unit is not None and name in _SI and UNITS[unit][0] != _SI[name]:
-        fitting = ", ".join(u for u, (kind, _) in UNITS.items() if kind == _SI[name])
-        raise DataError(f"{path}: {name} cannot be in {unit}; it may be in {fitting}.")
-
-
-def applied(table: pd.DataFrame, mapping: Mapping[str, Any]) -> pd.DataFrame:
-    """The table under its new names and in SI units; columns that no entry names are kept."""
-    out = table.copy()
-    for name, entry in mapping["columns"].items():
-        source = entry["from"]
-        if source not in table.columns:
-            raise DataError("The mapping asks for an " + unknown_name("column", source, map(str, table.columns)))
-        out[name] = _converted(name, table[source], entry)
-    used = {entry["from"] for entry in mapping["columns"].values()} - set(mapping["columns"]) - set(COLUMNS)
-    out = out.drop(columns=list(used))
+    ``folder`` and ``read``: where the files of ``also`` are, and how they are read. DataError where the mapping does not fit.
+    """
+    out = _renamed(table, mapping["columns"])
+    for other in mapping.get("also", []):
+        if folder is None or read is None:
+            raise DataError(f"The mapping takes columns from {other['file']}, too; give the log as a file beside it.")
+        out = merged(out, _renamed(read(folder / other["file"]), other["columns"], others=False))
+    out = wheels_from_body(out, mapping.get("wheelbase_m"))
+    if "hold_commands_s" in mapping:
+        out = held(out, float(mapping["hold_commands_s"]))
+    if "trials" in mapping:
+        out = split(out, *next(iter(mapping["trials"].items())))
     if "trial" not in out.columns:
         out.insert(0, "trial", 0)
     if mapping.get("repeated_poses") == "lost":
@@ -121,11 +52,83 @@ def repeated(table: pd.DataFrame) -> pd.Series:
     return same & told
 
 
-def _converted(name: str, values: pd.Series, entry: Mapping[str, Any]) -> pd.Series:
+def _renamed(table: pd.DataFrame, columns: Mapping[str, Any], others: bool = True) -> pd.DataFrame:
+    """Columns by the entries; ``others``: those that no entry names stay. Counters are last: they need time and trial."""
+    new: dict[str, pd.Series] = {}
+    for name, entry in sorted(columns.items(), key=lambda item: bool(item[1].get("counts"))):
+        values = _converted(name, _source(table, entry), entry)
+        if entry.get("counts"):
+            by = {"t_s": table.get("t_s"), "trial": table.get("trial"), **new}
+            values = _rate(name, values, by["t_s"], by["trial"])
+        new[name] = values
+    if not others:
+        return pd.DataFrame(new)
+    used = {name for entry in columns.values() for name in _named(entry)} - set(columns) - set(COLUMNS)
+    return table.drop(columns=list(used)).assign(**new)
+
+
+def _named(entry: Mapping[str, Any]) -> list[Any]:
+    return entry["from"] if isinstance(entry["from"], list) else [entry["from"]]
+
+
+def _source(table: pd.DataFrame, entry: Mapping[str, Any]) -> pd.DataFrame:
+    for name in _named(entry):
+        if name not in table.columns:
+            raise DataError("The mapping asks for an " + unknown_name("column", name, map(str, table.columns)))
+    return table[_named(entry)]
+
+
+def _converted(name: str, values: pd.DataFrame, entry: Mapping[str, Any]) -> pd.Series:
     if name == "trial":
-        return values
-    size = UNITS[entry["unit"]][1] if "unit" in entry else 1.0
-    out = values.astype(float) * size * float(entry.get("scale", 1.0)) + float(entry.get("offset", 0.0))
+        return values.iloc[:, 0]
+    unit = entry.get("unit")
+    if unit == "quaternion":
+        numbers = _yaw(values, entry.get("up", "z"))
+    else:
+        numbers = (_dated if unit == "date" else _numbers)(name, values.iloc[:, 0])
+    size = UNITS[unit][1] if unit else 1.0
+    out = numbers * size * float(entry.get("scale", 1.0)) + float(entry.get("offset", 0.0))
     if entry.get("clockwise"):
         out = -out
     return out + math.radians(float(entry.get("zero_deg", 0.0)))
+
+
+def _numbers(name: str, values: pd.Series) -> pd.Series:
+    try:
+        return values.astype(float)
+    except (ValueError, TypeError) as fault:
+        wrong = values[pd.to_numeric(values, errors="coerce").isna() & values.notna()].iloc[0]
+        hint = "; a date and time of day takes unit: date" if name == "t_s" else ""
+        raise DataError(f"{name} is taken from {values.name}, which holds {wrong!r}: no number{hint}.") from fault
+
+
+def _dated(name: str, values: pd.Series) -> pd.Series:
+    """Seconds since the first date."""
+    try:
+        stamps = pd.to_datetime(values, utc=True, format="ISO8601")
+    except (ValueError, TypeError) as fault:
+        text = f"{name} is taken from {values.name}, whose dates do not read: {fault}. Write 2026-05-31T12:00:00.25."
+        raise DataError(text) from fault
+    return (stamps - pd.Timestamp(0, tz="UTC")).dt.total_seconds()
+
+
+def _yaw(values: pd.DataFrame, up: str) -> pd.Series:
+    """Where the body's x axis points, seen from above, by quaternions (x, y, z, w) of any length.
+
+    ``up`` y, as motion capture often has it: counter-clockwise from x in the plane of x and -z.
+    """
+    x, y, z, w = values.to_numpy(dtype=float).T
+    ahead, left = w * w + x * x - y * y - z * z, 2 * (x * y + w * z) if up == "z" else 2 * (w * y - x * z)
+    none = (ahead == 0) & (left == 0)
+    return pd.Series(np.where(none, np.nan, np.arctan2(left, ahead)), index=values.index)
+
+
+def _rate(name: str, counted: pd.Series, t_s: pd.Series | None, trial: pd.Series | None) -> pd.Series:
+    """Speed until the next row of the trial, from what has been counted; a trial's last row keeps the speed before."""
+    if t_s is None:
+        raise DataError(f"{name} is counted, and a speed needs times: add an entry t_s.")
+    trials = pd.Series(0, index=counted.index) if trial is None else trial
+    by = trials.to_numpy()
+    span = t_s.groupby(by).diff()
+    rate = (counted.groupby(by).diff() / span.where(span > 0)).groupby(by).shift(-1)
+    return rate.groupby(by).ffill()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ import yaml
 
 from bns.diagnose.checks import Finding, checked
 from bns.diagnose.cycles import are_cycles, checked_cycles, cycle_tracks
-from bns.diagnose.importing import applied, mapping_beside
+from bns.diagnose.importing import applied
+from bns.diagnose.mapping import mapping_beside
 from bns.diagnose.tracks import Tracks, tracks_of
 from bns.errors import DataError
 
@@ -57,12 +59,22 @@ def read_table(path: Path) -> pd.DataFrame:
         raise DataError(f"There is no file {path}. Give a .csv or .parquet file of measurements.")
     try:
         if path.name.endswith((".csv", ".csv.gz")):
-            return pd.read_csv(path)
+            separator, decimal = _written(path)
+            return pd.read_csv(path, sep=separator, decimal=decimal)
         if path.suffix == ".parquet":
             return pd.read_parquet(path)
     except (ValueError, OSError, yaml.YAMLError) as fault:
         raise DataError(f"{path} does not read as {path.suffix[1:]}: {fault}.") from fault
     raise DataError(f"{path} is no .csv or .parquet file; measurements come as one of these.")
+
+
+def _written(path: Path) -> tuple[str, str]:
+    """What separates a .csv's columns, and its decimals, by its first two lines: many spreadsheets write 1,5;2,5."""
+    opened = gzip.open if path.suffix == ".gz" else open
+    with opened(path, "rt", encoding="utf-8", errors="replace") as lines:
+        head, first = lines.readline(), lines.readline()
+    separator = max(",;\t", key=head.count)
+    return separator, "," if separator != "," and "," in first and "." not in first else "."
 
 
 def _joined(paths: Sequence[Path]) -> pd.DataFrame:
@@ -78,7 +90,7 @@ def _joined(paths: Sequence[Path]) -> pd.DataFrame:
 
 def _mapped(path: Path) -> pd.DataFrame:
     table, mapping = read_table(path), mapping_beside(path)
-    return table if mapping is None else applied(table, mapping)
+    return table if mapping is None else applied(table, mapping, path.parent, read_table)
 
 
 def _of_one_robot(table: pd.DataFrame, robot: str | None) -> pd.DataFrame:

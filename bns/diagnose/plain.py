@@ -24,6 +24,8 @@ PLAIN = {
     "yaw-bias": "the robot turns a little to one side whenever it moves",
     "tether-pull": "something pulls the robot towards one place, as a cable does",
     "clock-offset": "the camera's clock and the commands' clock disagree",
+    "clock-drift": "the camera's clock runs faster or slower than the commands' clock",
+    "understeer": "how far the robot turns depends on how fast it drives",
     "marker-offset": "the tracked marker does not sit over the middle of the axle",
     "camera-scale": "the camera's positions are too large or too small",
     "camera-rotation": "the camera's positions are turned against the robot's headings",

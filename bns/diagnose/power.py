@@ -35,6 +35,23 @@ class Expected:
         return Expected(self.old, self.new[:trials], self.worth_old, self.worth_new[:trials], self.scatter, self.chance)
 
 
+@dataclass(frozen=True)
+class Past:
+    """Of the trials seen so far, for a pair of explanations: squares of their gains about the mean, and `scatter_of` these."""
+
+    squares: float = 0.0
+    scatter: float = 1.0
+
+    def telling(self, total: Array, squares: Array) -> Array:
+        """The separation that counts, of trials with separations s, ``total`` = sum s, ``squares`` = sum s^2.
+
+        The diagnosis judges a gain by how it varies between trials: (sum s / 2)^2 over (what is expected of) its squared standard
+        error, times four; without past trials, and each new one telling little, this is sum s itself. One trial that
+        tells a lot counts 4, whatever it tells: nobody knows whether the next would.
+        """
+        return np.asarray(total**2 / np.maximum(self.squares + squares / 4 + self.scatter * total, 1e-12))
+
+
 def told_apart(gain: Array, se: Array, worth: float, trials: int) -> NDArray[np.bool_]:
     """The diagnosis' own criterion: is a gain over a rival (a trial, with its standard error) more than a tie?"""
     return np.asarray((gain >= TIE_Z * se) & matters(gain, worth, trials))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,9 +11,10 @@ import pandas as pd
 
 from bns.diagnose.design import Pool, designed, random_pool
 from bns.diagnose.diagnosis import FEWEST_TRIALS, Diagnosis
-from bns.diagnose.power import Expected, blocked, decided, minutes_needed, scatter_of
+from bns.diagnose.noise import huber
+from bns.diagnose.power import Expected, Past, blocked, decided, minutes_needed, scatter_of
 from bns.diagnose.rivals import Rival, contests_of, rivals_of, without_last
-from bns.diagnose.separation import Apart, Pair, Stage, apart, separation
+from bns.diagnose.separation import Apart, Pair, Stage, apart
 from bns.diagnose.sequences import Arena, Bounds, Sequences
 from bns.diagnose.threads import one_thread_each
 from bns.diagnose.tracks import Array
@@ -23,6 +24,8 @@ from bns.errors import DataError
 HOPELESS_MINUTES = 24 * 60.0
 """Robot time beyond which a pair counts as the same for every experiment with these sensors."""
 SURE = 0.9
+MOST_FASTER = 100.0
+"""More times as long than this is not worth counting."""
 _DENSE = 3.0
 """Poses a command from which on they count as a track at the camera's rate."""
 
@@ -31,8 +34,8 @@ _DENSE = 3.0
 class Contest:
     """Two explanations: how likely the experiment decides between them, and after how many minutes (nine times in ten).
 
-    ``alike``: no command sequence tells them apart; ``other_measurements`` would. ``times_faster``: than plain random commands,
-    by what either drives the pair apart in a minute. ``already``: what was measured so far decides.
+    ``alike``: no command sequence tells them apart; ``other_measurements`` would. ``times_faster``: as many times as long
+    plain random commands would take for it. ``already``: what was measured so far decides.
     """
 
     first: str
@@ -120,7 +123,8 @@ def propose(
         contests_of(d, rivals),
     )
     rng = np.random.default_rng(seed)
-    best = designed(rng, rivals, stage, bounds, 60 * minutes, tick)
+    past = {(a, b): _past(d, rivals[a], rivals[b]) for a, b in stage.pairs}
+    best = designed(rng, rivals, stage, bounds, 60 * minutes, past, tick)
     if not len(best.plan):
         raise DataError(
             f"No trial of {bounds.trial_s:g} s stays inside the arena from its start at x = {arena.start[0]:.2f}, y = "
@@ -129,46 +133,47 @@ def propose(
     tick("random commands, for comparison")
     plain = random_pool(rng, rivals, stage, bounds, len(best.plan))
     tick("power")
-    contests = _contests(d, rivals, best, plain, stage)
+    contests = _contests(d, rivals, best, plain, stage, past)
     told = any(not c.alike for c in contests)
     plan = best.plan if told else best.plan.only(np.array([], dtype=np.int64))
     return Proposal(d.verdict, rivals, tuple(contests), plan, arena, bounds, minutes)
 
 
-def _contests(d: Diagnosis, rivals: tuple[Rival, ...], best: Pool, plain: Pool, stage: Stage) -> list[Contest]:
+def _contests(
+    d: Diagnosis, rivals: tuple[Rival, ...], best: Pool, plain: Pool, stage: Stage, past: Mapping[Pair, Past]
+) -> list[Contest]:
     assert d.found is not None
     nothing = Rival((), d.found.problem.fit(without_last(d.found)))
     last = len(rivals)
     more = replace(stage, pairs=(*stage.pairs, *((a, last) for a in range(last))))
-    found, _ = apart([*rivals, nothing], best.plan, more)
+    found, random = (apart([*rivals, nothing], pool.plan, more)[0] for pool in (best, plain))
     out = []
     for a, b in stage.pairs:
         one, other = rivals[a], rivals[b]
-        scatter = _scatter(d, one, other)
-        both = (
-            _expected(one, other, nothing, found[(a, b)][0], found[(a, last)][0], scatter),
-            _expected(other, one, nothing, found[(a, b)][1], found[(b, last)][0], scatter),
+        scatter = past[(a, b)].scatter
+        both, as_random = (
+            (
+                _expected(one, other, nothing, seen[(a, b)][0], seen[(a, last)][0], scatter),
+                _expected(other, one, nothing, seen[(a, b)][1], seen[(b, last)][0], scatter),
+            )
+            for seen in (found, random)
         )
         minutes = _minutes(both, found[(a, b)], best.plan.lasting_s, scatter)
         alike = minutes > HOPELESS_MINUTES or blocked(both)
+        longer = _minutes(as_random, random[(a, b)], plain.plan.lasting_s, scatter) / max(minutes, 1e-12)
         out.append(
             Contest(
                 one.title,
                 other.title,
                 0.0 if alike else decided(both),
                 np.inf if alike else minutes,
-                1.0 if alike else _a_minute(best, (a, b)) / max(_a_minute(plain, (a, b)), 1e-12),
+                1.0 if alike else min(longer, MOST_FASTER),
                 alike,
                 decided([e.first(0) for e in both]) >= SURE,
                 tuple(witnesses(one.names, other.names)),
             )
         )
     return out
-
-
-def _a_minute(pool: Pool, pair: Pair) -> float:
-    """Separation of a pair in a minute of driving."""
-    return separation(pool.found[pair]) / float(pool.plan.lasting_s.sum() / 60)
 
 
 def _expected(true: Rival, other: Rival, nothing: Rival, apart_: Apart, worth: Apart, scatter: float) -> Expected:
@@ -183,20 +188,28 @@ def _minutes(both: tuple[Expected, Expected], directions: tuple[Apart, Apart], l
     Where the old trials decide already, what the new ones would take alone.
     """
     alone = decided([e.first(0) for e in both]) >= SURE
-    for trials in np.unique(np.linspace(2, len(lasting_s), 12).astype(int)) if not alone else ():
-        if decided([e.first(int(trials)) for e in both]) >= SURE:
-            return float(lasting_s[:trials].sum() / 60)
+    if not alone and decided(both) >= SURE:
+        low, high = 0, len(lasting_s)
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (low, middle) if decided([e.first(middle) for e in both]) >= SURE else (middle, high)
+        return float(lasting_s[:high].sum() / 60)
     whole = sum(e.chance * one.total() for e, one in zip(both, directions, strict=True))
-    least = FEWEST_TRIALS * float(lasting_s.mean() / 60) if alone else 0.0
+    least = FEWEST_TRIALS * float(lasting_s.mean() / 60) if alone and len(lasting_s) else 0.0
     return max(minutes_needed(whole, float(lasting_s.sum() / 60), scatter), least)
 
 
-def _scatter(d: Diagnosis, a: Rival, b: Rival) -> float:
-    """From the trials seen so far: how their gains vary over what unit noise gives."""
+def _past(d: Diagnosis, a: Rival, b: Rival) -> Past:
+    """From the trials seen so far: how gains held out vary, and how much more so than unit noise lets them.
+
+    The latter from losses as fitted: those held out vary with the numbers, too, however close two explanations are.
+    """
     assert d.found is not None
+    per_trial, held_out = d.found.problem.per_trial, b.fit.held_out - a.fit.held_out
     difference = a.fit.white - b.fit.white
-    apart_so_far = d.found.problem.per_trial((difference * difference).sum(axis=1))
-    return scatter_of(b.fit.held_out - a.fit.held_out, apart_so_far)
+    fitted = per_trial(huber(b.fit.white) - huber(a.fit.white))
+    scatter = scatter_of(fitted, per_trial((difference * difference).sum(axis=1)))
+    return Past(float(((held_out - held_out.mean()) ** 2).sum()), scatter)
 
 
 def _frame_s(d: Diagnosis) -> float | None:

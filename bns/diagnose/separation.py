@@ -8,7 +8,7 @@ tracks allow (curvature H_B), and so does A (H_A). Twice the expected gain in lo
 
 Hunter and Reiner's criterion (Technometrics 7, 1965) with Box and Hill's regard for what is not known of the numbers
 (Technometrics 9, 1967); without the old tracks it is Atkinson and Fedorov's T-optimality, made linear (Biometrika 62, 1975). It
-vanishes where B can follow A. It is taken with either explanation as the true one, and the mean of both counts.
+vanishes where B can follow A. It is taken with either explanation as the true one, and both count.
 """
 
 from __future__ import annotations
@@ -170,8 +170,3 @@ def _sums(problem: Problem, other: tuple[Array, Array], true: tuple[Array, Array
         of_true.covariance,
         len(of_other.free),
     )
-
-
-def separation(both: tuple[Apart, Apart]) -> float:
-    """By all trials, the mean of both directions."""
-    return (both[0].total() + both[1].total()) / 2

@@ -12,6 +12,8 @@ from bns.diagnose.tracks import Array
 
 MARGIN_M = 0.05
 """Sequences keep this far from the arena's edge: rivals disagree, and motors vary."""
+BRIEFEST = 1 / 3
+"""Trials that are searched for may be as short as this share of ``trial_s``: where each tells enough, their number counts."""
 _TRIES = 12
 _ALONG = 4
 """Places on a command's arc that are looked at, its end among them."""
@@ -106,14 +108,22 @@ def extreme(bounds: Bounds) -> Draw:
     return draw
 
 
-def drawn(rng: np.random.Generator, count: int, bounds: Bounds, arena: Arena, base_m: float, draw: Draw) -> Sequences:
-    """``count`` trials of about ``trial_s``, command by command; what would leave the arena is drawn again,
-    and in the end left out.
+def drawn(
+    rng: np.random.Generator,
+    count: int,
+    bounds: Bounds,
+    arena: Arena,
+    base_m: float,
+    draw: Draw,
+    lasting_s: Array | None = None,
+) -> Sequences:
+    """``count`` trials of about ``lasting_s`` (count,), else ``trial_s`` each, command by command; what would leave the arena is
+    drawn again, and in the end left out.
 
     Paths are those of the ideal drive with a wheelbase of ``base_m``: who needs them exactly looks again.
     """
     pose = np.tile(np.array(arena.start), (count, 1))
-    left_s = np.full(count, bounds.trial_s)
+    left_s = np.full(count, bounds.trial_s) if lasting_s is None else lasting_s
     commands: list[Array] = []
     while (left_s >= bounds.shortest_s - 1e-9).any() and len(commands) < _most(bounds):
         now = np.zeros((count, 3))
@@ -132,7 +142,7 @@ def drawn(rng: np.random.Generator, count: int, bounds: Bounds, arena: Arena, ba
 
 
 def varied(rng: np.random.Generator, parents: Sequences, bounds: Bounds, draw: Draw) -> Sequences:
-    """One child of every trial: commands exchanged, stretched, made faster or slower, two swapped."""
+    """One child of every trial: commands exchanged, stretched, made faster or slower, two swapped, the last one left out."""
     stacked = np.stack([parents.left_m_s, parents.right_m_s, parents.duration_s], axis=2)
     count, most = stacked.shape[:2]
     used = stacked[..., 2] > 0
@@ -146,6 +156,9 @@ def varied(rng: np.random.Generator, parents: Sequences, bounds: Bounds, draw: D
         if len(lasting) > 1 and rng.random() < 0.3:
             a, b = rng.choice(lasting, 2, replace=False)
             child[row, [a, b]] = child[row, [b, a]]
+    ends = np.cumsum(child[..., 2], axis=1)
+    spare = (np.arange(most) == used.sum(axis=1)[:, None] - 1) & (ends - child[..., 2] >= BRIEFEST * bounds.trial_s)
+    used = used & ~(spare & (rng.random((count, 1)) < 0.3))
     out = np.zeros_like(child)
     left_s = np.full(count, bounds.trial_s)
     for k in range(most):
@@ -154,6 +167,11 @@ def varied(rng: np.random.Generator, parents: Sequences, bounds: Bounds, draw: D
         left_s = left_s - now[:, 2]
         out[:, k] = now
     return Sequences(out[..., 0], out[..., 1], out[..., 2])
+
+
+def brief(rng: np.random.Generator, bounds: Bounds, count: int) -> Array:
+    """Lengths (s) from the briefest to ``trial_s``, as many short as long, (count,)."""
+    return bounds.trial_s * np.asarray(np.exp(rng.uniform(np.log(BRIEFEST), 0.0, count)))
 
 
 def _trimmed(commands: Array, left_s: Array, bounds: Bounds) -> Array:

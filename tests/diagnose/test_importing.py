@@ -5,8 +5,9 @@ import pandas as pd
 import pytest
 
 from bns.cli import main
-from bns.diagnose.importing import applied, load_mapping
+from bns.diagnose.importing import applied
 from bns.diagnose.intake import load_measured
+from bns.diagnose.mapping import load_mapping
 from bns.errors import DataError
 from tests.diagnose.worlds import NOMINAL, measured
 
@@ -68,7 +69,7 @@ def test_the_mapping_is_kept_beside_the_data_and_used(log):
         ("from: X", "form: X", "x_m is .*; write {from: COLUMN"),
         ("clockwise", "clokwise", "Did you mean 'clockwise'"),
         ("from: X,", "from: x,", "asks for an unknown column 'x'"),
-        ("columns:", "cols:", "one key columns"),
+        ("columns:", "cols:", "must have the key columns"),
     ],
 )
 def test_mappings_that_are_wrong_say_where(log, old, new, message):

@@ -8,15 +8,16 @@ import pandas as pd
 import pytest
 
 from bns.cli import main
+from bns.diagnose.design import Pool, chosen
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.limits import arena_of, bounds_of
 from bns.diagnose.planned import foreseen, planned_tracks
-from bns.diagnose.power import Expected, decided, minutes_needed, power
+from bns.diagnose.power import Expected, Past, decided, minutes_needed, power
 from bns.diagnose.proposal import propose
 from bns.diagnose.proposal_words import proposal_text
 from bns.diagnose.rivals import contests_of, rivals_of
 from bns.diagnose.separation import Apart, Stage, apart
-from bns.diagnose.sequences import Arena, Bounds, Sequences, drawn, extreme, uniform, varied
+from bns.diagnose.sequences import Arena, Bounds, Sequences, brief, drawn, extreme, uniform, varied
 from bns.diagnose.tracks import tracks_of
 from bns.diagnose.wheels import WheelPredictor
 from bns.errors import DataError
@@ -62,6 +63,18 @@ def test_sequences_stay_inside_arena_and_bounds(kind):
     for trial in range(len(plan)):
         poses = path_of(plan, trial)
         assert ARENA.holds(poses[:, 0], poses[:, 1], 0.0).all()
+
+
+def test_brief_trials_last_from_a_third_to_the_whole():
+    rng = np.random.default_rng(1)
+    lasts = brief(rng, BOUNDS, 200)
+    assert 4 <= lasts.min() < 5
+    assert 11 < lasts.max() <= 12
+    plan = drawn(rng, 200, BOUNDS, ARENA, BASE_M, uniform(BOUNDS), lasts)
+    assert np.corrcoef(plan.lasting_s, lasts)[0, 1] > 0.7
+    children = varied(rng, plan, BOUNDS, uniform(BOUNDS))
+    fewer = (children.duration_s > 0).sum(axis=1) < (plan.duration_s > 0).sum(axis=1)
+    assert 0 < fewer.sum() < 100
 
 
 def test_the_same_seed_draws_the_same_sequences_and_another_seed_others():
@@ -162,6 +175,25 @@ def test_power_grows_with_trials_and_is_small_where_nothing_separates():
     both = [Expected(old, new, old, new, chance=0.7), Expected(old, none + 1e-12, old, new, chance=0.3)]
     assert 0.6 < decided(both) < 0.75
     assert minutes_needed(0.0, 10, 1.0) == np.inf
+
+
+def test_what_counts_of_a_separation_is_what_the_diagnosis_could_tell():
+    told = lambda each: float(Past().telling(np.sum(each), np.sum(np.square(each))))  # noqa: E731
+    assert told([0.01] * 50) == pytest.approx(0.5, rel=0.01)  # little a trial: their sum
+    assert told([1e6]) == pytest.approx(4, rel=0.01)  # one trial, however telling: a gain as large as its standard error
+    assert told([1e6] * 4) == pytest.approx(16, rel=0.01)
+    assert Past(squares=100.0).telling(np.array(10.0), np.array(10.0)) < told([1.0] * 10)
+    assert Past(scatter=3.0).telling(np.array(10.0), np.array(10.0)) < told([1.0] * 10)
+
+
+def test_short_trials_are_chosen_where_each_tells_enough_and_long_ones_where_not():
+    plan = Sequences(*(np.array([[v]] * 20 + [[w]] * 20) for v, w in ((0.1, 0.1), (0.1, 0.1), (3.0, 9.0))))
+    none = np.zeros((0, 0))
+    for long_tells, lasting in ((2.0, 3.0), (20.0, 9.0)):
+        each = np.repeat([50.0, 50.0 * long_tells] if lasting == 3.0 else [0.1, 0.1 * long_tells], 20)
+        one = Apart(each, np.zeros((40, 0)), np.zeros((40, 0, 0)), none, none, 0)
+        first = chosen(Pool(plan, {(0, 1): (one, one)}), 12.0, {(0, 1): Past()})[:3]
+        assert plan.lasting_s[first].tolist()[0] == lasting
 
 
 def test_a_pair_without_numbers_separates_by_its_error_alone():

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from bns.diagnose.checks import checked
-from bns.diagnose.importing import applied, load_mapping
+from bns.diagnose.importing import applied
+from bns.diagnose.mapping import load_mapping
 from bns.diagnose.tracks import MOST_FRAMES, RUN_UP_S, slimmed, tracks_of
 from bns.diagnose.wheels import WheelPredictor
 from bns.errors import DataError

@@ -60,7 +60,7 @@ def ask(world: World, options: Sequence[str] = ()) -> Record:
     with tempfile.TemporaryDirectory() as folder:
         data = write(world, Path(folder), acceptable(world))
         began, worked = time.perf_counter(), time.process_time()
-        status, out, fault = _call(["diagnose", str(data), *world.nominal.arguments, "--json", *options])
+        status, out, fault = called(["diagnose", str(data), *world.nominal.arguments, "--json", *options])
         seconds, cpu = time.perf_counter() - began, time.process_time() - worked
     try:
         given = json.loads(out)
@@ -69,7 +69,7 @@ def ask(world: World, options: Sequence[str] = ()) -> Record:
     return {"answer": given, "seconds_s": seconds, "cpu_s": cpu, "exit": status, "error": fault}
 
 
-def _call(arguments: list[str]) -> tuple[int, str, str]:
+def called(arguments: list[str]) -> tuple[int, str, str]:
     """(exit code, stdout, what went wrong) of the command line, in this process."""
     from bns.cli import main
 

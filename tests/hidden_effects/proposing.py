@@ -12,11 +12,11 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from bns.diagnose.diagnosis import Diagnosis, diagnose
 from bns.diagnose.evidence import held_out_gain
@@ -30,17 +30,16 @@ from bns.diagnose.tracks import tracks_of
 from bns.diagnose.wheels import WheelPredictor
 from bns.physics.effects import all_effects
 from bns.physics.model import load_model
-from bns.plotting import OKABE_ITO, PAGE_IN, save, style
-from tests.hidden_effects.camera import Camera, Layout, track
-from tests.hidden_effects.driving import ROBOTS, Driving
+from tests.hidden_effects.camera import Camera, Layout
+from tests.hidden_effects.driving import ROBOTS
+from tests.hidden_effects.experiment import Look, carried_out
 from tests.hidden_effects.listed import cause
 from tests.hidden_effects.luck import luck
-from tests.hidden_effects.motion import move
-from tests.hidden_effects.world import Parameters, motor_jitter
+from tests.hidden_effects.robot_time import figure, summary
+from tests.hidden_effects.world import Parameters
 
 ROBOT, JITTER, CAMERA = ROBOTS["khepera"], 0.004, Camera(0.003, 0.01, lost=0.0)
 MINUTES = 8.0
-STEP_S = 4e-3
 
 
 @dataclass(frozen=True)
@@ -82,17 +81,8 @@ def first_look(case: Case, seed: int) -> Sequences:
 
 def driven(case: Case, plan: Sequences, start: Sequence[float], seed: int, name: str) -> pd.DataFrame:
     """What the camera sees of a plan in the world of this case."""
-    count, most = plan.duration_s.shape
-    edges = np.concatenate([np.zeros((count, 1)), np.cumsum(plan.duration_s, axis=1)], axis=1)
-    wheels = np.stack([plan.left_m_s, plan.right_m_s], axis=2)
-    counts = (plan.duration_s > 0).sum(axis=1)
-    begins = np.concatenate([[0.0], np.cumsum(plan.lasting_s + 5.0)[:-1]])
-    driving = Driving(wheels, edges, counts, np.tile(np.array(start), (count, 1)), begins)
-    words = (case.truth, case.rival, name)
-    jitter = motor_jitter(luck(seed, *words, "jitter"), (count, most, 2), JITTER)
-    hidden = [cause(case.truth, case.hidden)]
-    paths = move(driving, ROBOT.wheelbase_m, hidden, jitter, luck(seed, *words), case.layout.tail_s, STEP_S)
-    table = track(luck(seed, *words, "camera"), paths, driving, hidden, CAMERA, case.layout)
+    hidden, words = [cause(case.truth, case.hidden)], (case.truth, case.rival, name)
+    table = carried_out(plan, start, hidden, Look(ROBOT.wheelbase_m, CAMERA, case.layout, JITTER), seed, words)
     table["trial"] = name + table["trial"].astype(str)
     return table
 
@@ -114,19 +104,48 @@ def decided(d: Diagnosis, case: Case, table: pd.DataFrame) -> bool:
 
 
 def minutes_until_decided(d: Diagnosis, case: Case, old: pd.DataFrame, new: pd.DataFrame, plan: Sequences) -> float:
-    """Minutes of driving beyond the first look until it is decided, by bisection over a plan's trials; inf if never within it."""
-    names = list(dict.fromkeys(new["trial"]))
+    """Minutes of driving beyond the first look until it is decided, to the command; inf if never within the plan.
 
-    def enough(trials: int) -> bool:
-        return decided(d, case, pd.concat([old, new[new["trial"].isin(names[:trials])]], ignore_index=True))
+    Looked at after more and more trials, each time a third more; then by bisection over the commands since the last look.
+    """
+    marks = _marks(plan)
 
-    if not enough(len(names)):
+    def enough(count: int) -> bool:
+        trial, until_s, _ = marks[count - 1]
+        names = list(dict.fromkeys(new["trial"]))
+        so_far = new["trial"].isin(names[:trial]) | ((new["trial"] == names[trial]) & (new["t_s"] <= until_s + 1e-6))
+        return decided(d, case, pd.concat([old, new[so_far]], ignore_index=True))
+
+    low = 0
+    for high in _looks(marks):
+        if enough(high):
+            break
+        low = high
+    else:
         return float("inf")
-    low, high = 0, len(names)
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if enough(middle) else (middle, high)
-    return float(plan.lasting_s[:high].sum() / 60)
+    return marks[high - 1][2]
+
+
+def _marks(plan: Sequences) -> list[tuple[int, float, float]]:
+    """Every command's trial, its end in the trial (s), and the driving until then (min)."""
+    marks, before_s = [], 0.0
+    for trial, lasts in enumerate(plan.duration_s):
+        ends = np.cumsum(lasts[lasts > 0])
+        marks += [(trial, float(end), (before_s + float(end)) / 60) for end in ends]
+        before_s += float(ends[-1])
+    return marks
+
+
+def _looks(marks: Sequence[tuple[int, float, float]]) -> list[int]:
+    """After how many commands to look: at the ends of trials, of two first, then of a third more each time, at last of all."""
+    ends = [count for count, (one, then) in enumerate(pairwise(marks), start=1) if then[0] != one[0]] + [len(marks)]
+    trials = [2]
+    while trials[-1] < len(ends):
+        trials.append(min(max(trials[-1] + 1, trials[-1] * 4 // 3), len(ends)))
+    return [ends[min(count, len(ends)) - 1] for count in trials]
 
 
 def measured_case(case: Case, seed: int) -> dict[str, object] | None:
@@ -141,62 +160,43 @@ def measured_case(case: Case, seed: int) -> dict[str, object] | None:
         return None
     arena = arena_of(predictor.tracks, "1.6x1.2", "0,0,90")
     bounds = bounds_of(predictor.tracks, model, None)
-    plan = propose(d, arena, bounds, MINUTES, seed=seed).plan
-    if not len(plan):
-        print(f"{case.truth} / {case.rival}: no commands would decide", file=sys.stderr)
-        return None
-    plain = random_plan(arena, bounds, len(plan), seed)
+    plans = {"proposed": propose(d, arena, bounds, MINUTES, seed=seed).plan, "random": random_plan(arena, bounds, seed)}
     out: dict[str, object] = {"truth": case.truth, "rival": case.rival, "seed": seed, "verdict": d.verdict}
-    for kind, one in (("proposed", plan), ("random", plain)):
-        new = driven(case, one, arena.start, seed, kind)
-        out[kind] = minutes_until_decided(d, case, old, new, one)
+    for kind, plan in plans.items():
+        if not len(plan):  # said to be beyond all commands: never decided
+            out[kind] = float("inf")
+            continue
+        new = driven(case, plan, arena.start, seed, kind)
+        out[kind] = minutes_until_decided(d, case, old, new, plan)
     return out
 
 
-def random_plan(arena: Arena, bounds: Bounds, trials: int, seed: int) -> Sequences:
-    """As many plain random trials."""
+def random_plan(arena: Arena, bounds: Bounds, seed: int) -> Sequences:
+    """Plain random trials that fill the time."""
+    trials = int(np.ceil(60 * MINUTES / bounds.trial_s))
     return drawn(luck(seed, "random"), trials, bounds, arena, ROBOT.wheelbase_m, uniform(bounds))
-
-
-@style()
-def figure(found: Sequence[dict[str, object]], stem: Path) -> Path:
-    """Minutes of driving, proposed against random, one dot a world."""
-    pairs = list(dict.fromkeys((str(f["truth"]), str(f["rival"])) for f in found))
-    drawn_ = Figure(figsize=(PAGE_IN, 0.34 * len(pairs) + 1.3))
-    axes = drawn_.subplots()
-    shown = {"random": (0.14, OKABE_ITO[1], "s"), "proposed": (-0.14, OKABE_ITO[0], "o")}
-    for row, pair in enumerate(pairs[::-1]):
-        for kind, (shift, colour, marker) in shown.items():
-            values = [float(str(f[kind])) for f in found if (f["truth"], f["rival"]) == pair]
-            late = [MINUTES * 1.25 if np.isinf(v) else v for v in values]
-            axes.plot(late, [row + shift] * len(late), marker, color=colour, label=kind if row == 0 else None)
-            axes.plot([np.median(late)] * 2, [row + shift - 0.12, row + shift + 0.12], color=colour)
-    axes.set_yticks(range(len(pairs)), [f"{truth}, not {rival}" for truth, rival in pairs[::-1]])
-    axes.set_xscale("log")
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_xlabel(f"minutes of driving until decided (dots beyond {MINUTES:g}: not decided; strokes: medians)")
-    axes.legend(title="commands", loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return save(drawn_, stem)[0]
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m tests.hidden_effects.proposing", description=__doc__)
     parser.add_argument("--seeds", type=int, default=3, help="worlds a pair (3)")
+    parser.add_argument("--first-seed", type=int, default=0, help="first of them (0; 0 to 2 were looked at while building)")
     parser.add_argument("--only", default="", metavar="WORD", help="pairs with this word in their names")
     parser.add_argument("--results", type=Path, default=Path("results/propose"), help="folder of the numbers and the figure")
     options = parser.parse_args(arguments)
     options.results.mkdir(parents=True, exist_ok=True)
     found = []
     for case in (c for c in CASES if options.only in f"{c.truth} {c.rival}"):
-        for seed in range(options.seeds):
+        for seed in range(options.first_seed, options.first_seed + options.seeds):
             one = measured_case(case, seed)
             if one is not None:
                 found.append(one)
                 print(json.dumps(one), flush=True)
     (options.results / "robot-time.json").write_text(json.dumps(found, indent=1) + "\n")
     if found:
-        print(figure(found, options.results / "robot-time"))
+        print(summary(found, MINUTES))
+        print(figure(found, MINUTES, options.results / "robot-time"))
     return 0
 
 

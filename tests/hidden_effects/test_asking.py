@@ -18,14 +18,14 @@ def test_json_on_stdout_is_the_answer(monkeypatch):
         assert Path(arguments[1]).read_text().startswith("trial,t_s,left_m_s")
         return 0, json.dumps({"verdict": "none"}), ""
 
-    monkeypatch.setattr(asking, "_call", call)
+    monkeypatch.setattr(asking, "called", call)
     record = asking.ask(WORLD)
     assert record["answer"] == {"verdict": "none"}
     assert record["seconds_s"] >= 0
 
 
 def test_no_json_is_no_answer(monkeypatch):
-    monkeypatch.setattr(asking, "_call", lambda _: (2, "", "bns: no such thing"))
+    monkeypatch.setattr(asking, "called", lambda _: (2, "", "bns: no such thing"))
     record = asking.ask(WORLD)
     assert (record["answer"], record["exit"], record["error"]) == (None, 2, "bns: no such thing")
 
@@ -50,5 +50,5 @@ def test_the_code_that_is_asked_is_there():
 
 
 def test_a_command_that_does_not_exist_is_told_not_raised():
-    status, out, _ = asking._call(["no-such-command"])
+    status, out, _ = asking.called(["no-such-command"])
     assert (status, out) == (2, "")

@@ -1,0 +1,87 @@
+"""One long log cut into trials: the diagnosis counts trials, and holds some of them out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from bns.errors import DataError
+from bns.measurements import BEFORE, COMMANDS, SESSION
+
+STILL_M_S = 1e-3
+"""Wheels told to be slower than this stand: encoders tremble."""
+KEPT_S = 1.0
+"""How much standing a trial keeps before and after its drive: late starts and slow stops are seen there."""
+
+
+def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
+    """The table with a column trial, times since each trial's first row, and the log's own time as ``session_s``.
+
+    ``by``: `standing_s` cuts wherever the robot is told to stand for so long (or told nothing) and leaves out all but the
+    `KEPT_S` around a drive; `gap_s` where so long nothing was written; `lasting_s` into pieces of that length, which begin in
+    motion and so bring along what was commanded before (columns `BEFORE`). DataError where that makes fewer than two trials.
+    """
+    missing = [name for name in ("t_s", *COMMANDS) if name not in table.columns]
+    if missing:
+        raise DataError(f"A log can be cut into trials once it has {', '.join(missing)}; add entries for them.")
+    if "trial" in table.columns:
+        raise DataError("The log has a column trial already; leave out trials from the mapping, or name the column otherwise.")
+    t = table["t_s"].to_numpy(dtype=float)
+    if not (np.diff(t) >= 0).all():
+        row = int(np.flatnonzero(~(np.diff(t) >= 0))[0]) + 1
+        raise DataError(f"Row {row}: t_s runs backwards or is empty; a log that is cut into trials must be in the order of time.")
+    trial = _CUTS[by](table, t, seconds)
+    if trial.max() < 1:
+        text = f"trials: {{{by}: {seconds:g}}} cuts this log of {t[-1] - t[0]:.0f} s into fewer than two trials. "
+        raise DataError(text + _hint(table, t))
+    out = table.assign(trial=trial, **({} if SESSION in table.columns else {SESSION: t - t[0]}))
+    if by == "lasting_s":
+        before = table[list(COMMANDS)].shift().fillna(0.0)
+        out = out.assign(**dict(zip(BEFORE, (before[name] for name in COMMANDS), strict=True)))
+    out = out[out["trial"] >= 0]
+    return out.assign(t_s=out["t_s"] - out.groupby("trial")["t_s"].transform("first")).reset_index(drop=True)
+
+
+def _hint(table: pd.DataFrame, t: NDArray[np.float64]) -> str:
+    longest = max((t[b] - t[a] for a, b in _stands(table, t, 0.0)), default=0.0)
+    gap = np.diff(t).max(initial=0.0)
+    return f"It stands for {longest:.2f} s at most, and its longest gap is {gap:.2f} s; lasting_s cuts anywhere."
+
+
+def _stands(table: pd.DataFrame, t: NDArray[np.float64], seconds: float) -> list[tuple[int, int]]:
+    """First row of each standing phase of at least so long, and the row at which it ends: the next drive's first, or the last."""
+    still = np.nan_to_num(table[list(COMMANDS)].to_numpy(dtype=float))
+    turned = np.diff(np.concatenate([[0], (np.abs(still).max(axis=1) < STILL_M_S).astype(int), [0]]))
+    begins, ends = np.flatnonzero(turned > 0), np.minimum(np.flatnonzero(turned < 0), len(t) - 1)
+    return [(int(a), int(b)) for a, b in zip(begins, ends, strict=True) if t[b] - t[a] >= seconds - 1e-9]
+
+
+def _between_stands(table: pd.DataFrame, t: NDArray[np.float64], seconds: float) -> NDArray[np.int64]:
+    trial = np.full(len(t), -1)
+    stands = _stands(table, t, seconds)
+    drives, begin, before_s = [], 0, 0.0
+    for a, b in stands:
+        kept_s = min(KEPT_S, (t[b] - t[a]) / 2)
+        if a > begin:
+            drives.append((t[begin] - before_s, t[a] + kept_s))
+        begin, before_s = b, kept_s
+    if begin < len(t) - 1:
+        drives.append((t[begin] - before_s, t[-1]))
+    for number, (first, last) in enumerate(drives):
+        trial[(t >= first - 1e-9) & (t <= last + 1e-9) & (trial < 0)] = number
+    return trial
+
+
+def _between_gaps(table: pd.DataFrame, t: NDArray[np.float64], seconds: float) -> NDArray[np.int64]:
+    return np.cumsum(np.diff(t, prepend=t[0]) > seconds)
+
+
+def _pieces(table: pd.DataFrame, t: NDArray[np.float64], seconds: float) -> NDArray[np.int64]:
+    """Equal pieces; what is left at the end belongs to the last."""
+    count = max(int((t[-1] - t[0]) / seconds + 1e-9), 1)
+    return np.minimum(((t - t[0]) / seconds + 1e-9).astype(np.int64), count - 1)
+
+
+_CUTS = {"standing_s": _between_stands, "gap_s": _between_gaps, "lasting_s": _pieces}
+"""As `mapping.SPLITS`: (table, times, seconds) -> trial of every row, -1 for rows of none."""
