@@ -28,11 +28,45 @@ STEADY = 0.1
 
 def largest_gap(store: Store, chosen: Selection, task: str, parameter: str, points: float) -> Checked:
     claim = f"largest gap between {TITLES[parameter]}s {points:g} points"
-    gap = widest_gap(store, chosen, task, parameter)
-    if gap["best"] == gap["worst"]:
-        return Checked(claim, f"only {valued(parameter, gap['best'])} so far", UNDECIDED)
-    ours = f"{gap['points']:.1f}{_interval(gap['low'], gap['high'], '.1f')} points at evaluation {gap['evaluation']:.0f}"
-    return Checked(claim, ours, near(gap["low"], gap["high"], points))
+    return _gap(claim, widest_gap(store, chosen, task, parameter), parameter, points)
+
+
+def gap_at_the_end(store: Store, chosen: Selection, task: str, parameter: str, points: float) -> Checked:
+    claim = f"{points:g} points between {TITLES[parameter]}s at the last evaluation"
+    return _gap(claim, widest_gap(store, chosen, task, parameter, at_last=True), parameter, points)
+
+
+def saturates(store: Store, chosen: Selection, task: str, range: list[float]) -> Checked:
+    sums, counts, _ = _over_evaluations(store, chosen, task)
+    low, high = (100 * end for end in _bootstrapped(sums[:, -1], counts[:, -1]))
+    ours = f"{100 * sums[:, -1].sum() / counts[:, -1].sum():.0f}{_interval(low, high, '.0f')} % at the last evaluation"
+    return Checked(f"success saturates at {range[0]:g} to {range[1]:g} %", ours, within(low, high, *range))
+
+
+def grows_evenly(store: Store, chosen: Selection, task: str, since: int) -> Checked:
+    claim = f"success grows linearly from evaluation {since} on"
+    sums, counts, evaluations = _over_evaluations(store, chosen, task)
+    marks = np.array([since, (since + evaluations[-1]) / 2, evaluations[-1]])
+    ends = np.abs(np.array(evaluations)[:, None] - marks).argmin(axis=0)
+    share = _late_share(ratios(np.ones((1, len(sums))), sums, counts)[:, ends])[0]
+    low = high = math.nan
+    if len(sums) >= FEWEST_SEEDS:
+        low, high = map(float, band(_late_share(ratios(resampled(len(sums), DRAWS), sums, counts)[:, ends])))
+    ours = f"{share:.0f}{_interval(low, high, '.0f')} % of what it gains until the last falls into the second half"
+    return Checked(claim, ours, near(low, high, 50))
+
+
+def goes_with(store: Store, chosen: Selection, task: str, parameter: str, measure: str, direction: str) -> Checked:
+    from scipy.stats import spearmanr  # noqa: PLC0415  # slow to load
+
+    rows = combinations(store, chosen)[0].query("task == @task").dropna(subset=[measure])
+    claim = f"{measure.replace('_', ' ')} {direction} with the {TITLES[parameter]}"
+    if rows[parameter].nunique() < 2 or rows[measure].nunique() < 2:
+        return Checked(claim, "not compared yet", UNDECIDED)
+    sided = {"grows": "greater", "falls": "less"}[direction]
+    found = spearmanr(rows[parameter], rows[measure], alternative=sided)
+    ours = f"rank correlation {found.statistic:+.2f} ({len(rows)} combinations)"
+    return Checked(claim, ours, likely(1 - float(found.pvalue)))
 
 
 def most_influential(store: Store, chosen: Selection, task: str, parameter: str) -> Checked:
@@ -117,6 +151,13 @@ def diversity_of_best_is_steady(store: Store, chosen: Selection, task: str, sinc
     return Checked(f"diversity of the best steady after evaluation {since}", ours, within(low, high, -STEADY, STEADY))
 
 
+def diversity_of_best_moves(store: Store, chosen: Selection, task: str, direction: str, since: int) -> Checked:
+    change, low, high = _change(store, chosen, task, which=0, since=since)
+    ours = f"changes by {100 * change:+.0f}{_interval(100 * low, 100 * high, '+.0f')} % from evaluation {since} to the last"
+    expected = {"grows": (0, math.inf), "falls": (-math.inf, 0)}[direction]
+    return Checked(f"diversity of the best {direction} from evaluation {since} on", ours, within(low, high, *expected))
+
+
 def diversity_of_worst_grows(store: Store, chosen: Selection, task: str) -> Checked:
     change, low, high = _change(store, chosen, task, which=1, since=5)
     ours = f"changes by {100 * change:+.0f}{_interval(100 * low, 100 * high, '+.0f')} % from evaluation 5 to the last"
@@ -141,6 +182,13 @@ def _first_half(shares: np.ndarray, evaluations: np.ndarray) -> np.ndarray:
     return np.where(half.any(axis=1), np.asarray(evaluations, float)[half.argmax(axis=1)], np.inf)
 
 
+def _gap(claim: str, gap: dict[str, float], parameter: str, points: float) -> Checked:
+    if gap["best"] == gap["worst"]:
+        return Checked(claim, f"only {valued(parameter, gap['best'])} so far", UNDECIDED)
+    ours = f"{gap['points']:.1f}{_interval(gap['low'], gap['high'], '.1f')} points at evaluation {gap['evaluation']:.0f}"
+    return Checked(claim, ours, near(gap["low"], gap["high"], points))
+
+
 def _gaps(store: Store, chosen: Selection, task: str, parameter: str) -> np.ndarray | None:
     """Widest gap of a parameter in each bootstrap sample."""
     sums, counts, _, _ = by_value(store, chosen, task, parameter)
@@ -156,6 +204,19 @@ def _mean_rates(store: Store, chosen: Selection, task: str, parameter: str) -> t
     if len(sums) < FEWEST_SEEDS:
         return None, values
     return np.nan_to_num(ratios(resampled(len(sums), DRAWS), sums.sum(axis=2), counts.sum(axis=2))), values
+
+
+def _over_evaluations(store: Store, chosen: Selection, task: str) -> tuple[np.ndarray, np.ndarray, list]:
+    """Successes and runs (seeds, evaluations) of all combinations together, and the evaluations."""
+    rows = by_seed(store, chosen, ("evaluation",), f"task = '{task}'")
+    (sums, evaluations), (counts, _) = (by_seed_array(rows, name) for name in ("successes", "runs"))
+    return sums, counts, list(evaluations)
+
+
+def _late_share(rates: np.ndarray) -> np.ndarray:
+    """Of rates (..., 3) at a beginning, middle and end: how much of the gain, in per cent, comes after the middle."""
+    gained = rates[..., 2] - rates[..., 0]
+    return np.divide(100 * (rates[..., 2] - rates[..., 1]), gained, out=np.full(gained.shape, np.nan), where=gained > 0)
 
 
 def _bootstrapped(sums: np.ndarray, counts: np.ndarray) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from analysis.coverage import coverage
 from analysis.drawn import Drawn
-from analysis.outcomes import FEWEST, at_the_end
+from analysis.outcomes import at_the_end, fewest
 from analysis.selection import Selection
 from analysis.store import BEGIN, NoDataError, Store, remembered
 from analysis.words import SHORT, TITLES, counted, each, valued
@@ -36,11 +36,11 @@ def combinations(store: Store, chosen: Selection) -> tuple[pd.DataFrame, int]:
     Raises:
         NoDataError: none has enough yet.
     """
-    found = at_the_end(store, chosen)
-    rows = found[found.runs >= FEWEST]
+    found, least = at_the_end(store, chosen), fewest(store, chosen)
+    rows = found[found.runs >= least]
     if rows.empty:
         raise NoDataError(
-            f"no combination has {FEWEST} finished runs yet (the most is {found.runs.max()}); "
+            f"no combination has {least} finished runs yet (the most is {found.runs.max()}); "
             f"run {BEGIN}, which goes on where it stopped"
         )
     return rows, len(found) - len(rows)
@@ -110,7 +110,7 @@ def described(
 ) -> Drawn:
     """The figure with its note and caption; ``what`` begins the caption."""
     said, n = coverage(store, chosen.sweeps, chosen.n), int(rows.runs.sum())
-    thinned = (f"{counted(thin, 'combination')} with fewer than {FEWEST} runs left out",) if thin else ()
+    thinned = (f"{counted(thin, 'combination')} with fewer than {fewest(store, chosen)} runs left out",) if thin else ()
     runs = each(rows.runs.min(), rows.runs.max())
     note(
         figure,

@@ -11,7 +11,7 @@ from analysis import checks
 from analysis.clouds import combinations
 from analysis.coverage import coverage
 from analysis.drawn import Drawn
-from analysis.outcomes import FEWEST
+from analysis.outcomes import fewest
 from analysis.selection import Selection, selections
 from analysis.source import source
 from analysis.store import NoDataError, Store
@@ -20,8 +20,8 @@ from analysis.words import task_number, task_title
 
 NAME = "findings"
 PAPER = "sections 4.6 and 5.9"
-
-TOO_FEW = f"no combination of parameters has {FEWEST} finished runs yet"
+_NOWHERE = ""
+"""Where the findings of a task with too few runs stand."""
 
 
 def draw(store: Store) -> list[Drawn]:
@@ -47,8 +47,9 @@ def checked(store: Store, chosen: Selection) -> pd.DataFrame:
                 made.append(row | {"where": finding["where"]})
     for number, findings in waiting.items():
         title = f"{number}, {task_title(chosen.robot, numbers[number])}"
-        row = {"task": title, "the source": f"all {findings} findings", "these results": TOO_FEW, "verdict": UNDECIDED}
-        made.append(row | {"where": ""})
+        few = f"no combination of parameters has {fewest(store, chosen)} finished runs yet"
+        row = {"task": title, "the source": f"all {findings} findings", "these results": few, "verdict": UNDECIDED}
+        made.append(row | {"where": _NOWHERE})
     return pd.DataFrame(made)
 
 
@@ -79,7 +80,7 @@ def _check(store: Store, chosen: Selection, name: str, task: str, arguments: dic
 
 def _drawn(store: Store, chosen: Selection, table: pd.DataFrame) -> Drawn:
     said, counts = coverage(store, chosen.sweeps, chosen.n), Counter(table.verdict)
-    waiting = table[table["these results"] == TOO_FEW]
+    waiting = table[table["where"] == _NOWHERE]
     see = f"{counts[AGREES]} agree, {counts[DIFFERS]} differ, {counts[UNDECIDED] - len(waiting)} are undecided"
     if len(waiting):
         see += f"; too few runs yet of {' and '.join(task.partition(', ')[2] for task in waiting.task)}"

@@ -43,16 +43,18 @@ def by_value(store: Store, chosen: Selection, task: str, parameter: str) -> tupl
     return sums, counts, sorted(rows[parameter].unique()), sorted(rows.evaluation.unique())
 
 
-def largest_gap(store: Store, chosen: Selection, task: str, parameter: str) -> dict[str, float]:
-    """The widest gap between two values' success rates, in points, where it is, and its interval.
+def largest_gap(store: Store, chosen: Selection, task: str, parameter: str, *, at_last: bool = False) -> dict[str, float]:
+    """The widest gap between two values' success rates, in points, where it is, and its interval; ``at_last``: at the last
+    evaluation.
 
     The interval is that of the difference between these two values at this evaluation; picking the widest makes small
     gaps look larger than they are. Keys: points, low, high, evaluation, best, worst.
     """
     sums, counts, values, evaluations = by_value(store, chosen, task, parameter)
     rates = 100 * ratios(np.ones((1, len(counts))), sums, counts)[0]
-    widest = np.nanargmax(np.nanmax(rates, axis=0) - np.nanmin(rates, axis=0))
-    best, worst = int(np.nanargmax(rates[:, widest])), int(np.nanargmin(rates[:, widest]))
+    widest = len(evaluations) - 1 if at_last else np.nanargmax(np.nanmax(rates, axis=0) - np.nanmin(rates, axis=0))
+    best = int(np.nanargmax(rates[:, widest]))
+    worst = len(values) - 1 - int(np.nanargmin(rates[::-1, widest]))  # another than the best even where all are as good
     low = high = math.nan
     if len(counts) >= FEWEST_SEEDS:
         drawn = 100 * ratios(resampled(len(counts), DRAWS), sums[:, :, widest], counts[:, :, widest])

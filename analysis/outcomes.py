@@ -15,7 +15,15 @@ from bns.store.schema import NEAR_CM
 NEAR = tuple(f"success_{cm}cm" for cm in NEAR_CM)
 FEWEST = 5
 """Runs behind a curve or dot; thinner ones jump between 0 and 100 % and are left out."""
+FEWEST_PLANNED = 2
+"""Runs behind a dot of a sweep that asks for no more: less can never be drawn of it, and the intervals say how little that is."""
 _KEPT = ("success", *NEAR, "diversity", "fitness_error", "fitness_world")
+
+
+def fewest(store: Store, chosen: Selection) -> int:
+    """Runs that a combination must have to be drawn and ranked: `FEWEST`, or all that are asked for of it, where that is less."""
+    planned = [store.plans[sweep].seeds for sweep in chosen.sweeps if sweep in store.plans]
+    return min(FEWEST, max(FEWEST_PLANNED, *planned)) if planned else FEWEST
 
 
 def outcomes(store: Store, chosen: Selection) -> str:

@@ -38,6 +38,11 @@ class Plan:
     varied: frozenset[str]
     """Those of the compared parameters that take more than one value."""
 
+    @property
+    def seeds(self) -> int:
+        """Runs that are asked for of each combination; all of them, if the combinations are not known."""
+        return self.runs // max(self.cells, 1)
+
 
 class Store:
     """The results in one folder as they are now: all figures of one call show the same runs; with ``run``, that run alone.

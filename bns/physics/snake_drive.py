@@ -89,4 +89,6 @@ def build(robot: Robot, model: str | None = None) -> SnakePhysics:
         text = Path(model).read_text(encoding="utf-8")
     except OSError as error:
         raise ModelError(f"cannot read {model}: {error.strerror}; give a file like bns/physics/snake/parameters.yaml.") from error
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{model} is not UTF-8 text; save it as UTF-8.") from error
     return SnakePhysics(read_parameters(text))

@@ -213,7 +213,7 @@ def test_one_run_of_a_planned_grid_is_drawn_with_its_wide_interval(tmp_path):
     assert set(curves(drawn.figure)) == {"10 % (n = 1)"}
     heights = np.ptp(drawn.figure.axes[0].collections[0].get_paths()[0].vertices[:, 1])
     assert heights > 75  # one run says next to nothing
-    with pytest.raises(NoDataError, match=r"no combination has 5 finished runs yet \(the most is 1\)"):
+    with pytest.raises(NoDataError, match=r"no combination has 2 finished runs yet \(the most is 1\)"):
         success_by_diversity.draw(Store(tmp_path))
 
 

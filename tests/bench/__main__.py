@@ -19,7 +19,7 @@ PARTS = {
     "training": "Rprop against torch",
     "rollout": "rollout, and a generation against evosax",
     "whole_run": "a whole run against the core's peak",
-    "snake": "the snake's physics, and a whole run of it",
+    "snake": "the snake: physics, training, a whole run",
     "two_jobs": "two workers against one, and the sweep's overhead",
     "reading": "reading a study for a figure",
     "figures": "drawing a whole study",

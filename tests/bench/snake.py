@@ -1,4 +1,4 @@
-"""The snake: a physics cycle, and a whole run at the source's settings against what the core could do."""
+"""The snake: a physics cycle, training, and a whole run at the source's settings against what the core could do."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from bns.engine.patterns import TRAINING_SHARE
 from bns.engine.philox import Key
+from bns.engine.rprop import Rprop
+from bns.engine.snn import initial_weights
 from bns.loop import run
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
@@ -20,6 +22,9 @@ from tests.bench.clock import one_core
 from tests.bench.line import Line, at_most
 from tests.bench.whole_run import BACKWARD_OPS, FORWARD, peak_flops
 
+PATTERNS = 720
+"""Stable cycles that the source's networks of displacements learned from."""
+NO_COUNTS = np.empty(0, np.float32)
 STEP_OPS = 40
 """Of one cycle of one rollout: the markers' frame, four products and sums each way, bounds, region."""
 MEAN_REPEATS = 2.5
@@ -28,7 +33,7 @@ _TINY = RunSpec(robot="snake", task="two-regions", population_size=4, evaluation
 
 def measure(quick: bool) -> list[Line]:
     """Processor seconds: a machine that others use as well does not lengthen them by waiting."""
-    return [_cycle(10 if quick else 100), _whole(1 if quick else 3)]
+    return [_cycle(10 if quick else 100), _training(100 if quick else 1000), _whole(1 if quick else 3)]
 
 
 def _cycle(count: int) -> Line:
@@ -42,6 +47,21 @@ def _cycle(count: int) -> Line:
         taken = time.process_time() - began
     note = f"{count / taken:.1f} cycles a second, {driven_s / taken:.0f} times as fast as the robot"
     return at_most("snake: a random cycle in physics, one core", taken / count, 0.25, "s", note=note)
+
+
+def _training(iterations: int) -> Line:
+    """One 4-100-1 network with a sigmoid at its output, on as many patterns as the static simulator learns from."""
+    key = Key(0, 0)
+    X = ROBOT.inputs(ROBOT.random_controllers(key, PATTERNS, 1).commands[:, 0])
+    target = (0.5 + 0.2 * np.sin(2 * X[0]) * X[3]).astype(np.float32)
+    rule = Rprop.start(initial_weights(key, 1, ROBOT.hidden, ROBOT.input_count), "rprop+", ROBOT.sigmoid_output)
+    rule.train_one(0, X, target, NO_COUNTS, PATTERNS, 10)
+    with one_core():
+        began = time.process_time()
+        rule.train_one(0, X, target, NO_COUNTS, PATTERNS, iterations)
+        taken = time.process_time() - began
+    name = "snake: Rprop, one 4-100-1, a pattern, neuron and iteration"
+    return at_most(name, 1e9 * taken / (iterations * PATTERNS * ROBOT.hidden), 2, "ns", note=f"{PATTERNS} patterns")
 
 
 def _whole(seeds: int) -> Line:

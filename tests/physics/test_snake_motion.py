@@ -163,6 +163,27 @@ def test_a_file_of_parameters_makes_another_world(tmp_path):
         build(robot, str(tmp_path / "none.yaml"))
 
 
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"links": 13.5}, "links is 13.5; it must be a whole number"),
+        ({"marker_gap_m": 1.2}, r"marker_gap_m is 1.2; it must be less than the body's length, links times pitch_m = 1.14"),
+        ({"radius_m": 0.05}, "pitch_m must be more than twice radius_m"),
+    ],
+)
+def test_numbers_that_are_no_body_together_are_refused(changed, message):
+    with pytest.raises(ModelError, match=message):
+        replace(shipped_parameters(), **changed)
+
+
+def test_files_that_are_no_text_or_no_yaml_are_refused(tmp_path):
+    (tmp_path / "latin.yaml").write_bytes("links: 13 # Länge".encode("latin-1"))
+    (tmp_path / "open.yaml").write_text("links: {value: 13")
+    for name, message in (("latin", "is not UTF-8 text"), ("open", "no valid YAML.*Correct the place it names")):
+        with pytest.raises(ModelError, match=f"(?s){message}"):
+            build(load_robot("snake"), str(tmp_path / f"{name}.yaml"))
+
+
 def test_parameters_say_what_is_wrong_with_them():
     good = "floor_friction: {value: 0.35, basis: guess, reason: x}"
     for text, message in (

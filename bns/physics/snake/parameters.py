@@ -57,6 +57,22 @@ class SnakeParameters:
         for field in dataclasses.fields(self):
             value = number(f"snake: {field.name}", getattr(self, field.name), **field.metadata)
             object.__setattr__(self, field.name, value)
+        self._check_body()
+
+    def _check_body(self) -> None:
+        """ModelError for numbers that are allowed each by itself, but are no body together."""
+        if self.links != int(self.links):
+            raise ModelError(f"snake: links is {self.links:g}; it must be a whole number.")
+        if self.pitch_m <= 2 * self.radius_m:
+            raise ModelError(
+                f"snake: pitch_m is {self.pitch_m:g} and radius_m {self.radius_m:g}; a link must be longer than it is wide: "
+                "pitch_m must be more than twice radius_m."
+            )
+        if self.marker_gap_m >= self.length_m:
+            raise ModelError(
+                f"snake: marker_gap_m is {self.marker_gap_m:g}; it must be less than the body's length, "
+                f"links times pitch_m = {self.length_m:g}."
+            )
 
     @property
     def joints(self) -> int:
@@ -76,7 +92,10 @@ class SnakeParameters:
 
 def read_parameters(text: str) -> SnakeParameters:
     """Parameters of a YAML text; ModelError names an entry that is missing, unknown or without its basis and reason."""
-    content = yaml.safe_load(text)
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError as fault:
+        raise ModelError(f"the snake's parameters are no valid YAML: {fault}. Correct the place it names.") from fault
     names = [field.name for field in dataclasses.fields(SnakeParameters)]
     if not isinstance(content, dict):
         raise ModelError(f"the snake's parameters are no mapping; give {', '.join(names)}.")

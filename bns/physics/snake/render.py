@@ -13,9 +13,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from bns.errors import ModelError
+from bns.physics.snake import UNUSABLE
 from bns.physics.snake.body import OnStep
 
 WIDTH_PX, HEIGHT_PX, FRAMES_A_SECOND = 960, 544, 25
+VIEW_M = 2.3
+"""Distance of the camera: the whole surface of the tasks, and a body that has just left it, are in sight."""
 STRIP_FRAMES = 6
 """Frames of a picture: from the first to the last, equally spaced in time."""
 Draw = Callable[[mujoco.MjData], np.ndarray]
@@ -52,9 +55,22 @@ class Film:
 
 
 def check_ending(path: Path) -> None:
-    """ModelError unless the name ends in .mp4 or .png."""
+    """ModelError unless the name ends in .png, or in .mp4 where films can be written."""
     if path.suffix not in {".mp4", ".png"}:
         raise ModelError(f"cannot render to {path}; let the name end in .mp4 (film) or .png (strip of frames).")
+    if path.suffix == ".mp4":
+        _check_encoder(path)
+
+
+def _check_encoder(path: Path) -> None:
+    try:
+        import imageio_ffmpeg  # noqa: PLC0415  # brings its own encoder; only films need it
+
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError) as error:
+        raise ModelError(
+            f"cannot render to {path}: no encoder of films ({error}); pip install imageio-ffmpeg, or let the name end in .png."
+        ) from error
 
 
 def camera(model: mujoco.MjModel) -> Draw:
@@ -71,8 +87,10 @@ def camera(model: mujoco.MjModel) -> Draw:
 
 
 def _rendered(model: mujoco.MjModel) -> Draw:
+    if UNUSABLE:
+        raise RuntimeError(UNUSABLE)
     renderer, view = mujoco.Renderer(model, HEIGHT_PX, WIDTH_PX), mujoco.MjvCamera()
-    view.lookat[:], view.distance, view.azimuth, view.elevation = (0.0, 0.0, 0.0), 1.9, 90.0, -60.0
+    view.lookat[:], view.distance, view.azimuth, view.elevation = (0.0, 0.0, 0.0), VIEW_M, 90.0, -60.0
 
     def draw(data: mujoco.MjData) -> np.ndarray:
         renderer.update_scene(data, view)
@@ -87,7 +105,7 @@ def stick_figure(model: mujoco.MjModel) -> Draw:
 
     def draw(data: mujoco.MjData) -> np.ndarray:
         figure = Figure(figsize=(WIDTH_PX / 100, HEIGHT_PX / 100), dpi=100, layout="constrained")
-        above, beside = figure.subplots(2, 1, height_ratios=[4, 1], sharex=True)
+        above, beside = figure.subplots(2, 1, height_ratios=[1.85, 0.3], sharex=True)
         body, markers = data.xpos[1:], data.site_xpos[sites]
         above.plot(body[:, 0], body[:, 1], "-", color="#444444", linewidth=4)
         upright = data.xmat[1:, 8]  # how far up a link's own upward axis points: 1 upright, 0 on its side, -1 on its back
@@ -95,7 +113,7 @@ def stick_figure(model: mujoco.MjModel) -> Draw:
         above.scatter(markers[:, 0], markers[:, 1], c=["#e6c200", "#1a9e3b"], s=80, zorder=3)
         beside.plot(body[:, 0], body[:, 2], "o-", color="#444444")
         above.set(xlim=(-1.35, 1.35), ylim=(-0.925, 0.925), aspect="equal", ylabel="y, north (m)")
-        beside.set(ylim=(0, 0.4), xlabel="x, east (m)", ylabel="height (m)")
+        beside.set(ylim=(0, 0.3), yticks=(0, 0.3), aspect="equal", xlabel="x, east (m)", ylabel="height (m)")  # one scale
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
@@ -104,7 +122,7 @@ def stick_figure(model: mujoco.MjModel) -> Draw:
 
 
 def _write_mp4(frames: list[np.ndarray], path: Path) -> None:
-    import imageio_ffmpeg  # noqa: PLC0415  # brings its own encoder; only films need it
+    import imageio_ffmpeg  # noqa: PLC0415  # as above
 
     writer: Any = imageio_ffmpeg.write_frames(str(path), (WIDTH_PX, HEIGHT_PX), fps=FRAMES_A_SECOND, ffmpeg_log_level="error")
     writer.send(None)
