@@ -196,7 +196,7 @@ def accuracy(measured: np.ndarray, predicted: np.ndarray) -> dict[str, float]:
     slope = float((spread * predicted).sum() / (spread**2).sum())
     return {
         "r2": float(1 - (error**2).sum() / (spread**2).sum()),
-        "regression_r2": float(np.corrcoef(measured, predicted)[0, 1] ** 2),
+        "regression_r2": float(np.corrcoef(measured, predicted)[0, 1] ** 2) if np.ptp(predicted) else 0.0,  # the same of all
         "slope": slope,
         "rmse": float(np.sqrt((error**2).mean())),
         "bias": float(error.mean()),

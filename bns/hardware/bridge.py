@@ -5,6 +5,7 @@ from __future__ import annotations
 import termios
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import asdict
 
 import serial
 
@@ -17,9 +18,11 @@ from bns.hardware.bridge_frames import (
     HELLO,
     MOVE,
     NO_ANSWER,
+    POSITION,
     SERVO,
     STATE,
     STOP,
+    STOPPED,
     VERSION,
     Frame,
     decoded,
@@ -34,6 +37,8 @@ from bns.hardware.stop import Stop
 BAUD = 115200
 ATTEMPTS = 6
 _TIMEOUT_S = 0.15
+_STOP_TIMEOUT_S = 0.06
+"""Twelve servos read take 12 ms, one of them silent nine more; the frames 4 ms."""
 _BETWEEN_S = 0.02
 _STARTING_S = 3.0
 
@@ -100,61 +105,67 @@ class BridgeChain:
         return found
 
     def stop(self, patience_s: float = 5.0) -> Stop:
-        """Torque off; confirmed when every servo has read it back, and no joint moves between two looks. Never raises."""
+        """Torque off; confirmed when every servo has read it back, and no joint moves between two looks. Never raises.
+
+        One question does all of it: the bridge takes the torque off again each time, and answers with what it reads back.
+        """
         began_s, acknowledged_s = self._clock.now_s(), None
         places: list[int] = []
         while True:
-            before = places
+            round_s, before = self._clock.now_s(), places
             try:
-                left, places = int.from_bytes(self._ask(STOP, b"", 2), "little"), []
-                problem = f"servos {[i + 1 for i in range(16) if left >> i & 1]} did not stop"
-                if not left:
-                    acknowledged_s = acknowledged_s or self._clock.now_s() - began_s
-                    places, problem = [position for position, *_ in SERVO.iter_unpack(self._state())], "the joints still move"
+                answer = self._ask(STOP, b"", STOPPED + POSITION.size * self.count, 1, _STOP_TIMEOUT_S)
+                left, here = int.from_bytes(answer[:STOPPED], "little"), [p for (p,) in POSITION.iter_unpack(answer[STOPPED:])]
+                places = [] if left else here
+                silent = [i + 1 for i in range(self.count) if left >> i & 1]
+                problem = f"servos {silent} did not stop" if left else "the joints still move"
             except ServoError as error:
                 problem = str(error)
-            lasted_s = self._clock.now_s() - began_s
-            still = bool(places) and len(before) == len(places)
+            now_s = self._clock.now_s()
+            if places and acknowledged_s is None:
+                acknowledged_s = now_s - began_s
+            still = places is not before and len(before) == len(places) > 0
             if still and all(abs(a - b) <= STILL_STEPS for a, b in zip(places, before, strict=True)):
-                return self._stopped(Stop(True, lasted_s, acknowledged_s))
-            if lasted_s > patience_s:
-                return self._stopped(Stop(False, lasted_s, acknowledged_s, problem))
-            self._clock.sleep(_BETWEEN_S)
+                return self._stopped(Stop(True, now_s - began_s, acknowledged_s))
+            if now_s - began_s > patience_s:
+                return self._stopped(Stop(False, now_s - began_s, acknowledged_s, problem))
+            self._clock.sleep(round_s + _BETWEEN_S - now_s)
 
     def _state(self) -> bytes:
         return self._ask(STATE, b"", self.count * SERVO.size)
 
     def _stopped(self, stop: Stop) -> Stop:
-        self._journal.note("stop", confirmed=stop.confirmed, seconds=stop.seconds, problem=stop.problem)
+        self._journal.note("stop", **asdict(stop))
         return stop
 
-    def _ask(self, kind: int, payload: bytes, size: int) -> bytes:
+    def _ask(self, kind: int, payload: bytes, size: int, attempts: int = ATTEMPTS, timeout_s: float = _TIMEOUT_S) -> bytes:
         """Payload of the answer, of that size; asked again when nothing or something else comes."""
         problem = ""
-        for attempt in range(ATTEMPTS):
+        for attempt in range(attempts):
             self.retries += attempt > 0
             self._sequence = (self._sequence + 1) % 256
             try:
-                answer = self._once(Frame(kind, self._sequence, payload))
+                answer = self._once(Frame(kind, self._sequence, payload), timeout_s)
             except (OSError, termios.error, HardwareError) as error:
                 self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             if answer is not None and answer.kind == kind | ANSWER and len(answer.payload) == size:
                 return answer.payload
             problem = "no answer" if answer is None else f"the answer was {answer}"
-        raise ServoError(f"bridge: {problem}; asked {ATTEMPTS} times")
+        raise ServoError(f"bridge: {problem}; asked {attempts} times")
 
     def _lose(self, error: Exception) -> None:
-        self._journal.note("link-lost", port=self._port, error=str(error))
+        if self._serial is not None:  # else it was gone before
+            self._journal.note("link-lost", port=self._port, error=str(error))
         with suppress(OSError, termios.error):
             self.close()
         self._serial = None
 
-    def _once(self, frame: Frame) -> Frame | None:
+    def _once(self, frame: Frame, timeout_s: float) -> Frame | None:
         if self._serial is None:  # it had vanished, and may be back
             self._serial = open_port(self._port, BAUD)
         self._serial.reset_input_buffer()
-        in_vain = self._clock.in_vain(_TIMEOUT_S)
+        in_vain = self._clock.in_vain(timeout_s)
         self._journal.note("sent", data=encoded(frame).hex())
         self._serial.write(encoded(frame))
         data, answer = b"", None
@@ -162,7 +173,7 @@ class BridgeChain:
             data += self._serial.read(max(1, self._serial.in_waiting))
             answer, data = decoded(data)
             if answer is None and in_vain():
-                self._clock.waited(_TIMEOUT_S)
+                self._clock.waited(timeout_s)
                 return None
         self._journal.note("received", data=encoded(answer).hex())
         return answer

@@ -9,7 +9,7 @@ START = 0xA5
 HELLO, ARM, MOVE, STATE, STOP = 1, 2, 3, 4, 5
 ANSWER = 0x80
 REFUSED = 0x7F
-VERSION = 1
+VERSION = 2
 NO_ANSWER = 0x80
 """In a servo's error byte: it did not answer the bridge."""
 TORN_S = 0.05
@@ -21,6 +21,10 @@ GOAL = struct.Struct("<HH")
 """Goal position and moving speed of one servo, in its own units."""
 SERVO = struct.Struct("<HHBBB")
 """Position, load, temperature (°C), voltage (0.1 V) and error byte of one servo."""
+STOPPED = 2
+"""Bytes at the beginning of the answer to a stop: a bit for each servo that was not read back with its torque off."""
+POSITION = struct.Struct("<H")
+"""Where a servo is, after those bytes; 0 of one that was not read."""
 _HEAD, _CRC = 4, 2
 
 

@@ -7,6 +7,7 @@ import struct
 import termios
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import asdict
 
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler
 
@@ -72,10 +73,12 @@ class Ax12Chain:
             number, f"write {name} {value}", lambda: (0, *call(self._port, number, register.address, value)), alarms
         )
 
-    def _checked(self, number: int, what: str, call: Callable[[], tuple[int, int, int]], alarms: bool) -> int:
+    def _checked(
+        self, number: int, what: str, call: Callable[[], tuple[int, int, int]], alarms: bool, attempts: int = ATTEMPTS
+    ) -> int:
         """Value of a call that answers (value, result, error byte); asked again when nothing or nonsense comes."""
         problem = ""
-        for attempt in range(ATTEMPTS):
+        for attempt in range(attempts):
             self.retries += attempt > 0
             try:
                 self._reopen()
@@ -94,7 +97,7 @@ class Ax12Chain:
                     raise ServoError(f"servo {number}: {', '.join(errors_in(bits))}")
                 return value
             problem = problem or str(self._packets.getTxRxResult(result))
-        raise ServoError(f"servo {number}: {what}: {problem}; asked {ATTEMPTS} times")
+        raise ServoError(f"servo {number}: {what}: {problem}; asked {attempts} times")
 
     def close(self) -> None:
         """Give the port free."""
@@ -102,7 +105,8 @@ class Ax12Chain:
             self._port.closePort()
 
     def _lose(self, error: Exception) -> None:
-        self._journal.note("link-lost", port=self._port.port_name, error=str(error))
+        if self._port.is_open:  # else it was gone before
+            self._journal.note("link-lost", port=self._port.port_name, error=str(error))
         with suppress(OSError, termios.error):
             self.close()
         self._port.is_open = False
@@ -164,7 +168,7 @@ class Ax12Chain:
         """One exchange for all of it: the registers stand side by side."""
         return told(self._block(number, "present_position", "present_temperature", alarms))
 
-    def _block(self, number: int, first: str, last: str, alarms: bool = False) -> bytes:
+    def _block(self, number: int, first: str, last: str, alarms: bool = False, attempts: int = ATTEMPTS) -> bytes:
         """The registers from `first` to `last`."""
         start, end = REGISTERS[first].address, REGISTERS[last].address + REGISTERS[last].size
         found: list[bytes] = []
@@ -174,7 +178,7 @@ class Ax12Chain:
             found[:] = [bytes(data)]
             return 0, result if result != COMM_SUCCESS or len(data) == end - start else COMM_RX_CORRUPT, bits
 
-        self._checked(number, f"read {first} to {last}", call, alarms)
+        self._checked(number, f"read {first} to {last}", call, alarms, attempts)
         return found[0]
 
     def recover(self, number: int) -> None:
@@ -183,32 +187,39 @@ class Ax12Chain:
         self.read(number, "present_position")
 
     def stop(self, patience_s: float = 5.0) -> Stop:
-        """Torque off, confirmed by every servo: torque reads 0, and no joint moves from one look to the next. Never raises."""
-        began_s, places = self._clock.now_s(), dict[int, int]()
-        acknowledged_s, self._port.is_using = None, False
-        with suppress(OSError, termios.error):  # to all at once; the rounds below see to those that did not hear it
-            self._reopen()
-            self._packets.write1ByteTxOnly(self._port, BROADCAST, REGISTERS["torque_enable"].address, 0)
+        """Torque off, confirmed by every servo: torque reads 0, and no joint moves from one look to the next. Never raises.
+
+        The order goes to all at once, and again for those that have not confirmed it; each is asked once a round, so that one
+        that is silent holds up nobody's else confirmation.
+        """
+        began_s, acknowledged_s, off = self._clock.now_s(), None, dict[int, int]()
         while True:
-            left = {number: why for number in self.ids if (why := self._not_still(number, places))}
-            lasted_s = self._clock.now_s() - began_s
-            if acknowledged_s is None and len(places) == len(self.ids):
-                acknowledged_s = lasted_s
-            if not left or lasted_s > patience_s:
+            round_s = self._clock.now_s()
+            if len(off) < len(self.ids):
+                self._all_off()
+            left = {number: why for number in self.ids if (why := self._not_still(number, off))}
+            now_s = self._clock.now_s()
+            acknowledged_s = acknowledged_s or (now_s - began_s if len(off) == len(self.ids) else None)
+            if not left or now_s - began_s > patience_s:
                 break
-            self._clock.sleep(_BETWEEN_S)
-        stop = Stop(not left, lasted_s, acknowledged_s, "; ".join(left.values()))
-        self._journal.note("stop", confirmed=stop.confirmed, seconds=stop.seconds, problem=stop.problem)
+            self._clock.sleep(round_s + _BETWEEN_S - now_s)
+        stop = Stop(not left, now_s - began_s, acknowledged_s, "; ".join(left.values()))
+        self._journal.note("stop", **asdict(stop))
         return stop
 
+    def _all_off(self) -> None:
+        """Take the torque off all servos at once; nobody answers that."""
+        self._port.is_using = False
+        with suppress(OSError, termios.error):
+            self._reopen()
+            self._packets.write1ByteTxOnly(self._port, BROADCAST, REGISTERS["torque_enable"].address, 0)
+            self._port.is_using = False
+
     def _not_still(self, number: int, places: dict[int, int]) -> str:
-        """Take the torque off a servo; why it does not stand still yet, or nothing. `places`: where those that are off were."""
+        """Why a servo does not stand still yet, or nothing. `places`: where those whose torque is off were at the last look."""
         try:
-            if number not in places:
-                self.write(number, "torque_enable", 0, alarms=True)
-            block = self._block(number, "torque_enable", "present_position", alarms=True)
+            block = self._block(number, "torque_enable", "present_position", alarms=True, attempts=1)
         except ServoError as error:
-            places.pop(number, None)
             return str(error)
         if block[0]:
             places.pop(number, None)

@@ -39,7 +39,7 @@ class ClockedPort(PortHandler):
 
     def isPacketTimeout(self) -> bool:  # noqa: N802  # the SDK's name
         """Whether to give up."""
-        late = self._late()
-        if self._silent() and not late:
+        if self._silent():
             self._clock.waited(self.packet_timeout / 1000.0)
-        return late or self._silent()
+            return True
+        return self._late()

@@ -6,8 +6,9 @@ with what the robot itself said about its wheels.
 
 from __future__ import annotations
 
+import math
 import re
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Protocol
 
 from bns.errors import HardwareError
@@ -23,6 +24,8 @@ STILL_M_S = 0.005
 """A wheel slower than this stands still: three quanta of the speed reading, and less than half a millimetre to coast."""
 _READINGS = 2
 """The protocol has no checksum: one reading can be garbled into a zero, two in a row hardly."""
+_OBEYS_S = 0.2
+"""An order to stop that shows no effect for so long is given again."""
 HIGHEST_UNITS = 43_000
 """End of the range that the firmware regulates."""
 _FLAT_V = 6.0
@@ -31,8 +34,12 @@ _FLAT_V = 6.0
 class Exchange(Protocol):
     """What the driver asks of a link."""
 
-    def exchange(self, request: bytes) -> bytes:
-        """The line that answers; NoReplyError if none does."""
+    def exchange(self, request: bytes, hurry: bool = False) -> bytes:
+        """The line that answers; NoReplyError if none does in the link's time-out, or in `hurry` in the time that answers use to
+        take, and then one that was late for the question before is an answer too."""
+
+    def forget(self) -> None:
+        """Drop answers that came too late."""
 
 
 @dataclass(frozen=True)
@@ -95,16 +102,23 @@ class KheperaIII:
         return float(f"{whole}.{fraction:0>4}")
 
     def stop(self, patience_s: float = 5.0) -> Stop:
-        """Set both speeds to zero until the robot acknowledges it and reads back still wheels; what came of it."""
-        began_s, acknowledged_s, still = self._clock.now_s(), None, 0
+        """Set both speeds to zero until the robot acknowledges it and reads back still wheels; what came of it. Never raises.
+
+        Nothing is waited for but answers, and for these no longer than they use to take: one that comes later than that still
+        counts. Once acknowledged, the order is given again only if the wheels go on turning: what is lost on the way back takes
+        nothing away from it.
+        """
+        began_s, acknowledged_s, ordered_s, still = self._clock.now_s(), None, -math.inf, 0
+        self._link.forget()
         while True:
             try:
-                if acknowledged_s is None:
-                    self._once(b"D,l0,l0", "d")
-                    acknowledged_s = self._clock.now_s() - began_s
+                if self._clock.now_s() - ordered_s > _OBEYS_S:
+                    self._once(b"D,l0,l0", "d", hurry=True)
+                    ordered_s = self._clock.now_s()
+                    acknowledged_s = acknowledged_s or ordered_s - began_s
                 still, problem = (still + 1 if self._stands() else 0), "the wheels still turn"
             except NoReplyError as error:
-                problem, acknowledged_s, still = str(error), None, 0
+                problem = str(error)
             lasted_s = self._clock.now_s() - began_s
             if still == _READINGS:
                 return self._stopped(Stop(True, lasted_s, acknowledged_s))
@@ -112,11 +126,11 @@ class KheperaIII:
                 return self._stopped(Stop(False, lasted_s, acknowledged_s, problem))
 
     def _stands(self) -> bool:
-        speeds = (int(v) / self.firmware.units_per_m_s for v in self._once(b"E", r"e,(-?\d+),(-?\d+)"))
+        speeds = (int(v) / self.firmware.units_per_m_s for v in self._once(b"E", r"e,(-?\d+),(-?\d+)", hurry=True))
         return max(abs(v) for v in speeds) <= STILL_M_S
 
     def _stopped(self, stop: Stop) -> Stop:
-        self._journal.note("stop", confirmed=stop.confirmed, seconds=stop.seconds, problem=stop.problem)
+        self._journal.note("stop", **asdict(stop))
         return stop
 
     def _ask(self, command: bytes, answer: str) -> tuple[str, ...]:
@@ -130,8 +144,8 @@ class KheperaIII:
                 problem = str(error)
         raise RobotLostError(f"{problem}; asked {ATTEMPTS} times")
 
-    def _once(self, command: bytes, answer: str) -> tuple[str, ...]:
-        line = self._link.exchange(command + b"\n").decode("latin-1")
+    def _once(self, command: bytes, answer: str, hurry: bool = False) -> tuple[str, ...]:
+        line = self._link.exchange(command + b"\n", hurry).decode("latin-1")
         match = re.fullmatch(answer, line)
         if match is None:
             raise NoReplyError(f"the answer to {command.decode()} was {line!r}")

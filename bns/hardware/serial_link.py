@@ -5,7 +5,9 @@ from __future__ import annotations
 import errno
 import os
 import termios
+from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import serial
@@ -17,6 +19,8 @@ from bns.hardware.journal import Journal
 
 _LONGEST_LINE = 256
 _SLICE_S = 0.01
+_REMEMBERED = 20
+"""Answers whose times say what is usual."""
 
 
 class NoReplyError(Exception):
@@ -32,30 +36,49 @@ class SerialLink:
     def __init__(self, port: str, baud: int, clock: Clock, journal: Journal, timeout_s: float = 0.1) -> None:
         self.port, self._baud, self._clock, self._journal = port, baud, clock, journal
         self._timeout_s = timeout_s
+        self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
         self._serial: serial.Serial | None = None
         self._serial = open_port(port, baud)
 
-    def exchange(self, request: bytes) -> bytes:
-        """Send `request`, return the line that answers without its end; NoReplyError if none does."""
-        began_s = self._clock.now_s()
+    def exchange(self, request: bytes, hurry: bool = False) -> bytes:
+        """Send `request`, return the line that answers without its end; NoReplyError if none does in the link's time-out.
+
+        In `hurry` the time-out is what answers use to take, and one that was late for the question before is not thrown away.
+        """
+        began_s, timeout_s = self._clock.now_s(), self._usual_s if hurry else self._timeout_s
         try:
             if self._serial is None:
                 self._serial = open_port(self.port, self._baud)
-            self._serial.reset_input_buffer()  # an answer that came too late belongs to no question
+            if not hurry:
+                self._serial.reset_input_buffer()  # an answer that came too late belongs to no question
             self._journal.note("sent", data=request.decode("latin-1"))
-            in_vain = self._clock.in_vain(self._timeout_s)
+            in_vain = self._clock.in_vain(timeout_s)
             self._serial.write(request)
             line = self._line(in_vain)
         except (serial.SerialException, OSError, termios.error, HardwareError) as error:
             self._lose(error)
-            self._wait_out(began_s)
+            self._wait_out(began_s + timeout_s)
             raise NoReplyError(f"the port {self.port} is gone ({error})") from error
         self._journal.note("received", data=line.decode("latin-1"))
-        late = self._clock.now_s() - began_s > self._timeout_s + _SLICE_S
+        took_s = self._clock.now_s() - began_s
+        late = took_s > timeout_s + _SLICE_S and not hurry
         if late or not line.endswith(b"\n"):
-            self._wait_out(began_s)
-            raise NoReplyError(f"no answer to {request!r} within {self._timeout_s:g} s")
+            self._wait_out(began_s + timeout_s)
+            raise NoReplyError(f"no answer to {request!r} within {timeout_s:.2g} s")
+        if not hurry:
+            self._took_s.append(took_s)
         return line.strip(b"\r\n")
+
+    def forget(self) -> None:
+        """Drop answers that came too late."""
+        with suppress(serial.SerialException, OSError, termios.error):  # then there are none
+            if self._serial is not None:
+                self._serial.reset_input_buffer()
+
+    @property
+    def _usual_s(self) -> float:
+        """After so long an answer is later than all of the last were, by one look at the port."""
+        return min(self._timeout_s, max(self._took_s, default=self._timeout_s) + _SLICE_S)
 
     def _line(self, in_vain: Callable[[], bool]) -> bytes:
         assert self._serial is not None
@@ -64,11 +87,12 @@ class SerialLink:
             line += self._serial.read_until(b"\n", _LONGEST_LINE)
         return line
 
-    def _wait_out(self, began_s: float) -> None:
-        self._clock.waited(began_s + self._timeout_s - self._clock.now_s())
+    def _wait_out(self, until_s: float) -> None:
+        self._clock.waited(until_s - self._clock.now_s())
 
     def _lose(self, error: Exception) -> None:
-        self._journal.note("link-lost", port=self.port, error=str(error))
+        if self._serial is not None:  # else it was gone before
+            self._journal.note("link-lost", port=self.port, error=str(error))
         self.close()
 
     def close(self) -> None:

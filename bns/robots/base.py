@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -74,6 +74,8 @@ class Robot(Protocol):
     """What its simulator can do beyond the source, switched on by ``ROBOT+OPTION`` as its name in a spec."""
     measured_columns: tuple[str, ...]
     """Columns of its table of measurements."""
+    given_columns: Mapping[str, tuple[float, float]]
+    """Columns, SI, of a file of commands to be driven as they are; the lowest and the highest value allowed."""
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """A random population."""
@@ -154,6 +156,9 @@ class Robot(Protocol):
 
     def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
         """Whether the path visits all goals in order, for each of `radii_m`."""
+
+    def given(self, rows: np.ndarray) -> np.ndarray:
+        """Commands (n, components) of rows (n, `given_columns`) within their limits; SpecError for one that is none."""
 
     def driven_ms(self, commands: np.ndarray) -> float:
         """How long these commands drive, in milliseconds."""

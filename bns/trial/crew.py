@@ -22,12 +22,12 @@ _MOST_VOID = 3
 
 
 class Crew:
-    """Implements `bns.trial.loop.Driver`. `start` (3,) is where the task begins."""
+    """Implements `bns.trial.loop.Driver`. `start` (3,) is where the task, or the next drive, begins."""
 
     def __init__(
         self, platform: Platform, operator: Operator, rig: Rig, start: np.ndarray, clock: Clock, journal: Journal
     ) -> None:
-        self._platform, self._operator, self._rig, self._start = platform, operator, rig, start
+        self._platform, self._operator, self._rig, self.start = platform, operator, rig, start
         self._clock, self._journal = clock, journal
         self._began_s = clock.now_s()
         self._first = True
@@ -114,7 +114,7 @@ class Crew:
             if why is None:
                 break
             self._journal.note("placing", why=why)
-            self._operator.place(self._start, why)
+            self._operator.place(self.start, why)
             void, self._first = 0, False
         else:
             raise TrialPausedError(f"the robot could not be brought to its start: {self._misplaced(0)}")
@@ -124,10 +124,10 @@ class Crew:
         pose = self._platform.pose()
         if pose is None:
             return "The tracker does not see the robot"
-        off_m = float(np.hypot(*(pose[:2] - self._start[:2])))
+        off_m = float(np.hypot(*(pose[:2] - self.start[:2])))
         if off_m > self._rig.placed_within_m:
             return f"The robot stands {100 * off_m:.0f} cm from its start"
-        off_rad = abs(math.remainder(pose[2] - self._start[2], 2.0 * math.pi))
+        off_rad = abs(math.remainder(pose[2] - self.start[2], 2.0 * math.pi))
         if off_rad > self._rig.placed_within_rad:
             return f"The robot is turned by {math.degrees(off_rad):.0f}° from its start"
         return "The drive came to nothing" if void else None

@@ -7,62 +7,107 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bns.errors import HardwareError
+from bns.errors import HardwareError, SpecError
+from bns.hardware.rig import surface_text
 from bns.hardware.safety import Stopping
 from bns.measurements import write_measurements
 from bns.robots import load_robot
-from bns.robots.base import on_floor
-from bns.robots.khepera import UNITS_PER_M_S
+from bns.robots.base import Robot, on_floor
 from bns.trial.crew import Crew
-from bns.trial.folder import JOURNAL, MEASUREMENTS, measured
+from bns.trial.folder import JOURNAL, MEASUREMENTS, forget_unless, measured, past_evaluations
 from bns.trial.session import Set, staged
 
-COLUMNS = ("trial", "left_m_s", "right_m_s", "duration_s")
-_FASTEST_M_S, _LONGEST_S = 0.3, 60.0
+_START = ("start_x_m", "start_y_m", "start_heading_rad")
 
 
-def read_commands(path: Path) -> list[np.ndarray]:
-    """Controllers (n, 3) in the robot module's units, one a trial, of a CSV file with `COLUMNS`; HardwareError if it is none."""
+def read_commands(path: Path, robot: Robot) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Controllers (n, components) in the robot's units, one a trial, each with the pose (3,) that it starts from, of a CSV file
+    with `trial`, the robot's `given_columns` and perhaps the start; HardwareError if it is none."""
+    limits = robot.given_columns
+    columns = ("trial", *limits)
     try:
         table = pd.read_csv(path)
     except (OSError, ValueError) as error:
-        raise HardwareError(f"cannot read the commands {path}: {error}. It is a CSV file with {', '.join(COLUMNS)}.") from error
-    missing = [name for name in COLUMNS if name not in table.columns]
+        raise HardwareError(f"cannot read the commands {path}: {error}. It is a CSV file with {', '.join(columns)}.") from error
+    missing = [name for name in columns if name not in table.columns]
     if missing:
-        raise HardwareError(f"{path} lacks the column {', '.join(missing)}; it needs {', '.join(COLUMNS)}.")
-    numbers = table[list(COLUMNS)].apply(pd.to_numeric, errors="coerce")
-    good = np.isfinite(numbers).all(axis=1) & (numbers[["left_m_s", "right_m_s"]].abs() <= _FASTEST_M_S).all(axis=1)
-    good &= (numbers["duration_s"] > 0) & (numbers["duration_s"] <= _LONGEST_S)
+        raise HardwareError(
+            f"{path} lacks the column {', '.join(missing)}; commands of a {robot.name} need {', '.join(columns)}."
+        )
+    numbers = table[list(columns)].apply(pd.to_numeric, errors="coerce")
+    good = np.isfinite(numbers).all(axis=1)
+    for name, (low, high) in limits.items():
+        good &= numbers[name].between(low, high)
     if not len(table) or not good.all():
         line = int(np.argmin(good)) + 2 if len(table) else 2
-        raise HardwareError(
-            f"line {line} of {path} is no command: speeds are from -{_FASTEST_M_S:g} to {_FASTEST_M_S:g} m/s, durations above 0 "
-            f"and up to {_LONGEST_S:g} s."
-        )
-    scale = np.array([UNITS_PER_M_S, UNITS_PER_M_S, 1000.0])
-    return [group[list(COLUMNS[1:])].to_numpy() * scale for _, group in numbers.groupby("trial", sort=True)]
+        allowed = ", ".join(f"{name} {low:.4g} to {high:.4g}" for name, (low, high) in limits.items())
+        raise HardwareError(f"line {line} of {path} is no command of a {robot.name}; allowed is {allowed}.")
+    starts = _starts(path, table, robot)
+    try:
+        return [
+            (robot.given(group[list(limits)].to_numpy()), starts[int(group.index[0])])
+            for _, group in numbers.groupby("trial", sort=True)
+        ]
+    except SpecError as error:
+        raise HardwareError(f"{path}: {error}.") from error
+
+
+def _starts(path: Path, table: pd.DataFrame, robot: Robot) -> np.ndarray:
+    """A start (3,) a row: what the file says, or the robot's own."""
+    if not set(_START) <= set(table.columns):
+        return np.tile(on_floor(robot, robot.start_pose())[0], (len(table), 1))
+    starts: np.ndarray = table[list(_START)].apply(pd.to_numeric, errors="coerce").to_numpy(np.float64)
+    if not np.isfinite(starts).all():
+        line = int(np.argmin(np.isfinite(starts).all(axis=1))) + 2
+        raise HardwareError(f"line {line} of {path} has no number for each of {', '.join(_START)}; write them, or leave all out.")
+    return starts
 
 
 def drive_commands(path: Path, how: Set, results: Path, seed: int) -> str:
-    """Drive every trial of a file from the start; measurements beside the journal; the report in words."""
-    if how.rig.robot != "khepera":
-        raise HardwareError(f"given commands are driven by a khepera, not by a {how.rig.robot}.")
-    trials = read_commands(path)
+    """Drive every trial of a file, or those that are left of them; measurements beside the journal; the report in words."""
+    robot = load_robot(how.rig.robot)
+    trials = read_commands(path, robot)
     folder = results / "trials" / f"experiment-{path.stem}{'-emulated' if how.emulated else ''}"
     journal = folder / JOURNAL
-    if journal.exists():
-        raise HardwareError(f"there is an experiment in {folder} already; move it away or rename {path}.")
-    robot = load_robot(how.rig.robot)
-    start = on_floor(robot, robot.start_pose())[0]
-    with Stopping() as stopping, staged(how, seed, journal, stopping) as stage:
-        crew = Crew(stage.platform, stage.operator, how.rig, start, stage.clock, stage.journal)
-        try:
-            for number, commands in enumerate(trials, 1):
+    done = _driven_before(journal, [commands for commands, _ in trials], how.resume)
+    for _, (x_m, y_m, _heading) in trials:
+        if not how.rig.limits.surface.holds(x_m, y_m):
+            raise HardwareError(
+                f"{path} starts a trial at ({x_m:.2f}, {y_m:.2f}) m, off the surface {surface_text(how.rig.limits.surface)}; "
+                "change the start, or surface_m in the rig."
+            )
+    try:
+        with Stopping() as stopping, staged(how, seed, journal, stopping) as stage:
+            crew = Crew(stage.platform, stage.operator, how.rig, trials[0][1], stage.clock, stage.journal)
+            for number, (commands, start) in enumerate(trials[done:], done + 1):
+                crew.start = start
                 crew.evaluate(number, commands)
-        finally:
-            stage.journal.sync()
-            table = measured(journal)
-            if len(table):
-                write_measurements(table, folder / MEASUREMENTS)
+    except HardwareError:
+        forget_unless(journal, "driven")
+        raise
+    finally:
+        table = measured(journal) if journal.exists() else pd.DataFrame()
+        if len(table):
+            write_measurements(table, folder / MEASUREMENTS, robot.measured_columns)
     ended = f"; {len(crew.ends)} ended early" if crew.ends else ""
     return f"{len(trials)} trials driven{ended}; {len(table)} rows of measurements in {folder / MEASUREMENTS}"
+
+
+def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int:
+    """How many of the trials are in the journal already; HardwareError if they should not be, or are others."""
+    if not journal.exists():
+        if resume:
+            raise HardwareError(f"there is nothing to go on with: no journal in {journal.parent}. Begin without --resume.")
+        return 0
+    if not resume:
+        raise HardwareError(
+            f"there is an experiment in {journal.parent} already; go on with --resume, move it away or rename the commands' file."
+        )
+    past = past_evaluations(journal)
+    same = len(past) <= len(trials) and all(
+        one.picked.shape == asked.shape and np.allclose(one.picked, asked, rtol=1e-5)
+        for one, asked in zip(past, trials, strict=False)
+    )
+    if not same:
+        raise HardwareError(f"{journal} drove other commands than the file holds now; rename the file to begin with it afresh.")
+    return len(past)

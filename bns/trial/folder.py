@@ -111,6 +111,12 @@ def measured(journal: Path) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 
+def forget_unless(journal: Path, kind: str) -> None:
+    """Remove a journal without an event of that kind: nothing has come of it, and the next attempt is no second one."""
+    if journal.exists() and f'"kind":"{kind}"' not in journal.read_text(encoding="utf-8"):
+        journal.unlink()
+
+
 def spec_event(spec: RunSpec) -> dict:
     """What the first line of a journal holds."""
     return dict(json.loads(spec.canonical_json()))

@@ -25,7 +25,7 @@ from bns.single import keep_run, live_view
 from bns.spec import RunSpec
 from bns.tasks import load_task
 from bns.trial.crew import Crew
-from bns.trial.folder import TrialFolder, spec_event
+from bns.trial.folder import TrialFolder, forget_unless, spec_event
 from bns.trial.loop import Trial, TrialResult
 from bns.trial.operator import AtTheTerminal, EmulatedHands, Nobody, Operator
 from bns.trial.report import report
@@ -104,7 +104,7 @@ def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: l
             stage.journal.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
-            _forget_if_empty(folder)
+            forget_unless(folder.journal, "trial")
         raise
     except BaseException:
         folder.write_measurements()
@@ -121,11 +121,6 @@ def _figures(spec: RunSpec, results: Path, folder: TrialFolder) -> str:
     except BnsError as error:  # the package was installed without them: the trial is none the worse for it
         complaint = str(error)
     return f"figures: {page / 'index.html'}" if not complaint else f"no figures: {complaint}"
-
-
-def _forget_if_empty(folder: TrialFolder) -> None:
-    if folder.journal.exists() and '"kind":"trial"' not in folder.journal.read_text(encoding="utf-8"):
-        folder.journal.unlink()
 
 
 def _kept(

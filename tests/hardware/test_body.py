@@ -5,6 +5,7 @@ import pytest
 
 from bns.engine.philox import Key
 from bns.hardware.emulators.body import DifferentialBody
+from bns.hardware.emulators.braking import FULL_VOLTAGE_M_S, Braking, motor_tau_s
 from bns.physics.differential_drive import simulate
 from bns.physics.model import load_model
 
@@ -44,14 +45,49 @@ def test_after_a_rest_a_drive_is_the_same_from_another_place():
     np.testing.assert_allclose(drive(body, begin_s=20.0), first, atol=1e-9)
 
 
-def test_memory_of_old_orders_is_dropped_only_at_rest():
+def test_it_drives_on_from_where_it_came_to_rest():
     body = quiet()
     body.order(0.1, 0.1, 0.0)
     body.order(0.0, 0.0, 1.0)
+    body.order(0.0, 0.0, 1.05)  # told again while it brakes: that changes nothing
     rolled = body.pose(1.5)
     body.order(0.1, 0.1, 10.0)
-    assert rolled[1] < body.pose(10.0)[1] + 1e-4
+    np.testing.assert_array_equal(rolled, body.pose(10.0))
     assert body.pose(11.0)[1] - body.pose(10.0)[1] == pytest.approx(0.09, abs=0.005)
+
+
+def test_an_order_to_stand_is_forgotten_by_a_later_order():
+    stopped, driven = quiet(), quiet()
+    for body in (stopped, driven):
+        body.order(0.1, 0.1, 0.0)
+    stopped.order(0.0, 0.0, 1.0)
+    for body in (stopped, driven):
+        body.order(0.1, 0.1, 1.01)  # before the first has reached the wheels
+    np.testing.assert_allclose(stopped.pose(2.0), driven.pose(2.0), atol=1e-9)
+
+
+@pytest.mark.parametrize("speeds", [(0.208, 0.208), (0.208, 0.05), (-0.1, 0.15), (0.0, 0.0)])
+def test_wheels_brake_as_a_motor_with_its_voltage_against_it(speeds):
+    """The closed form against small steps of dw/dt = -(v + w)/tau."""
+    tau_s, dt_s = motor_tau_s(0.08), 1e-5
+    braking = Braking(3.0, np.array(NORTH), np.array(speeds), 0.0884, tau_s)
+    pose, wheels = np.array(NORTH), np.array(speeds)
+    for step in range(15_000):
+        if step == 5000:
+            np.testing.assert_allclose(braking.pose_at(3.0 + step * dt_s), pose, atol=3e-4)
+        left, right = wheels * dt_s
+        pose = pose + np.array([np.cos(pose[2]), np.sin(pose[2]), 0.0]) * (left + right) / 2 + [0, 0, (right - left) / 0.0884]
+        wheels = np.sign(wheels) * np.maximum(np.abs(wheels) - (FULL_VOLTAGE_M_S + np.abs(wheels)) / tau_s * dt_s, 0.0)
+    np.testing.assert_allclose(braking.pose_at(9.0), pose, atol=3e-4)
+
+
+def test_from_full_speed_a_wheel_stands_after_half_the_time_that_it_took_to_speed_up():
+    body = quiet()
+    body.order(0.208, 0.208, 0.0)
+    body.order(0.0, 0.0, 2.0)
+    assert body.wheel_speeds_m_s(2.02)[0] == pytest.approx(0.208, rel=0.03)
+    assert body.wheel_speeds_m_s(2.12)[0] > 0.01
+    assert body.wheel_speeds_m_s(2.17) == (0.0, 0.0)
 
 
 def test_jitter_is_drawn_by_key():

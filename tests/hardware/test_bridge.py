@@ -100,6 +100,25 @@ def test_stop_is_read_back(bridge):
     assert not any(s.get("torque_enable") for s in emulator.servos)
 
 
+def test_a_stop_waits_for_joints_that_are_turned(bridge, clock):
+    driver, emulator = bridge()
+    driver.arm()
+    driver.move([1.0] * 3, [1.0] * 3)
+    clock.sleep(0.2)
+    servo, real = emulator.servos[1], emulator.servos[1].update
+    until_s = clock.now_s() + 0.3
+
+    def sinking():
+        real()
+        servo.put("present_position", 512 + max(0, round(1000 * (until_s - clock.now_s()))))
+
+    servo.update = sinking
+    stop = driver.stop()
+    assert stop.confirmed
+    assert 0.3 < stop.seconds < 0.4
+    assert stop.acknowledged_s < 0.05
+
+
 def test_a_silent_servo_is_not_stopped(bridge):
     driver, _ = bridge(Fault("silent-servo", at_s=0.0, for_s=1e9, servo=2))
     stop = driver.stop(patience_s=0.5)
@@ -114,9 +133,12 @@ def test_alarms_are_errors(bridge, clock):
         driver.health()
 
 
-def test_other_bridges_are_refused(bridge):
-    with pytest.raises(HardwareError, match="has found 2 servos; version 1 and 3 servos are needed"):
+def test_other_bridges_are_refused(bridge, monkeypatch):
+    with pytest.raises(HardwareError, match="has found 2 servos; version 2 and 3 servos are needed"):
         bridge(count=2)
+    monkeypatch.setattr("bns.hardware.emulators.bridge.VERSION", 1)
+    with pytest.raises(HardwareError, match=r"speaks version 1 .*Load the sketch of this bns"):
+        bridge()
 
 
 def test_nonsense_is_refused_by_the_bridge(bridge):

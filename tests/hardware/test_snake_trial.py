@@ -1,5 +1,6 @@
 """The snake on its emulated rig: drives against the physics model, whole trials, what goes wrong."""
 
+import re
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from bns.hardware.snake_settings import snake_settings
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 from bns.robots import load_robot
+from bns.robots.snake.table import GAIT
 from bns.trial.folder import measured, past_evaluations
 
 from . import soak
@@ -37,9 +39,10 @@ def rigged(tmp_path, clock):
     """rigged(*faults, **driver) -> platform, emulation, journal."""
     opened = []
 
-    def build(*faults, stopping=None, **driver):
+    def build(*faults, stopping=None, lost_s=None, **driver):
         rig = shipped_rig("snake")
-        rig = replace(rig, driver={**rig.driver, **driver})
+        limits = replace(rig.limits, lost_s=lost_s or rig.limits.lost_s)
+        rig = replace(rig, driver={**rig.driver, **driver}, limits=limits)
         emulation = snake.emulate(rig, Path(tempfile.mkdtemp(dir=tmp_path)), clock, FaultPlan(faults, 1), 0)
         opened.append(emulation)
         journal = Journal(tmp_path / f"snake{len(opened)}.jsonl", clock)
@@ -84,7 +87,7 @@ def test_an_emulated_drive_is_that_of_the_physics_model(rigged, wiring):
 
 
 def test_a_robot_that_rolls_over_is_stopped_and_its_cycle_is_unstable(rigged):
-    on = rigged()
+    on = rigged(lost_s=2.5)  # long enough to go over, not only to hide a marker on the way
     driven = on.platform.drive(np.array([GENTLE, ROLLING, GENTLE], np.float32))
     assert "has not seen the robot" in driven.ended
     assert driven.poses[:, 8].tolist() == [1.0, 1.0, 0.0]
@@ -193,6 +196,37 @@ def test_from_command_to_table_and_replay(tmp_path, capsys):
     first, again = (rows[rows["sweep"] == s].reset_index(drop=True) for s in ("trials-emulated", "trials-replayed"))
     same = [c for c in rows.columns if c not in {"run_id", "sweep"} and not c.endswith("_s")]
     pd.testing.assert_frame_equal(first[same], again[same])
+
+
+def test_given_cycles_are_driven_and_held_against_a_model(tmp_path, capsys):
+    file = tmp_path / "cycles.csv"
+    row = ",".join(str(v) for v in GENTLE[:4])
+    file.write_text(f"trial,a_lat_rad,a_vert_rad,omega_rad,alpha_rad\n1,{row}\n1,{row}\n2,{row}\n")
+    asked = ["trial", "--robot", "snake", "--emulated", "--yes", "--speed", "inf", "--results", tmp_path, "--commands", file]
+    assert call(*asked) == 0
+    assert "2 trials driven" in capsys.readouterr().out
+    found = tmp_path / "trials" / "experiment-cycles-emulated" / "measurements.csv"
+    table = pd.read_csv(found)
+    assert table.groupby("trial")["cycle"].max().to_dict() == {1: 2, 2: 1}
+    np.testing.assert_allclose(table[list(GAIT)].dropna().drop_duplicates(), [GENTLE[:4]], atol=1e-6)
+    assert call("compare", found, "--model", "snake") == 0
+    assert "2 trials, 6 tracked poses, model snake" in capsys.readouterr().out  # a begin and an end of each cycle
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("1,0.5,0.1,0.6", "lacks the column alpha_rad"),
+        ("1,0.5,0.1,0.6,9", "line 2 of .* is no command of a snake; allowed is a_lat_rad 0 to 1.571"),
+        ("1,0.5,0.6,0.6,0", "a_vert_rad must be below its a_lat_rad"),
+    ],
+)
+def test_cycles_that_are_none_are_named_before_anything_moves(tmp_path, capsys, row, message):
+    file, names = tmp_path / "bad.csv", ["trial", "a_lat_rad", "a_vert_rad", "omega_rad", "alpha_rad"]
+    file.write_text(",".join(names[: row.count(",") + 1]) + f"\n{row}\n")
+    assert call("trial", "--robot", "snake", "--emulated", "--results", tmp_path, "--commands", file) == 2
+    assert re.search(message, capsys.readouterr().err)
+    assert not (tmp_path / "trials").exists()
 
 
 def test_a_pause_is_gone_on_with(tmp_path, capsys):

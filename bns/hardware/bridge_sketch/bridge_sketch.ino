@@ -7,17 +7,17 @@
 
 const uint8_t DIRECTION = 2;
 const uint8_t MOST_SERVOS = 16;
-const uint8_t VERSION = 1;
+const uint8_t VERSION = 2;
 const uint32_t WATCHDOG_MS = 500, TORN_MS = 50, RAMP_MS = 50, ANSWER_US = 3000;
 
 const uint8_t START = 0xA5, HELLO = 1, ARM = 2, MOVE = 3, STATE = 4, STOP = 5, ANSWER = 0x80, REFUSED = 0xFF;
 const uint8_t NO_ANSWER = 0x80;  // in a servo's error byte
 
 // Control table of the AX-12.
-const uint8_t ANGLE_LIMITS = 6, TORQUE_ENABLE = 24, GOAL = 30, TORQUE_LIMIT = 34, POSITION = 36, MOVING = 46;
+const uint8_t ANGLE_LIMITS = 6, TORQUE_ENABLE = 24, GOAL = 30, TORQUE_LIMIT = 34, POSITION = 36;
 const uint8_t PING = 1, READ = 2, WRITE = 3, BROADCAST = 254, RAMP_STEPS = 4, TRIES = 3;
 
-uint8_t frame[4 + 255 + 2], servos = 0, ramp = RAMP_STEPS;
+uint8_t frame[4 + 255 + 2], back[7 * MOST_SERVOS], servos = 0, ramp = RAMP_STEPS;
 uint16_t held = 0, low[MOST_SERVOS], high[MOST_SERVOS], torque = 0;
 uint32_t heardMs = 0, byteMs = 0, rampMs = 0;
 bool armed = false;
@@ -101,20 +101,22 @@ void scan() {
   }
 }
 
-// Torque off; a bit for each servo that does not say that it is off and not moving.
-uint16_t stopAll() {
+// Torque off. Into `back`: a bit for each servo that does not say that it is off, and where the servos are (0: not read).
+void stopAll() {
   const uint8_t off[] = {TORQUE_ENABLE, 0};
   uint16_t left = 0;
   armed = false;
   ramp = RAMP_STEPS;
   say(BROADCAST, WRITE, off, 2);
   for (uint8_t i = 0; i < servos; i++) {
-    uint8_t on, moving;
-    bool good = write8(i + 1, TORQUE_ENABLE, 0) && readTable(i + 1, TORQUE_ENABLE, &on, 1) >= 0;
-    good = good && readTable(i + 1, MOVING, &moving, 1) >= 0;
-    if (!good || on || moving) left |= (uint16_t)1 << i;
+    uint8_t now[POSITION + 2 - TORQUE_ENABLE] = {0};  // one question for both: torque first, position last
+    bool good = readTable(i + 1, TORQUE_ENABLE, now, sizeof now) >= 0;
+    if (good && now[0]) write8(i + 1, TORQUE_ENABLE, 0);  // it did not hear the order to all; read back the next time
+    if (!good || now[0]) left |= (uint16_t)1 << i;
+    memcpy(back + 2 + 2 * i, now + sizeof now - 2, 2);
   }
-  return left;
+  back[0] = left;
+  back[1] = left >> 8;
 }
 
 // Torque grows in steps, so that nothing jerks; goals are where the joints are.
@@ -157,7 +159,6 @@ void answer(uint8_t kind, uint8_t sequence, const uint8_t *payload, uint8_t coun
 
 // Answers a question; false if it makes no sense or a servo did not take it.
 bool understood(uint8_t kind, uint8_t sequence, uint8_t *payload, uint8_t count) {
-  static uint8_t back[7 * MOST_SERVOS];
   if (kind == HELLO && count == 0) {
     if (!armed) scan();
     const uint8_t who[] = {VERSION, servos};
@@ -183,9 +184,8 @@ bool understood(uint8_t kind, uint8_t sequence, uint8_t *payload, uint8_t count)
     }
     answer(kind | ANSWER, sequence, back, 7 * servos);
   } else if (kind == STOP && count == 0) {
-    const uint16_t left = stopAll();
-    const uint8_t bits[] = {(uint8_t)left, (uint8_t)(left >> 8)};
-    answer(kind | ANSWER, sequence, bits, 2);
+    stopAll();
+    answer(kind | ANSWER, sequence, back, 2 + 2 * servos);
   } else {
     return false;
   }

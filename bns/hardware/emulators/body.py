@@ -1,7 +1,8 @@
 """The body of an emulated two-wheeled robot: the physics model, moved by whatever speeds were set, whenever they were.
 
 All of the drive since it was put down is integrated at once by the code of the physics world, so that an emulated trial
-and that world cannot disagree about physics.
+and that world cannot disagree about physics. How the robot comes to rest at the end is beyond that world, whose drives end with
+their last command: there the wheels brake as `braking` says.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ import threading
 import numpy as np
 
 from bns.engine.philox import Key, Purpose, normals
+from bns.hardware.emulators.braking import Braking, motor_tau_s
 from bns.physics.differential_drive import observe, track
 from bns.physics.model import Model
 
 _STEP_S = 0.01
 _AHEAD_S = 4.0
-_REST_S = 2.0  # all effects with a memory have settled
 
 
 class DifferentialBody:
@@ -24,11 +25,15 @@ class DifferentialBody:
 
     def __init__(self, model: Model, key: Key, start: tuple[float, float, float]) -> None:
         self.model, self._key = model, key
+        self._delay_s = model.values_of("command-delay")["delay_s"]
+        self._tau_s = motor_tau_s(model.values_of("motor-lag")["tau_s"])
         self._lock = threading.Lock()
+        self._stop_s: float | None = None
+        """When an order to stand reaches the wheels; they brake from then on."""
+        self._braking: Braking | None = None
         self._orders = 0
-        self._looks = 0
         self.put_down(start, 0.0)
-        self.order(0.0, 0.0, 0.0)  # compiles what is not compiled yet, before anybody waits for an answer
+        self.order(0.1, 0.1, 0.0)  # compiles what is not compiled yet, before anybody waits for an answer
         self.wheel_speeds_m_s(0.0)
         self.put_down(start, 0.0)
 
@@ -38,11 +43,15 @@ class DifferentialBody:
             self._restart(np.asarray(pose, np.float64), t_s)
 
     def order(self, left_m_s: float, right_m_s: float, t_s: float) -> None:
-        """Wheel speeds from now on."""
+        """Wheel speeds from now on; both 0 is an order to stand."""
         with self._lock:
-            if self._at_rest(t_s):
-                self._restart(self._at(t_s)[:3], t_s)
             self._orders += 1
+            if left_m_s == right_m_s == 0.0:
+                self._stop_s = t_s + self._delay_s if self._stop_s is None else self._stop_s
+                return
+            if self._stop_s is not None and t_s > self._stop_s:
+                self._restart(self._at(t_s), t_s)
+            self._stop_s = None
             jitter = normals(self._key, Purpose.WORLD_EVALUATED, self._orders, 1, 1)[0, 0, :2]
             speeds = np.array([left_m_s, right_m_s]) * (1.0 + self.model.jitter_relative * jitter)
             self._segments.append((max(t_s, self._segments[-1][0]), *speeds))
@@ -51,7 +60,7 @@ class DifferentialBody:
     def pose(self, t_s: float) -> np.ndarray:
         """True pose (3,): x_m, y_m, heading_rad, unwrapped."""
         with self._lock:
-            return self._at(t_s)[:3]
+            return self._at(t_s)
 
     def seen(self, t_s: float) -> np.ndarray:
         """Pose of what a tracker looks at: with the model's effects on measurements (an offset marker, say), without noise."""
@@ -60,7 +69,10 @@ class DifferentialBody:
     def wheel_speeds_m_s(self, t_s: float) -> tuple[float, float]:
         """Speeds of the wheels over the ground, m/s."""
         with self._lock:
-            before, now = self._at(t_s - _STEP_S), self._at(t_s)
+            return self._speeds_between(self._at(t_s - _STEP_S), self._at(t_s))
+
+    def _speeds_between(self, before: np.ndarray, now: np.ndarray) -> tuple[float, float]:
+        """Of the wheels, from one pose to that a step later."""
         ahead = np.array([np.cos(now[2]), np.sin(now[2])]) @ (now[:2] - before[:2]) / _STEP_S
         half_turn = (now[2] - before[2]) / _STEP_S * self.model.wheelbase_m / 2.0
         return float(ahead - half_turn), float(ahead + half_turn)
@@ -69,12 +81,18 @@ class DifferentialBody:
         self._pose0, self._t0_s = pose, t_s
         self._segments: list[tuple[float, float, float]] = [(t_s, 0.0, 0.0)]
         self._samples = np.empty((0, 3))
-
-    def _at_rest(self, t_s: float) -> bool:
-        since_s, left, right = self._segments[-1]
-        return left == 0.0 and right == 0.0 and t_s - since_s > _REST_S
+        self._stop_s, self._braking = None, None
 
     def _at(self, t_s: float) -> np.ndarray:
+        if self._stop_s is None or t_s <= self._stop_s:
+            return self._driven(t_s)
+        if self._braking is None:
+            speeds = np.array(self._speeds_between(self._driven(self._stop_s - _STEP_S), self._driven(self._stop_s)))
+            self._braking = Braking(self._stop_s, self._driven(self._stop_s), speeds, self.model.wheelbase_m, self._tau_s)
+        return self._braking.pose_at(t_s)
+
+    def _driven(self, t_s: float) -> np.ndarray:
+        """Pose (3,) by the orders to drive alone."""
         after_s = max(t_s - self._t0_s, 0.0)
         if after_s >= (len(self._samples) - 1) * _STEP_S:
             self._samples = self._integrated(after_s + _AHEAD_S)

@@ -12,10 +12,12 @@ from bns.hardware.bridge_frames import (
     HELLO,
     MOVE,
     NO_ANSWER,
+    POSITION,
     REFUSED,
     SERVO,
     STATE,
     STOP,
+    STOPPED,
     TORN_S,
     VERSION,
     WATCHDOG_S,
@@ -27,7 +29,10 @@ from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.faults import Faults
 from bns.hardware.emulators.servo import Servo
 
-_LATENCY_S = 0.004
+_LATENCY_S = 0.002
+_BYTE_S = 10 / 115_200
+_SERVO_S = 0.001
+"""To ask one of the servos something: some twenty bytes at 1 Mbaud, and the time after which a servo answers by default."""
 
 
 class BridgeEmulator:
@@ -43,7 +48,7 @@ class BridgeEmulator:
             ARM: self._arm,
             MOVE: self._move,
             STATE: lambda _p: b"".join(self._state(s) for s in self.servos),
-            STOP: lambda _p: self._stop().to_bytes(2, "little"),
+            STOP: lambda _p: self._stop(),
         }
         self.cut_line: Callable[[float], None] = lambda _seconds: None
         clock.listeners.append(self.moved_on)
@@ -78,11 +83,10 @@ class BridgeEmulator:
             for servo in self.servos:
                 servo.update()
             payload = self._answers.get(frame.kind, lambda _p: None)(frame.payload)
-            self._clock.sleep(_LATENCY_S)
-            if self._faults.strikes("lost-reply", now_s):
-                return self._nothing()
             kind = REFUSED if payload is None else frame.kind
-            return encoded(Frame(kind | ANSWER, frame.sequence, payload or b""))
+            answer = encoded(Frame(kind | ANSWER, frame.sequence, payload or b""))
+            self._clock.sleep(_LATENCY_S + (len(data) + len(answer)) * _BYTE_S + len(self.servos) * _SERVO_S)
+            return self._nothing() if self._faults.strikes("lost-reply", now_s) else answer
 
     def _nothing(self) -> bytes:
         self._clock.fell_silent()
@@ -114,14 +118,14 @@ class BridgeEmulator:
         names = ("present_position", "present_load", "present_temperature", "present_voltage")
         return SERVO.pack(*(servo.get(name) for name in names), servo.errors())
 
-    def _stop(self) -> int:
-        """Torque off; bits of the servos that are not off, or silent."""
-        left, self._armed = 0, False
+    def _stop(self) -> bytes:
+        """Torque off; bits of the servos that are silent and so may not be, and where each of the others is."""
+        left, places, self._armed = 0, b"", False
         for place, servo in enumerate(self.servos):
             if self._faults.strikes("silent-servo", self._clock.now_s(), servo.get("id")):
-                left |= 1 << place
+                left, places = left | 1 << place, places + POSITION.pack(0)
                 continue
             servo.put("torque_enable", 0)
             servo.update()
-            left |= servo.get("moving") << place
-        return left
+            places += POSITION.pack(servo.get("present_position"))
+        return left.to_bytes(STOPPED, "little") + places

@@ -38,7 +38,10 @@ class Camera(Protocol):
 
 
 class StreamCamera:
-    """Any camera or stream that `cv2.VideoCapture` opens: a number, a device file, an address."""
+    """Any camera or stream that `cv2.VideoCapture` opens: a number, a device file, an address.
+
+    A picture that is the one before to the last bit is none: sensors are never that still, but a camera that hangs is.
+    """
 
     def __init__(self, source: str, clock: Clock) -> None:
         self._clock, self._source = clock, source
@@ -71,7 +74,8 @@ class StreamCamera:
             if not good:  # unplugged: the last frame must not be taken for a new one
                 self._frame = None
                 break
-            self._frame = Frame(self._clock.now_s(), picture)
+            if self._frame is None or not np.array_equal(picture, self._frame.picture):
+                self._frame = Frame(self._clock.now_s(), picture)
             self._arrived.set()
             self._clock.arrived()
         self._capture.release()

@@ -6,7 +6,7 @@ Device units: wheel speeds in the firmware's units (144.01 units per mm/s before
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -47,6 +47,9 @@ class Khepera:
     bounds = CommandBounds(LOW, HIGH, np.array([2000.0, 2000.0, 400.0], np.float32))
     command_columns = ("left_units", "right_units", "duration_ms")
     measured_columns = COLUMNS
+    given_columns: Mapping[str, tuple[float, float]] = {
+        "left_m_s": (-0.3, 0.3), "right_m_s": (-0.3, 0.3), "duration_s": (0.001, 60.0),
+    }  # fmt: skip
     options: tuple[str, ...] = ()
 
     def with_options(self, names: tuple[str, ...]) -> Khepera:
@@ -169,6 +172,10 @@ class Khepera:
     def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
         """Whether all goals are visited in order, within each radius."""
         return tuple(_visited(poses, task.goals_m, radius) == len(task.goals_m) for radius in self.radii_m)
+
+    def given(self, rows: np.ndarray) -> np.ndarray:
+        """In the firmware's units and ms."""
+        return rows * np.array([UNITS_PER_M_S, UNITS_PER_M_S, 1000.0])
 
     def driven_ms(self, commands: np.ndarray) -> float:
         """Sum of the durations."""

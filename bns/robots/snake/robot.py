@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ import pandas as pd
 from bns.engine.evolution import Population, diversity
 from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import predict
+from bns.errors import SpecError
 from bns.robots.base import Luck, Recipe, Scores, turned
 from bns.robots.snake import cycles, path, posture, table
 from bns.robots.snake.rollout import evaluate
@@ -44,6 +45,9 @@ class Snake:
     bounds = cycles.BOUNDS
     command_columns = cycles.COLUMNS
     measured_columns = table.COLUMNS
+    given_columns: Mapping[str, tuple[float, float]] = {
+        name: (float(low), float(high)) for name, low, high in zip(table.GAIT, bounds.low, bounds.high, strict=False)
+    }
 
     def __init__(self, switched_on: tuple[str, ...] = ()) -> None:
         self.with_changes, self.rigid = "changes" in switched_on, "rigid" in switched_on
@@ -195,6 +199,12 @@ class Snake:
     def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
         """Empty: regions have no radius."""
         return ()
+
+    def given(self, rows: np.ndarray) -> np.ndarray:
+        """A cycle a row, driven once; SpecError where one would lift the body higher than it bends."""
+        if ((rows[:, 1] >= rows[:, 0]) & rows[:, :2].any(axis=1)).any():  # both 0: it lies still
+            raise SpecError("a cycle's a_vert_rad must be below its a_lat_rad: a body that lifts higher than it bends tips over")
+        return np.column_stack([rows, np.ones(len(rows))]).astype(np.float32)
 
     def driven_ms(self, commands: np.ndarray) -> float:
         """Time of the cycles: twelve steps of the joint with the longest way at the constant speed, and the pauses."""
