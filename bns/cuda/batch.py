@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from functools import cache
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from bns.cuda.device import OutOfDeviceMemoryError, device_name, faults, full
+from bns.cuda.kernels import kernels_of
 from bns.cuda.settings import settings_of
 from bns.cuda.support import check_supported
 from bns.engine.evolution import tournament_cdf
@@ -229,28 +229,3 @@ def warm(robot: str) -> None:
         Batch([tiny]).step()
     except OutOfDeviceMemoryError as error:
         raise full(error) from error
-
-
-@cache
-def kernels_of(robot: str) -> Kernels:
-    """The kernels of a robot, by its name."""
-    return Kernels(load_robot(robot), robot)
-
-
-class Kernels:
-    """The kernels of one robot, made once, and loaded only here: numba's CUDA support need not be there if nobody asks for it."""
-
-    def __init__(self, robot: Any, name: str) -> None:
-        load = import_module
-        self.cuda = load("numba.cuda")
-        own, training = load(f"bns.cuda.robots.{name}"), load("bns.cuda.training")
-        evolution, measuring, networks = load("bns.cuda.evolution"), load("bns.cuda.measuring"), len(robot.networks)
-        squashed = robot.sigmoid_output
-        self.train = training.training_kernel(robot.hidden, squashed, robot.repeats_inputs)
-        self.restart, self.warp = training.restart, training.WARP
-        self.merge = load("bns.cuda.merging").merge
-        self.evolve = evolution.evolution_kernel(own, networks, robot.hidden)
-        self.measure = measuring.measuring_kernel(robot.bounds, networks, robot.hidden, squashed)
-        self.drive, self.driven, self.measured = own.drive, own.DRIVEN, measuring.MEASURED
-        self.driving_grid, self.steps = own.driving_grid, own.STEPS
-        self.evals_of = load("bns.cuda.rows").evals_of

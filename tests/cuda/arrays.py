@@ -4,7 +4,7 @@ from importlib import import_module
 
 import numpy as np
 
-from bns.cuda.batch import kernels_of
+from bns.cuda.kernels import kernels_of
 from bns.cuda.settings import settings_of
 from bns.engine.evolution import Population, tournament_cdf
 from bns.engine.philox import Key

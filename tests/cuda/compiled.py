@@ -16,7 +16,7 @@ from numba import boolean, cuda, float32, float64, from_dtype, int32, int64, uin
 from numba.cuda import compiler, dispatcher
 from numba.types import void
 
-from bns.cuda.batch import kernels_of
+from bns.cuda.kernels import kernels_of
 from bns.cuda.settings import SETTINGS
 from bns.robots import load_robot
 

@@ -86,8 +86,17 @@ def test_one_run_shows_every_evaluation_as_it_ends(monkeypatch):
     assert_same(result.tables["evals"], run(spec).tables["evals"])
 
 
-def test_networks_that_fail_begin_anew_in_their_run_alone():
-    quick = replace(TINY, training_iterations_per_evaluation=0, generations_per_evaluation=0)
+def test_a_run_is_the_same_to_the_last_bit_whatever_runs_beside_it():
+    quick = replace(TINY, evaluations=1, training_iterations_per_evaluation=1, generations_per_evaluation=1)
+    beside = replace(quick, seed=9, population_size=11, max_commands=9)
+    alone, together = (carried_out(specs).columns(0) for specs in ([quick], [quick, beside]))
+    for name in set(alone) - {"training_cpu_s", "evolution_cpu_s"}:
+        np.testing.assert_array_equal(alone[name], together[name], err_msg=name)
+
+
+@pytest.mark.parametrize("spec", [TINY, SNAKE], ids=lambda spec: spec.robot)
+def test_networks_that_fail_begin_anew_in_their_run_alone(spec):
+    quick = replace(spec, training_iterations_per_evaluation=0, generations_per_evaluation=0)
 
     def spoil(batch):
         batch._weights[1, 2, 7] = np.nan
