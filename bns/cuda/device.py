@@ -12,6 +12,7 @@ from typing import Any
 from bns.errors import DeviceError
 
 _ELSE = "or leave --device out: the CPU gives the same study"
+_UNTOLD = "the driver sees none, or numba-cuda's compiler (NVVM) is not there."
 _OUT_OF_MEMORY = ("OUT_OF_MEMORY", "out of memory")
 
 
@@ -28,7 +29,7 @@ def device_name() -> str:
     """
     try:
         cuda = _module()
-        reason = "" if cuda.is_available() else " ".join(str(cuda.cuda_error() or "the driver sees no GPU.").split())
+        reason = "" if cuda.is_available() else " ".join(str(cuda.cuda_error() or _UNTOLD).split())
     except (ValueError, OSError) as error:  # a driver named by NUMBA_CUDA_DRIVER that is none
         reason = f"{_first_line(error)}."
     if reason:

@@ -3,6 +3,7 @@
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -209,4 +210,12 @@ def test_a_gpu_without_room_for_the_trial_kernel_is_not_called_old(monkeypatch):
     monkeypatch.setattr(device, "_tried", none)
     device.device_name.cache_clear()
     with pytest.raises(DeviceError, match=r"memory is full .*CtxRetain.*CUDA_VISIBLE_DEVICES"):
+        device.device_name()
+
+
+def test_a_driver_without_a_compiler_is_not_called_missing(monkeypatch):
+    cuda = SimpleNamespace(is_available=lambda: False, cuda_error=lambda: None)
+    monkeypatch.setattr(device, "_module", lambda: cuda)
+    device.device_name.cache_clear()
+    with pytest.raises(DeviceError, match=r"compiler \(NVVM\) is not there\. .*pip install 'bns\[cuda\]'"):
         device.device_name()
