@@ -78,9 +78,10 @@ def test_result_is_that_of_the_loop(together):
         np.testing.assert_allclose(there.learned_from, here.learned_from, rtol=1e-6)
 
 
-def test_one_run_shows_every_evaluation_as_it_ends(monkeypatch):
+@pytest.mark.parametrize("spec", [TINY, SNAKE], ids=lambda spec: spec.robot)
+def test_one_run_shows_every_evaluation_as_it_ends(spec, monkeypatch):
     monkeypatch.setattr(batches, "THREADS", 2)
-    rows, spec = [], replace(TINY, generations_per_evaluation=0, training_iterations_per_evaluation=0)
+    rows, spec = [], replace(spec, generations_per_evaluation=0, training_iterations_per_evaluation=0)
     result = run_there(spec, rows.append)
     assert [row["evaluation"] for row in rows] == [1, 2]
     assert_same(result.tables["evals"], run(spec).tables["evals"])
