@@ -50,6 +50,7 @@ def test_memory_that_is_full_is_said(monkeypatch, capsys):
         raise OutOfDeviceMemoryError("CUDA_ERROR_OUT_OF_MEMORY")
 
     monkeypatch.setattr(gpu, "current_device", Simulated)
+    monkeypatch.setattr(gpu, "ordered_specs", lambda sweep: tiny(sweep.robot, 3))
     monkeypatch.setattr(gpu, "warm", id)
     monkeypatch.setattr(gpu, "Batch", full)
     assert gpu.main([]) == 2
