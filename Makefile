@@ -13,7 +13,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench bench-gpu hidden-effects precompute soak-dask clean sweep-snake soak real-robots propose-benchmark closing-the-gap
+.PHONY: help setup test lint sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask clean sweep-snake soak real-robots propose-benchmark closing-the-gap
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -57,8 +57,11 @@ figures: setup ## page and figures of whatever results there are, into results/f
 bench: setup ## speed, as ratios against named peers measured in the same run
 	$(BIN)/python -m tests.bench --json "$(RESULTS)/bench.json"
 
-bench-gpu: setup ## the Khepera study on this machine's GPU, from a slice of it (needs: pip install -e '.[cuda]' in .venv)
+bench-gpu: setup ## both studies on this machine's GPU, from slices of them (needs: pip install -e '.[cuda]' in .venv)
 	$(BIN)/python -m tests.bench.gpu --json "$(RESULTS)/bench-gpu.json"
+
+compare-gpu: setup ## 200 runs a side and robot on GPU and CPU: do success, diversity and fitness error differ? (needs a GPU likewise)
+	$(BIN)/python -m tests.bench.devices --json "$(RESULTS)/compare-gpu.json"
 
 hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")

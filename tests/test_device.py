@@ -57,18 +57,29 @@ def test_bench_says_that_there_is_no_gpu(monkeypatch, capsys):
     assert capsys.readouterr().err == "bench-gpu: nothing measured. no GPU can be used: no driver\n"
 
 
-def test_table_of_the_bench_from_known_figures():
-    from tests.bench.gpu import Peak, Slice, lines_of
+def slice_of(robot, study_runs, **changes):
+    from tests.bench.gpu import Slice
 
-    part = Slice(
-        runs=2000, wall_s=40, training_s=30, evolution_s=8, training_ops=4e14, evolution_ops=1e14, moved_bytes=1e12,
-        neuron_iterations=1e13,
-    )  # fmt: skip
-    lines = lines_of(part, Peak(flops=5e13, bytes_s=5e12), 45_000, cpu_s=3.0)
-    values = [line.measured for line in lines]
+    known = {
+        "runs": 2000, "wall_s": 40, "training_s": 30, "evolution_s": 8, "training_ops": 4e14, "evolution_ops": 1e14,
+        "moved_bytes": 1e12, "neuron_iterations": 1e13, "cpu_s": 3.0,
+    }  # fmt: skip
+    return Slice(robot, study_runs, **known | changes)
+
+
+def test_table_of_the_bench_from_known_figures():
+    from tests.bench.gpu import Peak, table_of
+
+    peak = Peak(flops=5e13, bytes_s=5e12)
+    lines = table_of([slice_of("khepera", 45_000), slice_of("snake", 30_000, wall_s=200)], peak)
+    values = [line.measured for line in lines[:6]]
     assert values == pytest.approx([15, 26.667, 11.25, 22.5, 150, 20666.7], rel=1e-3)
     assert [line.met for line in lines[:2]] == [True, True]
     assert lines[0].floor == pytest.approx(22.5 * 10 / 60)  # 5e14 operations are 10 s at the peak, more than the bytes take
+    assert (lines[6].measured, lines[6].met) == (50, None)
+    assert (lines[-1].name, lines[-1].measured, lines[-1].met) == ("the whole study with the snake", 65, False)
+    assert lines[-1].floor == pytest.approx((22.5 + 15) * 10 / 60)
+    assert "together" not in table_of([slice_of("khepera", 45_000)], peak)[-1].name
 
 
 def test_peak_is_that_of_the_attributes():

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from functools import cache
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from bns.cuda.device import device_name, faults
+from bns.cuda.device import OutOfDeviceMemoryError, device_name, faults, full
+from bns.cuda.kernels import kernels_of
 from bns.cuda.settings import settings_of
 from bns.cuda.support import check_supported
 from bns.engine.evolution import tournament_cdf
@@ -25,8 +25,6 @@ from bns.tasks import default_task, load_task
 from bns.worlds import build_world
 
 THREADS = 128
-_FEW = 64
-"""Threads of a block where a thread has a run of its own: the runs spread over all of the GPU."""
 
 
 class Batch:
@@ -43,7 +41,7 @@ class Batch:
         device_name()
         self.specs, self._threads = tuple(specs), threads or THREADS
         self.robot = load_robot(specs[0].robot)
-        self._kernels = _kernels(self.robot.name)
+        self._kernels = kernels_of(self.robot.name)
         self.evaluations, self.evaluation = max(spec.evaluations for spec in specs), 0
         self._seconds = np.zeros((2, self.evaluations))
         with faults():
@@ -69,6 +67,12 @@ class Batch:
             self._measure()
         active = sum(spec.evaluations >= self.evaluation for spec in self.specs)
         self._seconds[:, self.evaluation - 1] = (trained - began) / active, (evolved - trained) / active
+
+    def patterns(self) -> np.ndarray:
+        """How many patterns each run's networks are trained on now (runs,), those of the same inputs as one."""
+        with faults():
+            found: np.ndarray = (self._distinct if self.robot.repeats_inputs else self._counts[0]).copy_to_host()
+        return found
 
     def evals(self) -> list[dict[str, np.ndarray] | ArithmeticError]:
         """Columns of every run so far, or what is wrong with its numbers; the times are its share of the GPU's."""
@@ -107,7 +111,7 @@ class Batch:
         outputs = predict(weights, self.robot.inputs(fittest), self.robot.sigmoid_output)
         simulated = self.robot.poses(self.robot.displacements(outputs), fittest)
         return RunResult(
-            {"evals": evals}, world.digest, self.robot.networks, weights, fittest, poses, simulated, learned_from
+            {"evals": evals}, world.digest, self.robot.networks, weights, controller, poses, simulated, learned_from
         )
 
     def _allocate(self) -> None:
@@ -116,35 +120,47 @@ class Batch:
         tasks = [load_task(spec.robot, spec.task) for spec in specs]
         self._keys = [Key.of_run(spec.seed, spec.root_seed, spec.robot, spec.task) for spec in specs]
         runs, networks = len(specs), len(robot.networks)
-        n, longest = max(spec.population_size for spec in specs), max(spec.max_commands for spec in specs)
+        n = max(spec.population_size for spec in specs)
+        # How long lists can get is the robot's own matter: a population of one shows it.
+        own = [
+            robot.initial_population(key, 1, spec.min_commands, spec.max_commands).commands.shape[1]
+            for key, spec in zip(self._keys, specs, strict=True)
+        ]
+        most = max(spec.evaluations * longest for spec, longest in zip(specs, own, strict=True))  # commands that a run can drive
         goals = np.zeros((runs, max(len(task.goals_m) for task in tasks), 2))
         cdfs = np.ones((2, runs, n))
-        lists, lengths = np.zeros((runs, n, longest, 3), np.float32), np.zeros((2, runs, n), np.int32)
+        lists = np.zeros((runs, n, max(own), len(robot.command_columns)), np.float32)
+        lengths = np.zeros((2, runs, n), np.int32)
         for run, (spec, task, key) in enumerate(zip(specs, tasks, self._keys, strict=True)):
             goals[run, : len(task.goals_m)] = task.goals_m
             size = spec.population_size
             cdfs[0, run, :size] = tournament_cdf(size, spec.tournament_size)
             cdfs[1, run, :size] = tournament_cdf(size, spec.real_world_selection_size)
             population = robot.initial_population(key, size, spec.min_commands, spec.max_commands)
-            lists[run, :size, : spec.max_commands], lengths[0, run, :size] = population.commands, population.lengths
+            lists[run, :size, : own[run]], lengths[0, run, :size] = population.commands, population.lengths
         untrained = np.stack([initial_weights(key, networks, robot.hidden, robot.input_count) for key in self._keys])
-        most = max(spec.evaluations * spec.max_commands for spec in specs)  # no run can gather more patterns
         static = load_static_simulator(robot.name)
 
         put, empty = cuda.to_device, cuda.device_array
-        self._settings = put(settings_of(specs, self._keys, [len(task.goals_m) for task in tasks]))
+        self._settings = put(settings_of(specs, self._keys, tasks, own))
         self._goals, self._cdf_parents, self._cdf_world = put(goals), put(cdfs[0]), put(cdfs[1])
         self._commands = empty((2, *lists.shape), np.float32)
         self._commands[0].copy_to_device(lists)
         self._lengths = put(lengths)
-        self._fitness, self._reached, self._order = (empty((runs, n), kind) for kind in (np.float64, np.int32, np.int32))
+        self._fitness = empty((runs, n), np.float64)
+        self._reached, self._used, self._order = (empty((runs, n), np.int32) for _ in range(3))
         self._untrained, self._weights = put(untrained), put(untrained)
         self._flat = self._weights.reshape(runs, networks * untrained.shape[2])
         self._step = put(np.full_like(untrained, INITIAL_STEP))
         self._last_gradient, self._last_change = put(np.zeros_like(untrained)), put(np.zeros_like(untrained))
-        self._X = empty((2, runs, INPUTS, most), np.float32)
-        self._targets = empty((2, runs, networks, most), np.float32)
+        self._X = empty((2, runs, INPUTS, most * self._kernels.steps), np.float32)
+        self._targets = empty((2, runs, networks, most * self._kernels.steps), np.float32)
         self._counts = put(np.zeros((2, runs), np.int32))
+        self._times = empty((1, 1, 1), np.float32)  # a pattern stands for itself
+        if robot.repeats_inputs:
+            self._merged, self._distinct = put(np.zeros(runs, np.int32)), put(np.zeros(runs, np.int32))
+            self._inputs, self._sums = empty((runs, INPUTS, most), np.float32), empty((runs, networks, most), np.float64)
+            self._means, self._times = (empty((runs, networks, most), np.float32) for _ in range(2))
         self._failures, self._hits = put(np.zeros(runs, np.int32)), put(np.zeros(runs, np.int32))
         self._static, self._noise_sd = put(static.weights.ravel().copy()), put(static.noise_sd)
         self._evaluated, self._fittest = (
@@ -153,7 +169,7 @@ class Batch:
         self._measured = put(np.full((runs, self.evaluations, len(self._kernels.measured)), np.nan))
 
     def _drive(self, purpose: Purpose, learning: bool, cdf: Any, rows: Any) -> None:
-        self._kernels.drive[-(-len(self.specs) // _FEW), min(_FEW, len(self.specs))](
+        self._kernels.drive[self._kernels.driving_grid(len(self.specs))](
             self.evaluation, self._settings, np.uint32(purpose), learning, self._static, self._noise_sd, self._flat,
             self._commands, self._lengths, self._order, cdf, self._goals, self._X, self._targets, self._counts,
             self._failures, rows,
@@ -162,8 +178,14 @@ class Batch:
     def _train(self, evaluation: int) -> None:
         runs, networks = self._weights.shape[:2]
         state = self._weights, self._step, self._last_gradient, self._last_change
+        patterns = self._X[0], self._targets[0], self._counts[0]
+        if self.robot.repeats_inputs:
+            distinct = self._inputs, self._sums, self._means, self._times, self._distinct
+            self._kernels.merge[runs, self._kernels.warp](evaluation, self._settings, *patterns, self._merged, *distinct)
+            patterns = self._inputs, self._means, self._distinct
+        X, targets, counts = patterns
         self._kernels.train[(runs, networks), self._kernels.warp](
-            evaluation, self._settings, *state, self._X[0], self._targets[0], self._counts[0]
+            evaluation, self._settings, *state, X, targets, self._times, counts
         )
         self._kernels.restart[-(-runs * networks // self._threads), self._threads](
             evaluation, self._settings, self._untrained, *state, self._failures
@@ -172,13 +194,13 @@ class Batch:
     def _evolve(self, evaluation: int) -> None:
         self._kernels.evolve[len(self.specs), self._threads](
             evaluation, self._settings, self._weights, self._commands, self._lengths, self._fitness, self._reached,
-            self._order, self._cdf_parents, self._goals, self._failures, self._hits,
+            self._used, self._order, self._cdf_parents, self._goals, self._failures, self._hits,
         )  # fmt: skip
 
     def _measure(self) -> None:
         self._kernels.measure[len(self.specs), self._threads](
-            self.evaluation, self._settings, self._flat, self._commands, self._lengths, self._fitness, self._order,
-            self._X, self._targets, self._counts, self._failures, self._hits, self._measured,
+            self.evaluation, self._settings, self._flat, self._commands, self._lengths, self._used, self._fitness,
+            self._order, self._X, self._targets, self._counts, self._failures, self._hits, self._measured,
         )  # fmt: skip
 
     def _now(self) -> float:
@@ -188,7 +210,11 @@ class Batch:
 
 @cache
 def warm(robot: str) -> None:
-    """Compile the robot's kernels, once a process, so that no batch is charged with it."""
+    """Compile the robot's kernels, once a process, so that no batch is charged with it.
+
+    Raises:
+        DeviceError: no GPU, it failed, or its memory is full.
+    """
     tiny = RunSpec(
         robot=robot,
         task=default_task(robot),
@@ -196,25 +222,10 @@ def warm(robot: str) -> None:
         evaluations=1,
         generations_per_evaluation=0,
         training_iterations_per_evaluation=1,
+        min_commands=1,
+        max_commands=1,
     )
-    Batch([tiny]).step()
-
-
-@cache
-def _kernels(name: str) -> _Kernels:
-    return _Kernels(load_robot(name), name)
-
-
-class _Kernels:
-    """The kernels of one robot, made once, and loaded only here: numba's CUDA support need not be there if nobody asks for it."""
-
-    def __init__(self, robot: Any, name: str) -> None:
-        load = import_module
-        self.cuda = load("numba.cuda")
-        own, training = load(f"bns.cuda.robots.{name}"), load("bns.cuda.training")
-        measuring, networks = load("bns.cuda.measuring"), len(robot.networks)
-        self.train, self.restart, self.warp = training.training_kernel(robot.hidden), training.restart, training.WARP
-        self.evolve = load("bns.cuda.evolution").evolution_kernel(own.scored, robot.bounds, networks, robot.hidden)
-        self.measure = measuring.measuring_kernel(robot.bounds, networks, robot.hidden)
-        self.drive, self.driven, self.measured = own.drive, own.DRIVEN, measuring.MEASURED
-        self.evals_of = load("bns.cuda.rows").evals_of
+    try:
+        Batch([tiny]).step()
+    except OutOfDeviceMemoryError as error:
+        raise full(error) from error

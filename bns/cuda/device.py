@@ -12,6 +12,7 @@ from typing import Any
 from bns.errors import DeviceError
 
 _ELSE = "or leave --device out: the CPU gives the same study"
+_UNTOLD = "the driver sees none, or numba-cuda's compiler (NVVM) is not there."
 _OUT_OF_MEMORY = ("OUT_OF_MEMORY", "out of memory")
 
 
@@ -28,7 +29,7 @@ def device_name() -> str:
     """
     try:
         cuda = _module()
-        reason = "" if cuda.is_available() else " ".join(str(cuda.cuda_error() or "the driver sees no GPU.").split())
+        reason = "" if cuda.is_available() else " ".join(str(cuda.cuda_error() or _UNTOLD).split())
     except (ValueError, OSError) as error:  # a driver named by NUMBA_CUDA_DRIVER that is none
         reason = f"{_first_line(error)}."
     if reason:
@@ -40,6 +41,8 @@ def device_name() -> str:
     except DeviceError:
         raise
     except Exception as error:  # of many kinds, from the compiler down to the driver
+        if _is_full(error):
+            raise full(error) from error
         raise DeviceError(
             f"--device cuda: a GPU is there, but a trial kernel failed: {_first_line(error)}. Most often its driver is older "
             f"than the CUDA version of numba-cuda: update the driver, install an older numba-cuda, {_ELSE}."
@@ -63,23 +66,18 @@ def _tried(cuda: Any) -> str:
     return name.decode() if isinstance(name, bytes) else str(name)
 
 
-def free_bytes() -> float:
-    """Memory of the GPU that nobody uses now; infinite in the simulator."""
-    return float(_module().current_context().get_memory_info()[0])
-
-
 @contextmanager
 def faults() -> Iterator[None]:
     """Turn what the driver raises into an error of ours.
 
     Raises:
-        OutOfDeviceMemoryError: the GPU's memory is full.
+        OutOfDeviceMemoryError: the GPU's memory is full, or that of the machine where a batch is put together.
         DeviceError: anything else of the GPU.
     """
     try:
         yield
     except Exception as error:
-        if any(text in str(error) for text in _OUT_OF_MEMORY):
+        if _is_full(error):
             raise OutOfDeviceMemoryError(_first_line(error)) from error
         if type(error).__module__.startswith(("numba.cuda", "numba_cuda", "cuda.")):
             raise DeviceError(
@@ -87,6 +85,18 @@ def faults() -> Iterator[None]:
                 "repeat the command, which goes on from here."
             ) from error
         raise
+
+
+def full(error: BaseException) -> DeviceError:
+    """Not even the smallest run fits into the GPU's memory."""
+    return DeviceError(
+        f"--device cuda: the GPU's memory is full ({_first_line(error)}). nvidia-smi shows who holds it; wait until they "
+        f"leave it, choose another GPU with CUDA_VISIBLE_DEVICES, {_ELSE}."
+    )
+
+
+def _is_full(error: BaseException) -> bool:
+    return isinstance(error, MemoryError) or any(text in str(error) for text in _OUT_OF_MEMORY)
 
 
 def _first_line(error: BaseException) -> str:

@@ -41,7 +41,7 @@ def evals_of(
         "evolution_cpu_s": evolution_s,
     }
     successes = _successes("success", best)
-    columns |= successes | {f"ever_{name}": np.logical_or.accumulate(values) for name, values in successes.items()}
+    columns |= successes | {f"ever_{name}": _so_far(values) for name, values in successes.items()}
     columns |= {
         "evaluated_fitness_simulation": picked["fitness_simulation"],
         "evaluated_fitness_world": picked["fitness_world"],
@@ -67,5 +67,11 @@ def _named(names: tuple[str, ...], rows: np.ndarray) -> dict[str, Any]:
 
 
 def _successes(prefix: str, driven: dict[str, Any]) -> dict[str, np.ndarray]:
-    by_radius = {f"{prefix}_{cm}cm": driven[f"{cm}cm"] > 0 for cm in RADII_CM}
-    return {prefix: by_radius[f"{prefix}_{RADII_CM[0]}cm"]} | by_radius
+    """On the whole and by radius; None where a robot's goals have no radius, as in `bns.recorder`."""
+    none = np.full(len(driven["success"]), None)
+    by_radius = {f"{prefix}_{cm}cm": driven[f"{cm}cm"] > 0 if f"{cm}cm" in driven else none for cm in RADII_CM}
+    return {prefix: driven["success"] > 0} | by_radius
+
+
+def _so_far(values: np.ndarray) -> np.ndarray:
+    return np.logical_or.accumulate(values) if values.dtype == bool else values

@@ -21,6 +21,7 @@ COMPONENTS = 3
 SPEEDS = 2
 """The first of them, which the networks are told of the command before, too."""
 _UNIT = 2.0**-32
+_PARENTS, _FIRST = np.uint32(Purpose.PARENTS), np.uint32(0)
 
 
 @exact
@@ -32,6 +33,13 @@ def winner(order, cdf, word):  # type: ignore[no-untyped-def]  # compiled
         at += half * np.int64(cdf[at + half - 1] <= u)
         left -= half
     return order[min(at + np.int64(cdf[at] <= u), order.size - 1)]
+
+
+@inline
+def couple(order, cdf, pair, step, k0, k1):  # type: ignore[no-untyped-def]  # compiled
+    """Two tournament winners: the parents of a pair of children."""
+    draws = philox(_FIRST, np.uint32(pair), step, _PARENTS, k0, k1)
+    return winner(order, cdf, draws[0]), winner(order, cdf, draws[1])
 
 
 @inline

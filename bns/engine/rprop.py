@@ -122,11 +122,24 @@ def _backward4(X, w, first, hidden_out, error, gradient, a, b):  # type: ignore[
     _write(gradient, w, k + 3 * PER_NEURON, g3, o3)
 
 
+@inline
+def residual(out: Any, target: Any) -> Any:
+    """Derivative of half the squared error by what goes into a linear output."""
+    return out - target
+
+
+@inline
+def squashed_residual(out: Any, target: Any) -> Any:
+    """As `residual`, through the slope of a sigmoid output."""
+    y = sigmoid(out)
+    return (y - target) * (y - y * y)
+
+
 @fast
 def _residuals(out, target, bias, error):  # type: ignore[no-untyped-def]  # compiled
     total = _ZERO
     for p in range(out.size):
-        e = out[p] + bias - target[p]
+        e = residual(out[p] + bias, target[p])
         error[p] = e
         total += e
     return total
@@ -134,11 +147,9 @@ def _residuals(out, target, bias, error):  # type: ignore[no-untyped-def]  # com
 
 @fast
 def _squashed_residuals(out, target, bias, error):  # type: ignore[no-untyped-def]  # compiled
-    """As `_residuals`, through the slope of a sigmoid output."""
     total = _ZERO
     for p in range(out.size):
-        y = sigmoid(out[p] + bias)
-        e = (y - target[p]) * (y - y * y)
+        e = squashed_residual(out[p] + bias, target[p])
         error[p] = e
         total += e
     return total

@@ -1,15 +1,21 @@
 """Uniform crossover and component-wise mutation of lists of one length.
 
 As in `bns.engine.evolution`, ``commands`` is (n, length, components) float32; the draws of each generation come from the key.
+Four components share a counter: those of a command take as many as they need.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from bns.engine.philox import Key, Purpose, uniforms
+from bns.engine.jit import inline
+from bns.engine.philox import Key, Purpose, philox, uniforms
 
 BLOCK_WORDS = 4
+_UNIT = 2.0**-32
+_CUTS = np.uint32(Purpose.CUTS)
 
 
 def component_draws(key: Key, purpose: Purpose, step: int, shape: tuple[int, int, int]) -> np.ndarray:
@@ -19,37 +25,31 @@ def component_draws(key: Key, purpose: Purpose, step: int, shape: tuple[int, int
     return uniforms(key, purpose, step, n, blocks * length).reshape(n, length, -1)[..., :components]
 
 
-def winners(key: Key, generation: int, order: np.ndarray, cdf: np.ndarray, pairs: int) -> np.ndarray:
-    """Two tournament winners a pair, (pairs, 2) indices into the population."""
-    draws = uniforms(key, Purpose.PARENTS, generation, pairs, 1)[:, 0, :2]
-    places = np.minimum(np.searchsorted(cdf, draws, side="right"), len(order) - 1)
-    return np.asarray(order[places])
+@inline
+def blocks_of(components: Any) -> Any:
+    """Counters that the draws of a command take."""
+    return (components + BLOCK_WORDS - 1) // BLOCK_WORDS
 
 
-def crossover(
-    key: Key, commands: np.ndarray, order: np.ndarray, cdf: np.ndarray, share: float, generation: int
-) -> np.ndarray:
-    """Children (n, length, components): the best one, then pairs whose components come from either parent.
+@inline
+def cross(front, back, share, j, pair, step, k0, k1, child):  # type: ignore[no-untyped-def]  # compiled
+    """The j-th command (components,) of a pair's child: each component is the front parent's with probability ``share``.
 
-    A component of a pair's first child is the first parent's with probability ``share``, its second child's the other
-    parent's (section 5.6: 0.5).
+    The same draws with the parents exchanged give the pair's other child (section 5.6: share 0.5).
     """
-    n, length, components = commands.shape
-    pairs = n // 2
-    parents = winners(key, generation, order, cdf, pairs)
-    first, second = commands[parents[:, 0]], commands[parents[:, 1]]
-    own = component_draws(key, Purpose.CUTS, generation, (pairs, length, components)) < share
-    both = np.stack([np.where(own, first, second), np.where(own, second, first)], axis=1)
-    return np.concatenate([commands[order[:1]], both.reshape(-1, length, components)])[:n]
+    blocks = blocks_of(child.size)
+    for block in range(blocks):
+        draws = philox(np.uint32(j * blocks + block), np.uint32(pair), step, _CUTS, k0, k1)
+        for word in range(min(BLOCK_WORDS, child.size - BLOCK_WORDS * block)):
+            c = BLOCK_WORDS * block + word
+            child[c] = front[c] if draws[word] * _UNIT < share else back[c]
 
 
-def mutation_moves(key: Key, shape: tuple[int, int, int], rate: float, generation: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which components mutate, bool (n, length, components), and where within their span, uniform in [-1, 1).
+@inline
+def moved_by(word: Any, rate: Any) -> Any:
+    """Whether a component with this word mutates, and where within its span it goes: -1 to 1.
 
-    The first controller is the elite and does not mutate. Given that a draw fell below the rate it is uniform there: it
-    serves twice.
+    Given that a draw fell below the rate it is uniform there: it serves twice.
     """
-    draws = component_draws(key, Purpose.MUTATION, generation, shape)
-    mutates = draws < rate
-    mutates[0] = False
-    return mutates, np.where(mutates, 2.0 * draws / max(rate, 1e-300) - 1.0, 0.0)
+    u = word * _UNIT
+    return u < rate, 2.0 * u / max(rate, 1e-300) - 1.0

@@ -16,18 +16,15 @@ from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 from bns.robots.snake import ROBOT
 from bns.robots.snake.cycles import COLUMNS, CYCLES
-from bns.robots.snake.robot import NOISY_EVALUATIONS
 from bns.spec import RunSpec
+from tests.bench import operations as counted
 from tests.bench.clock import one_core
 from tests.bench.line import Line, at_most
-from tests.bench.whole_run import BACKWARD_OPS, FORWARD, peak_flops
+from tests.bench.whole_run import peak_flops
 
 PATTERNS = 720
 """Stable cycles that the source's networks of displacements learned from."""
 NO_COUNTS = np.empty(0, np.float32)
-STEP_OPS = 40
-"""Of one cycle of one rollout: the markers' frame, four products and sums each way, bounds, region."""
-MEAN_REPEATS = 2.5
 _TINY = RunSpec(robot="snake", task="two-regions", population_size=4, evaluations=2, generations_per_evaluation=1)
 
 
@@ -87,8 +84,5 @@ def operations(spec: RunSpec, paths: dict[str, np.ndarray]) -> float:
         len(np.unique(commands[learned & (paths["step"] > 0) & (paths["evaluation"] <= e)], axis=0))
         for e in range(1, spec.evaluations + 1)
     ]
-    neurons = len(ROBOT.networks) * ROBOT.hidden
-    training = TRAINING_SHARE * sum(seen) * spec.training_iterations_per_evaluation * neurons * (FORWARD + BACKWARD_OPS)
-    controllers = spec.population_size * spec.evaluations * (spec.generations_per_evaluation + 1)
-    rollouts = controllers * CYCLES * MEAN_REPEATS * (NOISY_EVALUATIONS + 1) * STEP_OPS
-    return training + controllers * CYCLES * neurons * FORWARD + rollouts
+    evals = {"mean_commands": np.full(spec.evaluations, CYCLES)}
+    return counted.training(ROBOT, spec, TRAINING_SHARE * sum(seen)) + counted.evolution(ROBOT, spec, evals)

@@ -11,15 +11,9 @@ from bns.loop import run
 from bns.robots.khepera import ROBOT
 from bns.spec import RunSpec
 from bns.sweep.job import warm
+from tests.bench import operations as counted
 from tests.bench.clock import one_core, seconds
 from tests.bench.line import Line, at_most
-
-# Operations of our formulas: a multiplication and an addition count as two, a comparison and a division as one.
-INPUT_OPS = 10  # five products and sums
-SIGMOID_OPS = 2 + 1 + 8 + 6 + 3  # bns.engine.snn.sigmoid: two bounds, x * x, p, q, and 0.5 + x * p / q
-OUTPUT_OPS = 2
-BACKWARD_OPS = 15  # error at the neuron, its slope, six sums for the inputs and the bias, one for the output
-FORWARD = INPUT_OPS + SIGMOID_OPS + OUTPUT_OPS
 
 
 def peak_flops() -> float:
@@ -31,10 +25,8 @@ def peak_flops() -> float:
 
 def operations(spec: RunSpec, evals: dict[str, np.ndarray]) -> tuple[float, float]:
     """Of training and of evolution, for a run that left these rows."""
-    neurons = len(ROBOT.networks) * ROBOT.hidden
-    patterns = float(evals["training_patterns"].sum()) * spec.training_iterations_per_evaluation
-    commands = float(evals["mean_commands"].sum()) * spec.population_size * (spec.generations_per_evaluation + 1)
-    return patterns * neurons * (FORWARD + BACKWARD_OPS), commands * neurons * FORWARD
+    patterns = float(evals["training_patterns"].sum())
+    return counted.training(ROBOT, spec, patterns), counted.evolution(ROBOT, spec, evals)
 
 
 def measure(quick: bool) -> list[Line]:

@@ -16,15 +16,12 @@ from numba import boolean, cuda, float32, float64, from_dtype, int32, int64, uin
 from numba.cuda import compiler, dispatcher
 from numba.types import void
 
-from bns.cuda.evolution import evolution_kernel
-from bns.cuda.measuring import measuring_kernel
-from bns.cuda.robots import khepera
+from bns.cuda.kernels import kernels_of
 from bns.cuda.settings import SETTINGS
-from bns.cuda.training import restart, training_kernel
-from bns.robots.khepera import ROBOT
+from bns.robots import load_robot
 
 CAPABILITY = (9, 0)
-_NETWORKS, _HIDDEN = len(ROBOT.networks), ROBOT.hidden
+ROBOTS = ("khepera", "snake")
 
 
 def arrays(kind: Any, *dimensions: int) -> list[Any]:
@@ -32,32 +29,35 @@ def arrays(kind: Any, *dimensions: int) -> list[Any]:
     return [kind[(*[slice(None)] * (d - 1), slice(None, None, 1)) if d > 1 else slice(None, None, 1)] for d in dimensions]
 
 
-def kernels() -> dict[str, tuple[Any, Any]]:
+def kernels(robot: str) -> dict[str, tuple[Any, Any]]:
     """Name -> kernel and signature, as `bns.cuda.batch` launches it."""
+    own = kernels_of(robot)
     of_runs = [int64, *arrays(from_dtype(SETTINGS), 1)]
     weights, lists = arrays(float32, 3)[0], [*arrays(float32, 5), *arrays(int32, 3)]
     flat, counted = arrays(float32, 2)[0], arrays(int32, 1)[0]
     patterns = [*arrays(float32, 4, 4), *arrays(int32, 2)]
     fitness, order, goals = arrays(float64, 2)[0], arrays(int32, 2)[0], arrays(float64, 3)[0]
-    return {
-        "train": (training_kernel(_HIDDEN), void(*of_runs, *[weights] * 6, counted)),
-        "restart": (restart, void(*of_runs, *[weights] * 5, counted)),
+    found = {
+        "merge": (own.merge, void(*of_runs, weights, weights, *[counted] * 2, weights, goals, weights, weights, counted)),
+        "train": (own.train, void(*of_runs, *[weights] * 7, counted)),
+        "restart": (own.restart, void(*of_runs, *[weights] * 5, counted)),
         "evolve": (
-            evolution_kernel(khepera.scored, ROBOT.bounds, _NETWORKS, _HIDDEN),
-            void(*of_runs, weights, *lists, fitness, order, order, fitness, goals, counted, counted),
+            own.evolve,
+            void(*of_runs, weights, *lists, fitness, order, order, order, fitness, goals, counted, counted),
         ),
         "drive": (
-            khepera.drive,
+            own.drive,
             void(
                 *of_runs, uint32, boolean, *arrays(float32, 1), *arrays(float64, 1), flat, *lists, order, fitness, goals,
                 *patterns, counted, goals,
             ),
         ),
         "measure": (
-            measuring_kernel(ROBOT.bounds, _NETWORKS, _HIDDEN),
-            void(*of_runs, flat, *lists, fitness, order, *patterns, counted, counted, goals),
+            own.measure,
+            void(*of_runs, flat, *lists, order, fitness, order, *patterns, counted, counted, goals),
         ),
     }  # fmt: skip
+    return found if load_robot(robot).repeats_inputs else {name: pair for name, pair in found.items() if name != "merge"}
 
 
 def main(ptxas: str) -> int:
@@ -65,7 +65,7 @@ def main(ptxas: str) -> int:
     for module in (compiler, dispatcher):  # helpers are compiled for the GPU at hand, and there may be none
         module.get_current_device = lambda: SimpleNamespace(compute_capability=CAPABILITY)
     spilled = False
-    for name, (kernel, signature) in kernels().items():
+    for name, (kernel, signature) in ((f"{r} {name}", pair) for r in ROBOTS for name, pair in kernels(r).items()):
         fast = bool(kernel.targetoptions.get("fastmath"))
         text, _ = cuda.compile_ptx(kernel.py_func, signature, cc=CAPABILITY, fastmath=fast)
         with tempfile.TemporaryDirectory() as folder:
@@ -74,7 +74,7 @@ def main(ptxas: str) -> int:
             told = subprocess.run(command, capture_output=True, text=True, check=True).stderr
         lines = [line.strip().removeprefix("ptxas info    : ") for line in told.splitlines() if "Used" in line or "spill" in line]
         spilled |= "0 bytes spill stores, 0 bytes spill loads" not in told
-        print(f"{name:8s} {'; '.join(lines)}")
+        print(f"{name:16s} {'; '.join(lines)}")
     return int(spilled)
 
 

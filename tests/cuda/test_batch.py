@@ -25,6 +25,14 @@ OTHER = replace(
     tournament_size=0.2, real_world_selection_size=0.3, generations_per_evaluation=1, training_iterations_per_evaluation=2,
 )  # fmt: skip
 SHORT = replace(TINY, seed=2, evaluations=1, min_commands=1, max_commands=4)
+SNAKE = RunSpec(
+    robot="snake", task="two-regions", population_size=4, evaluations=2, generations_per_evaluation=1,
+    training_iterations_per_evaluation=2, min_commands=1, max_commands=2,
+)  # fmt: skip
+OTHER_SNAKE = replace(
+    SNAKE, seed=1, task="three-regions", population_size=3, mutation_rate=0.9, training_algorithm="irprop-", max_commands=1,
+    generations_per_evaluation=0, training_iterations_per_evaluation=1,
+)  # fmt: skip
 
 
 def carried_out(specs, spoil=None):
@@ -48,10 +56,10 @@ def assert_same(got, want):
             )
 
 
-@pytest.fixture(scope="module")
-def together():
+@pytest.fixture(scope="module", params=["khepera", "snake"])
+def together(request):
     """Runs that differ in everything a run can differ in, side by side."""
-    return carried_out([TINY, OTHER, SHORT])
+    return carried_out({"khepera": [TINY, OTHER, SHORT], "snake": [SNAKE, OTHER_SNAKE]}[request.param])
 
 
 def test_runs_side_by_side_are_those_of_the_cpu_engine(together):
@@ -65,21 +73,31 @@ def test_result_is_that_of_the_loop(together):
         assert (there.world_digest, there.networks) == (here.world_digest, here.networks)
         np.testing.assert_allclose(there.weights, here.weights, rtol=1e-4, atol=1e-4)
         np.testing.assert_allclose(there.fittest, here.fittest, rtol=1e-5)
-        np.testing.assert_allclose(there.world_poses, here.world_poses, rtol=1e-4)
+        np.testing.assert_allclose(there.world_poses, here.world_poses, rtol=1e-4, atol=1e-4)
         np.testing.assert_allclose(there.snn_poses, here.snn_poses, rtol=1e-3, atol=1e-4)
         np.testing.assert_allclose(there.learned_from, here.learned_from, rtol=1e-6)
 
 
-def test_one_run_shows_every_evaluation_as_it_ends(monkeypatch):
+@pytest.mark.parametrize("spec", [TINY, SNAKE], ids=lambda spec: spec.robot)
+def test_one_run_shows_every_evaluation_as_it_ends(spec, monkeypatch):
     monkeypatch.setattr(batches, "THREADS", 2)
-    rows, spec = [], replace(TINY, generations_per_evaluation=0, training_iterations_per_evaluation=0)
+    rows, spec = [], replace(spec, generations_per_evaluation=0, training_iterations_per_evaluation=0)
     result = run_there(spec, rows.append)
     assert [row["evaluation"] for row in rows] == [1, 2]
     assert_same(result.tables["evals"], run(spec).tables["evals"])
 
 
-def test_networks_that_fail_begin_anew_in_their_run_alone():
-    quick = replace(TINY, training_iterations_per_evaluation=0, generations_per_evaluation=0)
+def test_a_run_is_the_same_to_the_last_bit_whatever_runs_beside_it():
+    quick = replace(TINY, evaluations=1, training_iterations_per_evaluation=1, generations_per_evaluation=1)
+    beside = replace(quick, seed=9, population_size=11, max_commands=9)
+    alone, together = (carried_out(specs).columns(0) for specs in ([quick], [quick, beside]))
+    for name in set(alone) - {"training_cpu_s", "evolution_cpu_s"}:
+        np.testing.assert_array_equal(alone[name], together[name], err_msg=name)
+
+
+@pytest.mark.parametrize("spec", [TINY, SNAKE], ids=lambda spec: spec.robot)
+def test_networks_that_fail_begin_anew_in_their_run_alone(spec):
+    quick = replace(spec, training_iterations_per_evaluation=0, generations_per_evaluation=0)
 
     def spoil(batch):
         batch._weights[1, 2, 7] = np.nan
@@ -105,7 +123,7 @@ def test_numbers_that_are_lost_mark_their_run_alone():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"robot": "snake", "task": "two-regions"}, "there are no kernels for the robot snake"),
+        ({"robot": "snake+rigid", "task": "two-regions"}, r"there are no kernels for the robot snake\+rigid"),
         ({"world": "physics"}, "world is 'physics', and a GPU has only 'substitute'"),
         ({"record": "paths"}, "record is 'paths', and a GPU keeps only 'evals'"),
         ({"population_size": 5000}, "population_size is 5000; at most 4096"),

@@ -3,12 +3,14 @@
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from bns.cli import main
+from bns.cuda import batch, device
 from bns.cuda.device import OutOfDeviceMemoryError, faults
 from bns.errors import DeviceError
 from bns.spec import RunSpec
@@ -171,16 +173,49 @@ def test_faults_of_our_own_are_left_as_they_are():
         raise KeyError("x")
 
 
-def test_sweep_and_run_from_the_command_line_on_the_simulated_gpu(tmp_path, monkeypatch):
+def test_sweeps_of_both_robots_from_the_command_line_on_the_simulated_gpu(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("few.yaml").write_text(
-        "name: few\nrobot: khepera\nseeds: 2\nfixed: {evaluations: 1, population_size: 3, generations_per_evaluation: 0, "
-        "training_iterations_per_evaluation: 0, max_commands: 4}\ngrid: {mutation_rate: [0.1]}\n"
-    )
     monkeypatch.setattr("bns.cuda.batch.THREADS", 2)
-    assert main(["sweep", "few.yaml", "--device", "cuda"]) == 0
-    assert load(Path("results"), "runs")["status"].tolist() == ["ok", "ok"]
-    spec = RunSpec(seed=1, evaluations=1, population_size=3, generations_per_evaluation=0, max_commands=4)
+    for robot, task in (("khepera", "circle"), ("snake", "two-regions")):
+        Path(f"{robot}.yaml").write_text(
+            f"name: few-{robot}\nrobot: {robot}\nseeds: 2\nfixed: {{task: {task}, evaluations: 1, population_size: 3, "
+            "generations_per_evaluation: 0, training_iterations_per_evaluation: 0, min_commands: 1, max_commands: 4}\n"
+            "grid: {mutation_rate: [0.1]}\n"
+        )
+        assert main(["sweep", f"{robot}.yaml", "--device", "cuda"]) == 0
+    assert load(Path("results"), "runs")["status"].tolist() == ["ok"] * 4
+    assert load(Path("results"))["robot"].value_counts().to_dict() == {"khepera": 2, "snake": 2}
+    spec = RunSpec(seed=1, evaluations=1, population_size=3, generations_per_evaluation=0, min_commands=1, max_commands=4)
     spec = replace(spec, training_iterations_per_evaluation=0)
     evals = load(Path("results"))
     assert spec.run_id in set(evals["run_id"])  # by the same name as on the CPU
+
+
+def test_a_gpu_whose_memory_is_full_before_anything_begins(monkeypatch, tmp_path, capsys):
+    def none(specs):
+        raise OutOfDeviceMemoryError("[2] Call to cuMemAlloc results in CUDA_ERROR_OUT_OF_MEMORY")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(batch, "Batch", none)
+    batch.warm.cache_clear()
+    Path("few.yaml").write_text("name: few\nrobot: khepera\nseeds: 1\nfixed: {evaluations: 1}\ngrid: {mutation_rate: [0.1]}\n")
+    assert main(["sweep", "few.yaml", "--device", "cuda"]) == 2
+    assert "the GPU's memory is full ([2] Call to cuMemAlloc" in capsys.readouterr().err
+
+
+def test_a_gpu_without_room_for_the_trial_kernel_is_not_called_old(monkeypatch):
+    def none(module):
+        raise _DriverError("[2] Call to cuDevicePrimaryCtxRetain results in CUDA_ERROR_OUT_OF_MEMORY")
+
+    monkeypatch.setattr(device, "_tried", none)
+    device.device_name.cache_clear()
+    with pytest.raises(DeviceError, match=r"memory is full .*CtxRetain.*CUDA_VISIBLE_DEVICES"):
+        device.device_name()
+
+
+def test_a_driver_without_a_compiler_is_not_called_missing(monkeypatch):
+    cuda = SimpleNamespace(is_available=lambda: False, cuda_error=lambda: None)
+    monkeypatch.setattr(device, "_module", lambda: cuda)
+    device.device_name.cache_clear()
+    with pytest.raises(DeviceError, match=r"compiler \(NVVM\) is not there\. .*pip install 'bns\[cuda\]'"):
+        device.device_name()

@@ -3,98 +3,85 @@
 import numpy as np
 import pytest
 
-from bns.cuda.evolution import evolution_kernel
-from bns.cuda.measuring import MEASURED, measuring_kernel
-from bns.cuda.robots.khepera import scored
-from bns.cuda.settings import SETTINGS
-from bns.engine.evolution import Population, rank, tournament_cdf
-from bns.engine.philox import Key
-from bns.engine.snn import initial_weights, predict
-from bns.robots import load_robot
-from bns.tasks import load_task
+from bns.engine.evolution import Population, rank
+from bns.engine.snn import predict
+from bns.robots.base import Luck
+from tests.cuda.arrays import KEY, SIZE, Arrays
 
-ROBOT, KEY = load_robot("khepera"), Key(11, 4)
-TASK = load_task("khepera", "circle")
-SIZE, CAPACITY = 9, 6
-KERNEL = evolution_kernel(scored, ROBOT.bounds, 3, 20)
+ROBOTS = ["khepera", "snake"]
 
 
-class Arrays:
-    """One run as the kernels take it, with room for two controllers more than it has."""
-
-    def __init__(self, size=SIZE, share=0.4, generations=1, rate=0.5, shortest=2, longest=CAPACITY, scale=1.0):
-        self.settings = np.zeros(1, SETTINGS)
-        values = {
-            "evaluations": 3, "generations": generations, "population": size, "shortest": shortest, "longest": longest,
-            "goals": len(TASK.goals_m), "key0": KEY.words[0], "key1": KEY.words[1], "mutation_rate": rate,
-        }  # fmt: skip
-        for name, value in values.items():
-            self.settings[name] = value
-        self.start = ROBOT.initial_population(KEY, size, shortest, longest)
-        self.commands = np.zeros((2, 1, size + 2, CAPACITY, 3), np.float32)
-        self.commands[0, 0, :size, :longest] = self.start.commands
-        self.lengths = np.zeros((2, 1, size + 2), np.int32)
-        self.lengths[0, 0, :size] = self.start.lengths
-        self.weights = scale * initial_weights(KEY, 3, 20)[None]
-        self.fitness = np.zeros((1, size + 2))
-        self.reached, self.order = np.zeros((1, size + 2), np.int32), np.full((1, size + 2), -1, np.int32)
-        self.cdf = np.ones((1, size + 2))
-        self.cdf[0, :size] = tournament_cdf(size, share)
-        self.goals = np.zeros((1, len(TASK.goals_m) + 1, 2))
-        self.goals[0, :-1] = TASK.goals_m
-        self.failures, self.hits = np.zeros(1, np.int32), np.zeros(1, np.int32)
-
-    def evolve(self, evaluation, threads=4):
-        with np.errstate(all="ignore"):  # networks that have diverged are among the cases
-            KERNEL[1, threads](
-                evaluation, self.settings, self.weights, self.commands, self.lengths, self.fitness, self.reached,
-                self.order, self.cdf, self.goals, self.failures, self.hits,
-            )  # fmt: skip
-
-    def population(self, half=0):
-        n = int(self.settings["population"][0])
-        return Population(self.commands[half, 0, :n].copy(), self.lengths[half, 0, :n].copy())
-
-
-def test_scores_are_the_cpu_engines():
-    one = Arrays()
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_scores_are_the_cpu_engines(robot):
+    one = Arrays(robot)
     one.evolve(0)
-    scores = ROBOT.score(one.start, one.weights[0], TASK)
-    np.testing.assert_allclose(one.fitness[0, :SIZE], scores.fitness, rtol=1e-6)
-    np.testing.assert_array_equal(one.reached[0, :SIZE], scores.goals_reached)
-    np.testing.assert_array_equal(one.order[0, :SIZE], rank(one.fitness[0, :SIZE]))
+    scores = one.robot.score(one.start, one.weights[0], one.task, Luck(KEY, 0))
+    np.testing.assert_allclose(one.first(one.fitness), scores.fitness, rtol=1e-6)
+    np.testing.assert_array_equal(one.first(one.reached), scores.goals_reached)
+    np.testing.assert_array_equal(one.first(one.used), one.start.lengths if scores.used is None else scores.used)
+    np.testing.assert_array_equal(one.first(one.order), rank(one.first(one.fitness)))
     assert one.failures.tolist() == [0]
 
 
+def test_noise_is_that_of_the_generation():
+    first, second = Arrays("snake", generations_per_evaluation=0), Arrays("snake", size=3, mutation_rate=0.0)
+    first.evolve(0)
+    second.evolve(0)
+    second.evolve(1)
+    elite = int(second.first(second.order)[0])
+    assert elite in range(3)
+    scores = second.robot.score(second.population(1), second.weights[0], second.task, Luck(KEY, 1))
+    np.testing.assert_allclose(second.first(second.fitness), scores.fitness, rtol=1e-6)
+    assert (first.first(first.fitness)[:3] != scores.fitness).any()
+
+
 def test_failed_arithmetic_is_worth_nothing_comes_last_and_is_counted_after_the_first_time():
-    one = Arrays(scale=np.float32(1e7), generations=0)
+    one = Arrays("khepera", scale=1e7, generations_per_evaluation=0)
     one.evolve(0)
-    scores = ROBOT.score(one.start, one.weights[0], TASK)
+    scores = one.robot.score(one.start, one.weights[0], one.task)
     assert 0 < scores.failures <= SIZE
-    np.testing.assert_array_equal(one.fitness[0, :SIZE] == 0, scores.fitness == 0)
-    np.testing.assert_array_equal(one.order[0, :SIZE], rank(one.fitness[0, :SIZE]))
+    np.testing.assert_array_equal(one.first(one.fitness) == 0, scores.fitness == 0)
+    np.testing.assert_array_equal(one.first(one.order), rank(one.first(one.fitness)))
     assert one.failures.tolist() == [0]
     one.evolve(1)
     assert one.failures.tolist() == [scores.failures]
 
 
+def test_a_snake_whose_numbers_are_lost_is_worth_nothing():
+    one = Arrays("snake", size=2, longest=2, generations_per_evaluation=0)
+    one.weights[0, 0, -1] = np.nan
+    one.evolve(1)
+    scores = one.robot.score(one.start, one.weights[0], one.task, Luck(KEY, 0))
+    assert one.first(one.fitness).tolist() == scores.fitness.tolist() == [0, 0]
+    assert one.failures.tolist() == [scores.failures] == [2]
+
+
 def test_equals_keep_their_order():
-    one = Arrays(scale=np.float32(0), rate=0.0, share=0.0, generations=0)
+    one = Arrays("khepera", scale=0.0, mutation_rate=0.0, share=0.0, generations_per_evaluation=0)
     one.commands[0, 0, :] = one.commands[0, 0, 0]
     one.lengths[0, 0, :] = one.lengths[0, 0, 0]
     one.evolve(0)
-    assert one.order[0, :SIZE].tolist() == list(range(SIZE))
+    assert one.first(one.order).tolist() == list(range(SIZE))
 
 
 @pytest.mark.parametrize("size", [1, 2, 8, 9])
 @pytest.mark.parametrize(("rate", "shortest", "longest"), [(0.0, 2, 6), (0.5, 4, 4), (1.0, 1, 5)])
 def test_children_are_those_of_the_cpu_engine(size, rate, shortest, longest):
-    one = Arrays(size, rate=rate, shortest=shortest, longest=longest)
+    assert_children("khepera", size, rate, shortest, longest)
+
+
+@pytest.mark.parametrize(("size", "rate"), [(1, 0.5), (2, 1.0), (5, 0.3)])
+def test_children_of_snakes_are_those_of_the_cpu_engine(size, rate):
+    assert_children("snake", size, rate, 1, 2)
+
+
+def assert_children(robot, size, rate, shortest, longest):
+    one = Arrays(robot, size, mutation_rate=rate, shortest=shortest, longest=longest)
     one.evolve(0)
-    order = one.order[0, :size].astype(np.int64)
+    order = one.first(one.order).astype(np.int64)
     one.evolve(1)
     children = Population(np.zeros_like(one.start.commands), np.zeros_like(one.start.lengths))
-    hits = ROBOT.breed(KEY, one.start, order, one.cdf[0, :size].copy(), rate, shortest, 1, children)
+    hits = one.robot.breed(KEY, one.start, order, one.first(one.cdf).copy(), rate, shortest, 1, children)
     np.testing.assert_array_equal(one.population(1).lengths, children.lengths)
     for i in range(size):
         np.testing.assert_allclose(one.population(1).controller(i), children.controller(i), rtol=1e-6)
@@ -102,7 +89,7 @@ def test_children_are_those_of_the_cpu_engine(size, rate, shortest, longest):
 
 
 def test_several_generations_in_one_launch_are_one_after_the_other():
-    together, apart = Arrays(generations=4), Arrays(generations=2)
+    together, apart = Arrays("khepera", generations_per_evaluation=4), Arrays("khepera", generations_per_evaluation=2)
     together.evolve(0)
     together.evolve(1)
     for evaluation in range(3):
@@ -112,23 +99,20 @@ def test_several_generations_in_one_launch_are_one_after_the_other():
     np.testing.assert_array_equal(together.fitness, apart.fitness)
 
 
-def test_what_is_measured_is_what_the_cpu_engine_measures():
-    one, draws = Arrays(), np.random.default_rng(2)
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_what_is_measured_is_what_the_cpu_engine_measures(robot):
+    one, draws = Arrays(robot, generations_per_evaluation=0), np.random.default_rng(2)
     one.evolve(0)
-    one.settings["generations"] = 0
-    X = draws.uniform(-1, 1, (2, 1, 5, 4)).astype(np.float32)
-    targets, counts = draws.uniform(-1, 1, (2, 1, 3, 4)).astype(np.float32), np.array([[3], [0]], np.int32)
-    one.failures[0], one.hits[0], rows = 5, 6, np.zeros((1, 1, len(MEASURED)))
-    measuring_kernel(ROBOT.bounds, 3, 20)[1, 3](
-        1, one.settings, one.weights.reshape(1, -1), one.commands, one.lengths, one.fitness, one.order, X, targets,
-        counts, one.failures, one.hits, rows,
-    )  # fmt: skip
-    scores, errors = ROBOT.score(one.start, one.weights[0], TASK), predict(one.weights[0], X[0, 0, :, :3]) - targets[0, 0, :, :3]
+    one.X[:], one.targets[:] = draws.uniform(-1, 1, one.X.shape), draws.uniform(0, 1, one.targets.shape)
+    one.targets[0, 0, 0, 1] = np.nan  # a network that does not learn from a pattern
+    one.counts[0], one.failures[0], one.hits[0] = 3, 5, 6
+    scores = one.robot.score(one.start, one.weights[0], one.task, Luck(KEY, 0))
+    errors = predict(one.weights[0], one.X[0, 0, :, :3], one.robot.sigmoid_output) - one.targets[0, 0, :, :3]
     expected = {
-        "diversity": ROBOT.diversity(one.start, scores),
+        "diversity": one.robot.diversity(one.start, scores),
         "mean_fitness": scores.fitness.mean(),
         "best_fitness": scores.fitness.max(),
-        "training_error": np.mean(errors.astype(np.float64) ** 2),
+        "training_error": np.nanmean(errors.astype(np.float64) ** 2),
         "validation_error": np.nan,
         "training_patterns": 3,
         "validation_patterns": 0,
@@ -137,4 +121,4 @@ def test_what_is_measured_is_what_the_cpu_engine_measures():
         "bound_hits": 6,
         "arithmetic_failures": 5,
     }
-    np.testing.assert_allclose(rows[0, 0], [expected[name] for name in MEASURED], rtol=1e-5)
+    assert one.measure() == pytest.approx(expected, rel=1e-5, nan_ok=True)

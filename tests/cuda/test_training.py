@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.cuda.settings import SETTINGS
-from bns.cuda.training import WARP, lanes_of, restart, training_kernel
+from bns.cuda.training import WARP, layout_of, restart, training_kernel
 from bns.engine.philox import Key
 from bns.engine.rprop import INITIAL_STEP, Rprop
 from bns.engine.snn import initial_weights
@@ -24,12 +24,12 @@ def settings(**values):
     return one
 
 
-def trained(rule, X, targets, iterations, backtrack=True, evaluation=1):
+def trained(rule, X, targets, iterations, backtrack=True, evaluation=1, times=None):
     """Weights, step, last_gradient, last_change (1, networks, W) after a launch."""
     state = [np.array(part)[None] for part in (rule.weights, rule.step, rule.last_gradient, rule.last_change)]
-    training_kernel((rule.weights.shape[1] - 1) // 7)[(1, len(targets)), WARP](
+    training_kernel((rule.weights.shape[1] - 1) // 7, rule.sigmoid_output, times is not None)[(1, len(targets)), WARP](
         evaluation, settings(iterations=iterations, backtrack=backtrack), *state, X[None], targets[None],
-        np.array([X.shape[1]], np.int32),
+        np.zeros((1, 1, 1), np.float32) if times is None else times[None], np.array([X.shape[1]], np.int32),
     )  # fmt: skip
     return [part[0] for part in state]
 
@@ -65,10 +65,24 @@ def test_neurons_that_do_not_fill_the_lanes(hidden):
     np.testing.assert_allclose(got[0], rule.weights, rtol=1e-5, atol=1e-5)
 
 
-def test_a_network_takes_as_many_lanes_as_it_needs():
-    assert [lanes_of(hidden) for hidden in (4, 8, 20, 24, 100, 160)] == [1, 2, 4, 8, 32, 32]
+@pytest.mark.parametrize(("hidden", "n"), [(12, 5), (100, 3)])
+def test_networks_with_sigmoid_outputs_learn_from_patterns_that_stand_for_several(hidden, n):
+    weights, X, targets = problem(n, hidden, networks=2)
+    targets, times = 0.5 + targets / 5, np.random.default_rng(1).integers(1, 6, targets.shape).astype(np.float32)
+    times[1, 1] = 0  # one that this network does not learn from
+    rule = Rprop.start(weights, "rprop+", sigmoid_output=True)
+    got = trained(rule, X, targets, 2, times=times)
+    for net in range(2):
+        rule.train_one(net, X, targets[net], times[net], n, 2)
+    np.testing.assert_allclose(got[2], rule.last_gradient, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(got[0], rule.weights, rtol=1e-5, atol=1e-5)
+
+
+def test_a_network_takes_the_places_that_leave_the_fewest_empty():
+    sizes = (4, 8, 12, 20, 24, 100, 160)
+    assert [layout_of(hidden) for hidden in sizes] == [(4, 1), (4, 2), (4, 4), (5, 4), (4, 8), (4, 32), (5, 32)]
     with pytest.raises(ValueError, match="164 hidden neurons; a warp holds 160"):
-        lanes_of(164)
+        layout_of(164)
 
 
 def test_a_run_that_has_ended_is_left_alone():

@@ -23,6 +23,7 @@ from bns.diagnose.wheels import WheelPredictor
 from bns.errors import DataError
 from bns.measurements import write_measurements
 from bns.physics.differential_drive import simulate
+from bns.robots import load_robot
 from bns.trial.experiment import read_commands
 from tests.diagnose.worlds import BASE_M, NOMINAL, hidden, measured
 
@@ -209,7 +210,7 @@ def test_a_trial_file_is_written_that_a_trial_reads(tmp_path, capsys):
     arguments = ["propose", str(data), "--model", "khepera", "--minutes", "3", "--arena", "1.6x1.2", "--start=0,0,90"]
     assert main([*arguments, "-o", str(out)]) == 0
     assert f"--commands {out}" in capsys.readouterr().out
-    trials = read_commands(out)
+    trials = read_commands(out, load_robot("khepera"))
     table = pd.read_csv(out)
     assert len(trials) == table["trial"].nunique()
     assert (table[["left_m_s", "right_m_s"]] >= 0.0207).all(axis=None)  # a Khepera's least speed, and what was seen

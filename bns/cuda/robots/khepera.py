@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numba import cuda
 
+from bns.cuda.driving import chosen, keep, normals_of
+from bns.cuda.lists import breeding_of_lists
 from bns.cuda.networks import output
-from bns.engine.breeding import winner
-from bns.engine.patterns import TRAINING_SHARE
-from bns.engine.philox import Purpose, philox
+from bns.engine.philox import philox
 from bns.engine.snn import weight_count
 from bns.robots.khepera import ROBOT
 from bns.robots.khepera.rules import (
@@ -29,12 +29,26 @@ from bns.robots.khepera.rules import (
 
 _WIDTH = weight_count(ROBOT.hidden)
 _RADII_M = np.array(ROBOT.radii_m)
-_PICK, _SPLIT = np.uint32(Purpose.PICK), np.uint32(Purpose.SPLIT)
 _FIRST = np.uint32(0)
-_UNIT = 2.0**-32
+_THREADS = 64
+"""A thread has a run of its own: few in a block, so that the runs spread over all of the GPU."""
 
-DRIVEN = ("fitness_simulation", "fitness_world", "goals_reached", "commands", "driven_ms", "7cm", "10cm", "14cm", "20cm")
-"""What is kept of one controller that was driven, in this order; the last four are 1 for success within that radius."""
+DRIVEN = (
+    "fitness_simulation", "fitness_world", "goals_reached", "commands", "driven_ms", "success", "7cm", "10cm", "14cm", "20cm",
+)  # fmt: skip
+"""What is kept of one controller that was driven, in this order; the last are 1 for success, on the whole and by radius."""
+STEPS, DRAWS = 1, 1
+bred = breeding_of_lists(ROBOT.bounds)
+
+
+def driving_grid(runs: int) -> tuple[int, int]:
+    """Blocks and threads of `drive`."""
+    return -(-runs // _THREADS), min(_THREADS, runs)
+
+
+@cuda.jit(device=True)
+def draw(luck, own, step, thread, threads):  # type: ignore[no-untyped-def]  # compiled
+    """Nothing: there is no noise in evolution."""
 
 
 @cuda.jit(device=True)
@@ -48,8 +62,8 @@ def _displaced(w, at, left, right, new_left, new_right, duration):  # type: igno
 
 
 @cuda.jit(device=True)
-def scored(w, commands, length, goals):  # type: ignore[no-untyped-def]  # compiled
-    """Fitness and goals reached of one controller (longest, 3) on networks w (3 W,): algorithm 2, as `Khepera.score`."""
+def scored(w, commands, length, goals, own, luck):  # type: ignore[no-untyped-def]  # compiled
+    """One controller (longest, 3) on networks w (3 W,): algorithm 2, as `Khepera.score`."""
     x, y, heading, total, goal = START[0], START[1], START[2], 0.0, 0
     left, right = at_rest(CENTRE, PER_UNIT)
     for j in range(length):
@@ -64,37 +78,18 @@ def scored(w, commands, length, goals):  # type: ignore[no-untyped-def]  # compi
         goal, distance = aimed(x, y, goal, goals)
         total += distance
         heading += turn
-    return fitness_of(total, goal, goals), goal
+    return fitness_of(total, goal, goals), goal, length
 
 
 @cuda.jit(device=True)
-def _noise(draws):  # type: ignore[no-untyped-def]  # compiled
-    """Three standard normal numbers of four words, by Box and Muller, as `bns.engine.philox.normals`."""
-    one = math.sqrt(-2.0 * math.log((draws[0] + 0.5) * _UNIT))
-    other = math.sqrt(-2.0 * math.log((draws[2] + 0.5) * _UNIT))
-    angle = (draws[1] + 0.5) * (_UNIT * 2.0 * math.pi)
-    return one * math.cos(angle), other * math.cos((draws[3] + 0.5) * (_UNIT * 2.0 * math.pi)), one * math.sin(angle)
-
-
-@cuda.jit(device=True)
-def _learn(heading, dx, dy, turn, inputs, to_training, run, X, targets, counts):  # type: ignore[no-untyped-def]  # compiled
-    """Add the pattern of a command, begun with that heading and moving by dx, dy, turn, to one of two sets; 1 if not finite."""
+def _targets(heading, dx, dy, turn):  # type: ignore[no-untyped-def]  # compiled
+    """What the networks should say of a command that was begun with that heading and moved by dx, dy, turn."""
     sine, cosine = math.sin(heading), math.cos(heading)
-    target = (
+    return (
         np.float32((dx * sine - dy * cosine) / SCALE[0]),
         np.float32((dx * cosine + dy * sine) / SCALE[1]),
         np.float32(turn / SCALE[2]),
     )
-    if not (math.isfinite(target[0]) and math.isfinite(target[1]) and math.isfinite(target[2])):
-        return 1
-    which = 0 if to_training else 1
-    at = counts[which, run]
-    for k in range(5):
-        X[which, run, k, at] = inputs[k]
-    for net in range(3):
-        targets[which, run, net, at] = target[net]
-    counts[which, run] = at + 1
-    return 0
 
 
 @cuda.jit
@@ -107,18 +102,15 @@ def drive(  # type: ignore[no-untyped-def]  # compiled
     While ``learning`` it is the winner of the real-world tournament cdf (runs, n), and what it does joins the patterns X
     (2, runs, 5, capacity), targets (2, runs, 3, capacity), counts (2, runs): those to train on first, those to watch second.
     Otherwise it is the fittest. weights (runs, 3 W) are the networks, static (3 W,) and noise_sd (3,) the world; rows (runs,
-    evaluations, 9) takes `DRIVEN`.
+    evaluations, 10) takes `DRIVEN`.
     """
     run = cuda.grid(1)
     if run >= settings.size or evaluation > settings[run]["evaluations"]:
         return
     own, step = settings[run], np.uint32(evaluation)
-    n, key0, key1, aims = own["population"], own["key0"], own["key1"], goals[run, : own["goals"]]
+    n, aims = own["population"], goals[run, : own["goals"]]
     half = own["generations"] * (evaluation - 1 if learning else evaluation) % 2
-    who = order[run, 0]
-    if learning:
-        word = philox(_FIRST, _FIRST, step, _PICK, key0, key1)[0]
-        who = winner(order[run, :n], cdf[run, :n], word)
+    who = chosen(own, learning, order[run, :n], cdf[run, :n], step)
     w = weights[run]
     row = rows[run, evaluation - 1]
     visited = cuda.local.array(4, np.int32)
@@ -138,15 +130,13 @@ def drive(  # type: ignore[no-untyped-def]  # compiled
             total_snn = math.inf
 
         to_right, ahead, turn = _displaced(static, 0, left, right, new_left, new_right, duration)
-        noise = _noise(philox(np.uint32(j), _FIRST, step, purpose, key0, key1))
+        noise = normals_of(philox(np.uint32(j), _FIRST, step, purpose, own["key0"], own["key1"]))
         to_right, ahead = to_right + noise[0] * noise_sd[0], ahead + noise[1] * noise_sd[1]
         turn = turn + noise[2] * noise_sd[2]
         dx, dy = step_of(to_right, ahead, math.sin(heading), math.cos(heading))
         if learning:
-            to_training = philox(np.uint32(j), _FIRST, step, _SPLIT, key0, key1)[0] * _UNIT < TRAINING_SHARE
-            inputs = (left, right, new_left, new_right, duration)
-            failed = _learn(heading, dx, dy, turn, inputs, to_training, run, X, targets, counts)
-            failures[run] += failed
+            inputs, wanted = (left, right, new_left, new_right, duration), _targets(heading, dx, dy, turn)
+            failures[run] += keep(inputs, wanted, 0, j, own, step, run, X, targets, counts)
         x, y, heading = x + dx, y + dy, heading + turn
         goal, distance = aimed(x, y, goal, aims)
         total += distance
@@ -165,5 +155,6 @@ def drive(  # type: ignore[no-untyped-def]  # compiled
     row[2] = goal
     row[3] = lengths[half, run, who]
     row[4] = driven_ms
+    row[5] = visited[0] == aims.shape[0]
     for k in range(4):
-        row[5 + k] = visited[k] == aims.shape[0]
+        row[6 + k] = visited[k] == aims.shape[0]

@@ -16,6 +16,8 @@ metres of distance, more than the surface is wide. The source says "a large cons
 SMALLEST_SUM_M = 0.1
 """The sum that fitness is the inverse of is kept above this, half the way from a region's middle to its edge; so that fitness
 never exceeds 10 per metre, twice that of a path which ends at the edge of the last region."""
+LEAST_STABLE = 0.5
+"""A cycle counts as stable from this output on."""
 STABLE = 8
 """Column of an observation that says whether the cycle was stable."""
 
@@ -32,7 +34,7 @@ def walk(displacements: np.ndarray, changes: np.ndarray | None = None, rigid: bo
     for i, moved in enumerate(displacements):
         before = markers if changes is None else moved_on(markers, changes[i], changes[i, 4] if rigid else None)
         markers = moved_on(before, moved, math.hypot(*(before[1] - before[0])) if rigid else None)
-        rows.append(np.concatenate([before.ravel(), markers.ravel(), [float(moved[4] >= 0.5)]]))
+        rows.append(np.concatenate([before.ravel(), markers.ravel(), [float(moved[4] >= LEAST_STABLE)]]))
     return np.array(rows).reshape(-1, 9)
 
 

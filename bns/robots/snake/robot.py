@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -15,14 +14,20 @@ from bns.errors import SpecError
 from bns.robots.base import Luck, Recipe, Scores, turned
 from bns.robots.snake import cycles, path, posture, table
 from bns.robots.snake.rollout import evaluate
+from bns.robots.snake.rules import (
+    BOUNDS,
+    HALF,
+    JOINT_SPEED_RAD_S,
+    MIDDLE,
+    MOST_REPEATS,
+    NOISE_SD_M,
+    NOISY_EVALUATIONS,
+    REACH_M,
+    REPEATS,
+    SETTLE_S,
+    STEP_RAD,
+)
 from bns.tasks import Task
-
-NOISE_SD_M = np.array([0.10, 0.05, 0.10, 0.05])
-"""Noise in evolution on Δx and Δy of yellow, then of green (section 5.4.1)."""
-NOISY_EVALUATIONS = 10
-_REACH_M = 2.0
-"""Displacements from -1 to 1 m lie between outputs 0 and 1: the order of the largest that cycles make."""
-_JOINT_SPEED_RAD_S, _SETTLE_S = 1.5, 0.05
 
 
 class Snake:
@@ -42,7 +47,7 @@ class Snake:
     recipe: Recipe | None = Recipe(400, 20, 3, 20, 4, 12_000, (0.08, 0.08, 0.08, 0.08, 0.0))
     """Section 5.4.1; the noise of the substitute world is 8 cm on every displacement (section 5.8)."""
     radii_m: tuple[float, ...] = ()
-    bounds = cycles.BOUNDS
+    bounds = BOUNDS
     command_columns = cycles.COLUMNS
     measured_columns = table.COLUMNS
     given_columns: Mapping[str, tuple[float, float]] = {
@@ -70,26 +75,25 @@ class Snake:
 
     def inputs(self, commands: np.ndarray) -> np.ndarray:
         """Inputs (5, n): A_lat, A_vert, ω, α, each from -1 to 1, and one that is not used."""
-        middle, half = (self.bounds.low + self.bounds.high) / 2, (self.bounds.high - self.bounds.low) / 2
         X = np.zeros((5, len(commands)), np.float32)
-        X[:4] = ((commands - middle) / half)[:, :4].T
+        X[:4] = ((commands - MIDDLE) / HALF)[:, :4].T
         return X
 
     def displacements(self, outputs: np.ndarray) -> np.ndarray:
         """(n, 5): to the right and along, m, of yellow, then of green; last the stability, from 0 to 1."""
         moved = np.array(outputs.T, np.float64)
-        moved[:, :4] = (moved[:, :4] - 0.5) * _REACH_M
+        moved[:, :4] = (moved[:, :4] - 0.5) * REACH_M
         return moved
 
     def targets(self, displacements: np.ndarray) -> np.ndarray:
         """Network targets (5, n)."""
         wanted = np.array(displacements, np.float64)
-        wanted[:, :4] = wanted[:, :4] / _REACH_M + 0.5
+        wanted[:, :4] = wanted[:, :4] / REACH_M + 0.5
         return np.ascontiguousarray(wanted.T, np.float32)
 
     def learnable(self, displacements: np.ndarray) -> np.ndarray:
         """Displacements are learned from stable cycles, stability from all (section 5.4.1)."""
-        stable = displacements[:, 4] >= 0.5
+        stable = displacements[:, 4] >= path.LEAST_STABLE
         return np.vstack([np.tile(stable, (4, 1)), np.ones((1, len(stable)), bool)])
 
     def poses(self, displacements: np.ndarray, commands: np.ndarray | None = None) -> np.ndarray:
@@ -146,8 +150,8 @@ class Snake:
         )
         fitness, reached, used = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int32)
         half = (task.region_m / 2, task.surface_m[0] / 2, task.surface_m[1] / 2)
-        noise = self._noise(luck, length * cycles.MOST_REPEATS)
-        repeats = np.ascontiguousarray(commands[..., cycles.REPEATS])
+        noise = self._noise(luck, length * MOST_REPEATS)
+        repeats = np.ascontiguousarray(commands[..., REPEATS])
         moved = self._population_changes(commands)
         failures = evaluate(moves, moved, self.rigid, repeats, noise, task.goals_m, *half, fitness, reached, used)
         return Scores(fitness, reached, int(failures), used)
@@ -179,7 +183,7 @@ class Snake:
         children: Population,
     ) -> int:
         """Uniform crossover and mutation; the number of cycles does not change, so none is cut."""
-        children.commands[:] = cycles.breed(key, parents, order, cdf, rate, generation)
+        cycles.breed(key, parents.commands, order, cdf, rate, generation, children.commands)
         children.lengths[:] = parents.lengths
         return 0
 
@@ -208,10 +212,10 @@ class Snake:
 
     def driven_ms(self, commands: np.ndarray) -> float:
         """Time of the cycles: twelve steps of the joint with the longest way at the constant speed, and the pauses."""
-        largest_step = 2 * math.sin(math.pi / 12) * commands[:, 0]
-        return float(1000 * 12 * (largest_step / _JOINT_SPEED_RAD_S + _SETTLE_S).sum())
+        largest_step = STEP_RAD * commands[:, 0]
+        return float(1000 * 12 * (largest_step / JOINT_SPEED_RAD_S + SETTLE_S).sum())
 
     def measurements(self, trial: int, commands: np.ndarray, poses: np.ndarray) -> pd.DataFrame:
         """Two rows a cycle: its parameters and the markers at its begin, the markers and its stability at its end."""
         lasted_s = np.array([self.driven_ms(one[None]) / 1000 for one in commands.astype(np.float64)])
-        return table.cycle_table(trial, commands, poses, lasted_s, _SETTLE_S)
+        return table.cycle_table(trial, commands, poses, lasted_s, SETTLE_S)

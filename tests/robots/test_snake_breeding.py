@@ -1,0 +1,65 @@
+"""Breeding of the snake against a twin of whole arrays, bit for bit."""
+
+import numpy as np
+import pytest
+
+from bns.engine.evolution import Population, rank, tournament_cdf
+from bns.engine.philox import Key, Purpose, uniforms
+from bns.engine.uniform import component_draws
+from bns.robots import load_robot
+from bns.robots.snake import cycles
+from bns.robots.snake.rules import BOUNDS, LARGEST_RATIO, MOST_REPEATS, REPEATS, TURN_RAD
+
+ROBOT, KEY = load_robot("snake"), Key(4, 2)
+
+
+def twin(commands, order, cdf, rate, generation):
+    pairs = len(commands) // 2
+    draws = uniforms(KEY, Purpose.PARENTS, generation, pairs, 1)[:, 0, :2]
+    parents = order[np.minimum(np.searchsorted(cdf, draws, side="right"), len(order) - 1)]
+    first, second = commands[parents[:, 0]], commands[parents[:, 1]]
+    own = component_draws(KEY, Purpose.CUTS, generation, (pairs, *commands.shape[1:])) < cycles.PARENT_SHARE
+    both = np.stack([np.where(own, first, second), np.where(own, second, first)], axis=1).reshape(-1, *commands.shape[1:])
+    children = np.concatenate([commands[order[:1]], both])[: len(commands)]
+    u = component_draws(KEY, Purpose.MUTATION, generation, children.shape)
+    mutates, moves = u < rate, 2.0 * u / max(rate, 1e-300) - 1.0
+    return np.concatenate([children[:1], allowed(mutated(children, mutates, moves))[1:]])
+
+
+def mutated(commands, mutates, moves):
+    moved = commands + np.where(mutates, moves * BOUNDS.mutation_span, 0).astype(np.float32)
+    moved[..., REPEATS] = 1 + np.floor(np.where(mutates, (moves[..., :] + 1) / 2, 0)[..., REPEATS] * MOST_REPEATS)
+    return np.where(mutates, moved, commands)
+
+
+def allowed(commands):
+    commands[..., 2:4] = np.mod(commands[..., 2:4], np.float32(TURN_RAD))
+    np.clip(commands, BOUNDS.low, BOUNDS.high, out=commands)
+    commands[..., 1] = np.minimum(commands[..., 1], np.float32(LARGEST_RATIO) * commands[..., 0])
+    return commands
+
+
+@pytest.mark.parametrize("n", [2, 7, 100])
+@pytest.mark.parametrize("rate", [0.0, 0.1, 1.0])
+def test_children_are_those_of_the_twin(n, rate):
+    parents = ROBOT.initial_population(KEY, n, 4, 100)
+    order, cdf = rank(np.random.default_rng(0).random(n)), tournament_cdf(n, 0.05)
+    for generation in range(1, 5):
+        children = Population(np.zeros_like(parents.commands), np.zeros_like(parents.lengths))
+        ROBOT.breed(KEY, parents, order, cdf, rate, 4, generation, children)
+        np.testing.assert_array_equal(children.commands, twin(parents.commands, order, cdf, rate, generation))
+        parents = children
+
+
+def test_what_is_near_is_a_mutation_of_everything():
+    commands = ROBOT.random_controllers(KEY, 1, 50).controller(0)
+    moves = 2 * component_draws(KEY, Purpose.PROBE, 3, (1, 50, 5))[0] - 1
+    wanted = allowed(mutated(commands, np.ones(commands.shape, bool), moves))
+    np.testing.assert_array_equal(ROBOT.near(commands, KEY, 3), wanted)
+
+
+def test_one_alone_goes_on_as_it_is():
+    one = ROBOT.initial_population(KEY, 1, 4, 100)
+    children = Population(np.zeros_like(one.commands), np.zeros_like(one.lengths))
+    ROBOT.breed(KEY, one, np.arange(1), tournament_cdf(1, 0.5), 1.0, 4, 1, children)
+    np.testing.assert_array_equal(children.commands, one.commands)
