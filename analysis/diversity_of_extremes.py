@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.coverage import coverage
 from analysis.drawn import Drawn
-from analysis.intervals import BOOTSTRAP, bootstrap, ratios
+from analysis.intervals import BOOTSTRAP, FEWEST_SEEDS, bootstrap, ratios
 from analysis.outcomes import by_seed
 from analysis.ranking import any_of, by_seed_array, extremes, ranking
 from analysis.selection import Selection, selections
@@ -70,11 +70,13 @@ def _draw(store: Store, chosen: Selection, task: str, ends: tuple[pd.DataFrame, 
         ax.set_ylim(0, top)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     n, said = int(sum(cells.runs.sum() for cells in ends)), coverage(store, chosen.sweeps, chosen.n)
-    note(figure, "; ".join((f"{n:,} runs in these combinations", *said.missing, f"bands: {BOOTSTRAP}")) + ".")
+    known = any(frame.low.notna().any() for frame in pooled.values())
+    bands = f"bands: {BOOTSTRAP}" if known else f"no bands: fewer than {FEWEST_SEEDS} seeds"
+    note(figure, "; ".join((f"{n:,} runs in these combinations", *said.missing, bands)) + ".")
     shows = (
         f"Mean diversity of the populations after each evaluation from the fifth on, of the {len(ends[0])} best and as many "
         f"worst combinations on task {task_title(chosen.robot, task)}, ranked by success at the last evaluation. Thin: each "
-        f"combination; thick: their mean, with {BOOTSTRAP}. n = {n:,} runs of {', '.join(chosen.sweeps)}."
+        f"combination; thick: their mean; {bands}. n = {n:,} runs of {', '.join(chosen.sweeps)}."
     )
     data = pd.concat([frame.assign(which=which) for which, frame in pooled.items()])
     return Drawn(

@@ -16,6 +16,8 @@ from bns.plotting import style
 NAME = "fitness-error-by-diversity"
 PAPER = "figures 4.11 and 5.26"
 COLOUR = "population_size"
+LONGEST = 2.5
+"""An axis ends at this many times the largest mean: intervals of a few runs would press all dots onto the other axis."""
 
 
 def draw(store: Store) -> list[Drawn]:
@@ -30,8 +32,8 @@ def _draw(store: Store, chosen: Selection) -> Drawn:
     tasks = [task for task in chosen.tasks if task in set(rows.task)]
     shown = [Panel(task_title(chosen.robot, task), rows[rows.task == task]) for task in tasks]
     figure, axes = cloud(shown, COLOUR, "mean fitness error (1/m)")
-    for ax in axes:
-        ax.set_ylim(bottom=0)
+    for ax, panel in zip(axes, shown, strict=True):
+        ax.set_ylim(0, min(ax.get_ylim()[1], LONGEST * panel.rows.y.max()) or None)
     what = (
         "Mean absolute difference between the fitness of the fittest controller in simulation and in the world at the last "
         f"evaluation, against the mean diversity of the populations then, by {TITLES[COLOUR]}; bars are Student's 95 % "
@@ -39,7 +41,8 @@ def _draw(store: Store, chosen: Selection) -> Drawn:
     )
     return described(
         store, chosen, figure, rows, name=NAME, title="Fitness error against diversity", what=what,
-        intervals="Student's 95 % intervals of the mean", thin=thin, see=_in_words(chosen, rows),
+        intervals=f"Student's 95 % intervals of the mean, cut at {LONGEST:g} times the largest", thin=thin,
+        see=_in_words(chosen, rows),
     )  # fmt: skip
 
 

@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from analysis.coverage import coverage
 from analysis.drawn import Drawn
 from analysis.importance import at_the_end, largest_gap, permutation_importances, variance_shares
-from analysis.intervals import BOOTSTRAP, band
+from analysis.intervals import BOOTSTRAP, FEWEST_SEEDS, band
 from analysis.outcomes import criterion
 from analysis.ranking import varied
 from analysis.selection import Selection, selections
 from analysis.store import Store
-from analysis.words import CELL, TITLES, task_title, valued
+from analysis.words import CELL, TITLES, counted, task_title, valued
 from bns.plotting import lettered, note, ordered_styles, panels, style
 
 NAME = "influence"
@@ -68,6 +68,8 @@ def _draw(store: Store, chosen: Selection) -> Drawn:
     n, said = int(rows.drop_duplicates("task").runs.sum()), coverage(store, chosen.sweeps, chosen.n)
     unknown = ("no mark where combinations differ no more than chance makes them",) if rows.variance.isna().any() else ()
     bars = f"bars in (a) and (b): {BOOTSTRAP.removeprefix('pointwise ')}; in (c): 95 % of the splits"
+    if (few := rows.seeds.max()) < FEWEST_SEEDS:
+        bars = f"no bars, and nothing in (c): {counted(few, 'seed')}, and {FEWEST_SEEDS} are needed"
     note(figure, "; ".join((*said.sentences, *unknown, bars)) + ".")
     shows = (
         f"What each parameter does to success (the fittest controller {criterion(store, chosen)}), seeds as the unit. (a) The "
@@ -94,6 +96,8 @@ def _panel(
     ax.set_ylim(len(names) - 0.5, -0.5)
     if measure == "variance":
         ax.set_xlim(-3, 103)
+    elif rows[measure].isna().all():
+        ax.set_xticks([0])
 
 
 def _offsets(count: int) -> np.ndarray:
@@ -103,7 +107,7 @@ def _offsets(count: int) -> np.ndarray:
 def _table(rows: pd.DataFrame, chosen: Selection) -> pd.DataFrame:
     def interval(row: dict, measure: str, form: str) -> str:
         if np.isnan(row[measure]):
-            return "chance alone"
+            return f"from {FEWEST_SEEDS} seeds on" if measure == "permutation" and row["seeds"] < FEWEST_SEEDS else "chance alone"
         value, low, high = (format(row[name], form) for name in (measure, f"{measure}_low", f"{measure}_high"))
         return value if "nan" in (low, high) else f"{value} ({low} to {high})"
 

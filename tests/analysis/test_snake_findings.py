@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from figure_helpers import with_evals, written
 
-from analysis import checks, findings, fitness_error_by_diversity
+from analysis import checks, diversity_of_extremes, findings, fitness_error_by_diversity, influence, success_so_far
 from analysis.clouds import combinations
 from analysis.selection import selections
 from analysis.store import NoDataError, Store
@@ -87,6 +87,8 @@ def test_a_finished_sweep_of_two_seeds_has_its_dots_and_its_estimates_but_no_ver
     assert fitness_error_by_diversity.draw(store)[0].n == 80
     table = findings.draw(store)[0].table.set_index("the source")
     assert not (table["where"] == "").any()
+    assert "no bands: fewer than 5 seeds" in diversity_of_extremes.draw(store)[0].shows
+    assert set(influence.draw(store)[0].table["loss of R²"]) == {"from 5 seeds on"}
     row = table.loc["success saturates at 80 to 90 %"]
     assert (row["these results"], row.verdict) == ("85 % at the last evaluation", "undecided")
 
@@ -97,3 +99,19 @@ def test_dots_of_a_sweep_that_asks_for_more_wait_for_five_runs(tmp_path):
     store = Store(tmp_path)
     with pytest.raises(NoDataError, match=r"no combination has 5 finished runs yet \(the most is 2\)"):
         combinations(store, selections(store)[0])
+
+
+def test_success_so_far_counts_each_run_from_its_first_success_on(tmp_path):
+    runs = []
+    for seed, first in enumerate((2, 3, None)):
+        now, ever = np.zeros(4, bool), np.zeros(4, bool)
+        if first:
+            now[first - 1], ever[first - 1 :] = True, True
+        for rate in (0.1, 0.5):
+            spec = RunSpec(robot="snake", task="two-regions", seed=seed, evaluations=4, mutation_rate=rate)
+            runs.append(with_evals(spec, success=now, ever_success=ever))
+    written(tmp_path, "planted", runs)
+    rows = success_so_far.draw(Store(tmp_path))[0].data
+    counts = {reading: own.successes.tolist() for reading, own in rows.groupby("reading")}
+    assert counts == {"success": [0, 2, 2, 0], "ever_success": [0, 2, 4, 4]}
+    assert set(rows.runs) == {6}
