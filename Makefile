@@ -60,7 +60,7 @@ bench: setup ## speed, as ratios against named peers measured in the same run
 bench-gpu: setup ## the Khepera study on this machine's GPU, from a slice of it (needs: pip install -e '.[cuda]' in .venv)
 	$(BIN)/python -m tests.bench.gpu --json "$(RESULTS)/bench-gpu.json"
 
-hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
+hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, half an hour; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")
 
 GAP = docs/closing-the-gap
