@@ -63,7 +63,7 @@ bench-gpu: setup ## both studies on this machine's GPU, from slices of them (nee
 compare-gpu: setup ## 200 runs a side and robot on GPU and CPU: do success, diversity and fitness error differ? (needs a GPU likewise)
 	$(BIN)/python -m tests.bench.devices --json "$(RESULTS)/compare-gpu.json"
 
-hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, hours; QUICK=1 for a look in minutes
+hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, half an hour; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")
 
 GAP = docs/closing-the-gap
