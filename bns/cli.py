@@ -20,6 +20,7 @@ from bns.trial.options import add_looking_options, add_trial_options
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
 _INTERRUPTED, _TERMINATED = 130, 143
+_NO_PLACE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.EACCES, errno.EPERM, errno.EROFS}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -44,10 +45,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("bns: out of memory; use a smaller population or fewer jobs", file=sys.stderr)
         return BnsError.exit_code
     except OSError as error:
-        if error.errno != errno.ENOSPC:
+        if error.errno == errno.ENOSPC:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            print(f"bns: cannot write the output: {error.strerror}", file=sys.stderr)
+        elif error.errno in _NO_PLACE and error.filename is not None:
+            print(f"bns: cannot use {error.filename}: {error.strerror}. Name another place, or mend that one.", file=sys.stderr)
+        else:
             raise
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        print(f"bns: cannot write the output: {error.strerror}", file=sys.stderr)
         return BnsError.exit_code
 
 

@@ -140,7 +140,7 @@ _ROBOTS: Mapping[str, Callable[[Rig, Clock], Iterator[Finding]]] = {"khepera": k
 def tracker_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
     """Calibration of the tracker's camera, and whether it opens."""
     if "calibration" in rig.tracker:
-        found = load_calibration(Path(rig.tracker["calibration"]))
+        found = load_calibration(Path(str(rig.tracker["calibration"])))
         good = found.rms_px <= WORST_RMS_PX
         yield Finding(good, f"calibration of {found.camera}: RMS {found.rms_px:.2f} pixels", "" if good else "bns calibrate")
     tracker = open_tracker(rig.tracker, clock)

@@ -26,6 +26,10 @@ def watch(rig: Rig, clock: Clock, seconds: float, folder: Path | None, say: Call
     tracker = open_tracker(rig.tracker, clock)
     looks = seen = 0
     try:
+        if folder is not None:
+            if not isinstance(tracker, FrameTracker):
+                raise HardwareError(f"the {rig.tracker['kind']} tracker has no pictures to write; leave --frames out.")
+            folder.mkdir(parents=True, exist_ok=True)
         end_s = clock.now_s() + seconds
         while clock.now_s() < end_s:
             sight = tracker.look()
@@ -51,9 +55,8 @@ def _draw(tracker: object, rig: Rig, sight: Sight | None, path: Path) -> None:
     frame = tracker.camera.newest() if isinstance(tracker, FrameTracker) else None
     if frame is None:
         return
-    lens, height_m = load_calibration(Path(rig.tracker["calibration"])).lens, float(rig.tracker["height_m"])
+    lens, height_m = load_calibration(Path(str(rig.tracker["calibration"]))).lens, float(rig.tracker["height_m"])
     picture = annotated(frame, sight, lambda p: lens.px(np.column_stack([p, np.full(len(p), height_m)])))
-    path.parent.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(path), picture)
 
 

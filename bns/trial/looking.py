@@ -29,6 +29,8 @@ def calibrated(options: argparse.Namespace) -> str:
     board = Board(square_m=options.square_mm / 1000, marker_m=0.75 * options.square_mm / 1000)
     if options.print_board is not None:
         return _printed(board, options.print_board)
+    if not options.output.absolute().parent.is_dir():
+        raise HardwareError(f"there is no folder {options.output.parent} to write {options.output.name} into; make it first.")
     found = from_folder(options.frames, options.floor, board) if options.frames else _filmed(options, board)
     found.save(options.output)
     height_m = float(-(found.lens.rotation.T @ found.lens.shift_m)[2])

@@ -58,6 +58,7 @@ def test_a_changed_byte_is_always_another_one():
         ("faults: [{kind: hang-up, at_s: -1}]", "at_s is -1; it must be a number from 0"),
         ("faults: [{kind: hang-up, at_s: soon}]", "at_s is 'soon'"),
         ("faults: [{kind: hang-up, when: 3}]", "is no fault"),
+        ("faults: [{kind: silent-servo, rate: 0.1, id: a}]", "id is 'a'; it must be the number of a servo"),
         ("faults: 3", "must hold `faults:`, a list"),
         ("seed: -1\nfaults: []", "seed is -1"),
         ("faults: [", "cannot read the fault plan"),

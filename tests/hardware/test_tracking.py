@@ -210,6 +210,19 @@ def test_a_stream_is_read_newest_first_and_its_end_is_noticed(scene):
         tracker.close()
 
 
+def test_a_camera_that_hangs_shows_nothing_new(scene):
+    shown = [scene.frame([]), scene.frame([])]  # alike but for the noise
+    clock = EmulatedClock(np.inf)
+    with CameraEmulator(lambda: shown[0] if clock.now_s() < 1.0 else shown[1], clock, rate_hz=10) as camera:
+        reader = StreamCamera(camera.address, clock)
+        began_s = reader.newest().t_s
+        clock.sleep(0.5)
+        assert reader.newest().t_s == began_s
+        clock.sleep(0.6)
+        assert reader.newest().t_s > 1.0
+        reader.close()
+
+
 def test_track_shows_what_is_seen(tmp_path, capsys):
     rig = tmp_path / "rig.yaml"
     rig.write_text(

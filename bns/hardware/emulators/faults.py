@@ -126,7 +126,10 @@ def _fault(path: Path, entry: Any) -> Fault:
     numbers = {name: _number(path, name, entry[name]) for name in ("rate", "at_s", "for_s") if name in entry}
     if numbers.get("rate", 0.0) > 1.0:
         raise HardwareError(f"{path}: rate is {entry['rate']!r}; a chance is from 0 to 1.")
-    return Fault(entry["kind"], servo=int(entry.get("id", 0)), **numbers)
+    servo = entry.get("id", 0)
+    if type(servo) is not int or not 0 <= servo <= 253:
+        raise HardwareError(f"{path}: id is {servo!r}; it must be the number of a servo, from 0 to 253.")
+    return Fault(entry["kind"], servo=servo, **numbers)
 
 
 def _number(path: Path, name: str, value: Any) -> float:

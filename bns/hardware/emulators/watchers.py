@@ -14,6 +14,7 @@ from bns.hardware.emulators.faults import Faults
 from bns.hardware.emulators.scene import Patch, Scene, disc, tag
 from bns.hardware.emulators.wii import WiiEmulator
 from bns.hardware.tracking.calibration import Calibration
+from bns.hardware.tracking.kinds import checked
 from bns.hardware.tracking.lens import Lens, looking_down
 from bns.hardware.tracking.wii import overhead
 
@@ -41,6 +42,7 @@ def emulated_tracker(
     settings: Mapping[str, Any], folder: Path, pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
 ) -> tuple[dict[str, Any], Device]:
     """An emulated device that watches a rigid robot; the tracker's settings with its address, and the device."""
+    checked(settings)
     if settings["kind"] == "wii":
         path = folder / "wiimote"
         return {**settings, "device": str(path)}, WiiEmulator(path, pose, overhead(settings), clock, faults, seed)

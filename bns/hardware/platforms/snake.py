@@ -21,7 +21,7 @@ from bns.hardware.snake_drive import SnakeDrive
 from bns.hardware.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
-from bns.hardware.tracking.kinds import open_tracker
+from bns.hardware.tracking.kinds import checked, open_tracker
 
 
 class SnakePlatform:
@@ -91,8 +91,7 @@ def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: Journa
 def open_platform(rig: Rig, clock: Clock, journal: Journal, stopping: Stopping) -> SnakePlatform:
     """Open port and tracker, and make sure before anything else that the servos are limp, fit and all there."""
     settings = snake_settings(rig.driver)
-    if rig.tracker["kind"] != "colour":
-        raise HardwareError(f"the snake's ends are told apart by colour; its tracker is {rig.tracker['kind']}, not kind: colour.")
+    _check_tracker(rig)
     chain = open_chain(rig.port, settings, clock, journal)
     try:
         with StopsAtTheEnd(chain.stop):
@@ -109,4 +108,11 @@ def open_platform(rig: Rig, clock: Clock, journal: Journal, stopping: Stopping) 
 
 def emulate(rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> EmulatedSnakeRig:
     """An emulated robot under an emulated camera, their ports in `folder`."""
+    _check_tracker(rig)
     return EmulatedSnakeRig(rig, folder, clock, plan, seed)
+
+
+def _check_tracker(rig: Rig) -> None:
+    if rig.tracker["kind"] != "colour":
+        raise HardwareError(f"the snake's ends are told apart by colour; its tracker is {rig.tracker['kind']}, not kind: colour.")
+    checked(rig.tracker)

@@ -9,14 +9,16 @@ from typing import Any
 import cv2
 import numpy as np
 
+from bns.errors import HardwareError
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Camera, Frame, FrameTracker, open_camera
-from bns.hardware.tracking.kinds import taken
+from bns.hardware.tracking.kinds import Settings
 from bns.hardware.tracking.lens import Lens
 from bns.hardware.tracking.rigid import fit
 from bns.hardware.tracking.sight import Sight
 
+SETTINGS = Settings(("camera", "calibration", "side_m", "height_m"), ("number",), ("side_m", "height_m"))
 _WORST_SHARE = 0.1
 """A marker whose corners do not form a square of its size, to this share of its side, is none."""
 
@@ -48,9 +50,10 @@ class ArucoDetector:
 
 def detector(settings: Mapping[str, Any]) -> ArucoDetector:
     """The detector that a rig describes."""
-    taken("aruco", settings, ("camera", "calibration", "side_m", "height_m"), ("number",))
-    lens = load_calibration(Path(settings["calibration"])).lens
-    return ArucoDetector(lens, int(settings.get("number", 0)), float(settings["side_m"]), float(settings["height_m"]))
+    lens, number = load_calibration(Path(str(settings["calibration"]))).lens, settings.get("number", 0)
+    if type(number) is not int or not 0 <= number < 50:
+        raise HardwareError(f"the aruco tracker: number is {number!r}; markers of this kind (4x4) have the numbers 0 to 49.")
+    return ArucoDetector(lens, number, float(settings["side_m"]), float(settings["height_m"]))
 
 
 def open_tracker(settings: Mapping[str, Any], clock: Clock) -> FrameTracker:

@@ -104,7 +104,7 @@ class FrameTracker:
 
 def open_camera(settings: Mapping[str, Any], clock: Clock) -> StreamCamera:
     """The camera of a rig, if its frames are those that the rig's calibration was made for."""
-    calibration = load_calibration(Path(settings["calibration"]))
+    calibration = load_calibration(Path(str(settings["calibration"])))
     camera = StreamCamera(str(settings["camera"]), clock)
     frame = camera.newest()
     try:

@@ -14,10 +14,15 @@ from bns.errors import HardwareError
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Frame, FrameTracker, open_camera
-from bns.hardware.tracking.kinds import taken
+from bns.hardware.tracking.kinds import Settings
 from bns.hardware.tracking.lens import Lens
 from bns.hardware.tracking.sight import Sight
 
+SETTINGS = Settings(
+    ("camera", "calibration", "diameter_m", "height_m"),
+    ("distance_m", "yellow", "green"),
+    ("diameter_m", "height_m", "distance_m"),
+)
 YELLOW, GREEN = (20, 38), (50, 85)
 """Hues as OpenCV counts them, 0 to 179."""
 _HUE_GAP = 5
@@ -98,13 +103,18 @@ def _centroid(outline: np.ndarray, picture: np.ndarray, hsv: np.ndarray) -> np.n
     return np.array([(across * weight).sum(), (down * weight).sum()]) / weight.sum()
 
 
+def _hues(name: str, given: Any) -> tuple[int, ...]:
+    good = isinstance(given, list) and len(given) == 2 and all(type(h) is int and 0 <= h <= 179 for h in given)
+    if not good or given[0] >= given[1]:
+        raise HardwareError(f"the colour tracker: {name} is {given!r}; write two hues, 0 to 179, the lower one first.")
+    return tuple(given)
+
+
 def detector(settings: Mapping[str, Any]) -> ColourDetector:
     """The detector that a rig describes."""
-    optional = ("distance_m", "yellow", "green")
-    taken("colour", settings, ("camera", "calibration", "diameter_m", "height_m"), optional)
-    lens = load_calibration(Path(settings["calibration"])).lens
-    hues = {name: tuple(int(h) for h in settings[name]) for name in ("yellow", "green") if name in settings}
-    sizes = {name: float(settings[name]) for name in ("diameter_m", "height_m", "distance_m") if name in settings}
+    lens = load_calibration(Path(str(settings["calibration"]))).lens
+    hues = {name: _hues(name, settings[name]) for name in ("yellow", "green") if name in settings}
+    sizes = {name: float(settings[name]) for name in SETTINGS.sizes if name in settings}
     return ColourDetector(lens, Markers(**sizes, **hues))  # type: ignore[arg-type]  # two hues each
 
 

@@ -16,10 +16,13 @@ import numpy as np
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
-from bns.hardware.tracking.kinds import taken
+from bns.hardware.tracking.kinds import Settings
 from bns.hardware.tracking.rigid import best_fit
 from bns.hardware.tracking.sight import Sight
 
+SETTINGS = Settings(
+    ("device", "height_m", "view_rad"), ("x_m", "y_m", "up_rad", "leds_m"), ("height_m", "view_rad")
+)
 EVENT = struct.Struct("llHHi")
 """struct input_event of the kernel: seconds, microseconds, type, code, value."""
 EV_SYN, EV_ABS, SYN_REPORT, SYN_DROPPED, ABS_HAT0X = 0, 3, 0, 3, 0x10
@@ -117,12 +120,10 @@ class WiiTracker:
 
 def overhead(settings: Mapping[str, Any]) -> Overhead:
     """The camera that a rig describes."""
-    own = {name: value for name, value in settings.items() if name != "kind"}
-    taken("wii", own, ("device", "height_m", "view_rad"), ("x_m", "y_m", "up_rad", "leds_m"))
     try:
-        return Overhead(**{name: float(value) for name, value in own.items() if name not in {"device", "leds_m"}})
+        return Overhead(**{name: float(value) for name, value in settings.items() if name not in {"kind", "device", "leds_m"}})
     except (TypeError, ValueError) as error:
-        raise HardwareError(f"the wii tracker has a setting that is no number: {own!r}") from error
+        raise HardwareError(f"the wii tracker has a setting that is no number: {dict(settings)!r}") from error
 
 
 def open_tracker(settings: Mapping[str, Any], clock: Clock) -> WiiTracker:
