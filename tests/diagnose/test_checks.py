@@ -93,3 +93,12 @@ def test_tracks_hold_commands_as_they_were_in_force(table):
     some = tracks.only(np.array([2, 0]))
     assert some.names == ("2", "0")
     np.testing.assert_array_equal(some.pose[: some.first[1]], tracks.pose[tracks.first[2] :])
+
+
+def test_turns_of_more_than_half_a_round_between_two_poses_are_not_held_against_the_wheels():
+    lasts = np.tile([0.4, 0.8, 2.0, 2.2], 10)
+    turned = np.cumsum(np.append(0.0, 2.1 * lasts))
+    pose = {"x_m": 0.0, "y_m": 0.0, "heading_rad": np.angle(np.exp(1j * turned))}
+    speeds = {"left_m_s": np.append(np.full(40, 0.02), np.nan), "right_m_s": np.append(np.full(40, 0.206), np.nan)}
+    table = pd.DataFrame({"trial": 0, "t_s": np.cumsum(np.append(0.0, lasts)), **speeds, **pose})
+    checked(table.assign(x_m=0.02 * np.arange(41)))
