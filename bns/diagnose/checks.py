@@ -219,7 +219,8 @@ def _units(table: pd.DataFrame) -> None:
     if _turns_as_degrees(table):
         raise DataError("Headings turn far more than the wheels can make them: heading_rad looks like degrees.")
     if len(ways) and np.abs(ways[:, 2]).sum() > 0.3:
-        same = float(ways[:, 2] @ ways[:, 3] / np.sqrt((ways[:, 2] @ ways[:, 2]) * (ways[:, 3] @ ways[:, 3]) + 1e-300))
+        told, seen = ways[np.abs(ways[:, 2]) <= np.median(np.abs(ways[ways[:, 2] != 0, 2])), 2:].T  # larger ones may be rounds
+        same = float(told @ seen / np.sqrt((told @ told) * (seen @ seen) + 1e-300))
         if same < -0.5:
             raise DataError(
                 "The robot turns against the wheels: heading_rad must run counter-clockwise, "

@@ -101,3 +101,12 @@ def test_a_trial_without_a_tracked_pose_is_left_out_and_said_to_be(table, gone):
     assert [f.trial for f in findings if "the trial is left out" in f.text] == [str(gone)]
     assert len(tracks_of(usable)) == 2
     assert gone not in set(usable.trial)
+
+
+def test_turns_of_more_than_half_a_round_between_two_poses_are_not_held_against_the_wheels():
+    lasts = np.tile([0.4, 0.8, 2.0, 2.2], 10)
+    turned = np.cumsum(np.append(0.0, 2.1 * lasts))
+    pose = {"x_m": 0.0, "y_m": 0.0, "heading_rad": np.angle(np.exp(1j * turned))}
+    speeds = {"left_m_s": np.append(np.full(40, 0.02), np.nan), "right_m_s": np.append(np.full(40, 0.206), np.nan)}
+    table = pd.DataFrame({"trial": 0, "t_s": np.cumsum(np.append(0.0, lasts)), **speeds, **pose})
+    checked(table.assign(x_m=0.02 * np.arange(41)))
