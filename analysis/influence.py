@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
+from threading import Thread
 
 import numpy as np
 import pandas as pd
@@ -29,6 +31,7 @@ MEASURES = {
 
 
 def draw(store: Store) -> list[Drawn]:
+    Thread(target=import_module, args=("sklearn.inspection",)).start()  # a second to load, beside the queries
     return [_draw(store, chosen) for chosen in selections(store)]
 
 
