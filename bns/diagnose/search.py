@@ -138,13 +138,11 @@ class Search:
         steps: list[Step] = []
         tried: set[frozenset[str]] = set()
         while len(accepted) < MOST:
-            step = self._round(problem, fit, accepted)
+            step, problem, fit = self._round(problem, fit, accepted)
             steps.append(step)
             if not step.taken:
                 break
             accepted = (*accepted, step.taken)
-            chosen = next(c for c in step.ranking if c.name == step.taken)
-            problem, fit = self._settled(chosen.fit.model, problem.following.noise)
             problem, fit, accepted = self._swapped(problem, fit, accepted)
             problem, fit, accepted = self._looked_back(problem, fit, accepted)
             if frozenset(accepted) in tried:
@@ -162,13 +160,21 @@ class Search:
         problem = problem_for(self.predictor, model, start)
         return problem, problem.fit(model)
 
-    def _round(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> Step:
+    def _round(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[Step, Problem, Fit]:
+        """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in."""
         left = [effect for name, effect in self.catalogue.items() if name not in accepted]
         tried = each(partial(self._tried, problem, fit), [*DECOYS, *left])
         bar = max(c.evidence.gain for c in tried[: len(DECOYS)])
         ranking = sorted(tried[len(DECOYS) :], key=lambda c: -c.evidence.gain)
-        allowed = [c for c in ranking if self._earned(c, fit, bar) and not c.veto]
-        return Step(tuple(ranking), bar, allowed[0].name if allowed else "")
+        for place, candidate in enumerate(ranking):
+            if candidate.veto or not self._earned(candidate, fit, bar):
+                continue
+            settled = self._settled(candidate.fit.model, problem.following.noise)
+            veto = veto_of(settled[1], candidate.name, bounds=False)
+            if not veto:
+                return Step(tuple(ranking), bar, candidate.name), *settled
+            ranking[place] = replace(candidate, veto=veto)
+        return Step(tuple(ranking), bar, ""), problem, fit
 
     def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
         self.tick(effect.name)
@@ -182,24 +188,32 @@ class Search:
 
     def _swapped(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[Problem, Fit, tuple[str, ...]]:
         """Exchange an accepted effect for one that has earned its place too, while that makes the held-out loss smaller."""
+        barred: set[str] = set()
         for _ in range(len(accepted) if len(accepted) > 1 else 0):
-            best, new = fit, accepted
+            best, new, comes = fit, accepted, ""
             for name, other, tried in self._exchanges(problem, fit, accepted):
-                if tried.held_out.sum() < best.held_out.sum() - 0.5 and self._may_stay(problem, tried, other):
-                    best, new = tried, tuple(other if a == name else a for a in accepted)
+                better = other not in barred and tried.held_out.sum() < best.held_out.sum() - 0.5
+                if better and self._may_stay(problem, tried, other):
+                    best, new, comes = tried, tuple(other if a == name else a for a in accepted), other
             if new == accepted:
                 break
-            accepted = new
-            problem, fit = self._settled(best.model, problem.following.noise)
+            exchanged, settled = self._settled(best.model, problem.following.noise)
+            if any(veto_of(settled, name, bounds=False) for name in new):  # under its own noise it asks for more
+                barred.add(comes)
+            else:
+                problem, fit, accepted = exchanged, settled, new
         return problem, fit, accepted
 
     def _looked_back(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
     ) -> tuple[Problem, Fit, tuple[str, ...]]:
-        """Drop what no longer earns its place."""
-        for name in accepted[:-1]:
+        """Drop what no longer earns its place, and what can no longer be believed beside what came in."""
+        newest = accepted[-1]
+        for name in accepted:
             lacking = without(problem, fit, name)
-            if not self._earned_over(problem, lacking, fit, name):
+            earned = name == newest or self._earned_over(problem, lacking, fit, name)
+            # at a bound it may be: what does nothing beside a newcomer earns nothing
+            if not earned or veto_of(fit, name, bounds=False):
                 accepted = tuple(a for a in accepted if a != name)
                 problem, fit = self._settled(lacking.model, problem.following.noise)
         return problem, fit, accepted

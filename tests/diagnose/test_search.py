@@ -7,7 +7,7 @@ import pytest
 
 from bns.diagnose.candidates import fit_with
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.search import Search
+from bns.diagnose.search import Search, veto_of
 from bns.diagnose.tracks import tracks_of
 from bns.diagnose.wheels import WheelPredictor
 from bns.physics.decoys import DECOYS
@@ -113,6 +113,18 @@ def test_a_rival_must_have_earned_its_place(monkeypatch, name, values, rivals):
     monkeypatch.setattr("bns.diagnose.search.alike", lambda *_: True)
     monkeypatch.setattr(search, "_exchanges", lambda *_: [("camera-scale", name, tried)])
     assert len(search._rivals(problem, fit, ("camera-scale",))) == rivals
+
+
+def test_what_asks_for_too_much_once_noise_and_numbers_have_settled_is_passed_over(monkeypatch):
+    def veto(fit, name, bounds=True):
+        return "too much" if name == "wheelbase" and not bounds else veto_of(fit, name, bounds)
+
+    monkeypatch.setattr("bns.diagnose.search.veto_of", veto)
+    tracks = tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=12, seed=11))
+    found = Search(WheelPredictor(tracks), NOMINAL).run()
+    first = found.steps[0].ranking[0]
+    assert (first.name, first.veto) == ("wheelbase", "too much")
+    assert "wheelbase" not in found.accepted
 
 
 def test_slopes_of_a_smaller_model_lead_to_the_same_fit():
