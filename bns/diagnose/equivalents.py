@@ -15,9 +15,9 @@ import numpy as np
 from bns.diagnose.alike import alike
 from bns.diagnose.fit import Fit, Problem
 from bns.diagnose.noise import weights
-from bns.diagnose.search import veto_of
 from bns.diagnose.threads import each
 from bns.diagnose.tracks import Array
+from bns.diagnose.veto import veto_of
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 

@@ -10,8 +10,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
-import numpy as np
-
 from bns.diagnose.alike import alike
 from bns.diagnose.candidates import best_start, fit_with, listed
 from bns.diagnose.evidence import MIN_Z, Evidence
@@ -21,6 +19,7 @@ from bns.diagnose.own_clocks import OwnClocks, judged, own_clocks, with_one_cloc
 from bns.diagnose.predictor import Predictor
 from bns.diagnose.threads import each
 from bns.diagnose.tracks import Array
+from bns.diagnose.veto import veto_of
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
 from bns.physics.model import Model
@@ -285,17 +284,3 @@ def problem_for(predictor: Predictor, model: Model, start: Array | None = None) 
     """The problem of fitting models like this one: its noise is estimated under it."""
     steps = predictor.steps(model)
     return Problem(predictor, filter_for(predictor, steps, estimate_noise(predictor, steps, start)))
-
-
-def veto_of(fit: Fit, name: str, bounds: bool = True) -> str:
-    """Why an effect with these numbers cannot be believed; "" if it can. ``bounds``: do numbers at one count?"""
-    for index, number in enumerate(fit.free):
-        p = number.parameter
-        if number.effect != name:
-            continue
-        value, (low, high) = float(fit.values[index]), fit.interval(index)
-        if bounds and value in {p.low, p.high}:
-            return f"{p.name} is at its bound, {value:g} {p.unit}"
-        if np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
-            return f"{p.name} = {value:g} {p.unit} is outside of what is plausible, {p.plausible[0]:g} to {p.plausible[1]:g}"
-    return ""

@@ -7,8 +7,9 @@ import pytest
 
 from bns.diagnose.candidates import fit_with
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.search import Search, veto_of
+from bns.diagnose.search import Search
 from bns.diagnose.tracks import tracks_of
+from bns.diagnose.veto import veto_of
 from bns.diagnose.wheels import WheelPredictor
 from bns.physics.decoys import DECOYS
 from bns.physics.formula import formula_effect
