@@ -11,6 +11,7 @@ from scipy.stats import t as student
 
 from bns.diagnose.candidates import listed
 from bns.diagnose.equivalents import longer
+from bns.diagnose.evidence import fewest_trials
 from bns.diagnose.fit import Fit
 from bns.diagnose.folds import errors_at_horizons, held_out_steps
 from bns.diagnose.formula_search import Formula, best_formula
@@ -26,8 +27,6 @@ from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
 
 VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
-FEWEST_TRIALS = 8
-"""With fewer the signs of whole trials cannot all come out alike by a chance that is small enough."""
 FEW_TRIALS = 40
 _HINT = 3.0
 """A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
@@ -98,10 +97,11 @@ def diagnose(
     tick: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """What the model lacks on these tracks."""
-    reason = too_little(predictor.tracks)
+    search = Search(predictor, model, extra, tick)
+    reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
-    found = Search(predictor, model, extra, tick).run()
+    found = search.run()
     tick("what is left")
     seen = patterns(found.problem, found.fit)
     rest = unexplained(found.problem, found.fit, seen)
@@ -125,11 +125,11 @@ def diagnose(
     )
 
 
-def too_little(tracks: Tracks) -> str:
-    """Why nothing can be concluded from these tracks; "" if something may."""
-    if len(tracks) < FEWEST_TRIALS:
+def too_little(tracks: Tracks, fewest: int) -> str:
+    """Why nothing can be concluded from these tracks, of which there must be so many; "" if something may."""
+    if len(tracks) < fewest:
         return (
-            f"{len(tracks)} trials: whatever they show could be luck. {FEWEST_TRIALS} trials are the least, "
+            f"{len(tracks)} trials: whatever they show could be luck. {fewest} trials are the least, "
             "20 or more find what is large, 60 what is small."
         )
     frames = np.diff(tracks.first)

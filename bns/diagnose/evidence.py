@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import count
 
 import numpy as np
 
@@ -54,6 +55,12 @@ def sign_flip_p(scores: Array, curvature: Array) -> float:
     sums = _signs(len(scores)) @ apart
     by_luck = np.einsum("fk,fk->f", sums, sums)
     return float((1 + np.count_nonzero(by_luck >= seen * (1 - 1e-9))) / (1 + FLIPS))
+
+
+@lru_cache
+def fewest_trials(level: float) -> int:
+    """From fewer no effect can be taken, however large it is: that all trials pull the same way is no rarer by luck than this."""
+    return next(n for n in count(2) if sign_flip_p(np.ones((n, 1)), np.eye(1)) < level)
 
 
 @lru_cache(maxsize=1)

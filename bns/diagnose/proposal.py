@@ -10,16 +10,19 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.design import Pool, designed, random_pool
-from bns.diagnose.diagnosis import FEWEST_TRIALS, Diagnosis
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.evidence import fewest_trials
 from bns.diagnose.noise import huber
 from bns.diagnose.power import Expected, Past, blocked, decided, minutes_needed, scatter_of
 from bns.diagnose.rivals import Rival, contests_of, rivals_of, without_last
+from bns.diagnose.search import FALSE_ALARM
 from bns.diagnose.separation import Apart, Pair, Stage, apart
 from bns.diagnose.sequences import Arena, Bounds, Sequences
 from bns.diagnose.threads import one_thread_each
 from bns.diagnose.tracks import Array
 from bns.diagnose.witness import witnesses
 from bns.errors import DataError
+from bns.physics.effects import all_effects
 
 HOPELESS_MINUTES = 24 * 60.0
 """Robot time beyond which a pair counts as the same for every experiment with these sensors."""
@@ -195,7 +198,7 @@ def _minutes(both: tuple[Expected, Expected], directions: tuple[Apart, Apart], l
             low, high = (low, middle) if decided([e.first(middle) for e in both]) >= SURE else (middle, high)
         return float(lasting_s[:high].sum() / 60)
     whole = sum(e.chance * one.total() for e, one in zip(both, directions, strict=True))
-    least = FEWEST_TRIALS * float(lasting_s.mean() / 60) if alone and len(lasting_s) else 0.0
+    least = fewest_trials(FALSE_ALARM / len(all_effects())) * float(lasting_s.mean() / 60) if alone and len(lasting_s) else 0.0
     return max(minutes_needed(whole, float(lasting_s.sum() / 60), scatter), least)
 
 

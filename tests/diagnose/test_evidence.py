@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bns.diagnose.evidence import held_out_gain, sign_flip_p
+from bns.diagnose.evidence import fewest_trials, held_out_gain, sign_flip_p
 from bns.diagnose.search import problem_for
 from bns.diagnose.tracks import tracks_of
 from bns.diagnose.wheels import WheelPredictor
@@ -69,3 +69,10 @@ def test_what_holds_a_trial_out_is_close_to_a_fit_without_it():
         truly = problem.per_trial(huber(problem.white(without.model)))[trial]
         assert fit.held_out[trial] == pytest.approx(truly, rel=2e-3)
         assert fit.held_out[trial] >= fit.losses[trial] - 1e-6
+
+
+def test_so_many_trials_are_the_fewest_that_can_bring_an_effect_in():
+    level = 0.05 / 20
+    fewest = fewest_trials(level)
+    assert fewest == 10  # 2 of the 2^10 ways that the signs can fall
+    assert sign_flip_p(np.ones((fewest - 1, 1)), np.eye(1)) >= level > sign_flip_p(np.ones((fewest, 1)), np.eye(1))
