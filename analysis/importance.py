@@ -33,7 +33,7 @@ _STREAM = 5
 @remembered
 def by_value(store: Store, chosen: Selection, task: str, parameter: str) -> tuple[np.ndarray, np.ndarray, list, list]:
     """Successes and runs (seeds, values, evaluations), and the values and evaluations in order."""
-    rows = _of_task(_by_value(store, chosen, parameter), task)
+    rows = successes_by_seed(store, chosen, ("evaluation", parameter), f"task = '{task}'")
     runs, successes = (
         rows.pivot_table(index=["root_seed", "seed"], columns=[parameter, "evaluation"], values=name, fill_value=0)
         for name in ("runs", "successes")
@@ -66,24 +66,9 @@ def largest_gap(store: Store, chosen: Selection, task: str, parameter: str, *, a
 
 
 @remembered
-def _by_value(store: Store, chosen: Selection, parameter: str) -> pd.DataFrame:
-    # All tasks in one query: it takes hardly longer than one of them.
-    return successes_by_seed(store, chosen, ("evaluation", parameter), "true")
-
-
-@remembered
-def _by_combination(store: Store, chosen: Selection) -> pd.DataFrame:
-    return successes_by_seed(store, chosen, CELL, "last")
-
-
-def _of_task(rows: pd.DataFrame, task: str) -> pd.DataFrame:
-    return rows[rows.task == task].drop(columns="task")
-
-
-@remembered
 def at_the_end(store: Store, chosen: Selection, task: str) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
     """Combinations (rows), and successes and runs of each seed at the last evaluation, both (seeds, combinations)."""
-    rows = _of_task(_by_combination(store, chosen), task)
+    rows = successes_by_seed(store, chosen, CELL, f"task = '{task}' AND last")
     cells = rows[list(CELL)].drop_duplicates().sort_values(list(CELL)).reset_index(drop=True)
     numbered = rows.merge(cells.reset_index(names="cell"), on=list(CELL))
     (sums, _), (counts, _) = (by_seed_array(numbered, name, "cell") for name in ("successes", "runs"))

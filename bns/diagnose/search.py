@@ -209,10 +209,11 @@ class Search:
         """Drop what no longer earns its place, and what can no longer be believed beside what came in."""
         newest = accepted[-1]
         for name in accepted:
+            believed = not veto_of(fit, name, bounds=False)  # at a bound it may be: what does nothing there earns nothing
+            if believed and name == newest:
+                continue
             lacking = without(problem, fit, name)
-            earned = name == newest or self._earned_over(problem, lacking, fit, name)
-            # at a bound it may be: what does nothing beside a newcomer earns nothing
-            if not earned or veto_of(fit, name, bounds=False):
+            if not believed or not self._earned_over(problem, lacking, fit, name):
                 accepted = tuple(a for a in accepted if a != name)
                 problem, fit = self._settled(lacking.model, problem.following.noise)
         return problem, fit, accepted

@@ -26,7 +26,7 @@ def test_lost_answers_cost_a_khepera_s_stop_little(tmp_path):
 
 
 def test_a_khepera_whose_line_was_gone_is_stopped_once_it_is_back(tmp_path):
-    """The emulated line comes back in a thread of its own, which a busy machine lets wait: the longest times are its."""
+    """A thread that answers on the emulated line must notice that it is back; a busy machine lets it wait for that."""
     assert np.median(still_s("khepera", 5, ["hang-up"])) <= stops.AIM_S + 0.04
 
 
