@@ -20,7 +20,7 @@ from analysis.ranking import TEN, in_words, ranking, varied
 from analysis.selection import CONFIRMING, Selection, selections
 from analysis.store import Store
 from analysis.words import CELL, counted, task_title
-from bns.plotting import BLUE, RED, note, panels, style
+from bns.plotting.style import BLUE, RED, note, panels, style
 
 NAME = "best-combinations"
 PAPER = "the ranking of section 4.5"

@@ -14,7 +14,7 @@ from analysis.drawn import Drawn
 from analysis.intervals import mean_interval
 from analysis.store import NoDataError, Store
 from analysis.words import each, task_order, task_title
-from bns.plotting import note, ordered_styles, panels, style
+from bns.plotting.style import note, ordered_styles, panels, style
 
 NAME = "budget"
 PAPER = "choice of defaults, not in the source"

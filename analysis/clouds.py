@@ -15,7 +15,7 @@ from analysis.outcomes import at_the_end, fewest
 from analysis.selection import Selection
 from analysis.store import BEGIN, NoDataError, Store, remembered
 from analysis.words import SHORT, TITLES, counted, each, valued
-from bns.plotting import lettered, note, ordered_styles, panels, style
+from bns.plotting.style import lettered, note, ordered_styles, panels, style
 
 CROWD = 60
 """From this many dots a panel on, their intervals are drawn faintly."""

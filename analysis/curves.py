@@ -15,7 +15,7 @@ from analysis.outcomes import FEWEST, by_value, criterion
 from analysis.selection import Selection, selections
 from analysis.store import Store
 from analysis.words import TITLES, counted, task_title, valued
-from bns.plotting import lettered, note, ordered_styles, panels, style
+from bns.plotting.style import lettered, note, ordered_styles, panels, style
 
 
 def success_by(store: Store, parameter: str, name: str) -> list[Drawn]:

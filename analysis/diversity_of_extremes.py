@@ -15,7 +15,7 @@ from analysis.ranking import any_of, by_seed_array, extremes, ranking
 from analysis.selection import Selection, selections
 from analysis.store import BEGIN, NoDataError, Store, remembered
 from analysis.words import CELL, task_title
-from bns.plotting import BLUE, GREY, lettered, note, panels, style
+from bns.plotting.style import BLUE, GREY, lettered, note, panels, style
 
 NAME = "diversity-of-extremes"
 PAPER = "figures 4.13 to 4.15, 5.29 and 5.30"

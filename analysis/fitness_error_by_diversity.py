@@ -11,7 +11,7 @@ from analysis.intervals import mean_interval
 from analysis.selection import Selection, selections
 from analysis.store import Store
 from analysis.words import TITLES, task_title
-from bns.plotting import style
+from bns.plotting.style import style
 
 NAME = "fitness-error-by-diversity"
 PAPER = "figures 4.11 and 5.26"

@@ -10,7 +10,7 @@ from typing import Any
 
 from analysis.publish import captions
 from analysis.words import place
-from bns.plotting import COLUMN_IN, PAGE_IN
+from bns.plotting.style import COLUMN_IN, PAGE_IN
 from bns.store.files import publish
 
 STYLE_SHEET = Path(__file__).with_name("page.css")

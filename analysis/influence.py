@@ -19,7 +19,7 @@ from analysis.ranking import varied
 from analysis.selection import Selection, selections
 from analysis.store import Store
 from analysis.words import CELL, TITLES, counted, task_title, valued
-from bns.plotting import lettered, note, ordered_styles, panels, style
+from bns.plotting.style import lettered, note, ordered_styles, panels, style
 
 NAME = "influence"
 PAPER = "sections 4.6.1 and 5.9.1"

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from analysis.drawn import Drawn
 from analysis.store import NoDataError, Store
 from analysis.words import counted, task_number, task_title
-from bns.plotting import BLUE, GREY, RED, lettered, note, panels, style
+from bns.plotting.style import BLUE, GREY, RED, lettered, note, panels, style
 
 NAME = "one-run"
 PAPER = "figure 4.17"

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.cycle_networks import CyclePredictor
-from bns.diagnose.cycles import CycleTracks
-from bns.diagnose.horizons import errors_of
-from bns.diagnose.intake import load_measured
+from bns.diagnose.data.cycles import CycleTracks
+from bns.diagnose.data.load import load_measured
+from bns.diagnose.predict.cycle_networks import CyclePredictor
+from bns.diagnose.predict.horizons import errors_of
 from bns.physics.model import Model
 from bns.robots import load_robot, robot_names
 from bns.robots.simulator import load_static_simulator
 from bns.robots.snake.robot import Snake
 from bns.spec import OPTION_MARK
-from bns.validation import measurements_path
+from bns.static_simulator.transfer_trials import measurements_path
 
 
 def driven_tables(results: Path) -> dict[str, Path]:

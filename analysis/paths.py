@@ -8,7 +8,7 @@ from analysis.coverage import coverage
 from analysis.drawn import Drawn
 from analysis.store import NoDataError, Store
 from analysis.words import counted, task_title
-from bns.plotting import draw_paths, frame_alike, goal_reach, note, outcome, panels, style
+from bns.plotting.style import draw_paths, frame_alike, goal_reach, note, outcome, panels, style
 from bns.robots import load_robot
 from bns.tasks import load_task
 

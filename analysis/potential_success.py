@@ -15,7 +15,7 @@ from analysis.ranking import any_of, by_seed_array, extremes, ranking
 from analysis.selection import Selection, selections
 from analysis.store import NoDataError, Store
 from analysis.words import task_title
-from bns.plotting import GREY, note, ordered_styles, panels, style
+from bns.plotting.style import GREY, note, ordered_styles, panels, style
 
 NAME = "potential-success"
 PAPER = "figure 4.16"

@@ -11,7 +11,7 @@ import pandas as pd
 
 from analysis.drawn import Drawn
 from analysis.store import Store, among
-from bns.plotting import save
+from bns.plotting.style import save
 from bns.store.files import publish, remove
 
 KINDS = ("png", "svg", "csv", "json")

@@ -12,7 +12,7 @@ from analysis.drawn import Drawn
 from analysis.intervals import wilson
 from analysis.store import NoDataError, Store
 from bns.errors import ModelError
-from bns.plotting import BLUE, GREY, RED, lettered, note, panels, style
+from bns.plotting.style import BLUE, GREY, RED, lettered, note, panels, style
 from bns.robots import load_robot, robot_names
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.drawn import Drawn
 from analysis.store import NoDataError, Store
-from bns.plotting import OKABE_ITO, lettered, note, panels, style
+from bns.plotting.style import OKABE_ITO, lettered, note, panels, style
 from bns.spec import OPTION_MARK
 
 NAME = "simulator-options"

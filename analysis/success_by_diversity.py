@@ -11,7 +11,7 @@ from analysis.outcomes import criterion, radii_cm
 from analysis.selection import Selection, selections
 from analysis.store import Store
 from analysis.words import TITLES, task_title
-from bns.plotting import style
+from bns.plotting.style import style
 
 NAME = "success-by-diversity"
 PAPER = "figures 4.12 and 5.27"

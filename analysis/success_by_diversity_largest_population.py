@@ -10,7 +10,7 @@ from analysis.selection import Selection, selections
 from analysis.store import Store
 from analysis.success_by_diversity import COLOUR, in_words, success_panels
 from analysis.words import TITLES
-from bns.plotting import style
+from bns.plotting.style import style
 
 NAME = "success-by-diversity-largest-population"
 PAPER = "figure 5.28"

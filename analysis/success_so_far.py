@@ -11,7 +11,7 @@ from analysis.outcomes import criterion
 from analysis.selection import Selection, selections
 from analysis.store import Store
 from analysis.words import task_title
-from bns.plotting import BLUE, RED, lettered, note, panels, style
+from bns.plotting.style import BLUE, RED, lettered, note, panels, style
 
 NAME = "success-so-far"
 PAPER = "figures 4.7 and 5.22, another reading"

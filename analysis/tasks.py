@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bns.plotting import draw_goals, frame_alike, panels, save, style
+from bns.plotting.style import draw_goals, frame_alike, panels, save, style
 from bns.robots import load_robot
 from bns.tasks import load_task, task_names
 

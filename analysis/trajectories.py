@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from analysis.drawn import Drawn
 from analysis.store import NoDataError, Store
 from analysis.words import task_title
-from bns.plotting import BLUE, GREY, RED, draw_goals, frame_alike, goal_reach, note, panels, style
+from bns.plotting.style import BLUE, GREY, RED, draw_goals, frame_alike, goal_reach, note, panels, style
 from bns.robots import load_robot
 from bns.tasks import load_task
 

@@ -13,7 +13,7 @@ from analysis.drawn import Drawn
 from analysis.source import trials_of
 from analysis.store import NoDataError, Store
 from analysis.words import counted, task_number, task_order, task_title
-from bns.plotting import BLUE, GREY, RED, note, panels, style
+from bns.plotting.style import BLUE, GREY, RED, note, panels, style
 
 NAME = "trials"
 PAPER = "tables 4.2 and 5.4"

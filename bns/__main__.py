@@ -2,6 +2,6 @@
 
 import sys
 
-from bns.cli import main
+from bns.cli.main import main
 
 sys.exit(main())

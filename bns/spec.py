@@ -19,6 +19,8 @@ from bns.errors import SpecError, unknown_name
 ENGINE_VERSION = 2
 """Raised whenever the same spec would give other numbers; part of every run's name."""
 
+RADII_CM = (7, 10, 14, 20)
+"""Radii of the goals, cm, at which success is recorded."""
 
 OPTION_MARK = "+"
 

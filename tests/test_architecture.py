@@ -18,11 +18,11 @@ FLOORS = (
     {"physics"},
     {"hardware"},
     {"worlds"},
-    {"evolver", "trainer", "recorder", "loop", "cuda", "precompute", "refinement", "validation"},
+    {"bootstrap", "cuda", "static_simulator"},
     {"store"},
     {"sweep"},
-    {"diagnose", "plotting", "single", "watch"},
-    {"cluster_options", "measuring", "reporting", "trial"},
+    {"diagnose", "plotting", "console"},
+    {"trial"},
     {"cli"},
     {"__main__"},
 )
@@ -68,6 +68,37 @@ def upward(module: str, rooms: list[tuple[str, int]]) -> list[str]:
     return [f"bns/{module}:{line} imports {room}" for room, line in rooms if LEVEL[room] > own]
 
 
+DIAGNOSE_FLOORS = (
+    {"data"},
+    {"predict"},
+    {"estimate"},
+    {"select", "residuals"},
+    {"caveats"},
+    {"adding", "comparison", "diagnosis"},
+    {"design"},
+    {"report"},
+)
+"""Rooms and files of ``diagnose/``, the ground first: a log's way to its verdict enters no room twice."""
+
+
+def test_the_rooms_of_the_diagnosis_stand_on_floors_too():
+    level = {room: number for number, rooms in enumerate(DIAGNOSE_FLOORS) for room in rooms}
+    inside = [path.relative_to(PACKAGE / "diagnose") for path in (PACKAGE / "diagnose").rglob("*.py")]
+    found = []
+    for path in inside:
+        own = path.parts[0].removesuffix(".py")
+        for node in ast.walk(ast.parse((PACKAGE / "diagnose" / path).read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("bns.diagnose"):
+                rest = node.module.split(".")[2:]
+                rooms = rest[:1] or [alias.name for alias in node.names]
+                found += [
+                    f"{path}:{node.lineno} imports {room}"
+                    for room in rooms
+                    if own != "__init__" and room != own and level[room] >= level[own]
+                ]
+    assert found == []
+
+
 def test_every_room_has_a_floor():
     rooms = {room_of(module) for module in modules()}
     assert rooms == set(LEVEL), "say in FLOORS where a new room stands"
@@ -91,7 +122,7 @@ def test_the_schema_of_the_files_depends_on_the_ground_only():
 def test_no_module_of_a_robot_is_known_to_the_engine_or_the_loop():
     """A robot is added by adding a file: what stands above finds it by its name."""
     for module in modules():
-        if room_of(module) in {"engine", "tasks", "evolver", "trainer", "recorder", "loop", "store", "sweep", "cli"}:
+        if room_of(module) in {"engine", "tasks", "bootstrap", "store", "sweep", "cli"}:
             assert "robots.khepera" not in (PACKAGE / module).read_text(), module
 
 
@@ -108,7 +139,7 @@ def test_the_package_does_not_import_its_tests():
     [
         ("import bns.store.reader", ["store"]),
         ("def f():\n    from bns.sweep import runner", ["sweep"]),
-        ("from bns import loop, errors", ["loop", "errors"]),
+        ("from bns import bootstrap, errors", ["bootstrap", "errors"]),
         ("from ..store.reader import load", ["store"]),
         ("from . import philox", ["engine"]),
         ("from bns import __version__", ["__init__"]),
@@ -120,5 +151,5 @@ def test_imports_of_every_form_are_seen(source, rooms):
 
 
 def test_an_upward_import_is_reported_with_its_line():
-    found = upward("engine/snn.py", imported("import os\nfrom bns.loop import run", ("bns", "engine")))
-    assert found == ["bns/engine/snn.py:2 imports loop"]
+    found = upward("engine/snn.py", imported("import os\nfrom bns.bootstrap.loop import run", ("bns", "engine")))
+    assert found == ["bns/engine/snn.py:2 imports bootstrap"]

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import bns as package
-from bns.cli import _duration, main
+from bns.cli.main import _duration, main
 from bns.errors import BnsError
 from bns.robots.simulator import load_static_simulator
 from bns.sweep.executor import SerialExecutor

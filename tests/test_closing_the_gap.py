@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from analysis.transfer.__main__ import main as transfer
-from bns.cli import main as bns
+from bns.cli.main import main as bns
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "closing-the-gap.md").read_text()

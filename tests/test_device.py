@@ -30,7 +30,7 @@ def test_without_a_driver(what, tmp_path, bns):
     ],
 )
 def test_options_that_do_not_go_together(options, message, tmp_path, capsys):
-    from bns.cli import main
+    from bns.cli.main import main
 
     (tmp_path / "few.yaml").write_text(SWEEP)
     assert main(["sweep", str(tmp_path / "few.yaml"), "--device", "cuda", *options]) == 2

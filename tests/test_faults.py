@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bns.cli import main
+from bns.cli.main import main
 from bns.engine import jit
 from bns.engine.evolution import tournament_cdf
 from bns.engine.philox import Key
@@ -28,7 +28,7 @@ def test_place_for_networks_is_tried_before_the_run(target, tmp_path, monkeypatc
 
 
 def test_precompute_into_a_place_that_is_a_file(tmp_path, monkeypatch, capsys):
-    from bns import precompute
+    from bns.static_simulator import train as precompute
 
     monkeypatch.setattr(precompute, "ROUNDS", 1)
     monkeypatch.setattr(precompute, "ITERATIONS", 1)

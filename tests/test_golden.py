@@ -2,7 +2,7 @@
 
 import pytest
 
-from bns.loop import run
+from bns.bootstrap.loop import run
 from bns.spec import ENGINE_VERSION, RunSpec
 
 SPEC = RunSpec(

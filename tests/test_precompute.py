@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from bns import precompute as pre
 from bns.engine.philox import Key
 from bns.errors import ModelError
 from bns.robots import load_robot
 from bns.robots import simulator as files
+from bns.static_simulator import train as pre
 from bns.worlds import build_world
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import bns as package
-from bns.cli import _parser, main
+from bns.cli.main import _parser, main
 from bns.sweep.grid import load_sweep, parse_sweep
 from bns.sweep.order import ordered_specs
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from bns import precompute as pre
-from bns import refinement
 from bns.engine.philox import Key
 from bns.robots import load_robot
 from bns.robots import simulator as files
 from bns.robots.base import Recipe
 from bns.robots.simulator import load_static_simulator
 from bns.robots.snake import path
+from bns.static_simulator import train as pre
+from bns.static_simulator import train_in_stages as refinement
 
 ROBOT, KEY = load_robot("snake"), Key(2, 3)
 SMALL = Recipe(60, 3, 2, 4, 1, 400, (0.08, 0.08, 0.08, 0.08, 0.0))

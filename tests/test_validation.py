@@ -8,9 +8,9 @@ import pytest
 
 from analysis import simulator_options
 from analysis.store import NoDataError
-from bns import validation
 from bns.robots import load_robot
 from bns.robots.snake import path
+from bns.static_simulator import transfer_trials as validation
 from bns.tasks import load_task
 from bns.worlds import build_world
 

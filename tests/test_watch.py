@@ -11,11 +11,11 @@ import pytest
 from store.synthetic import record
 
 import bns as package
-from bns import watch as watching
+from bns.cli import watch as watching
+from bns.cli.watch import trace, watch
 from bns.errors import BnsError
 from bns.spec import RunSpec
 from bns.store import Writer
-from bns.watch import trace, watch
 
 
 def add_runs(results: Path, seed: int) -> None:

@@ -14,14 +14,14 @@ import pandas as pd
 import yaml
 
 from analysis.intervals import bootstrap
+from bns.diagnose.data.load import Measured, load_measured
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.folds import counted, errors_at_horizons, held_out_steps
-from bns.diagnose.horizons import HORIZONS, errors_of
-from bns.diagnose.intake import Measured, load_measured
-from bns.diagnose.predictor import Predictor, Steps
-from bns.diagnose.search import Found
-from bns.diagnose.wheels import predictor_for_search
-from bns.diagnose.words import diagnosis_text
+from bns.diagnose.estimate.cross_validation import counted, errors_at_horizons, held_out_steps
+from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.predict.horizons import HORIZONS, errors_of
+from bns.diagnose.predict.wheels import predictor_for_search
+from bns.diagnose.report.text import diagnosis_text
+from bns.diagnose.select.stepwise import Found
 from bns.errors import DataError
 from bns.physics.model import Model
 

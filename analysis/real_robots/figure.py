@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from bns.diagnose.horizons import HORIZONS
-from bns.plotting import OKABE_ITO, PAGE_IN, note, save, style
+from bns.diagnose.predict.horizons import HORIZONS
+from bns.plotting.style import OKABE_ITO, PAGE_IN, note, save, style
 
 _WORDS = {"command": "to the end of a command", "1s": "1 s ahead", "5s": "5 s ahead", "trial": "a whole trial ahead"}
 _SHOWN = {

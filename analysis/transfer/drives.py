@@ -14,8 +14,8 @@ import pandas as pd
 from analysis.intervals import band, resampled, wilson
 from analysis.store import NoDataError, Store
 from bns.engine.philox import Key, Purpose
-from bns.recorder import RADII_CM
 from bns.robots.base import Robot
+from bns.spec import RADII_CM
 from bns.tasks import load_task
 from bns.worlds.base import World
 

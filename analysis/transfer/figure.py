@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.intervals import INTERVALS, bootstrap, wilson
-from bns.plotting import GREY, OKABE_ITO, PAGE_IN, note, save, style
+from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, note, save, style
 from bns.tasks import load_task
 
 _LINES = ("-", "--", "-.", ":")

@@ -1,4 +1,4 @@
-"""A batch of runs on the GPU: the four steps of `bns.loop`, for all of them at once."""
+"""A batch of runs on the GPU: the four steps of `bns.bootstrap.loop`, for all of them at once."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bns.bootstrap.loop import RunResult
 from bns.cuda.device import OutOfDeviceMemoryError, device_name, faults, full
 from bns.cuda.kernels import kernels_of
 from bns.cuda.settings import settings_of
@@ -17,7 +18,6 @@ from bns.engine.evolution import tournament_cdf
 from bns.engine.philox import Key, Purpose
 from bns.engine.rprop import INITIAL_STEP
 from bns.engine.snn import INPUTS, initial_weights, predict
-from bns.loop import RunResult
 from bns.robots import load_robot
 from bns.robots.simulator import load_static_simulator
 from bns.spec import RunSpec
@@ -54,7 +54,7 @@ class Batch:
         return self.evaluation == self.evaluations
 
     def step(self) -> None:
-        """The next evaluation, in the order of `bns.loop.run`."""
+        """The next evaluation, in the order of `bns.bootstrap.loop.run`."""
         self.evaluation += 1
         with faults():
             self._drive(Purpose.WORLD_EVALUATED, True, self._cdf_world, self._evaluated)
@@ -96,7 +96,7 @@ class Batch:
         return found
 
     def result(self, run: int = 0) -> RunResult:
-        """One run that is done, as `bns.loop.run` gives it; ArithmeticError if its numbers are not finite."""
+        """One run that is done, as `bns.bootstrap.loop.run` gives it; ArithmeticError if its numbers are not finite."""
         spec, evals = self.specs[run], self.columns(run)
         task, world = load_task(spec.robot, spec.task), build_world(spec.world, self.robot)
         with faults():

@@ -1,4 +1,4 @@
-"""The rows that kernels leave of a run, as the columns that `bns.recorder` keeps."""
+"""The rows that kernels leave of a run, as the columns that `bns.bootstrap.recorder` keeps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bns.cuda.measuring import MEASURED
-from bns.recorder import RADII_CM
+from bns.spec import RADII_CM
 
 _WHOLE = (
     "goals_reached", "commands", "training_patterns", "validation_patterns", "generations", "bound_hits", "arithmetic_failures"
@@ -67,7 +67,7 @@ def _named(names: tuple[str, ...], rows: np.ndarray) -> dict[str, Any]:
 
 
 def _successes(prefix: str, driven: dict[str, Any]) -> dict[str, np.ndarray]:
-    """On the whole and by radius; None where a robot's goals have no radius, as in `bns.recorder`."""
+    """On the whole and by radius; None where a robot's goals have no radius, as in `bns.bootstrap.recorder`."""
     none = np.full(len(driven["success"]), None)
     by_radius = {f"{prefix}_{cm}cm": driven[f"{cm}cm"] > 0 if f"{cm}cm" in driven else none for cm in RADII_CM}
     return {prefix: driven["success"] > 0} | by_radius

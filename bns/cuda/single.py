@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from bns.bootstrap.loop import Progress, RunResult
 from bns.cuda.batch import Batch
 from bns.cuda.device import OutOfDeviceMemoryError
 from bns.errors import DeviceError
-from bns.loop import Progress, RunResult
 from bns.spec import RunSpec
 
 
 def run(spec: RunSpec, progress: Progress | None = None) -> RunResult:
-    """As `bns.loop.run`, in the substitute world; a batch of one, which leaves most of the GPU idle.
+    """As `bns.bootstrap.loop.run`, in the substitute world; a batch of one, which leaves most of the GPU idle.
 
     Raises:
         SpecError: a run that only the CPU can do.

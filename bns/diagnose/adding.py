@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import yaml
 
-from bns.diagnose.candidates import fit_with
-from bns.diagnose.fit import Fit
-from bns.diagnose.folds import errors_at_horizons, held_out_steps
-from bns.diagnose.horizons import noise_floor
-from bns.diagnose.intake import Measured
-from bns.diagnose.own_clocks import with_own_clocks
-from bns.diagnose.predictor import Predictor
-from bns.diagnose.search import problem_for
-from bns.diagnose.threads import one_thread_each
+from bns.diagnose.data.load import Measured
+from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.parallel import one_thread_each
+from bns.diagnose.estimate.starts import fit_with
+from bns.diagnose.estimate.trial_clock_test import with_own_clocks
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.horizons import noise_floor
+from bns.diagnose.select.stepwise import problem_for
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.effects import all_effects, effect_in_file, effect_named

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.fit import Fit
-from bns.diagnose.horizons import Errors, errors_of, noise_floor
-from bns.diagnose.own_clocks import steps_of
-from bns.diagnose.predictor import Predictor
-from bns.diagnose.search import problem_for
-from bns.diagnose.structure import Pattern, patterns
-from bns.diagnose.threads import one_thread_each
-from bns.diagnose.tracks import Array
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.parallel import one_thread_each
+from bns.diagnose.estimate.trial_clock_test import steps_of
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.horizons import Errors, errors_of, noise_floor
+from bns.diagnose.residuals.along_variables import Pattern, patterns
+from bns.diagnose.select.stepwise import problem_for
 from bns.errors import DataError
 from bns.physics.model import Model
 

@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from bns.diagnose.candidates import listed
-from bns.diagnose.equivalents import longer
-from bns.diagnose.evidence import fewest_trials
-from bns.diagnose.fit import Fit
-from bns.diagnose.folds import errors_at_horizons, held_out_steps
-from bns.diagnose.formula_search import Formula, best_formula
-from bns.diagnose.horizons import HORIZONS, noise_floor
-from bns.diagnose.notes import notes_on
-from bns.diagnose.predictor import Predictor
-from bns.diagnose.search import FALSE_ALARM, MIN_GAIN, Candidate, Found, Search
-from bns.diagnose.structure import Pattern, patterns
-from bns.diagnose.threads import one_thread_each
-from bns.diagnose.tracks import Tracks
-from bns.diagnose.unexplained import Unexplained, unexplained
+from bns.diagnose.caveats import notes_on
+from bns.diagnose.data.tracks import Tracks
+from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.parallel import one_thread_each
+from bns.diagnose.estimate.significance import fewest_trials
+from bns.diagnose.estimate.starts import listed
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.horizons import HORIZONS, noise_floor
+from bns.diagnose.residuals.along_variables import Pattern, patterns
+from bns.diagnose.residuals.symbolic import Formula, best_formula
+from bns.diagnose.residuals.unexplained import Unexplained, unexplained
+from bns.diagnose.select.equivalents import longer
+from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, Candidate, Found, Search
 from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
 

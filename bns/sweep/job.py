@@ -26,7 +26,7 @@ def run_job(spec: RunSpec) -> RunRecord:
     meter, tables, row = _Meter(), {}, {}
     try:
         # Imported here: the parent of a sweep has no need of the kernels and their libraries.
-        from bns.loop import run  # noqa: PLC0415
+        from bns.bootstrap.loop import run  # noqa: PLC0415
 
         warm(spec.robot, spec.world)
         meter = _Meter()
@@ -40,8 +40,8 @@ def run_job(spec: RunSpec) -> RunRecord:
 @cache
 def warm(robot: str = "khepera", world: str = "substitute") -> None:
     """Compile the robot's kernels or load them from disk, once a process, so that no run is charged with it."""
+    from bns.bootstrap.loop import run  # noqa: PLC0415
     from bns.engine.jit import note_compiled  # noqa: PLC0415
-    from bns.loop import run  # noqa: PLC0415
     from bns.tasks import default_task  # noqa: PLC0415
 
     run(

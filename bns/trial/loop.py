@@ -13,15 +13,15 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from bns.bootstrap.evolver import Evolver
+from bns.bootstrap.loop import RunResult
+from bns.bootstrap.recorder import Recorder
+from bns.bootstrap.trainer import Trainer
 from bns.engine.philox import Key
 from bns.errors import HardwareError
-from bns.evolver import Evolver
-from bns.loop import RunResult
-from bns.recorder import Recorder
 from bns.robots import load_robot
 from bns.spec import RunSpec
 from bns.tasks import load_task
-from bns.trainer import Trainer
 from bns.trial.background import Rounds
 from bns.worlds.robot import RobotWorld, in_task_frame
 

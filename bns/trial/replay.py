@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from bns.console import live_view
 from bns.errors import HardwareError
-from bns.single import keep_run, live_view
+from bns.sweep.single_run import keep_run
 from bns.trial.folder import past_evaluations, spec_of
 from bns.trial.loop import Evaluation, Trial
 

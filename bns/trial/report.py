@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.recorder import RADII_CM
-from bns.spec import RunSpec
+from bns.spec import RADII_CM, RunSpec
 from bns.trial.crew import Crew
 from bns.trial.loop import TrialResult
 

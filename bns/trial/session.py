@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from bns.console import live_view
 from bns.errors import BnsError, HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
@@ -18,18 +19,18 @@ from bns.hardware.journal import Journal
 from bns.hardware.platform import Emulation, Platform, platform_module
 from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
-from bns.plotting import path_figure
+from bns.plotting.scripts import draw, scripts
+from bns.plotting.style import path_figure
 from bns.robots import load_robot
 from bns.robots.base import on_floor
-from bns.single import keep_run, live_view
 from bns.spec import RunSpec
+from bns.sweep.single_run import keep_run
 from bns.tasks import load_task
 from bns.trial.crew import Crew
 from bns.trial.folder import TrialFolder, forget_unless, spec_event
 from bns.trial.loop import Trial, TrialResult
 from bns.trial.operator import AtTheTerminal, EmulatedHands, Nobody, Operator
 from bns.trial.report import report
-from bns.watch import draw, scripts
 
 SWEEP, SWEEP_EMULATED = "trials", "trials-emulated"
 MOST_ROUNDS = 50

@@ -43,7 +43,7 @@ def real_results(tmp_path_factory) -> Path:
 @pytest.fixture
 def texts():
     """Function: figure -> (text, size in points) of all that is visibly written on it."""
-    from bns.plotting import style
+    from bns.plotting.style import style
 
     def walk(figure) -> list[tuple[str, float]]:
         with style():

@@ -8,7 +8,7 @@ from analysis import budget, paths, success_by_diversity, success_by_mutation
 from analysis.__main__ import figures
 from analysis.intervals import wilson
 from analysis.store import NoDataError, Store
-from bns.plotting import COLUMN_IN, PAGE_IN, TEXT_PT
+from bns.plotting.style import COLUMN_IN, PAGE_IN, TEXT_PT
 from bns.spec import RunSpec
 from bns.store import Writer, load
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from bns import plotting
+from bns.bootstrap.loop import run
 from bns.errors import StoreError
-from bns.loop import run
+from bns.plotting import style as plotting
 from bns.robots import load_robot
 from bns.spec import RunSpec
 from bns.tasks import load_task

@@ -9,13 +9,13 @@ import pytest
 
 from analysis.real_robots.__main__ import main
 from analysis.real_robots.cases import cases, diagnosed, measured, table_of, with_start
-from bns.diagnose.checks import checked
-from bns.diagnose.folds import errors_at_horizons, held_out_steps
-from bns.diagnose.importing import applied
-from bns.diagnose.own_clocks import own_clocks, steps_of
-from bns.diagnose.search import problem_for
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.checks import checked
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
+from bns.diagnose.estimate.trial_clock_test import own_clocks, steps_of
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.stepwise import problem_for
 from bns.errors import DataError
 from bns.physics.model import Model
 

@@ -8,7 +8,7 @@ from analysis.store import NoDataError, Store
 from analysis.transfer.__main__ import main
 from analysis.transfer.drives import SUCCESSES, described, first_success, summary, transferred
 from analysis.transfer.figure import transfer_figure
-from bns.loop import run
+from bns.bootstrap.loop import run
 from bns.robots import load_robot
 from bns.spec import RunSpec
 from bns.store.record import RunRecord

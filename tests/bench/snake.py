@@ -7,11 +7,11 @@ from statistics import median
 
 import numpy as np
 
+from bns.bootstrap.loop import run
 from bns.engine.patterns import TRAINING_SHARE
 from bns.engine.philox import Key
 from bns.engine.rprop import Rprop
 from bns.engine.snn import initial_weights
-from bns.loop import run
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 from bns.robots.snake import ROBOT

@@ -7,7 +7,7 @@ from statistics import median
 
 import numpy as np
 
-from bns.loop import run
+from bns.bootstrap.loop import run
 from bns.robots.khepera import ROBOT
 from bns.spec import RunSpec
 from bns.sweep.job import warm

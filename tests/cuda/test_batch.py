@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bns.bootstrap.loop import run
 from bns.cuda import batch as batches
 from bns.cuda.batch import Batch
 from bns.cuda.single import run as run_there
 from bns.errors import SpecError
-from bns.loop import run
 from bns.spec import RunSpec
 
 TINY = RunSpec(

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from bns.cli import main
+from bns.cli.main import main
 from bns.cuda import batch, device
 from bns.cuda.device import OutOfDeviceMemoryError, faults
 from bns.errors import DeviceError

@@ -14,7 +14,7 @@ from tests.cuda.arrays import KEY, Arrays
 
 
 def drive(robot, learning, **changes):
-    """The run, and the same as `bns.loop` and `bns.recorder` would: row, patterns."""
+    """The run, and the same as `bns.bootstrap.loop` and `bns.bootstrap.recorder` would: row, patterns."""
     one = Arrays(robot, size=4, generations_per_evaluation=0, **changes)
     one.evolve(0)
     static, purpose = load_static_simulator(robot), Purpose.WORLD_EVALUATED if learning else Purpose.WORLD_FITTEST

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bns.diagnose.alike import alike
+from bns.diagnose.select.indistinguishable import alike
 
 RNG = np.random.default_rng(0)
 FIT = SimpleNamespace(held_out=RNG.normal(10, 1, 60))

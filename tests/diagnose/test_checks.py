@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose.checks import checked
-from bns.diagnose.tracks import tracks_of
+from bns.diagnose.data.checks import checked
+from bns.diagnose.data.tracks import tracks_of
 from bns.errors import DataError
 from tests.diagnose.worlds import NOMINAL, measured
 

@@ -4,14 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.cli import main
-from bns.diagnose.clocks import with_clocks_set, without_clocks
+from bns.cli.main import main
+from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.noise import weights
-from bns.diagnose.own_clocks import every_other_block, own_clocks, with_own_clocks
-from bns.diagnose.search import problem_for
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.estimate.noise import weights
+from bns.diagnose.estimate.trial_clock_test import every_other_block, own_clocks, with_own_clocks
+from bns.diagnose.estimate.trial_clocks import with_clocks_set, without_clocks
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.stepwise import problem_for
 from bns.errors import ModelError
 from bns.measurements import write_measurements
 from bns.physics.model import load_model, parse_model

@@ -5,7 +5,7 @@ import json
 import pandas as pd
 import pytest
 
-from bns.cli import main
+from bns.cli.main import main
 from bns.measurements import write_measurements
 from bns.physics.model import load_model
 from tests.diagnose.worlds import NOMINAL, hidden, measured

@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.cli import main
+from bns.cli.main import main
 from bns.diagnose.comparison import compare
-from bns.diagnose.cycle_networks import CyclePredictor
-from bns.diagnose.cycles import checked_cycles, cycle_tracks
-from bns.diagnose.horizons import errors_of
+from bns.diagnose.data.cycles import checked_cycles, cycle_tracks
+from bns.diagnose.predict.cycle_networks import CyclePredictor
+from bns.diagnose.predict.horizons import errors_of
 from bns.engine.philox import Key
 from bns.engine.snn import predict
 from bns.errors import DataError

@@ -2,12 +2,12 @@
 
 import pytest
 
-from bns.diagnose.candidates import listed
+from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.equivalents import longer
-from bns.diagnose.search import problem_for
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.estimate.starts import listed
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.equivalents import longer
+from bns.diagnose.select.stepwise import problem_for
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 

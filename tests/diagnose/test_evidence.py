@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bns.diagnose.evidence import fewest_trials, held_out_gain, sign_flip_p
-from bns.diagnose.search import problem_for
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.significance import fewest_trials, held_out_gain, sign_flip_p
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.stepwise import problem_for
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
@@ -42,7 +42,7 @@ def test_gain_is_paired_by_trial():
     ],
 )
 def test_planted_numbers_come_back_within_their_intervals(effects, effect, name, true):
-    from bns.diagnose.candidates import fit_with
+    from bns.diagnose.estimate.starts import fit_with
     from bns.physics.effects import effect_named
 
     predictor = WheelPredictor(tracks_of(measured(hidden(**effects), trials=14, seed=3)))
@@ -56,8 +56,8 @@ def test_planted_numbers_come_back_within_their_intervals(effects, effect, name,
 
 def test_what_holds_a_trial_out_is_close_to_a_fit_without_it():
     """One Newton step from the common fit stands for a fit to all other trials."""
-    from bns.diagnose.fit import Problem
-    from bns.diagnose.noise import huber
+    from bns.diagnose.estimate.fit import Problem
+    from bns.diagnose.estimate.noise import huber
 
     predictor = WheelPredictor(tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=8, seed=5)))
     model = NOMINAL.with_effect("wheelbase", factor=1.0)

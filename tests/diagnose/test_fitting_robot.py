@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose.fitting_robot import check_same_robot
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.predict.check_robot import check_same_robot
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError
 from bns.physics.differential_drive import track
 

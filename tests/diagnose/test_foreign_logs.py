@@ -8,17 +8,17 @@ import pandas as pd
 import pytest
 import yaml
 
-from bns.cli import main
-from bns.diagnose.checks import checked
-from bns.diagnose.drafting import drafted
-from bns.diagnose.fitting_robot import check_same_robot
-from bns.diagnose.folds import errors_at_horizons
-from bns.diagnose.importing import applied
-from bns.diagnose.intake import load_measured, read_table
-from bns.diagnose.mapping import load_mapping
-from bns.diagnose.splitting import KEPT_S, split
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.cli.main import main
+from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.checks import checked
+from bns.diagnose.data.guess_mapping import drafted
+from bns.diagnose.data.load import load_measured, read_table
+from bns.diagnose.data.mapping import load_mapping
+from bns.diagnose.data.split_trials import KEPT_S, split
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.cross_validation import errors_at_horizons
+from bns.diagnose.predict.check_robot import check_same_robot
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError
 from tests.diagnose.logs import continuous, ros
 from tests.diagnose.worlds import BASE_M, NOMINAL, hidden, measured

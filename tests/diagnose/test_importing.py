@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.cli import main
-from bns.diagnose.importing import applied
-from bns.diagnose.intake import load_measured
-from bns.diagnose.mapping import load_mapping
+from bns.cli.main import main
+from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.load import load_measured
+from bns.diagnose.data.mapping import load_mapping
 from bns.errors import DataError
 from tests.diagnose.worlds import NOMINAL, measured
 

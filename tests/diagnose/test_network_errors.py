@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bns.cli import main
-from bns.diagnose.network_errors import nearness, why_wrong
-from bns.diagnose.networks import NetworkPredictor
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.unseen import Commands, explained
+from bns.cli.main import main
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.predict.networks import NetworkPredictor
+from bns.diagnose.residuals.missing_inputs import Commands, explained
+from bns.diagnose.residuals.network_errors import nearness, why_wrong
 from bns.engine.philox import Key
 from bns.engine.rprop import Rprop
 from bns.engine.snn import initial_weights

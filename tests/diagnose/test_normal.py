@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bns.diagnose.noise import HUBER, huber
-from bns.diagnose.normal import normal, normal_by_trial, stepped
+from bns.diagnose.estimate.noise import HUBER, huber
+from bns.diagnose.estimate.normal_equations import normal, normal_by_trial, stepped
 
 FIRST = np.array([0, 7, 7, 20])
 """The second trial was never tracked."""

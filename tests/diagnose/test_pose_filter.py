@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.engine import reference
 from bns.engine.pose_filter import displacements, filter_gains, innovations
 from bns.physics.differential_drive import track

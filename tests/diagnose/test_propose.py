@@ -7,19 +7,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.cli import main
-from bns.diagnose.design import Pool, chosen
+from bns.cli.main import main
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.design.competing_models import contests_of, rivals_of
+from bns.diagnose.design.discrimination import Apart, Stage, apart
+from bns.diagnose.design.limits import arena_of, bounds_of
+from bns.diagnose.design.planned import foreseen, planned_tracks
+from bns.diagnose.design.power import Expected, Past, decided, minutes_needed, power
+from bns.diagnose.design.proposal import propose
+from bns.diagnose.design.search import Pool, chosen
+from bns.diagnose.design.sequences import Arena, Bounds, Sequences, brief, drawn, extreme, uniform, varied
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.limits import arena_of, bounds_of
-from bns.diagnose.planned import foreseen, planned_tracks
-from bns.diagnose.power import Expected, Past, decided, minutes_needed, power
-from bns.diagnose.proposal import propose
-from bns.diagnose.proposal_words import proposal_text
-from bns.diagnose.rivals import contests_of, rivals_of
-from bns.diagnose.separation import Apart, Stage, apart
-from bns.diagnose.sequences import Arena, Bounds, Sequences, brief, drawn, extreme, uniform, varied
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.proposal_text import proposal_text
 from bns.errors import DataError
 from bns.measurements import write_measurements
 from bns.physics.differential_drive import simulate
@@ -111,8 +111,8 @@ def test_separation_is_what_a_real_refit_leaves(narrow):
     one = found[(0, 1)][0]
     # nothing known of the rival's numbers, all of the true ones
     free = replace(one, prior=1e-9 * np.eye(len(one.prior)), spread=np.zeros_like(one.spread))
-    from bns.diagnose.fit import Problem
-    from bns.diagnose.noise import filter_for
+    from bns.diagnose.estimate.fit import Problem
+    from bns.diagnose.estimate.noise import filter_for
 
     predictor = foreseen(a.fit.model, planned_tracks(plan, ARENA.start, None, np.zeros(12)))
     problem = Problem(predictor, filter_for(predictor, predictor.steps(a.fit.model), d.found.problem.following.noise))
@@ -264,7 +264,7 @@ def test_an_arena_too_small_for_any_trial_is_refused(narrow):
 
 
 def test_measurements_of_two_files_are_taken_together(tmp_path):
-    from bns.diagnose.intake import load_measured
+    from bns.diagnose.data.load import load_measured
 
     first, second = tmp_path / "a.csv", tmp_path / "b.csv"
     for path, seed in ((first, 1), (second, 2)):

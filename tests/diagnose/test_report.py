@@ -9,12 +9,12 @@ from functools import cache
 
 import pytest
 
-from bns.cli import main
+from bns.cli.main import main
+from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
-from bns.diagnose.plain import PLAIN, figures_in_words
-from bns.diagnose.shown_paths import shown_paths
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.plain_language import PLAIN, figures_in_words
+from bns.diagnose.report.shown_paths import shown_paths
 from bns.measurements import write_measurements
 from bns.physics.effects import all_effects
 from bns.physics.formula import formula_effect

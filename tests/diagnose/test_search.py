@@ -5,12 +5,12 @@ import re
 import numpy as np
 import pytest
 
-from bns.diagnose.candidates import fit_with
+from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.search import Search
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.veto import veto_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.estimate.starts import fit_with
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.plausibility import veto_of
+from bns.diagnose.select.stepwise import Search
 from bns.physics.decoys import DECOYS
 from bns.physics.formula import formula_effect
 from bns.physics.model import ActiveEffect
@@ -112,7 +112,7 @@ def test_a_rival_must_have_earned_its_place(monkeypatch, name, values, rivals):
     search = Search(WheelPredictor(tracks_of(table)), NOMINAL)
     problem, fit = search._settled(NOMINAL.with_effect("camera-scale", factor=1.05))
     tried = problem.fit(NOMINAL.with_effect(name, **values))
-    monkeypatch.setattr("bns.diagnose.search.alike", lambda *_: True)
+    monkeypatch.setattr("bns.diagnose.select.stepwise.alike", lambda *_: True)
     monkeypatch.setattr(search, "_exchanges", lambda *_: [("camera-scale", name, tried)])
     assert len(search._rivals(problem, fit, ("camera-scale",))) == rivals
 
@@ -121,7 +121,7 @@ def test_what_asks_for_too_much_once_noise_and_numbers_have_settled_is_passed_ov
     def veto(fit, name, bounds=True):
         return "too much" if name == "wheelbase" and not bounds else veto_of(fit, name, bounds)
 
-    monkeypatch.setattr("bns.diagnose.search.veto_of", veto)
+    monkeypatch.setattr("bns.diagnose.select.stepwise.veto_of", veto)
     tracks = tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=12, seed=11))
     found = Search(WheelPredictor(tracks), NOMINAL).run()
     first = found.steps[0].ranking[0]

@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose.checks import checked
-from bns.diagnose.importing import applied
-from bns.diagnose.mapping import load_mapping
-from bns.diagnose.tracks import MOST_FRAMES, RUN_UP_S, slimmed, tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.checks import checked
+from bns.diagnose.data.mapping import load_mapping
+from bns.diagnose.data.tracks import MOST_FRAMES, RUN_UP_S, slimmed, tracks_of
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError
 from bns.measurements import POSE
 from tests.diagnose.worlds import NOMINAL, hidden, measured

@@ -4,14 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.evidence import Evidence
-from bns.diagnose.outbreaks import FAR, TRIALS, WIDTH, outbreaks
-from bns.diagnose.search import problem_for
-from bns.diagnose.structure import SHARE, Pattern, nudge, remaining
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.unexplained import unexplained
-from bns.diagnose.wheels import RECENT_S, WheelPredictor
+from bns.diagnose.estimate.significance import Evidence
+from bns.diagnose.predict.wheels import RECENT_S, WheelPredictor
+from bns.diagnose.residuals.along_variables import SHARE, Pattern, nudge, remaining
+from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, outbreaks
+from bns.diagnose.residuals.unexplained import unexplained
+from bns.diagnose.select.stepwise import problem_for
 from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
 
 KICK_S, KICK_RAD = 1.6, 0.15

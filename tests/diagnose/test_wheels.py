@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose import wheels
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.predict import wheels
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.physics.formula import formula_effect
 from tests.diagnose.worlds import NOMINAL, measured
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from bns.bootstrap.evolver import Evolver
+from bns.bootstrap.trainer import Trainer
 from bns.engine.philox import Key, Purpose
 from bns.engine.snn import initial_weights
-from bns.evolver import Evolver
 from bns.robots import load_robot
 from bns.spec import RunSpec
 from bns.tasks import load_task
-from bns.trainer import Trainer
 from bns.worlds import build_world
 
 ROBOT, KEY = load_robot("khepera"), Key(5, 1)

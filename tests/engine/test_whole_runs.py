@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from bns.bootstrap.loop import run
 from bns.engine.philox import Key
 from bns.engine.snn import initial_weights, predict
-from bns.loop import run
 from bns.robots import load_robot
 from bns.spec import FIELDS, RunSpec
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from bns.cli import main
+from bns.cli.main import main
 from bns.hardware.journal import events
 from bns.trial.folder import past_evaluations
 

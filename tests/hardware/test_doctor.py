@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bns.cli import main
+from bns.cli.main import main
 from bns.hardware.doctor import cameras, examine, latency_of, may_use, ports
 from bns.hardware.rig import load_rig
 

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 import bns
-from bns.cli import main
+from bns.cli.main import main
 from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.doctor import examine
 from bns.hardware.emulators.faults import Fault, FaultPlan

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bns.cli import main
+from bns.cli.main import main
 from bns.errors import HardwareError
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.camera import CameraEmulator

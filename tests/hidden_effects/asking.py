@@ -71,7 +71,7 @@ def ask(world: World, options: Sequence[str] = ()) -> Record:
 
 def called(arguments: list[str]) -> tuple[int, str, str]:
     """(exit code, stdout, what went wrong) of the command line, in this process."""
-    from bns.cli import main
+    from bns.cli.main import main
 
     out, told = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(told):

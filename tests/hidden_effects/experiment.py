@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.sequences import Sequences
+from bns.diagnose.design.sequences import Sequences
 from tests.hidden_effects.camera import Camera, Layout, track
 from tests.hidden_effects.cause import Cause
 from tests.hidden_effects.driving import Driving

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from bns.plotting import PAGE_IN, save, style
+from bns.plotting.style import PAGE_IN, save, style
 from tests.hidden_effects.listed import LISTED
 from tests.hidden_effects.summary import Result
 

@@ -18,16 +18,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.design.competing_models import refitted, rivals_of
+from bns.diagnose.design.limits import arena_of, bounds_of
+from bns.diagnose.design.power import told_apart
+from bns.diagnose.design.proposal import propose
+from bns.diagnose.design.sequences import Arena, Bounds, Sequences, drawn, uniform
 from bns.diagnose.diagnosis import Diagnosis, diagnose
-from bns.diagnose.evidence import held_out_gain
-from bns.diagnose.limits import arena_of, bounds_of
-from bns.diagnose.power import told_apart
-from bns.diagnose.proposal import propose
-from bns.diagnose.rivals import refitted, rivals_of
-from bns.diagnose.search import problem_for
-from bns.diagnose.sequences import Arena, Bounds, Sequences, drawn, uniform
-from bns.diagnose.tracks import tracks_of
-from bns.diagnose.wheels import WheelPredictor
+from bns.diagnose.estimate.significance import held_out_gain
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.stepwise import problem_for
 from bns.physics.effects import all_effects
 from bns.physics.model import load_model
 from tests.hidden_effects.camera import Camera, Layout

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from bns.plotting import OKABE_ITO, PAGE_IN, save, style
+from bns.plotting.style import OKABE_ITO, PAGE_IN, save, style
 
 KINDS = ("proposed", "random")
 DRAWS = 5000

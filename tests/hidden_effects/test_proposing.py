@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose.sequences import Sequences
+from bns.diagnose.design.sequences import Sequences
 from tests.hidden_effects.deciding import Open, is_right
 from tests.hidden_effects.experiment import Look, carried_out, plan_in
 from tests.hidden_effects.listed import cause

@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from bns.bootstrap.loop import run
 from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import predict
 from bns.errors import SpecError
-from bns.loop import run
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 from bns.robots import load_robot

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import sweep_jobs
 
-from bns.cli import main
+from bns.cli.main import main
 from bns.errors import SpecError, StoreError, SweepWarning
 from bns.store.reader import load
 from bns.store.record import RunRecord

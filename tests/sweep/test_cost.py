@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from sweep_jobs import make_sweep
 
-from bns.cli import main
+from bns.cli.main import main
 from bns.store import load
 from bns.sweep.cost import MACHINES, START_UP_S, Cost, Machine, cost_table, total
 from bns.sweep.executor import SerialExecutor

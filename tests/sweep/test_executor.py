@@ -116,7 +116,7 @@ def test_a_fault_in_a_run_becomes_a_row(monkeypatch):
         def explode(_spec, fault=fault):
             raise fault
 
-        monkeypatch.setattr("bns.loop.run", explode)
+        monkeypatch.setattr("bns.bootstrap.loop.run", explode)
         record = run_job(spec)
         assert record.run["status"] == "failed"
         assert record.run["error"].startswith(text)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bns.cli import SWEEP_OF_SINGLE_RUNS
+from bns.cli.main import SWEEP_OF_SINGLE_RUNS
 from bns.errors import SpecError
 from bns.sweep.combos import MOST_RUNS
 from bns.sweep.grid import Sweep, load_sweep

@@ -1,0 +1,1 @@
+"""Bootstrapped Neuro-Simulation itself: the loop, and what it moves (population, networks, tables)."""

@@ -1,0 +1,1 @@
+"""Measurements: how they are read, mapped, checked and cut into tracks."""

@@ -1,0 +1,274 @@
+"""What is odd about measurements, before anything is concluded from them.
+
+Every finding names trial and row; nothing goes in silence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+
+from bns.diagnose.data.apply_mapping import repeated
+from bns.diagnose.data.merge_topics import without_commands
+from bns.errors import DataError
+from bns.measurements import COLUMNS, COMMANDS, POSE
+
+_HELD = 0.2
+_JUMP_M = 0.02
+_JUMP_RAD = 0.35
+_JUMP_ROUNDS = 6
+_NEAR_S = 0.4
+_LONG_STEP_S = 30.0
+_FINER = ((1e6, "nanoseconds"), (3e3, "microseconds"), (0.0, "milliseconds"))
+"""A step between rows above so many seconds was written in such a unit."""
+_UNTOLD_RATIO = 1.5
+_DEGREES_AT_LEAST = 150.0
+"""Radians a metre: a wheelbase of under a centimetre, or degrees."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One oddity: what, in which trial, in which row of the table (counted from 0), and what was done about it."""
+
+    trial: str
+    row: int
+    text: str
+
+
+def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
+    """The rows that can be used, in order, and what was found. DataError where going on would be guessing."""
+    check_columns(table, COLUMNS)
+    table = table.reset_index(drop=True)
+    to_numbers(table, COLUMNS[1:])
+    findings: list[Finding] = []
+    _held(table, findings)
+    kept = []
+    for trial, rows in table.groupby("trial", sort=False):
+        good = forward_in_time(str(trial), rows, findings)
+        good = _without_jumps(str(trial), good, findings)
+        _gaps_and_losses(str(trial), good, findings)
+        if _tracked(good).any():
+            kept.append(good)
+        else:
+            findings.append(Finding(str(trial), int(rows.index[0]), "no pose was tracked in it; the trial is left out"))
+    usable = pd.concat(kept) if kept else table
+    if not _tracked(usable).any():
+        raise DataError("There is no tracked pose in these measurements: every x_m, y_m or heading_rad is empty.")
+    _units(usable)
+    return usable.reset_index(drop=True), findings
+
+
+def _tracked(rows: pd.DataFrame) -> pd.Series[bool]:
+    """Which rows hold a whole pose."""
+    return rows[list(POSE)].notna().all(axis=1)
+
+
+def check_columns(table: pd.DataFrame, columns: Sequence[str]) -> None:
+    """DataError if one of the columns is missing, or if there are no rows."""
+    missing = [name for name in columns if name not in table.columns]
+    if missing:
+        raise DataError(
+            f"The measurements lack {', '.join(missing)}; they have {', '.join(map(str, table.columns))}. "
+            "Name the columns with `bns import`, or write " + ", ".join(columns) + "."
+        )
+    if table.empty:
+        raise DataError("The measurements have no rows.")
+
+
+def to_numbers(table: pd.DataFrame, columns: Sequence[str]) -> None:
+    """Make these columns floats, in place. DataError names the first row that holds something else, or no time."""
+    for name in columns:
+        values = pd.to_numeric(table[name], errors="coerce")
+        wrong = values.isna() & table[name].notna() & (table[name].astype(str).str.lower() != "nan")
+        if wrong.any():
+            row = int(np.flatnonzero(wrong)[0])
+            raise DataError(f"Row {row}: {name} is {table[name].iloc[row]!r}; it must be a number, or empty.")
+        if np.isinf(values).any():
+            row = int(np.flatnonzero(np.isinf(values))[0])
+            raise DataError(f"Row {row}: {name} is infinite; leave it empty where nothing was measured.")
+        table[name] = values.astype(float)
+    if table["t_s"].isna().any():
+        row = int(np.flatnonzero(table["t_s"].isna())[0])
+        raise DataError(f"Row {row}: t_s is empty; every row needs its time.")
+
+
+def _held(table: pd.DataFrame, findings: list[Finding]) -> None:
+    """Says so where a slow tracker's poses are repeated until the next comes: they look like a robot that moves in jerks."""
+    again = repeated(table)
+    if again.mean() > _HELD:
+        row = int(np.flatnonzero(again)[0])
+        text = (
+            f"{again.mean():.0%} of all poses repeat the one before while the robot is told to move, the first here: is the "
+            "tracker slower than the log? `repeated_poses: lost` in the mapping of `bns import` takes them out"
+        )
+        findings.append(Finding(str(table["trial"].iloc[row]), row, text))
+
+
+def forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
+    """Rows later than all before them."""
+    t = rows["t_s"].to_numpy()
+    latest = np.maximum.accumulate(t)
+    good = np.ones(len(t), dtype=bool)
+    good[1:] = t[1:] > latest[:-1]
+    for i in map(int, np.flatnonzero(~good)):
+        what = "repeats" if t[i] == latest[i - 1] else "lies before"
+        findings.append(Finding(trial, int(rows.index[i]), f"time {t[i]:g} s {what} an earlier one; row left out"))
+    if (~good).mean() > 0.5 and len(t) > 4:
+        raise DataError(
+            f"Trial {trial}: time runs backwards or stands still in {(~good).sum()} of {len(t)} rows. Sort the rows by time; "
+            "give every trial its own name if several were written together."
+        )
+    return rows[good]
+
+
+def _without_jumps(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
+    """Poses far from where their neighbours put them are emptied: a marker was mistaken.
+
+    Repeated, since jumps come in pairs too.
+    """
+    out = rows
+    for _ in range(_JUMP_ROUNDS):
+        seen = out[list(POSE)].notna().all(axis=1).to_numpy()
+        if seen.sum() < 5:
+            break
+        pose, t = out.loc[seen, list(POSE)].to_numpy(), out.loc[seen, "t_s"].to_numpy()
+        bad = out.index[seen][_jumps(pose, t)]
+        if not len(bad):
+            break
+        findings += [
+            Finding(trial, int(row), "the tracked pose jumps away and back; pose taken as lost") for row in bad
+        ]
+        out = out.copy()
+        out.loc[bad, list(POSE)] = np.nan
+    return out
+
+
+def _jumps(pose: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Which poses (n, 3) lie far off the line through their neighbours, more so than those do; (n,)."""
+    values = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
+    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    inner = values[1:-1] - values[:-2] - share * (values[2:] - values[:-2])
+    off = np.vstack([_beyond(values, t, 0, 1, 2), inner, _beyond(values, t, -1, -2, -3)])
+    size = np.column_stack([np.hypot(off[:, 0], off[:, 1]), np.abs(off[:, 2])])
+    near = np.pad(t[2:] - t[:-2], 1, mode="edge") < _NEAR_S
+    if not near.any():
+        return np.zeros(len(t), dtype=bool)
+    limits = np.maximum([_JUMP_M, _JUMP_RAD], 12 * np.median(size[near], axis=0))
+    times = size / limits
+    times[[0, -1]] /= 2  # a line drawn beyond its ends is less certain
+    excess = times.max(axis=1)
+    # there and back: a pose that is held and then catches up is no jump
+    across = np.hypot(*(pose[2:, :2] - pose[:-2, :2]).T)
+    returns = np.pad(across < np.maximum(size[1:-1, 0], limits[0] / 2), 1, constant_values=True)
+    around = np.pad(excess, 1)
+    found: np.ndarray = near & returns & (excess > 1) & (excess >= around[:-2]) & (excess >= around[2:])
+    return found
+
+
+def _beyond(values: np.ndarray, t: np.ndarray, at: int, one: int, two: int) -> np.ndarray:
+    """How far a pose at an end lies off the line through the next two."""
+    slope = (values[one] - values[two]) / (t[one] - t[two])
+    off: np.ndarray = values[at] - values[one] - slope * (t[at] - t[one])
+    return off
+
+
+def _gaps_and_losses(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> None:
+    t = rows["t_s"].to_numpy()
+    if len(t) > 2:
+        usual = float(np.median(np.diff(t)))
+        for i in map(int, np.flatnonzero(np.diff(t) > max(5 * usual, 0.2))):
+            if usual < 0.2:
+                findings.append(Finding(trial, int(rows.index[i]), f"no row for {t[i + 1] - t[i]:.2f} s"))
+    lost = rows[list(POSE)].isna().any(axis=1)
+    if lost.any():
+        findings.append(
+            Finding(trial, int(rows.index[lost][0]), f"{lost.sum()} poses lost, the first here")
+        )
+
+
+def _units(table: pd.DataFrame) -> None:
+    """Compare what was commanded with what was seen: units show as factors."""
+    pauses = table["t_s"].diff()
+    step = float(pauses[pauses > 0].median())
+    if step > _LONG_STEP_S:  # before anything is done second by second
+        unit = next(unit for least, unit in _FINER if step > least)
+        raise DataError(f"Successive rows are {step:g} s apart: t_s looks like {unit}; it must be seconds.")
+    ways = np.array(list(_driven(table)))
+    speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
+    ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
+    untold = without_commands(table)
+    if untold > 0.5 and ratio > _UNTOLD_RATIO:
+        raise DataError(
+            f"In {untold:.0%} of the rows with a pose no command is in force, yet the robot goes {ratio:.1f} times as far as "
+            "commanded. Have commands rows of their own? `hold_commands_s: .inf` in the mapping of `bns import` keeps each until "
+            "the next."
+        )
+    if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
+        raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
+    if speed > 20:
+        raise DataError(f"Commands of up to {speed:g} m/s: left_m_s and right_m_s look like mm/s or a device's units.")
+    for factor, unit in ((100.0, "centimetres"), (1000.0, "millimetres")):
+        if factor / 3 < ratio < factor * 3:
+            raise DataError(
+                f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {unit}; they must be metres."
+            )
+    if _turns_as_degrees(table):
+        raise DataError("Headings turn far more than the wheels can make them: heading_rad looks like degrees.")
+    if len(ways) and np.abs(ways[:, 2]).sum() > 0.3:
+        told, seen = ways[np.abs(ways[:, 2]) <= np.median(np.abs(ways[ways[:, 2] != 0, 2])), 2:].T  # larger ones may be rounds
+        same = float(told @ seen / np.sqrt((told @ told) * (seen @ seen) + 1e-300))
+        if same < -0.5:
+            raise DataError(
+                "The robot turns against the wheels: heading_rad must run counter-clockwise, "
+                "or left_m_s and right_m_s are exchanged."
+            )
+
+
+def _turns_as_degrees(table: pd.DataFrame) -> bool:
+    """Typical change of heading from row to row over that of the wheels' way: one over the wheelbase, in radians."""
+    span = table["t_s"].diff().where(table["trial"].eq(table["trial"].shift()))
+    commanded = ((table[COMMANDS[1]] - table[COMMANDS[0]]).shift() * span).abs()
+    seen = table["heading_rad"].diff().abs().where(commanded > 0)
+    wide = commanded > commanded[commanded > 0].quantile(0.5)
+    ratio = float((seen[wide] / commanded[wide]).median())
+    return ratio > _DEGREES_AT_LEAST
+
+
+def _ratio(commanded: np.ndarray, seen: np.ndarray) -> float:
+    return float(seen.sum() / commanded.sum()) if commanded.sum() > 0 else float("nan")
+
+
+def _driven(table: pd.DataFrame) -> Iterator[tuple[float, float, float, float]]:
+    """For windows of about a second: way and turn commanded (base of 1 m), way and turn seen."""
+    for _, rows in table.groupby("trial", sort=False):
+        t = rows["t_s"].to_numpy()
+        left, right = np.nan_to_num(rows[list(COMMANDS)].to_numpy()).T
+        span = np.append(np.diff(t), 0.0)
+        way = np.concatenate([[0], np.cumsum((np.abs(left + right) / 2 * span)[:-1])])
+        turn = np.concatenate([[0], np.cumsum(((right - left) * span)[:-1])])
+        pose = rows[list(POSE)].to_numpy()
+        seen = np.flatnonzero(np.isfinite(pose).all(axis=1))
+        marks = (
+            seen[np.unique(np.searchsorted(t[seen], np.arange(t[0], t[-1] + 1e-9, 1.0)).clip(max=len(seen) - 1))]
+            if len(seen)
+            else seen
+        )
+        heading = np.full(len(t), np.nan)
+        if len(seen):
+            heading[seen] = pose[seen, 2]
+        for a, b in pairwise(marks):
+            yield (
+                way[b] - way[a],
+                float(np.hypot(*(pose[b, :2] - pose[a, :2]))),
+                turn[b] - turn[a],
+                float(_turned(heading[a : b + 1])),
+            )
+
+
+def _turned(heading: np.ndarray) -> float:
+    known = heading[np.isfinite(heading)]
+    return float(np.diff(np.unwrap(known)).sum()) if len(known) > 1 else 0.0

@@ -1,0 +1,108 @@
+"""Measurements from a file, as checked tracks."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+import yaml
+
+from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.checks import Finding, checked
+from bns.diagnose.data.cycles import are_cycles, checked_cycles, cycle_tracks
+from bns.diagnose.data.mapping import mapping_beside
+from bns.diagnose.data.tracks import Tracks, tracks_of
+from bns.errors import DataError
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A file's tracks, what was odd about it, and its SHA-256 (20 digits), which names it in a model's provenance."""
+
+    path: Path
+    tracks: Tracks
+    findings: tuple[Finding, ...]
+    digest: str
+    robot: str = ""
+    """What a column ``robot`` says; "" where there is none."""
+
+
+def load_measured(path: str | Path, robot: str | None = None, more: Sequence[Path] = ()) -> Measured:
+    """Read, map (if ``DATA.import.yaml`` lies beside), check.
+
+    ``robot`` chooses the rows of one robot where a ``robot`` column names several. ``more``: files whose trials come after those
+    of ``path``, under their file's name. DataError if a file cannot be used.
+    """
+    path = Path(path)
+    table = _of_one_robot(_joined([path, *more]), robot)
+    of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
+    tracks, findings = _tracks(table)
+    digest = hashlib.sha256(b"".join(p.read_bytes() for p in (path, *more))).hexdigest()[:20]
+    return Measured(path, tracks, tuple(findings), digest, of)
+
+
+def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:
+    if are_cycles(table):
+        cycles, findings = checked_cycles(table)
+        return cycle_tracks(cycles), findings
+    usable, findings = checked(table)
+    return tracks_of(usable), findings
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """A .csv (or .csv.gz) or .parquet file as it is; DataError if there is none or it does not read."""
+    if not path.is_file():
+        raise DataError(f"There is no file {path}. Give a .csv or .parquet file of measurements.")
+    try:
+        if path.name.endswith((".csv", ".csv.gz")):
+            separator, decimal = _written(path)
+            return pd.read_csv(path, sep=separator, decimal=decimal)
+        if path.suffix == ".parquet":
+            return pd.read_parquet(path)
+    except (ValueError, OSError, yaml.YAMLError) as fault:
+        raise DataError(f"{path} does not read as {path.suffix[1:]}: {fault}.") from fault
+    raise DataError(f"{path} is no .csv or .parquet file; measurements come as one of these.")
+
+
+def _written(path: Path) -> tuple[str, str]:
+    """What separates a .csv's columns, and its decimals, by its first two lines: many spreadsheets write 1,5;2,5."""
+    opened = gzip.open if path.suffix == ".gz" else open
+    with opened(path, "rt", encoding="utf-8", errors="replace") as lines:
+        head, first = lines.readline(), lines.readline()
+    separator = max(",;\t", key=head.count)
+    return separator, "," if separator != "," and "," in first and "." not in first else "."
+
+
+def _joined(paths: Sequence[Path]) -> pd.DataFrame:
+    tables = [_mapped(path) for path in paths]
+    if len(tables) == 1:
+        return tables[0]
+    for number, (path, table) in enumerate(zip(paths, tables, strict=True)):
+        if "trial" in table.columns:
+            before = f"{number}-{path.stem}: " if number else ""
+            table["trial"] = before + table["trial"].astype(str)
+    return pd.concat(tables, ignore_index=True)
+
+
+def _mapped(path: Path) -> pd.DataFrame:
+    table, mapping = read_table(path), mapping_beside(path)
+    return table if mapping is None else applied(table, mapping, path.parent, read_table)
+
+
+def _of_one_robot(table: pd.DataFrame, robot: str | None) -> pd.DataFrame:
+    if "robot" not in table.columns:
+        return table
+    names = sorted(str(name) for name in table["robot"].dropna().unique())
+    if robot is None and len(names) > 1:
+        raise DataError(
+            f"The measurements are of {len(names)} robots: {', '.join(names)}. Choose one with --robot {names[0]}."
+        )
+    if robot is None:
+        return table
+    if robot not in names:
+        raise DataError(f"The measurements have no robot {robot!r}; they have {', '.join(names)}.")
+    return table[table["robot"].astype(str) == robot]

@@ -1,0 +1,1 @@
+"""The next experiment: commands that discriminate between competing models."""

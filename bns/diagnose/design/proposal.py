@@ -1,0 +1,226 @@
+"""The next experiment: trials inside the arena that tell rival explanations apart in the least robot time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.design.competing_models import Rival, contests_of, rivals_of, without_last
+from bns.diagnose.design.discrimination import Apart, Pair, Stage, apart
+from bns.diagnose.design.independent_measurement import witnesses
+from bns.diagnose.design.power import Expected, Past, blocked, decided, minutes_needed, scatter_of
+from bns.diagnose.design.search import Pool, designed, random_pool
+from bns.diagnose.design.sequences import Arena, Bounds, Sequences
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.estimate.noise import huber
+from bns.diagnose.estimate.parallel import one_thread_each
+from bns.diagnose.estimate.significance import fewest_trials
+from bns.diagnose.select.stepwise import FALSE_ALARM
+from bns.errors import DataError
+from bns.physics.effects import all_effects
+
+HOPELESS_MINUTES = 24 * 60.0
+"""Robot time beyond which a pair counts as the same for every experiment with these sensors."""
+SURE = 0.9
+MOST_FASTER = 100.0
+"""More times as long than this is not worth counting."""
+_DENSE = 3.0
+"""Poses a command from which on they count as a track at the camera's rate."""
+
+
+@dataclass(frozen=True)
+class Contest:
+    """Two explanations: how likely the experiment decides between them, and after how many minutes (nine times in ten).
+
+    ``alike``: no command sequence tells them apart; ``other_measurements`` would. ``times_faster``: as many times as long
+    plain random commands would take for it. ``already``: what was measured so far decides.
+    """
+
+    first: str
+    second: str
+    power: float
+    minutes: float
+    times_faster: float
+    alike: bool
+    already: bool
+    other_measurements: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """An experiment. ``plan`` has no trials where no commands would tell anything."""
+
+    verdict: str
+    rivals: tuple[Rival, ...]
+    contests: tuple[Contest, ...]
+    plan: Sequences
+    arena: Arena
+    bounds: Bounds
+    minutes: float
+
+    @property
+    def power(self) -> float:
+        """Chance that every pair is decided that commands can decide: that of the hardest one; 0 where there is none."""
+        return min((c.power for c in self.contests if not c.alike), default=0.0)
+
+    def commands(self) -> pd.DataFrame:
+        """The trial file: trial, left_m_s, right_m_s, duration_s, and the pose each trial starts from."""
+        rows = [
+            (trial, left, right, lasts, *self.arena.start)
+            for trial in range(len(self.plan))
+            for left, right, lasts in zip(
+                self.plan.left_m_s[trial], self.plan.right_m_s[trial], self.plan.duration_s[trial], strict=True
+            )
+            if lasts > 0
+        ]
+        names = ["trial", "left_m_s", "right_m_s", "duration_s", "start_x_m", "start_y_m", "start_heading_rad"]
+        table = pd.DataFrame(rows, columns=names)
+        return table.round(dict(zip(names[1:], (5, 5, 3, 4, 4, 5), strict=True)))
+
+    def as_json(self) -> dict[str, Any]:
+        """One object of plain values."""
+        return {
+            "verdict": self.verdict,
+            "rivals": [list(r.names) for r in self.rivals],
+            "power": self.power,
+            "minutes": float(self.plan.lasting_s.sum() / 60),
+            "contests": [{name: _plain(value) for name, value in vars(c).items()} for c in self.contests],
+            "start": {"x_m": self.arena.start[0], "y_m": self.arena.start[1], "heading_rad": self.arena.start[2]},
+            "arena": {k: v for k, v in vars(self.arena).items() if k != "start"},
+            "trials": len(self.plan),
+            "commands": self.commands().iloc[:, :4].to_dict("records"),
+        }
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+@one_thread_each()
+def propose(
+    d: Diagnosis,
+    arena: Arena,
+    bounds: Bounds,
+    minutes: float,
+    *,
+    seed: int = 0,
+    tick: Callable[[str], None] = lambda _: None,
+) -> Proposal:
+    """The experiment of about ``minutes`` of driving that tells the diagnosis' rivals apart; DataError if there are none."""
+    tick("rivals")
+    rivals = rivals_of(d)
+    if len(rivals) < 2:
+        why = "; ".join(d.notes) or "no effect comes near to explaining anything"
+        raise DataError(f"There are no two explanations that an experiment could tell apart (verdict {d.verdict}): {why}")
+    assert d.found is not None
+    stage = Stage(
+        d.found.problem,
+        arena,
+        _frame_s(d),
+        lambda plan: np.linspace(0, 60 * minutes, len(plan), endpoint=False),
+        contests_of(d, rivals),
+    )
+    rng = np.random.default_rng(seed)
+    past = {(a, b): _past(d, rivals[a], rivals[b]) for a, b in stage.pairs}
+    best = designed(rng, rivals, stage, bounds, 60 * minutes, past, tick)
+    if not len(best.plan):
+        raise DataError(
+            f"No trial of {bounds.trial_s:g} s stays inside the arena from its start at x = {arena.start[0]:.2f}, y = "
+            f"{arena.start[1]:.2f} m. Give a larger one (--arena 2x1.5) or another start (--start 0,0,90)."
+        )
+    tick("random commands, for comparison")
+    plain = random_pool(rng, rivals, stage, bounds, len(best.plan))
+    tick("power")
+    contests = _contests(d, rivals, best, plain, stage, past)
+    told = any(not c.alike for c in contests)
+    plan = best.plan if told else best.plan.only(np.array([], dtype=np.int64))
+    return Proposal(d.verdict, rivals, tuple(contests), plan, arena, bounds, minutes)
+
+
+def _contests(
+    d: Diagnosis, rivals: tuple[Rival, ...], best: Pool, plain: Pool, stage: Stage, past: Mapping[Pair, Past]
+) -> list[Contest]:
+    assert d.found is not None
+    nothing = Rival((), d.found.problem.fit(without_last(d.found)))
+    last = len(rivals)
+    more = replace(stage, pairs=(*stage.pairs, *((a, last) for a in range(last))))
+    found, random = (apart([*rivals, nothing], pool.plan, more)[0] for pool in (best, plain))
+    out = []
+    for a, b in stage.pairs:
+        one, other = rivals[a], rivals[b]
+        scatter = past[(a, b)].scatter
+        both, as_random = (
+            (
+                _expected(one, other, nothing, seen[(a, b)][0], seen[(a, last)][0], scatter),
+                _expected(other, one, nothing, seen[(a, b)][1], seen[(b, last)][0], scatter),
+            )
+            for seen in (found, random)
+        )
+        minutes = _minutes(both, found[(a, b)], best.plan.lasting_s, scatter)
+        alike = minutes > HOPELESS_MINUTES or blocked(both)
+        longer = _minutes(as_random, random[(a, b)], plain.plan.lasting_s, scatter) / max(minutes, 1e-12)
+        out.append(
+            Contest(
+                one.title,
+                other.title,
+                0.0 if alike else decided(both),
+                np.inf if alike else minutes,
+                1.0 if alike else min(longer, MOST_FASTER),
+                alike,
+                decided([e.first(0) for e in both]) >= SURE,
+                tuple(witnesses(one.names, other.names)),
+            )
+        )
+    return out
+
+
+def _expected(true: Rival, other: Rival, nothing: Rival, apart_: Apart, worth: Apart, scatter: float) -> Expected:
+    old = other.fit.held_out - true.fit.held_out
+    chance = 1 / (1 + np.exp(-np.clip(old.sum() / scatter, -50, 50)))
+    return Expected(old, apart_.each(), nothing.fit.held_out - true.fit.held_out, worth.each(), scatter, float(chance))
+
+
+def _minutes(both: tuple[Expected, Expected], directions: tuple[Apart, Apart], lasting_s: Array, scatter: float) -> float:
+    """Robot time until nine in ten such experiments decide: read off the plan's first trials, else foretold from all of them.
+
+    Where the old trials decide already, what the new ones would take alone.
+    """
+    alone = decided([e.first(0) for e in both]) >= SURE
+    if not alone and decided(both) >= SURE:
+        low, high = 0, len(lasting_s)
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (low, middle) if decided([e.first(middle) for e in both]) >= SURE else (middle, high)
+        return float(lasting_s[:high].sum() / 60)
+    whole = sum(e.chance * one.total() for e, one in zip(both, directions, strict=True))
+    least = fewest_trials(FALSE_ALARM / len(all_effects())) * float(lasting_s.mean() / 60) if alone and len(lasting_s) else 0.0
+    return max(minutes_needed(whole, float(lasting_s.sum() / 60), scatter), least)
+
+
+def _past(d: Diagnosis, a: Rival, b: Rival) -> Past:
+    """From the trials seen so far: how gains held out vary, and how much more so than unit noise lets them.
+
+    The latter from losses as fitted: those held out vary with the numbers, too, however close two explanations are.
+    """
+    assert d.found is not None
+    per_trial, held_out = d.found.problem.per_trial, b.fit.held_out - a.fit.held_out
+    difference = a.fit.white - b.fit.white
+    fitted = per_trial(huber(b.fit.white) - huber(a.fit.white))
+    scatter = scatter_of(fitted, per_trial((difference * difference).sum(axis=1)))
+    return Past(float(((held_out - held_out.mean()) ** 2).sum()), scatter)
+
+
+def _frame_s(d: Diagnosis) -> float | None:
+    """Time between frames of the tracks; None where poses come at the ends of commands only."""
+    assert d.found is not None
+    tracks = d.found.problem.predictor.tracks
+    commands = (tracks.duration_s > 0).sum(axis=1)
+    if float(np.median(np.diff(tracks.first) / np.maximum(commands, 1))) < _DENSE:
+        return None
+    steps = np.diff(tracks.t_s)[~tracks.is_first[1:]]
+    return float(np.median(steps))

@@ -1,0 +1,1 @@
+"""Parameters by least squares, noise, cross-validation, paired tests."""

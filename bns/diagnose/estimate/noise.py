@@ -1,0 +1,82 @@
+"""How much a frame scatters and how much the drive does: estimated from the tracks themselves, under a given model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.predict.base import Predictor, Steps
+from bns.engine.pose_filter import filter_gains, innovations
+
+HUBER = 3.5
+"""Whitened residuals (three numbers a frame) beyond this length count linearly: outliers are normal."""
+
+_ENOUGH = 24
+_GUESS = np.array([2e-3, 8e-3, 4e-3, 2e-3, 2e-2])
+_LOW = np.array([2e-5, 1e-4, 1e-5, 1e-5, 1e-4])
+_HIGH = np.array([0.3, 0.5, 0.5, 0.5, 3.0])
+
+
+def huber(white: Array) -> Array:
+    """Loss of every frame: half the squared length, linear beyond `HUBER`; (frames,)."""
+    length = _length(white)
+    return np.where(length <= HUBER, length * length / 2, HUBER * length - HUBER * HUBER / 2)
+
+
+def weights(white: Array) -> Array:
+    """What a frame counts in a step of least squares under `huber`; (frames,), at most 1."""
+    length = _length(white)
+    return HUBER / np.maximum(length, HUBER)
+
+
+def _length(white: Array) -> Array:
+    return np.sqrt(np.asarray(np.einsum("kc,kc->k", white, white), dtype=np.float64))
+
+
+@dataclass(frozen=True)
+class Filter:
+    """The filter for tracks with a given noise; its gains belong to one model's steps and serve all that are like it."""
+
+    noise: Array
+    gain: Array
+    whiten: Array
+    logdet: Array
+
+    def white(self, tracks: Tracks, steps: Steps) -> Array:
+        """Whitened innovations under other steps, (frames, 3)."""
+        return innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, self.gain, self.whiten)
+
+
+def filter_for(predictor: Predictor, steps: Steps, noise: Array) -> Filter:
+    """The filter with the gains that these steps and this noise ask for."""
+    return Filter(noise, *filter_gains(steps.body, predictor.tracks.is_first, predictor.way_m, noise))
+
+
+def estimate_noise(predictor: Predictor, steps: Steps, start: Array | None = None) -> Array:
+    """Most likely noise, as `filter_gains` takes it: position m, heading rad, and the drive's scatter three ways.
+
+    From at most `_ENOUGH` trials, evenly chosen: five numbers need no more.
+    """
+    tracks = predictor.tracks
+    chosen = np.unique(np.linspace(0, len(tracks) - 1, min(len(tracks), _ENOUGH)).round().astype(int))
+    frames = np.concatenate([np.arange(tracks.first[i], tracks.first[i + 1]) for i in chosen])
+    body, drift, pose = steps.body[frames], steps.drift_m[frames], tracks.pose[frames]
+    is_first, way_m = tracks.is_first[frames], predictor.way_m[frames]
+    low, high = np.log(_LOW), np.log(_HIGH)
+    if predictor.tracking is not None:
+        low[:2] = high[:2] = np.log(predictor.tracking)
+
+    def surprise(logs: Array) -> float:
+        inside = np.clip(logs, low, high)
+        gain, whiten, logdet = filter_gains(body, is_first, way_m, np.exp(inside))
+        white = innovations(body, drift, pose, is_first, gain, whiten)
+        total = float(logdet.sum() + huber(white).sum())
+        return (total if np.isfinite(total) else 1e300) + 1e3 * float(((logs - inside) ** 2).sum())
+
+    first = np.log(_GUESS if start is None else start)
+    simplex = np.vstack([first, first + 0.7 * np.eye(len(first))])
+    options = {"initial_simplex": simplex, "xatol": 0.05, "fatol": 0.5, "maxfev": 300}
+    return np.exp(np.clip(minimize(surprise, first, method="Nelder-Mead", options=options).x, low, high))

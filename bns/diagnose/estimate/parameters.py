@@ -1,0 +1,50 @@
+"""The numbers of a model that are fitted, and how a model is moved along them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.data.tracks import Array
+from bns.physics.effect import Parameter
+from bns.physics.model import Model
+
+
+@dataclass(frozen=True)
+class Free:
+    """One number that is fitted: which effect's, and which."""
+
+    effect: str
+    parameter: Parameter
+
+    def of(self, model: Model) -> float:
+        """Its value in a model."""
+        return model.values_of(self.effect)[self.parameter.name]
+
+
+def moved_by(model: Model, free: Sequence[Free], step: Array) -> Model:
+    """The model with its free numbers moved, held within their bounds."""
+    values = {f.effect: dict(model.values_of(f.effect)) for f in free}
+    for number, change in zip(free, step, strict=True):
+        p = number.parameter
+        values[number.effect][p.name] = float(np.clip(number.of(model) + change, p.low, p.high))
+    return model.with_values(values)
+
+
+def increment(number: Free, value: float) -> float:
+    """A step for differences, turned round at the upper bound."""
+    p = number.parameter
+    scale = 1e-3 * abs(value) if np.isinf(p.neutral) else 1e-3 * (p.plausible[1] - p.plausible[0])
+    return -scale if value + scale > p.high else scale
+
+
+def inside(model: Model, free: Sequence[Free], gradient: Array) -> NDArray[np.bool_]:
+    """Numbers that are not pressed against a bound by a gradient of the loss, (p,)."""
+    pressed = [
+        (f.of(model) <= f.parameter.low and slope > 0) or (f.of(model) >= f.parameter.high and slope < 0)
+        for f, slope in zip(free, gradient, strict=True)
+    ]
+    return ~np.array(pressed, dtype=bool)

@@ -1,0 +1,69 @@
+"""Is one model better than another on trials that neither was fitted to? The trial is the unit, and trials are paired."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import count
+
+import numpy as np
+
+from bns.diagnose.data.tracks import Array
+
+FLIPS = 20_000
+_SEED = 20_250_101
+MIN_Z = 2.5
+"""Least gain that counts, in its standard errors: it must be earned in many trials, not in a few."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Mean held-out gain a trial (in units of log-likelihood), its standard error, and the chance of such a fit by luck."""
+
+    gain: float
+    se: float
+    p_value: float
+
+    @property
+    def z(self) -> float:
+        """Gain in standard errors."""
+        return self.gain / self.se if self.se > 0 else 0.0
+
+
+def held_out_gain(before: Array, after: Array) -> tuple[float, float]:
+    """Mean paired gain of held-out losses (trials,), and its standard error."""
+    gains = before - after
+    trials = len(gains)
+    mean = float(gains.mean())
+    if not np.isfinite(mean):
+        return float("-inf"), 0.0
+    return mean, float(gains.std(ddof=1) / np.sqrt(trials)) if trials > 1 else float("inf")
+
+
+def sign_flip_p(scores: Array, curvature: Array) -> float:
+    """Chance that trials without the effect pull together as these do.
+
+    ``scores`` (trials, k): each trial's gradient in the k numbers under test. Were nothing there, each trial would be as
+    likely to pull the other way: the statistic g' H^-1 g of the sum g is held against itself with the signs of
+    whole trials drawn by lot. Exact whatever the scatter inside and between trials, heavy tails included.
+    """
+    sizes, directions = np.linalg.eigh(np.linalg.pinv(curvature, hermitian=True))
+    apart = scores @ (directions * np.sqrt(np.maximum(sizes, 0.0)))  # in these the statistic is a plain sum of squares
+    seen = float((apart.sum(axis=0) ** 2).sum())
+    if not np.isfinite(seen) or seen <= 0:
+        return 1.0
+    sums = _signs(len(scores)) @ apart
+    by_luck = np.einsum("fk,fk->f", sums, sums)
+    return float((1 + np.count_nonzero(by_luck >= seen * (1 - 1e-9))) / (1 + FLIPS))
+
+
+@lru_cache
+def fewest_trials(level: float) -> int:
+    """From fewer no effect can be taken, however large it is: that all trials pull the same way is no rarer by luck than this."""
+    return next(n for n in count(2) if sign_flip_p(np.ones((n, 1)), np.eye(1)) < level)
+
+
+@lru_cache(maxsize=1)
+def _signs(trials: int) -> Array:
+    """Lots of +1 and -1, (flips, trials); always the same, so kept: drawing them costs more than using them."""
+    return np.random.default_rng(_SEED).choice([-1.0, 1.0], size=(FLIPS, trials))

@@ -1,0 +1,1 @@
+"""What a model, or networks, say the robot should have done."""

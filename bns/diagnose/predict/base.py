@@ -1,0 +1,55 @@
+"""What the diagnosis asks of a model of any robot: where it will be at the next frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.data.tracks import Array, Tracks
+from bns.physics.model import Model
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Predicted displacement since the frame before; zeros where a trial begins.
+
+    ``body`` (frames, 3): forward_m, left_m, turn_rad in the frame of the robot at the frame before; ``drift_m``
+    (frames, 2): east and north, whatever way the robot faces.
+    """
+
+    body: Array
+    drift_m: Array
+
+
+class Predictor(Protocol):
+    """Tracks with all that can be worked out of them once.
+
+    ``way_m`` (frames,): how far the robot was driven since the frame before. ``horizons``: names of the times over which
+    predictions are judged; ``near``: the one of them that curves and worst moments are about. ``tracking``: noise of a tracked
+    position (m) and heading (rad), where the tracks tell it by themselves; None: it is estimated under a model.
+    """
+
+    tracks: Tracks
+    way_m: Array
+    horizons: tuple[str, ...]
+    near: str
+    tracking: tuple[float, float] | None
+
+    def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Frames at which the windows of a horizon begin and end."""
+
+    def steps(self, model: Model) -> Steps:
+        """What the model predicts between successive frames."""
+
+    def variables(self) -> dict[str, Array]:
+        """Name -> values along which errors may show, one a step of the predictor's own grid, (trials, steps)."""
+
+    def at_frames(self, frames: NDArray[np.int64]) -> dict[str, Array]:
+        """`variables` at the times of some frames, (frames,) each."""
+
+    def scores(self) -> Mapping[str, Mapping[str, float]]:
+        """How well each output of the model agrees with what was measured, by its name; empty where it has but a path."""

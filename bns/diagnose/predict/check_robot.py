@@ -1,0 +1,109 @@
+"""Is the model one of this robot? A model of another one would be blamed on effects."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.horizons import windows
+from bns.errors import DataError
+from bns.physics.model import Model
+from bns.robots import robot_names
+
+_FACTOR = 1.8
+_EXPLAINED = 0.25
+"""Another robot it is if turns that are scaled leave less than this share of the deviation."""
+_FEWEST = 5
+_CLEAR_M, _ARC_RAD = 0.02, 1.2
+_TOGETHER, _TURNED_RAD = 0.8, 1.05
+"""Directions agree if their mean is longer than this; a camera that is askew by less is an effect (`camera-rotation`)."""
+
+
+def check_named_robot(robot: str, model: Model) -> None:
+    """DataError if the data name another robot than the one the model is of."""
+    name = model.name.removesuffix("-world")
+    if robot and robot != name and {robot, name} <= set(robot_names()):
+        raise DataError(
+            f"The measurements are of the robot {robot}, the model {model.name} is of {name}; give a model of {robot}."
+        )
+
+
+def check_same_robot(predictor: Predictor, model: Model) -> None:
+    """DataError if ways or turns are so far off that the data must be another robot's, or in other units."""
+    tracks = predictor.tracks
+    start, end = windows(tracks, "1s")
+    if len(start) < _FEWEST:
+        return
+    steps = predictor.steps(model).body
+    turn = np.concatenate([[0.0], np.cumsum(steps[:, 2])])[1:]
+    predicted = turn[end] - turn[start]
+    heading = tracks.pose[end, 2] - tracks.pose[start, 2]
+    # where the model says that the turn is small enough, it can be told from one more round
+    clear = (np.abs(predicted) < _ARC_RAD) & (np.abs(predicted) > 0.05)
+    seen = (heading + np.pi) % (2 * np.pi) - np.pi
+    if clear.sum() >= _FEWEST:
+        ratio = _scale(seen[clear], predicted[clear])
+        # motors that follow late also turn by another share in a second, but no one factor makes the model right
+        explained = np.abs(seen - ratio * predicted)[clear].sum() < _EXPLAINED * np.abs(seen - predicted)[clear].sum()
+        if explained and (ratio > _FACTOR or 0 < ratio < 1 / _FACTOR):
+            raise DataError(
+                f"The robot turns {ratio:.2f} times as far as a model with a wheelbase of {model.wheelbase_m:g} m says. "
+                f"Is this its model? A wheelbase of {model.wheelbase_m / ratio:.3g} m would fit: "
+                f"--wheelbase {model.wheelbase_m / ratio:.3g}."
+            )
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])[1:]
+    straight = (np.abs(predicted) < 0.3) & (way[end] - way[start] > 0.02)
+    if straight.sum() >= _FEWEST:
+        went = np.hypot(*(tracks.pose[end, :2] - tracks.pose[start, :2]).T)[straight]
+        ratio = float(np.median(went / (way[end] - way[start])[straight]))
+        if ratio < 0.03:
+            raise DataError(
+                "The robot hardly moves although it is told to: is it tracked, are its motors on, are these its commands?"
+            )
+        if ratio > 3 or ratio < 1 / 3:
+            raise DataError(
+                f"The robot goes {ratio:.2g} times as far as commanded. Are the speeds in m/s, "
+                "the positions in m, the times in s? `bns import` turns other units into these."
+            )
+    arcs = np.abs(predicted) < _ARC_RAD
+    _check_directions(tracks, start[arcs], end[arcs], np.cumsum(steps[:, 0]))
+
+
+def _check_directions(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.int64], forward_m: Array) -> None:
+    """DataError if the robot goes another way than it faces, by a right angle or mirrored: along an arc, than it faces halfway.
+
+    ``forward_m`` (frames,): how far it was driven forwards; windows that hardly were say nothing about directions.
+    """
+    driven = forward_m[end] - forward_m[start]
+    clear = np.abs(driven) > _CLEAR_M
+    if clear.sum() < _FEWEST:
+        return
+    start, end, driven = start[clear], end[clear], driven[clear]
+    went = (tracks.pose[end, :2] - tracks.pose[start, :2]) * np.sign(driven)[:, None]
+    way = np.exp(1j * np.arctan2(went[:, 1], went[:, 0]))
+    turned = (tracks.pose[end, 2] - tracks.pose[start, 2] + np.pi) % (2 * np.pi) - np.pi
+    faces = np.exp(1j * (tracks.pose[start, 2] + turned / 2))
+    beside, mirrored = complex((way / faces).mean()), complex((way * faces).mean())
+    if abs(beside) > _TOGETHER and abs(np.angle(beside)) > _TURNED_RAD:
+        degrees = np.degrees(np.angle(beside))
+        square = 90 * round(degrees / 90)
+        right = f"zero_deg: {square if abs(degrees - square) < 20 else round(degrees)}"
+        raise DataError(
+            f"Driving ahead the robot goes {abs(degrees):.0f}° to the {'left' if degrees > 0 else 'right'} of where "
+            "heading_rad points: positions and headings are in different frames, or the speeds have the other sign. "
+            f"`{right}` in the entry heading_rad of the mapping of `bns import` turns the headings."
+        )
+    if abs(mirrored) > _TOGETHER and abs(beside) < 0.5:
+        raise DataError(
+            "Positions are mirrored against headings: x_m must run east, y_m north, heading_rad counter-clockwise from x. "
+            "`scale: -1` in the entry y_m (or x_m) of the mapping of `bns import` turns one of them round."
+        )
+
+
+def _scale(seen: Array, predicted: Array) -> float:
+    """Least absolute deviations of seen = scale * predicted: the median of the ratios, weighted by what was predicted."""
+    ratios, weights = seen / predicted, np.abs(predicted)
+    order = np.argsort(ratios)
+    return float(ratios[order][np.searchsorted(np.cumsum(weights[order]), weights.sum() / 2)])

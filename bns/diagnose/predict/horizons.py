@@ -1,0 +1,153 @@
+"""How far predictions are off, from the measured pose, after a command, a second, five seconds, a whole trial."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.predict.base import Predictor, Steps
+
+HORIZONS = ("command", "1s", "5s", "trial")
+_SECONDS = {"1s": 1.0, "5s": 5.0}
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors at the ends of windows, one row each.
+
+    start, end: (windows,) frames; forward_m, left_m: in the robot's frame at the window's end as measured; heading_rad.
+    """
+
+    trial: NDArray[np.int64]
+    start: NDArray[np.int64]
+    end: NDArray[np.int64]
+    forward_m: Array
+    left_m: Array
+    heading_rad: Array
+
+    @property
+    def position_m(self) -> Array:
+        """Distance between predicted and measured position, (windows,)."""
+        return np.hypot(self.forward_m, self.left_m)
+
+    def summary(self, trials: int) -> dict[str, float]:
+        """Root mean squares, the median position error, its standard error by trial, and the number of windows."""
+        if not len(self.start):
+            return {"windows": 0}
+        square = self.position_m**2
+        sums = np.bincount(self.trial, square, trials)
+        counts = np.bincount(self.trial, minlength=trials)
+        mean = float(square.mean())
+        rms = float(np.sqrt(mean))
+        scatter = float(np.sqrt(((sums - mean * counts) ** 2).sum()) / counts.sum())
+        return {
+            "position_m": rms,
+            "position_se_m": scatter / (2 * rms) if rms > 0 else 0.0,
+            "median_position_m": float(np.median(self.position_m)),
+            "forward_m": _rms(self.forward_m),
+            "left_m": _rms(self.left_m),
+            "heading_rad": _rms(self.heading_rad),
+            "windows": len(self.start),
+        }
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt((values * values).mean()))
+
+
+def windows(tracks: Tracks, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Frames at which the windows of a horizon begin and end, back to back within each trial."""
+    begins: list[int] = []
+    ends: list[int] = []
+    for trial in range(len(tracks)):
+        a, b = int(tracks.first[trial]), int(tracks.first[trial + 1])
+        marks = _marks(tracks, trial, horizon, tracks.t_s[a:b])
+        frames = a + np.unique(marks)
+        begins += list(frames[:-1])
+        ends += list(frames[1:])
+    return np.array(begins, dtype=np.int64), np.array(ends, dtype=np.int64)
+
+
+def _marks(tracks: Tracks, trial: int, horizon: str, t_s: Array) -> NDArray[np.int64]:
+    if len(t_s) < 2:
+        return np.zeros(1, dtype=np.int64)
+    if horizon == "trial":
+        return np.array([0, len(t_s) - 1])
+    if horizon == "command":
+        times = np.concatenate([[0.0], np.cumsum(tracks.duration_s[trial])])
+    else:
+        times = np.arange(0.0, t_s[-1] + 1e-9, _SECONDS[horizon])
+    times = times[times <= t_s[-1] + 1e-6]
+    return np.searchsorted(t_s, times - 1e-6).clip(max=len(t_s) - 1)
+
+
+def errors_of(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
+    """Measured minus predicted at the ends of a horizon's windows, each predicted from the pose measured at its start."""
+    tracks = predictor.tracks
+    start, end = predictor.windows(horizon)
+    path = _path(tracks, steps)
+    pose = tracks.pose
+    turn = pose[start, 2] - path[start, 2]
+    cos, sin = np.cos(turn), np.sin(turn)
+    dx, dy = path[end, 0] - path[start, 0], path[end, 1] - path[start, 1]
+    drift = np.cumsum(steps.drift_m, axis=0)
+    ex = pose[end, 0] - (pose[start, 0] + cos * dx - sin * dy + drift[end, 0] - drift[start, 0])
+    ey = pose[end, 1] - (pose[start, 1] + sin * dx + cos * dy + drift[end, 1] - drift[start, 1])
+    eh = pose[end, 2] - (pose[start, 2] + path[end, 2] - path[start, 2])
+    eh -= 2 * np.pi * np.round(eh / (2 * np.pi))
+    c, s = np.cos(pose[end, 2]), np.sin(pose[end, 2])
+    return Errors(tracks.trial[start], start, end, c * ex + s * ey, c * ey - s * ex, eh)
+
+
+def _path(tracks: Tracks, steps: Steps) -> Array:
+    """The predicted path of every trial from the origin, (frames, 3): displacements in the robot's frame put end to end."""
+    turns = np.cumsum(steps.body[:, 2])
+    heading = turns - turns[tracks.first[:-1]][tracks.trial]
+    before = heading - steps.body[:, 2]
+    cos, sin = np.cos(before), np.sin(before)
+    x = np.cumsum(cos * steps.body[:, 0] - sin * steps.body[:, 1])
+    y = np.cumsum(sin * steps.body[:, 0] + cos * steps.body[:, 1])
+    begin = tracks.first[:-1]
+    return np.stack([x - x[begin][tracks.trial], y - y[begin][tracks.trial], heading], axis=1)
+
+
+def laid_paths(tracks: Tracks, steps: Steps) -> Array:
+    """Predicted poses (frames, 3) of every trial, each path begun at the trial's first measured pose."""
+    path = _path(tracks, steps)
+    begin = tracks.first[:-1]
+    start = tracks.pose[begin][tracks.trial]
+    cos, sin = np.cos(start[:, 2]), np.sin(start[:, 2])
+    drift = np.cumsum(steps.drift_m, axis=0)
+    drift = drift - drift[begin][tracks.trial]
+    x = start[:, 0] + cos * path[:, 0] - sin * path[:, 1] + drift[:, 0]
+    y = start[:, 1] + sin * path[:, 0] + cos * path[:, 1] + drift[:, 1]
+    return np.stack([x, y, start[:, 2] + path[:, 2]], axis=1)
+
+
+def noise_floor(predictor: Predictor, noise: Array, horizon: str) -> dict[str, float]:
+    """Error that a perfect model would show: tracking noise at both ends, and the scatter of the drive between."""
+    tracks = predictor.tracks
+    start, end = predictor.windows(horizon)
+    if not len(start):
+        return {}
+    way = np.cumsum(predictor.way_m)
+    driven = way[end] - way[start]
+    straight = np.hypot(*(tracks.pose[end, :2] - tracks.pose[start, :2]).T)
+    heading = noise[1] ** 2 * straight**2
+    bent = (
+        noise[4] ** 2 * driven * straight**2 / 3
+    )  # heading scatter on the way, a third of it as displacement at the end
+    position = 4 * noise[0] ** 2 + heading + bent + (noise[2] ** 2 + noise[3] ** 2) * driven
+    return {
+        "position_m": float(np.sqrt(position.mean())),
+        "heading_rad": float(np.sqrt((2 * noise[1] ** 2 + noise[4] ** 2 * driven).mean())),
+    }
+
+
+def summaries(predictor: Predictor, steps: Steps) -> Mapping[str, dict[str, float]]:
+    """`Errors.summary` at every horizon that the tracks have."""
+    return {h: errors_of(predictor, steps, h).summary(len(predictor.tracks)) for h in HORIZONS}

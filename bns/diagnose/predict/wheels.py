@@ -1,0 +1,253 @@
+"""What a differential drive with effects predicts from frame to frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.data.tracks import Array, Tracks, slimmed
+from bns.diagnose.predict.base import Steps
+from bns.diagnose.predict.horizons import HORIZONS, windows
+from bns.engine.pose_filter import displacements, followed
+from bns.physics.differential_drive import taken_at
+from bns.physics.effect import Effect
+from bns.physics.grid import Grid
+from bns.physics.model import ActiveEffect, Model
+from bns.physics.motion import flow_of, wheel_motion, with_body_effects
+from bns.physics.signals import Body, Conditions, View
+
+RECENT_S = 0.15
+"""How fast an event fades in the variables that say what has just happened: soon it does nothing any more."""
+_COARSE_S = 0.1
+_TAIL_S = 1.0
+"""What the last row says, a command or none, is in force this long: poses may be stamped early."""
+_KEPT = 500_000
+"""Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
+_MOVING = ("wheel", "body")
+
+Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
+"""Effects that act, their values, and those of each trial."""
+
+
+class WheelPredictor:
+    """Drives the commands of tracks once, and answers any model with the displacement between successive frames."""
+
+    horizons: tuple[str, ...] = HORIZONS
+    near = "1s"
+    tracking: tuple[float, float] | None = None
+
+    def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
+        self.tracks = tracks
+        self.grid = _grid_of(tracks, dt_s)
+        self.conditions = _conditions(tracks, self.grid.node_s)
+        self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
+        zero = np.zeros_like(self.grid.step_s)
+        wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
+        way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[0][:, 0]
+        self.way_m = self._since_previous(way)
+        # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
+        kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
+        self._wheels = lru_cache(kept)(self._turned)
+        self._body, self._at = lru_cache(kept)(self._driven), lru_cache(kept)(self._followed)
+
+    def steps(self, model: Model) -> Steps:
+        """Displacement of the tracked point since the frame before, in the frame of the robot there."""
+        poses, sums = self._at(model.wheelbase_m, _chain(model, (*_MOVING, "clock")))
+        view = View(poses)
+        for active in model.at("measure"):
+            view = active.effect.apply(view, **active.by_name)
+        return Steps(displacements(view.poses, self.tracks.is_first), self._drift(model, poses, sums))
+
+    def _turned(self, wheelbase_m: float, chain: Chain) -> Body:
+        return replace(wheel_motion(_model_of(wheelbase_m, chain), self.grid, self.conditions), place=self._place)
+
+    def _driven(self, wheelbase_m: float, chain: Chain) -> Body:
+        model = _model_of(wheelbase_m, chain)
+        return with_body_effects(model, self._wheels(wheelbase_m, _chain(model, ("wheel",))))
+
+    def _followed(self, wheelbase_m: float, chain: Chain) -> tuple[Array, Array]:
+        """`followed` at the frames; read-only, for many models share it."""
+        model, grid, tracks = _model_of(wheelbase_m, chain), self.grid, self.tracks
+        body = self._body(wheelbase_m, _chain(model, _MOVING))
+        poses, sums = followed(
+            grid.step_s,
+            body.forward_m_s,
+            body.sideways_m_s,
+            body.yaw_rad_s,
+            body.moving,
+            tracks.trial,
+            taken_at(model, tracks.t_s, tracks.trial),
+        )
+        poses.flags.writeable = sums.flags.writeable = False
+        return poses, sums
+
+    def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Back to back within each trial."""
+        return windows(self.tracks, horizon)
+
+    def scores(self) -> Mapping[str, Mapping[str, float]]:
+        """A model of wheels has but a path."""
+        return {}
+
+    def variables(self) -> dict[str, Array]:
+        """What the robot was told and where it was, at every step of the grid, (trials, steps)."""
+        grid, tracks = self.grid, self.tracks
+        middle = (grid.node_s[:, 1:] + grid.node_s[:, :-1]) / 2
+        changed = (np.diff(grid.left_m_s, axis=1, prepend=0) != 0) | (np.diff(grid.right_m_s, axis=1, prepend=0) != 0)
+        began = np.maximum.accumulate(np.where(changed, grid.node_s[:, :-1], 0.0), axis=1)
+        speed, turn = (grid.left_m_s + grid.right_m_s) / 2, grid.right_m_s - grid.left_m_s
+        way = np.cumsum((np.abs(grid.left_m_s) + np.abs(grid.right_m_s)) / 2 * grid.step_s, axis=1)
+        return {
+            "left_m_s": grid.left_m_s,
+            "right_m_s": grid.right_m_s,
+            "speed_m_s": speed,
+            "wheel_difference_m_s": turn,
+            "previous_speed_m_s": _before(speed, changed),
+            "previous_wheel_difference_m_s": _before(turn, changed),
+            "time_in_command_s": middle - began,
+            "time_in_trial_s": middle,
+            "session_s": tracks.start_s[:, None] + middle,
+            "way_m": way,
+            "left_change_m_s": _fresh_change(grid.left_m_s, middle - began, changed),
+            "right_change_m_s": _fresh_change(grid.right_m_s, middle - began, changed),
+            "left_reversed": _reversed(grid.left_m_s, grid.step_s),
+            "right_reversed": _reversed(grid.right_m_s, grid.step_s),
+            "just_started": np.exp(-middle / RECENT_S),
+            **{name: self._seen_on_grid(name) for name in self._seen()},
+        }
+
+    def at_frames(self, frames: NDArray[np.int64]) -> dict[str, Array]:
+        """`variables` at the times of some frames, (frames,) each."""
+        rows = self.tracks.trial[frames]
+        steps = np.array(
+            [
+                np.searchsorted(self.grid.node_s[r], t + 1e-9, side="right") - 1
+                for r, t in zip(rows, self.tracks.t_s[frames], strict=True)
+            ]
+        ).clip(0, self.grid.step_s.shape[1] - 1)
+        return {name: values[rows, steps] for name, values in self.variables().items()}
+
+    def _seen_on_grid(self, name: str) -> Array:
+        middle, values = (self.grid.node_s[:, 1:] + self.grid.node_s[:, :-1]) / 2, self._seen()[name]
+        return np.stack([_held(self.tracks, values, row, middle[row]) for row in range(len(self.tracks))])
+
+    def _seen(self) -> dict[str, Array]:
+        tracks = self.tracks
+        heading = np.concatenate(
+            [np.unwrap(tracks.pose[a:b, 2]) for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
+        )
+        extra = {k: v for k, v in tracks.extra.items() if np.isfinite(v).sum() > 1 and k != "session_s"}
+        return {"x_m": tracks.pose[:, 0], "y_m": tracks.pose[:, 1], "heading_rad": heading, **extra}
+
+    def _since_previous(self, values: Array) -> Array:
+        change = np.diff(values, axis=0, prepend=values[:1])
+        change[self.tracks.is_first] = 0.0
+        return change
+
+    def _drift(self, model: Model, path: Array, sums: Array) -> Array:
+        """What the floor adds in the world's frame between where the robot was seen (millimetres do not matter there).
+
+        A robot gets far between poses at the ends of commands: it is taken to be midway, and off that line as its path is.
+        """
+        flow = flow_of(model)
+        if (flow.x_m_s, flow.y_m_s, flow.return_per_s) == (0.0, 0.0, 0.0):
+            return np.zeros((len(path), 2))
+        time_s, *where = self._since_previous(sums).T
+        way, before, seen = self._since_previous(path), np.roll(path, 1, axis=0), self.tracks.pose
+        bent = np.stack(where, axis=1) - time_s[:, None] * (before + way / 2)[:, :2]
+        turned = np.roll(seen[:, 2], 1) - before[:, 2]
+        cos, sin = np.cos(turned), np.sin(turned)
+        bent = np.stack([cos * bent[:, 0] - sin * bent[:, 1], sin * bent[:, 0] + cos * bent[:, 1]], axis=1)
+        midway = (seen + np.roll(seen, 1, axis=0))[:, :2] / 2
+        out: Array = np.array([flow.x_m_s, flow.y_m_s]) * time_s[:, None] - flow.return_per_s * (midway * time_s[:, None] + bent)
+        return out
+
+
+def _chain(model: Model, stages: Sequence[str]) -> Chain:
+    return tuple((a.effect, a.values, a.own) for a in model.effects if a.effect.stage in stages)
+
+
+def _model_of(wheelbase_m: float, chain: Chain) -> Model:
+    return Model(wheelbase_m, tuple(ActiveEffect(e, values, per_trial=bool(own), own=own) for e, values, own in chain))
+
+
+def predictor_for_search(tracks: Tracks) -> WheelPredictor:
+    """A predictor that answers fast enough to be asked thousands of times: of many poses some, and then in coarser steps."""
+    slim = slimmed(tracks)
+    return WheelPredictor(slim) if slim is tracks else WheelPredictor(slim, dt_s=_COARSE_S)
+
+
+def _grid_of(tracks: Tracks, dt_s: float) -> Grid:
+    """Steps of at most ``dt_s`` that end wherever a command or a frame does: a pose inside a step would lie on a chord."""
+    nodes, lefts, rights = [], [], []
+    for trial in range(len(tracks)):
+        frames = tracks.t_s[tracks.first[trial] : tracks.first[trial + 1]]
+        ends = np.cumsum(tracks.duration_s[trial])
+        marks = np.unique(
+            np.concatenate([[0.0], ends, frames[frames >= 0], [max(ends[-1], *frames[-1:]) + _TAIL_S]]).round(9)
+        )
+        counts = np.maximum(np.ceil(np.diff(marks) / dt_s - 1e-9).astype(np.int64), 1)
+        inner = np.concatenate([[0.0], np.repeat(np.diff(marks) / counts, counts)])
+        node = marks[0] + np.cumsum(inner)
+        lasting = np.flatnonzero(tracks.duration_s[trial] > 0)
+        middle = (node[1:] + node[:-1]) / 2
+        which = np.append(lasting, len(ends) - 1)[np.searchsorted(ends[lasting], middle)]
+        nodes.append(node)
+        lefts.append(tracks.left_m_s[trial][which])
+        rights.append(tracks.right_m_s[trial][which])
+    width = max(map(len, nodes))
+    node_s = np.stack([np.pad(node, (0, width - len(node)), mode="edge") for node in nodes])
+    left, right = (np.stack([np.pad(v, (0, width - 1 - len(v))) for v in values]) for values in (lefts, rights))
+    return Grid(np.diff(node_s, axis=1), node_s, left, right, np.zeros((len(nodes), 0), dtype=np.int64))
+
+
+def _before(values: Array, changed: NDArray[np.bool_]) -> Array:
+    """What was in force before the last change, at every step; 0 before the first."""
+    before = np.pad(values, ((0, 0), (1, 0)))[:, :-1]
+    out = np.zeros_like(values)
+    current = np.zeros(len(values))
+    for k in range(values.shape[1]):
+        current = np.where(changed[:, k], before[:, k], current)
+        out[:, k] = current
+    return out
+
+
+def _fresh_change(speed: Array, since_s: Array, changed: NDArray[np.bool_]) -> Array:
+    """By how much a command changed, fading once it is in force."""
+    change: Array = (speed - _before(speed, changed)) * np.exp(-since_s / RECENT_S)
+    return change
+
+
+def _reversed(speed: Array, step_s: Array) -> Array:
+    """The direction of a wheel since it last turned round, fading from 1 or -1; 0 where it never did."""
+    out, fresh, sign = np.zeros_like(speed), np.zeros(len(speed)), np.zeros(len(speed))
+    for k in range(speed.shape[1]):
+        now = np.sign(speed[:, k])
+        fresh = np.where((now != 0) & (sign != 0) & (now != sign), 1.0, fresh)
+        sign = np.where(now != 0, now, sign)
+        half = np.exp(-step_s[:, k] / (2 * RECENT_S))
+        out[:, k], fresh = sign * fresh * half, fresh * half * half
+    return out
+
+
+def _conditions(tracks: Tracks, node_s: Array) -> Conditions:
+    middle = (node_s[:, 1:] + node_s[:, :-1]) / 2
+    volts = tracks.extra.get("battery_v")
+    drop = None
+    if volts is not None and np.isfinite(volts).any():
+        reference = volts[np.isfinite(volts)][0]
+        drop = np.stack([_held(tracks, volts, row, middle[row]) for row in range(len(tracks))]) - reference
+        drop = -drop
+    return Conditions(session_s=tracks.start_s[:, None] + middle, battery_drop_v=drop)
+
+
+def _held(tracks: Tracks, values: Array, trial: int, t_s: Array) -> Array:
+    frames = slice(tracks.first[trial], tracks.first[trial + 1])
+    known = np.isfinite(values[frames])
+    if not known.any():
+        return np.full(len(t_s), np.nanmean(values))
+    return np.interp(t_s, tracks.t_s[frames][known], values[frames][known])

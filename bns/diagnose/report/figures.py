@@ -1,0 +1,106 @@
+"""Pictures of a comparison, a diagnosis and a mended model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bns.diagnose.adding import Mended
+from bns.diagnose.comparison import Comparison, Curve
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.report.text import ahead
+from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, save, style
+
+LABELS = {
+    "left_m_s": "left wheel commanded (m/s)",
+    "right_m_s": "right wheel commanded (m/s)",
+    "speed_m_s": "speed commanded (m/s)",
+    "wheel_difference_m_s": "right − left commanded (m/s)",
+    "previous_speed_m_s": "speed before the change (m/s)",
+    "previous_wheel_difference_m_s": "right − left before the change (m/s)",
+    "time_in_command_s": "time in the command (s)",
+    "time_in_trial_s": "time in the trial (s)",
+    "session_s": "time in the session (s)",
+    "way_m": "way driven in the trial (m)",
+    "heading_rad": "heading (rad)",
+    "place": "place",
+    "a_lat_rad": "lateral amplitude (rad)",
+    "a_vert_rad": "vertical amplitude (rad)",
+    "omega_rad": "ω (rad)",
+    "alpha_rad": "α (rad)",
+    "previous_a_lat_rad": "lateral amplitude before (rad)",
+    "previous_a_vert_rad": "vertical amplitude before (rad)",
+    "previous_omega_rad": "ω before (rad)",
+    "previous_alpha_rad": "α before (rad)",
+    "cycle": "cycle of the trial",
+}
+
+
+@style()
+def comparison_figure(c: Comparison, path: Path) -> Path:
+    """Residuals along the variables that explain most, one row a variable, with 95 % bands."""
+    variables = list(dict.fromkeys(curve.variable for curve in c.curves))[:5]
+    ways = list(dict.fromkeys(curve.direction for curve in c.curves))
+    figure = Figure(figsize=(PAGE_IN, 1.7 * max(len(variables), 1) + 0.5))
+    axes = figure.subplots(max(len(variables), 1), max(len(ways), 1), squeeze=False)
+    for curve in c.curves:
+        if curve.variable in variables:
+            _draw_curve(axes[variables.index(curve.variable)][ways.index(curve.direction)], curve)
+    for column, way in enumerate(ways):
+        axes[0][column].set_title(way)
+    trials = f"{c.trials} trials; bands: 95 %, bootstrap over trials"
+    figure.suptitle(f"Measured − predicted by {c.model}, {ahead(c.near)} ahead ({trials})")
+    return save(figure, path)[0]
+
+
+def _draw_curve(axes: Axes, curve: Curve) -> None:
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    axes.fill_between(curve.centre, curve.low, curve.high, alpha=0.3, color=OKABE_ITO[0], linewidth=0)
+    axes.plot(curve.centre, curve.mean, color=OKABE_ITO[0], marker="o")
+    axes.set_xlabel(LABELS.get(curve.variable, curve.variable))
+
+
+@style()
+def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12) -> Path:
+    """What each effect earns on trials held out, when added alone to the model; bars are 95 % intervals."""
+    assert d.found is not None
+    step = d.found.steps[0]
+    shown = [c for c in step.ranking if np.isfinite(c.evidence.gain)][:most][::-1]
+    figure = Figure(figsize=(PAGE_IN * 0.75, 0.24 * len(shown) + 1.2))
+    axes = figure.subplots()
+    taken = {*d.effects}
+    for row, c in enumerate(shown):
+        colour = OKABE_ITO[2] if c.name in taken else GREY if c.veto else OKABE_ITO[0]
+        axes.errorbar(c.evidence.gain, row, xerr=1.96 * c.evidence.se, fmt="o", color=colour, capsize=2)
+    axes.axvline(step.bar, color=OKABE_ITO[1], linestyle="--", label="best decoy")
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.set_yticks(range(len(shown)), [c.name for c in shown])
+    axes.set_xscale("symlog", linthresh=1.0)
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xlabel("gain in log-likelihood a trial, on trials held out")
+    axes.set_title(f"verdict: {d.verdict}" + (f" ({', '.join(d.effects)})" if d.effects else ""))
+    axes.legend(loc="lower right")
+    return save(figure, path)[0]
+
+
+@style()
+def ladder_figure(m: Mended, path: Path) -> Path:
+    """The error ladder: nominal model, each effect added in turn, noise floor; one line a horizon."""
+    names = [r.name if r.name == "nominal" else f"+ {r.name}" for r in m.ladder]
+    figure = Figure(figsize=(PAGE_IN * 0.75, 3.0))
+    axes = figure.subplots()
+    for colour, marker, horizon in zip(OKABE_ITO, "os^D", m.ladder[0].error, strict=False):
+        values = [1e3 * r.error[horizon] for r in m.ladder]
+        axes.plot(range(len(values)), values, marker=marker, color=colour, label=f"{ahead(horizon)}")
+        axes.plot([0, len(values) - 1], [1e3 * m.floor[horizon]] * 2, color=colour, linestyle=":", linewidth=1)
+    axes.set_xticks(range(len(names)), names)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("{x:g}")
+    axes.set_ylabel("position error on trials held out (mm)")
+    axes.legend(title="horizon (dotted: noise floor)", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes.set_title("Error ladder")
+    return save(figure, path)[0]

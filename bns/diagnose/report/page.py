@@ -1,0 +1,181 @@
+"""A diagnosis as one HTML page that needs nothing else: no network, no other file, no manual."""
+
+from __future__ import annotations
+
+import base64
+import json
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from bns.diagnose.adding import Mended, add_effects
+from bns.diagnose.comparison import Comparison, compare
+from bns.diagnose.data.load import Measured
+from bns.diagnose.design.proposal import Proposal
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report import tables
+from bns.diagnose.report.figures import comparison_figure, diagnosis_figure, ladder_figure
+from bns.diagnose.report.plain_language import certainty, headline, numbers_in_words
+from bns.diagnose.report.proposal_figure import plan_figure
+from bns.diagnose.report.proposal_text import proposal_lines
+from bns.diagnose.report.shown_paths import shown_paths
+from bns.errors import DataError
+from bns.physics.model import Model
+
+_PIXELS_IN_POINT = 1.25 * 96 / 72
+"""A little larger than in print: a screen is read from further away."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """All that a report is made of. ``proposal`` is None where there is nothing to tell apart; ``why_none`` says why."""
+
+    measured: Measured
+    model: Model
+    diagnosis: Diagnosis
+    comparison: Comparison | None
+    mended: Mended | None
+    proposal: Proposal | None
+    why_none: str
+    paths: list[dict[str, Any]]
+
+
+def gathered(
+    measured: Measured,
+    predictor: WheelPredictor,
+    model: Model,
+    d: Diagnosis,
+    proposed: Callable[[], Proposal],
+    tick: Callable[[str], None] = lambda _: None,
+) -> Material:
+    """Everything worked out that the page shows; ``proposed`` works out the experiment."""
+    tick("where the model fails")
+    try:
+        comparison: Comparison | None = compare(predictor, model)
+    except DataError:  # single poses: the verdict says so
+        comparison = None
+    mended = None
+    if d.found is not None and d.effects:
+        tick("the ladder")
+        added = {a.effect.name: (a.effect, a.written) for a in d.found.fit.model.effects}
+        mended = add_effects(predictor, model, [added[name] for name in d.effects], measured)
+    tick("the next experiment")
+    proposal, why = None, ""
+    try:
+        proposal = proposed()
+    except DataError as none:
+        why = str(none)
+    tick("paths")
+    return Material(measured, model, d, comparison, mended, proposal, why, shown_paths(predictor, model, d))
+
+
+def report_html(m: Material, command: Mapping[str, str]) -> str:
+    """The page. ``command``: words of the user's command line that the next ones repeat: data, model."""
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(_part("report.html.j2")).render(**_values(m, command))
+
+
+def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
+    d, has_found = m.diagnosis, m.diagnosis.found is not None
+    has_after = bool(m.paths) and "after" in m.paths[0]
+    values: dict[str, Any] = {
+        "css": Markup(_part("report.css")),
+        "js": Markup(_part("report.js")),
+        "data_name": m.measured.path.name,
+        "model_name": m.model.name,
+        "trials": len(m.measured.tracks),
+        "verdict": d.verdict,
+        "headline": headline(d),
+        "certainty": certainty(d),
+        "numbers": numbers_in_words(d.found.fit, d.effects) if d.found is not None else [],
+        "formula": _formula(d),
+        "improvement": tables.improvement_text(d),
+        "rivals": _rivals(m),
+        "paths": Markup(json.dumps(m.paths, separators=(",", ":")).replace("<", "\\u003c")) if m.paths else "",
+        "paths_text": _paths_text(m, has_after),
+        "has_after": has_after,
+        "errors": tables.error_table(d, m.comparison),
+        "ladder": _drawn(partial(ladder_figure, m.mended), "the error ladder") if m.mended else None,
+        "ladder_table": tables.ladder_table(m.mended) if m.mended else None,
+        "comparison": _compared(m.comparison),
+        "curves": tables.curves_table(m.comparison) if m.comparison else None,
+        "worst": tables.worst_table(m.comparison) if m.comparison else None,
+        "ranking": _drawn(partial(diagnosis_figure, d), "what each effect would explain") if has_found else None,
+        "ranking_table": tables.ranking_table(d) if has_found else None,
+        "next_lines": proposal_lines(m.proposal) if m.proposal else [m.why_none],
+        "plan_picture": _planned(m.proposal),
+        "commands": tables.commands_table(m.proposal) if m.proposal and len(m.proposal.plan) else None,
+        "notes": list(d.notes),
+        "next_commands": tables.next_commands(d, m.proposal, command),
+        "exact": tables.exact_table(d) if has_found and d.effects else None,
+        "equations": tables.equations_table(d) if d.effects else None,
+        "findings": tables.findings_table(m.measured) if m.measured.findings else None,
+        "findings_title": f"{len(m.measured.findings)} oddities found in the data",
+        "origin": f"Data {m.measured.path.name}, SHA-256 {m.measured.digest}…; model {m.model.name}, {m.model.digest}.",
+    }
+    titles = {"paths": "paths", "errors": "errors", "comparison": "where it fails", "ranking": "every effect"}
+    places = {"errors": "error", "comparison": "where"}
+    shown = [(places.get(key, key), title) for key, title in titles.items() if values[key]]
+    return {**values, "contents": [*shown, ("next", "next experiment"), ("details", "details")]}
+
+
+def _formula(d: Diagnosis) -> dict[str, str] | None:
+    if d.formula is None:
+        return None
+    values = ", ".join(f"{name} = {value:.3g}" for name, value in d.formula.values.items())
+    return {"on": d.formula.on, "term": d.formula.term, "numbers": values}
+
+
+def _rivals(m: Material) -> list[dict[str, str]]:
+    """The numbers of explanations that fit as well as the accepted one."""
+    if m.diagnosis.verdict != "tie" or m.proposal is None:
+        return []
+    others = m.proposal.rivals[1:]
+    return [
+        number | {"effect": f"{number['effect']} ({rival.title})" if len(rival.names) > 1 else number["effect"]}
+        for rival in others
+        for number in numbers_in_words(rival.fit, rival.names)
+    ]
+
+
+def _paths_text(m: Material, has_after: bool) -> str:
+    shown, trials = len(m.paths), len(m.measured.tracks)
+    order = "those first in which mending the model changes most" if has_after else "the worst predicted first"
+    some = f"{shown} of {trials} trials, {order}" if shown < trials else f"All {trials} trials, {order}"
+    after = " The mended model's numbers come from other trials than those it predicts here." if has_after else ""
+    return (
+        f"{some}. Predictions start from the first measured pose and know only the commands; even a perfect model's path parts "
+        f"from the measured one in time, since motors vary and the first heading is known only so well.{after}"
+    )
+
+
+def _compared(c: Comparison | None) -> dict[str, Any] | None:
+    if c is None or not c.curves:
+        return None
+    return _drawn(partial(comparison_figure, c), "errors along the variables that explain most of them")
+
+
+def _planned(p: Proposal | None) -> dict[str, Any] | None:
+    if p is None or not len(p.plan):
+        return None
+    return _drawn(partial(plan_figure, p), "the first proposed trials, as each explanation foresees them")
+
+
+def _drawn(draw: Callable[[Path], Path], alt: str) -> dict[str, Any]:
+    """A figure of the one style as data for the page, with the width that it is made for (pixels)."""
+    with tempfile.TemporaryDirectory() as folder:
+        svg = draw(Path(folder) / "figure").with_suffix(".svg").read_bytes()
+    points = float(svg[:1000].partition(b'width="')[2].partition(b"pt")[0])
+    return {"data": base64.b64encode(svg).decode(), "width": round(_PIXELS_IN_POINT * points), "alt": alt}
+
+
+def _part(name: str) -> str:
+    return (resources.files("bns.diagnose.report") / "template" / name).read_text(encoding="utf-8")

@@ -1,0 +1,124 @@
+"""Effects, numbers and verdicts for somebody who has not read the manual."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.diagnose.design.competing_models import without_last
+from bns.diagnose.diagnosis import Diagnosis, numbers_of
+from bns.diagnose.estimate.fit import Fit
+
+PLAIN = {
+    "speed-gain": "the wheels turn faster or slower than they are told to",
+    "wheel-mismatch": "one wheel is larger than the other",
+    "wheelbase": "the wheels stand closer together or further apart than the model says",
+    "motor-lag": "the motors follow their commands with a lag",
+    "command-delay": "commands reach the motors late",
+    "dead-zone": "a part of every wheel's speed is lost to friction",
+    "speed-limit": "the wheels cannot turn faster than a limit",
+    "acceleration-limit": "the wheels' speed can change only so fast",
+    "turn-slip": "turning costs forward speed",
+    "side-slip": "the robot slides sideways in curves",
+    "battery-sag": "the robot becomes slower as its battery empties",
+    "floor-slope": "the robot drifts to one side of the floor, as on a slope",
+    "yaw-bias": "the robot turns a little to one side whenever it moves",
+    "tether-pull": "something pulls the robot towards one place, as a cable does",
+    "clock-offset": "the camera's clock and the commands' clock disagree",
+    "clock-drift": "the camera's clock runs faster or slower than the commands' clock",
+    "understeer": "how far the robot turns depends on how fast it drives",
+    "marker-offset": "the tracked marker does not sit over the middle of the axle",
+    "camera-scale": "the camera's positions are too large or too small",
+    "camera-rotation": "the camera's positions are turned against the robot's headings",
+}
+"""Effect -> what happens, in everyday words."""
+
+_UNITS = {"s": (1e3, "ms"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "rad": (57.29578, "°"), "rad/s": (57.29578, "°/s")}
+"""SI unit -> factor and unit for people."""
+_LARGE = 1.0
+_CAUSES = 3
+
+
+def described(name: str) -> str:
+    """An effect in everyday words; its own name where nobody wrote any."""
+    return PLAIN.get(name, f"the effect “{name}”")
+
+
+def figures_in_words(value: float, low: float | None, high: float | None, unit: str) -> tuple[str, str]:
+    """A number with its unit, and its 95 % interval ("" where there is none), rounded to what is known of it."""
+    factor, shown = _UNITS.get(unit, (1.0, "" if unit == "1" else unit))
+    if unit in {"s", "m"} and abs(value) >= _LARGE:
+        factor, shown = 1.0, unit
+    numbers = [factor * v for v in (value, low, high) if v is not None and np.isfinite(v)]
+    if not numbers:
+        return "not known", ""
+    spread = max(numbers) - min(numbers)
+    digits = _digits(spread if spread > 0 else abs(numbers[0]))
+    gap = "" if shown.startswith("°") else " "
+    ended = f"{gap}{shown}" if shown else ""
+    if len(numbers) < 3:
+        return f"{numbers[0]:.{digits}f}{ended}", ""
+    return f"{numbers[0]:.{digits}f}{ended}", f"{numbers[1]:.{digits}f} to {numbers[2]:.{digits}f}{ended}"
+
+
+def _digits(size: float) -> int:
+    """Decimals that show two figures of a size."""
+    return int(np.clip(1 - np.floor(np.log10(max(size, 1e-12))), 0, 8))
+
+
+def numbers_in_words(fit: Fit, names: tuple[str, ...]) -> list[dict[str, str]]:
+    """Each number of some effects: effect, what it is, value, interval, and the value as the model file has it."""
+    texts = {(f.effect, f.parameter.name): f.parameter.text for f in fit.free}
+    return [
+        {
+            "effect": effect,
+            "name": name,
+            "text": texts[(effect, name)],
+            **dict(zip(("value", "interval"), figures_in_words(n["value"], n["low"], n["high"], n["unit"]), strict=True)),
+            "exact": f"{n['value']:.6g} {n['unit'] if n['unit'] != '1' else ''}".strip(),
+        }
+        for effect, values in numbers_of(fit).items()
+        if effect in names
+        for name, n in values.items()
+    ]
+
+
+def headline(d: Diagnosis) -> str:
+    """The verdict in one sentence or two."""
+    said = _all_of(d.effects)
+    if d.verdict == "tie" and d.found is not None:
+        causes = [_all_of(names) for names in (d.found.accepted, *d.found.rivals)]
+        some = [f"that {cause}" for cause in causes[:_CAUSES]] + (["something else"] if len(causes) > _CAUSES else [])
+        return f"The model misses either {', or '.join(some)}. These measurements cannot say which."
+    return {
+        "none": "Nothing is missing from the model that these measurements could show.",
+        "effects": f"The model misses that {said}.",
+        "unlisted": "Something is missing from the model that is none of the known effects"
+        + (f", beside the fact that {said}." if said else "."),
+        "insufficient-data": "These measurements do not suffice to say whether anything is missing.",
+    }[d.verdict]
+
+
+def _all_of(names: tuple[str, ...]) -> str:
+    return " and ".join(described(name) for name in names)
+
+
+def certainty(d: Diagnosis) -> str:
+    """How sure the verdict is, in a sentence or two."""
+    found = d.found
+    if found is None:
+        return d.notes[0] if d.notes else ""
+    trials = len(found.problem.predictor.tracks)
+    if d.verdict == "none":
+        return f"No known effect earns anything on trials that it was not fitted to ({trials} trials)."
+    if d.verdict == "insufficient-data":
+        return next((n for n in d.notes if "more would" in n), "") or f"{trials} trials hint at something, and do not settle it."
+    if d.verdict == "unlisted":
+        left = next((n for n in d.notes if n.startswith(("Left unexplained", "What is not foreseen"))), "")
+        return f"Over {trials} trials predictions still go wrong in a pattern that is not luck. {left}".strip()
+    chance = next(c.evidence.p_value for s in found.steps for c in s.ranking if c.name in d.effects)
+    better = float((found.problem.fit(without_last(found)).held_out > found.fit.held_out).mean())
+    luck = "less than one in ten thousand" if chance < 1e-4 else f"about {chance:.1g}"
+    return (
+        f"Judged on trials left out of the fit, {better:.0%} of {trials} trials are predicted better with it; "
+        f"the chance that luck alone does this is {luck}."
+    )

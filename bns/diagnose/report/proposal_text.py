@@ -1,0 +1,57 @@
+"""A proposed experiment in words, for a terminal and for the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bns.diagnose.design.proposal import Contest, Proposal
+from bns.robots.khepera import START
+
+
+def proposal_text(p: Proposal, written: str = "") -> str:
+    """Who stands against whom, what the experiment would decide, and what to type next."""
+    first = f"verdict so far: {p.verdict}; explanations to tell apart: {'; '.join(r.title for r in p.rivals)}"
+    return "\n".join([first, *proposal_lines(p), *_next(p, written)])
+
+
+def contest_text(c: Contest) -> str:
+    """One sentence or two on one pair."""
+    pair = f"{c.first} against {c.second}"
+    if c.alike:
+        other = "; or ".join(c.other_measurements)
+        return f"{pair}: no sequence of commands tells them apart." + (f" Another measurement does: {other}." if other else "")
+    if c.already:
+        return f"{pair}: these measurements decide already; {_minutes(c.minutes)} of new ones would do so alone."
+    beside = f" (plain random commands: {c.times_faster:.1f} times as long)" if c.times_faster > 1 else ""
+    return f"{pair}: decided with a chance of {c.power:.0%}; nine in ten would be after {_minutes(c.minutes)}{beside}."
+
+
+def proposal_lines(p: Proposal) -> list[str]:
+    """A sentence a pair, then what the trials are."""
+    lines = [contest_text(c) for c in p.contests]
+    if not len(p.plan):
+        return [*lines, "No trial is proposed: no commands would decide anything."]
+    a = p.arena
+    return [
+        *lines,
+        f"{len(p.plan)} trials of about {p.plan.lasting_s.mean():.0f} s are proposed, {p.plan.lasting_s.sum() / 60:.1f} min of "
+        f"driving, inside x {a.x_low_m:.2f} to {a.x_high_m:.2f} m, y {a.y_low_m:.2f} to {a.y_high_m:.2f} m, each from "
+        f"x = {a.start[0]:.2f} m, y = {a.start[1]:.2f} m, heading {np.degrees(a.start[2]):.0f}°; wheels "
+        f"{p.bounds.slowest_m_s:.3g} to {p.bounds.fastest_m_s:.3g} m/s.",
+    ]
+
+
+def _next(p: Proposal, written: str) -> Iterator[str]:
+    if written:
+        if not np.allclose(p.arena.start, START, atol=0.02):
+            yield "note: bns trial starts every trial at x = 0, y = 0, heading 90°; --start=0,0,90 plans for that."
+        yield f"written to {written}; drive it with: bns trial --robot khepera --rig RIG.yaml --commands {written}"
+        yield "then: bns diagnose DATA --more NEW.csv --model M"
+
+
+def _minutes(minutes: float) -> str:
+    if minutes > 24 * 60:
+        return "more than a day"
+    return f"{minutes:.1f} min" if minutes < 120 else f"{minutes / 60:.1f} h"

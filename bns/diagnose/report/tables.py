@@ -1,0 +1,145 @@
+"""The numbers behind the report's figures, as tables of texts: {columns, rows}."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bns.diagnose.adding import Mended
+from bns.diagnose.comparison import Comparison
+from bns.diagnose.data.load import Measured
+from bns.diagnose.design.proposal import Proposal
+from bns.diagnose.diagnosis import Diagnosis, numbers_of
+from bns.diagnose.predict.horizons import HORIZONS
+from bns.diagnose.report.plain_language import figures_in_words
+
+Table = dict[str, list[Any]]
+AHEAD = {"command": "one command", "1s": "1 second", "5s": "5 seconds", "trial": "the whole trial"}
+
+
+def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
+    """Error at every horizon, before and after, beside the noise floor."""
+    if d.error and d.effects:
+        rows = [[AHEAD[h], *(_mm(e[k]) for k in ("before", "after", "noise_floor"))] for h, e in d.error.items()]
+        return _table(["after", "as it was (mm)", "mended (mm)", "noise floor (mm)"], rows)
+    if d.error:
+        rows = [[AHEAD[h], _mm(e["before"]), _mm(e["noise_floor"])] for h, e in d.error.items()]
+        return _table(["after", "as it is (mm)", "noise floor (mm)"], rows)
+    if c is None:
+        return None
+    rows = [[AHEAD[h], _mm(c.errors[h]["position_m"]), _mm(c.floor[h])] for h in HORIZONS if c.errors[h]["windows"]]
+    return _table(["after", "as it is (mm)", "noise of the tracking (mm)"], rows)
+
+
+def improvement_text(d: Diagnosis) -> str:
+    """What adding the effects does to the error, in a sentence; "" where nothing was added."""
+    if not d.error or not d.effects:
+        return ""
+    e = d.error["1s"] if np.isfinite(d.error["1s"]["before"]) else d.error["command"]
+    ahead = "a second" if e is d.error["1s"] else "a command"
+    known = "With it" if d.verdict != "unlisted" else "With the known effects alone"
+    return (
+        f"{known}, predictions {ahead} ahead are {_mm(e['after'])} mm off instead of {_mm(e['before'])} mm "
+        f"(noise alone: {_mm(e['noise_floor'])} mm)."
+    )
+
+
+def ladder_table(m: Mended) -> Table:
+    """Every rung at every horizon."""
+    horizons = list(m.ladder[0].error)
+    rows = [["as it was" if r.name == "nominal" else f"+ {r.name}", *(_mm(r.error[h]) for h in horizons)] for r in m.ladder]
+    rows.append(["noise floor", *(_mm(m.floor[h]) for h in horizons)])
+    return _table(["model", *(f"{AHEAD[h]} (mm)" for h in horizons)], rows)
+
+
+def curves_table(c: Comparison) -> Table:
+    """Every dot of the curves with its band."""
+    rows = [
+        [curve.variable, curve.direction, *(f"{v:.4g}" for v in dot)]
+        for curve in c.curves
+        for dot in zip(curve.centre, curve.mean, curve.low, curve.high, strict=True)
+    ]
+    return _table(["variable", "error", "at", "mean", "95 % from", "to"], rows)
+
+
+def worst_table(c: Comparison) -> Table:
+    """The worst moments."""
+    rows = [[w.trial, f"{w.t_s:.2f}", _mm(w.position_m), f"{np.degrees(w.heading_rad):+.1f}"] for w in c.worst]
+    return _table(["trial", "time (s)", "position off (mm)", "heading off (°)"], rows)
+
+
+def ranking_table(d: Diagnosis) -> Table:
+    """Every effect alone: gain with its interval, chance, fitted numbers, veto."""
+    assert d.found is not None
+    rows = []
+    for c in d.found.steps[0].ranking:
+        e = c.evidence
+        fitted = numbers_of(c.fit).get(c.name, {})
+        values = [
+            f"{name} {' '.join(part for part in _shown(n) if part)}" for name, n in fitted.items() if n["value"] is not None
+        ]
+        known = np.isfinite(e.gain)
+        gain = [f"{e.gain:.3g}", f"{e.gain - 1.96 * e.se:.3g} to {e.gain + 1.96 * e.se:.3g}"] if known else ["none", ""]
+        rows.append([c.name, *gain, f"{e.p_value:.2g}", "; ".join(values), c.veto])
+    return _table(["effect", "gain a trial", "95 %", "chance of luck", "fitted numbers (95 %)", "why not considered"], rows)
+
+
+def _shown(number: Mapping[str, Any]) -> tuple[str, str]:
+    value, interval = figures_in_words(number["value"], number["low"], number["high"], number["unit"])
+    return value, f"({interval})" if interval else ""
+
+
+def commands_table(p: Proposal) -> Table:
+    """The proposed trial file."""
+    table = p.commands().iloc[:, :4]
+    rows = [[int(row[0]), f"{row[1]:.4f}", f"{row[2]:.4f}", f"{row[3]:.2f}"] for row in table.itertuples(index=False)]
+    return _table(["trial", "left (m/s)", "right (m/s)", "for (s)"], rows)
+
+
+def exact_table(d: Diagnosis) -> Table:
+    """The accepted effects' numbers in SI units."""
+    assert d.found is not None
+    rows = [
+        [effect, name, *(f"{n[k]:.6g}" if n[k] is not None else "" for k in ("value", "se", "low", "high")), n["unit"]]
+        for effect, numbers in numbers_of(d.found.fit).items()
+        for name, n in numbers.items()
+    ]
+    return _table(["effect", "number", "value", "standard error", "95 % from", "to", "unit"], rows)
+
+
+def equations_table(d: Diagnosis) -> Table:
+    """What the accepted effects do, as equations, and what looks like them."""
+    assert d.found is not None
+    accepted = [a.effect for a in d.found.fit.model.effects if a.effect.name in d.effects]
+    return _table(["effect", "equation", "looks like"], [[e.name, e.equation, ", ".join(e.lookalikes)] for e in accepted])
+
+
+def findings_table(measured: Measured, most: int = 100) -> Table:
+    """What was odd about the data."""
+    return _table(["trial", "row", "what"], [[f.trial, f.row, f.text] for f in measured.findings[:most]])
+
+
+def next_commands(d: Diagnosis, p: Proposal | None, command: Mapping[str, str]) -> list[str]:
+    """What to type next."""
+    data, model = command["data"], command["model"]
+    out = []
+    if d.effects:
+        out.append(f"bns add {' '.join(d.effects)} {model} --data {data} -o mended.yaml")
+    if d.formula is not None:
+        out.append(f"bns add found --term '{d.formula.term}' --on {d.formula.on} {model} --data {data} -o mended.yaml")
+    if p is not None and len(p.plan):
+        out.append(f"bns propose {data} {model} -o next.csv")
+        out.append("bns trial --robot khepera --rig RIG.yaml --commands next.csv")
+        out.append(f"bns diagnose {data} {model} --more NEW-MEASUREMENTS.csv")
+    return out
+
+
+def _table(columns: list[str], rows: list[list[Any]]) -> Table:
+    return {"columns": columns, "rows": rows}
+
+
+def _mm(metres: float) -> str:
+    size = 1e3 * metres
+    return f"{size:.1f}" if np.isfinite(size) and size < 100 else f"{size:.0f}" if np.isfinite(size) else "not known"

@@ -1,0 +1,1 @@
+"""What no listed effect explains: along which variables, when, in which form."""

@@ -1,0 +1,153 @@
+"""Is there anything left? What a fitted model still gets wrong, along every variable there is.
+
+For each variable a free curve (a field over the floor for the place) is added to the robot's forward, sideways and turning
+velocity, and to all three as a share of them, and judged as any effect is: by what it earns on trials that it was not
+fitted to. No physics is assumed, so whatever moves the robot by a rule that can be seen from outside shows here, listed or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.fit import Fit, Problem, chance
+from bns.diagnose.estimate.noise import huber
+from bns.diagnose.estimate.normal_equations import Normal, stepped
+from bns.diagnose.estimate.parallel import each
+from bns.diagnose.estimate.significance import MIN_Z, Evidence, held_out_gain
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Body
+
+SHARE = "share_of_motion"
+"""All three velocities in proportion: what brakes a robot forward brakes it backward and in its turns as well."""
+CHANNELS = ("forward_m_s", "sideways_m_s", "yaw_rad_s", SHARE)
+WORLD = ("east_m_s", "north_m_s")
+"""Velocities in the world's frame, for what a place does to the robot."""
+KNOTS = 5
+"""Bends of a free curve: at these many quantiles of the variable."""
+FIELD = 5
+"""A field over the floor has so many bumps a side."""
+PENALTIES = (1.0, 30.0)
+"""How strongly curves are drawn to zero, in expected squares of the standardised curve; the better one counts."""
+CHANCE = 0.02
+"""Chance of any false alarm over all variables and channels."""
+LEAST = 0.0015
+"""Least gain that counts, as a share of the loss."""
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """What a free curve of one variable, added to one velocity, earns on held-out trials."""
+
+    variable: str
+    channel: str
+    evidence: Evidence
+    share: float
+
+
+def patterns(problem: Problem, fit: Fit) -> list[Pattern]:
+    """Every variable with every velocity, the best first."""
+    variables = problem.predictor.variables()
+    headings, usual = variables["heading_rad"], float(fit.losses.mean())
+
+    def seen(tried: tuple[str, list[Array], str]) -> Pattern:
+        variable, basis, channel = tried
+        earned = _earned(problem, fit, _columns(problem, fit, channel, basis, headings))
+        return Pattern(variable, channel, earned, earned.gain / usual)
+
+    tried = [(v, basis, c) for v, basis in curves(variables) for c in (*CHANNELS, *(WORLD if v == "place" else ()))]
+    return sorted(each(seen, tried), key=lambda p: -p.evidence.gain)
+
+
+def remaining(found: list[Pattern]) -> list[Pattern]:
+    """The patterns that cannot be luck, are earned in many trials and are large enough to matter."""
+    level = CHANCE / max(len(found), 1)
+    return [p for p in found if p.evidence.p_value < level and p.evidence.z > MIN_Z and p.share > LEAST]
+
+
+def curves(variables: Mapping[str, Array]) -> Iterator[tuple[str, list[Array]]]:
+    """Name and basis functions, (trials, steps) each, of every variable that varies."""
+    for name, values in variables.items():
+        if name in {"x_m", "y_m"}:
+            continue
+        # of the values that occur, however often: a variable that is nearly always zero bends where it is not
+        seen = np.unique(values[np.isfinite(values)].round(6))
+        knots = np.unique(np.quantile(seen, np.linspace(0, 1, KNOTS)))
+        if len(knots) > 1:
+            yield name, [np.interp(values, knots, row) for row in np.eye(len(knots))]
+    if {"x_m", "y_m"} <= set(variables):
+        yield "place", _bumps(variables["x_m"], variables["y_m"], FIELD)
+    speeds = ("speed_m_s", "wheel_difference_m_s")
+    if set(speeds) <= set(variables):
+        yield "speed and turn", _bumps(variables[speeds[0]], variables[speeds[1]], FIELD - 1)
+
+
+def _bumps(x: Array, y: Array, side: int) -> list[Array]:
+    """Gaussian bumps on a grid over two variables."""
+    (x0, x1), (y0, y1) = np.quantile(x, [0.01, 0.99]), np.quantile(y, [0.01, 0.99])
+    wide, high = (0.6 * (top - low) / (side - 1) + 1e-9 for low, top in ((x0, x1), (y0, y1)))
+    return [
+        np.exp(-(((x - cx) / wide) ** 2 + ((y - cy) / high) ** 2) / 2)
+        for cx in np.linspace(x0, x1, side)
+        for cy in np.linspace(y0, y1, side)
+    ]
+
+
+def nudge(channel: str, curve: Array, heading_rad: Array) -> Effect:
+    """An effect that adds ``size`` times a curve (trials, steps) to one velocity while the robot moves, or to all as a share."""
+
+    def apply(body: Body, size: float) -> Body:
+        if channel == SHARE:
+            return body.scaled(1 + size * curve)
+        added = size * curve * body.moving
+        if channel in WORLD:
+            return body.with_drift(channel.removesuffix("_m_s"), added, heading_rad)
+        return body.with_added(channel, added)
+
+    return Effect(
+        name="nudge",
+        stage="body",
+        parameters=(Parameter("size", "1", -1e3, 1e3, (-1.0, 1.0), 0.0, "size of the curve"),),
+        equation="",
+        residuals="",
+        lookalikes=(),
+        apply=apply,
+        rank=116,
+    )
+
+
+def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array) -> Array:
+    """Change of the whitened innovations a unit of each basis function, (frames, 3, k)."""
+    small = 1e-3 if channel in {"yaw_rad_s", SHARE} else 1e-4
+    out = np.empty((*fit.white.shape, len(basis)))
+    for j, curve in enumerate(basis):
+        changed = fit.model.with_active(nudge(channel, curve, headings), (small,))
+        out[..., j] = (problem.white(changed) - fit.white) / small
+    return out
+
+
+def _earned(problem: Problem, fit: Fit, columns: Array) -> Evidence:
+    joint = np.concatenate([fit.jacobian, columns], axis=2)
+    pulls = problem.normal(joint, fit.white)
+    gain, se = max((_gain(problem, fit, joint, pulls, penalty) for penalty in PENALTIES), key=lambda found: found[0])
+    return Evidence(gain, se, chance(pulls, fit.jacobian.shape[2]) if gain > 0 else 1.0)
+
+
+def _gain(problem: Problem, fit: Fit, joint: Array, pulls: Normal, penalty: float) -> tuple[float, float]:
+    """Held-out gain of a linear addition to a fitted model, each trial judged by a fit to the others.
+
+    The model's own numbers move along with it. ``penalty``: how many typical trials speak for the addition being nothing.
+    """
+    gradients, curvatures = pulls.gradients, pulls.curvatures
+    total, trials, own = curvatures.sum(axis=0), len(curvatures), fit.jacobian.shape[2]
+    scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    ridge = np.full(len(total), penalty / trials)
+    ridge[:own] = 1e-9
+    others = (total - curvatures) / np.outer(scale, scale) + np.diag(ridge)
+    against = (gradients.sum(axis=0) - gradients) / scale
+    steps = -np.linalg.solve(others, against[..., None])[..., 0] / scale
+    moved = stepped(problem.predictor.tracks.first, joint, fit.white, steps)
+    return held_out_gain(fit.held_out, problem.per_trial(huber(moved)))

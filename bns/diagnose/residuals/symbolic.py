@@ -1,0 +1,161 @@
+"""What the unlisted might be: a short formula in the known variables, or the place it is tied to.
+
+The free curves of `structure` say along which variable and in which velocity the model fails. Here orthogonal matching
+pursuit (scikit-learn) picks the few terms of a library that explain it; what it picks is then fitted as an effect
+like any other, and offered with its held-out gain as a term that `bns add` takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from sklearn.linear_model import orthogonal_mp
+
+from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.noise import weights
+from bns.diagnose.estimate.parallel import each
+from bns.diagnose.estimate.significance import Evidence
+from bns.diagnose.residuals.along_variables import SHARE, Pattern
+from bns.errors import ModelError
+from bns.physics.effect import Effect
+from bns.physics.formula import formula_effect
+from bns.physics.model import Model
+
+NAME = "unlisted"
+_ON = {"forward_m_s": "v", SHARE: "v", "sideways_m_s": "s", "yaw_rad_s": "w", "east_m_s": "east", "north_m_s": "north"}
+_CARRIERS = {
+    "v": ("v", "moving"),
+    "s": ("v", "v*w", "moving"),
+    "w": ("w", "v", "moving"),
+    "east": ("moving",),
+    "north": ("moving",),
+}
+"""What a curve may multiply, by the velocity it adds to."""
+_SHAPES = {
+    "left_m_s": ("l", "abs(l)", "l**2", "sign(l)"),
+    "right_m_s": ("r", "abs(r)", "r**2", "sign(r)"),
+    "speed_m_s": ("v", "abs(v)", "v**2", "sign(v)"),
+    "wheel_difference_m_s": ("w", "abs(w)", "w**2", "max(w, 0)", "min(w, 0)", "sign(w)"),
+    "time_in_trial_s": ("tau", "exp(-tau)", "exp(-tau/3)", "exp(-tau/8)", "tau**2"),
+    "session_s": ("t", "t**2"),
+    "heading_rad": ("sin(heading)", "cos(heading)", "sin(2*heading)", "cos(2*heading)"),
+    "way_m": ("d", "exp(-d)", "d**2"),
+    "place": ("x", "y", "x*y", "x**2", "y**2"),
+}
+_TERMS_AT_MOST = 3
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A candidate: ``term`` to add to the velocity ``on``, its fit, and what it earns on held-out trials."""
+
+    on: str
+    term: str
+    fit: Fit
+    evidence: Evidence
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The fitted numbers of the formula."""
+        return self.fit.model.values_of(NAME)
+
+
+def best_formula(problem: Problem, fit: Fit, found: Sequence[Pattern]) -> Formula | None:
+    """The formula that earns most along the patterns that were found; None if none earns anything."""
+    tried = each(partial(_tried, problem, fit), found[:3])
+    return max((f for of_one in tried for f in of_one if f.evidence.gain > 0), key=lambda f: f.evidence.gain, default=None)
+
+
+def _tried(problem: Problem, fit: Fit, pattern: Pattern) -> list[Formula]:
+    on = _ON[pattern.channel]
+    terms = [f"{c} * {shape}" for c in _CARRIERS[on] for shape in _SHAPES.get(pattern.variable, ())]
+    tried = [_sparse(problem, fit, on, [*_CARRIERS[on], *terms])] if terms else []
+    if pattern.variable == "place":
+        tried.append(_bump(problem, fit, on))
+    return [f for f in tried if f is not None]
+
+
+def _sparse(problem: Problem, fit: Fit, on: str, terms: Sequence[str]) -> Formula | None:
+    """The one to three terms that orthogonal matching pursuit takes; as many as still earn something held out."""
+    usable, columns = [], []
+    for term in terms:
+        effect = formula_effect(NAME, f"k * {term}", on)
+        try:
+            columns.append(_column(problem, fit, effect))
+        except ModelError:
+            continue  # a pole on these trials
+        usable.append(term)
+    matrix = np.stack([_weighted(fit, c) for c in columns], axis=1)
+    size = np.linalg.norm(matrix, axis=0)
+    keep = size > 1e-9 * size.max()
+    matrix, usable = matrix[:, keep] / size[keep], [t for t, k in zip(usable, keep, strict=True) if k]
+    target, best = -_weighted(fit, fit.white), None
+    for count in range(1, min(_TERMS_AT_MOST, len(usable)) + 1):
+        chosen = [usable[i] for i in np.flatnonzero(orthogonal_mp(matrix, target, n_nonzero_coefs=count))]
+        found = _fitted(problem, fit, on, " + ".join(f"k{i} * {t}" for i, t in enumerate(chosen)))
+        if found is None or (best is not None and found.evidence.gain < 1.1 * best.evidence.gain):
+            break
+        best = found
+    return best
+
+
+def _bump(problem: Problem, fit: Fit, on: str) -> Formula | None:
+    """A round patch of floor: where, how wide, how strong."""
+    pose = problem.predictor.tracks.pose
+    (x0, x1), (y0, y1) = np.quantile(pose[:, 0], [0.05, 0.95]), np.quantile(pose[:, 1], [0.05, 0.95])
+    best, left = None, _weighted(fit, fit.white)
+    for cx in np.linspace(x0, x1, 5):
+        for cy in np.linspace(y0, y1, 5):
+            for width in (0.1, 0.3):
+                term = f"k * {_CARRIERS[on][0]} * exp(-((x - {cx:.3g})**2 + (y - {cy:.3g})**2) / {2 * width**2:.3g})"
+                column = _weighted(fit, _column(problem, fit, formula_effect(NAME, term, on)))
+                pull, size = float(column @ left), max(float(column @ column), 1e-300)
+                if best is None or pull**2 / size > best[0]:
+                    best = (pull**2 / size, -pull / size, cx, cy, width)
+    assert best is not None
+    term = f"k * {_CARRIERS[on][0]} * exp(-((x - a)**2 + (y - b)**2) / (2 * c**2))"
+    effect = formula_effect(NAME, term, on)
+    start = dict(zip("kabc", best[1:], strict=True))
+    model = fit.model.with_active(effect, tuple(start[p.name] for p in effect.parameters))
+    try:
+        added = problem.fit(_written(model, term, on))
+    except ModelError:
+        return None
+    found = Formula(on, term, added, problem.evidence(fit, added))
+    # a patch that has run away from where the robot was is none
+    inside = x0 <= found.values["a"] <= x1 and y0 <= found.values["b"] <= y1
+    return found if inside else None
+
+
+def _fitted(problem: Problem, fit: Fit, on: str, term: str) -> Formula | None:
+    effect = formula_effect(NAME, term, on)
+    model = _written(fit.model.with_active(effect, (0.0,) * len(effect.parameters)), term, on)
+    try:
+        added = problem.fit(model)
+    except ModelError:
+        return None
+    return Formula(on, term, added, problem.evidence(fit, added))
+
+
+def _written(model: Model, term: str, on: str) -> Model:
+    effects = tuple(replace(a, written={"term": term, "on": on}) if a.effect.name == NAME else a for a in model.effects)
+    return replace(model, effects=effects)
+
+
+def _column(problem: Problem, fit: Fit, effect: Effect) -> np.ndarray:
+    small = 1e-4
+    changed: np.ndarray = (problem.white(fit.model.with_active(effect, (small,))) - fit.white) / small
+    return changed
+
+
+def _weighted(fit: Fit, columns: np.ndarray) -> np.ndarray:
+    """One long row, without what the model's own numbers could do as well."""
+    root = np.sqrt(weights(fit.white))[:, None]
+    flat = (columns * root).ravel()
+    if not fit.jacobian.shape[2]:
+        return flat
+    own = (fit.jacobian * root[..., None]).reshape(len(flat), -1)
+    return flat - own @ np.linalg.lstsq(own, flat, rcond=None)[0]

@@ -1,0 +1,95 @@
+"""Longer explanations that do the same: two effects in the place of one. They are no tie, for the shorter is to be preferred,
+but whoever mends the robot should know of them: a camera's scale that is off looks like a speed gain with a wrong wheelbase.
+
+Which pairs might do it is read from the tracks' own sensitivities; those are then fitted, and judged as rivals are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.noise import weights
+from bns.diagnose.estimate.parallel import each
+from bns.diagnose.select.indistinguishable import alike
+from bns.diagnose.select.plausibility import veto_of
+from bns.physics.effect import Effect
+from bns.physics.model import Model
+
+LEFT_OVER = 0.03
+"""A pair is tried if, to first order, it leaves this share of the replaced effect's work undone at most ..."""
+ALONE = 0.1
+"""... and neither of its effects alone leaves less than this: with that one alone, the other would have nothing to do."""
+TRIED = 2
+"""So many pairs are fitted for each effect that was accepted, the most promising first."""
+_SMALL = 1e-3
+"""Step of a number for a derivative, as a share of its plausible range."""
+
+
+def longer(problem: Problem, fit: Fit, accepted: Sequence[str], others: Sequence[Effect]) -> list[tuple[str, ...]]:
+    """Sets of one effect more than ``accepted`` that these tracks cannot tell from it; names in the order of the replaced one."""
+    found = []
+    for name in accepted:
+        pairs = _promising(problem, fit, name, others)
+        if not pairs:
+            continue
+        model = fit.model.without(name)
+        without = problem.fit(model)
+        for pair, tried in zip(pairs, each(partial(_fitted, problem, model), pairs), strict=True):
+            if alike(tried, fit, without) and not any(veto_of(tried, effect.name) for effect in pair):
+                found.append(tuple(n for one in accepted for n in ((e.name for e in pair) if one == name else (one,))))
+    return found
+
+
+def _promising(problem: Problem, fit: Fit, name: str, others: Sequence[Effect]) -> list[tuple[Effect, Effect]]:
+    """Pairs whose sensitivities together span what the effect of that name does, and neither alone."""
+    base = fit.model.without(name)
+    white, root = problem.white(base), np.sqrt(weights(fit.white))[:, None]
+    done = ((fit.white - white) * root).ravel()
+    own = fit.jacobian[..., [i for i, number in enumerate(fit.free) if number.effect != name]] * root[..., None]
+    given = own.reshape(len(done), -1)
+    smooth = [effect for effect in others if _smooth(effect)]
+    added = each(lambda e: np.stack(list(_columns(problem, base, white, root, e)), axis=1), smooth)
+    columns = {effect.name: column for effect, column in zip(smooth, added, strict=True)}
+    left_alone = {n: _left(done, [given, c]) for n, c in columns.items()}
+    pairs = []
+    for a, b in combinations([e for e in others if e.name in columns and left_alone[e.name] > ALONE], 2):
+        left = _left(done, [given, columns[a.name], columns[b.name]])
+        if left < LEFT_OVER:
+            pairs.append((left, (a, b)))
+    return [pair for _, pair in sorted(pairs, key=lambda p: p[0])[:TRIED]]
+
+
+def _smooth(effect: Effect) -> bool:
+    """Whether the effect has derivatives where it does nothing."""
+    return not any(np.isinf(value) for value in effect.neutral.values())
+
+
+def _columns(problem: Problem, base: Model, white: Array, root: Array, effect: Effect) -> Iterator[Array]:
+    neutral = tuple(effect.neutral.values())
+    for index, p in enumerate(effect.parameters):
+        small = _SMALL * (p.plausible[1] - p.plausible[0])
+        values = tuple(v + small * (i == index) for i, v in enumerate(neutral))
+        yield ((problem.white(base.with_active(effect, values)) - white) / small * root).ravel()
+
+
+def _left(done: Array, parts: Sequence[Array]) -> float:
+    """Share of the squares of ``done`` that no mixture of the columns explains."""
+    joint = np.concatenate(parts, axis=1)
+    size = np.sqrt((joint * joint).sum(axis=0))
+    joint = joint[:, size > 0] / size[size > 0]
+    curvature, pull = joint.T @ joint, joint.T @ done
+    explained = float(pull @ np.linalg.pinv(curvature, rcond=1e-10, hermitian=True) @ pull)
+    return 1.0 - explained / max(float(done @ done), 1e-300)
+
+
+def _fitted(problem: Problem, model: Model, effects: Sequence[Effect]) -> Fit:
+    """The fit with effects that begin where they do next to nothing."""
+    for effect in effects:
+        model = model.with_active(effect, tuple(effect.neutral.values()))
+    return problem.fit(model)

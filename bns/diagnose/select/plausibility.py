@@ -1,0 +1,21 @@
+"""Whether fitted numbers can be believed: within their bounds, and within what is plausible."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.diagnose.estimate.fit import Fit
+
+
+def veto_of(fit: Fit, name: str, bounds: bool = True) -> str:
+    """Why an effect with these numbers cannot be believed; "" if it can. ``bounds``: do numbers at one count?"""
+    for index, number in enumerate(fit.free):
+        p = number.parameter
+        if number.effect != name:
+            continue
+        value, (low, high) = float(fit.values[index]), fit.interval(index)
+        if bounds and value in {p.low, p.high}:
+            return f"{p.name} is at its bound, {value:g} {p.unit}"
+        if np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
+            return f"{p.name} = {value:g} {p.unit} is outside of what is plausible, {p.plausible[0]:g} to {p.plausible[1]:g}"
+    return ""

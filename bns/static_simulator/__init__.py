@@ -1,0 +1,1 @@
+"""Simulators trained once from random commands, and trials of controllers evolved on them."""
