@@ -15,7 +15,7 @@ from bns.spec import RunSpec
 from bns.tasks import default_task
 from bns.trial.experiment import drive_commands
 from bns.trial.replay import replayed
-from bns.trial.session import Set, carry_out
+from bns.trial.session import TrialSetup, carry_out
 
 
 def carried_out(options: argparse.Namespace, parameters: Mapping[str, Any]) -> str:
@@ -38,7 +38,7 @@ def spec_of(parameters: Mapping[str, Any]) -> RunSpec:
     return RunSpec(**{**parameters, "world": "robot", "task": parameters["task"] or default_task(robot)})
 
 
-def how_of(options: argparse.Namespace) -> Set:
+def how_of(options: argparse.Namespace) -> TrialSetup:
     """Rig, clock and operator; HardwareError for what does not go together."""
     if options.rig is None and not options.emulated:
         raise HardwareError(
@@ -52,7 +52,7 @@ def how_of(options: argparse.Namespace) -> Set:
             raise HardwareError(f"--{name} is for --emulated; a real robot has its own.")
     rig = shipped_rig(options.robot) if options.rig is None else load_rig(options.rig, options.robot)
     plan = FaultPlan() if options.faults is None else load_plan(options.faults)
-    return Set(
+    return TrialSetup(
         rig,
         options.emulated,
         options.speed,

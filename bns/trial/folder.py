@@ -10,7 +10,7 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 from bns.errors import HardwareError
-from bns.hardware.journal import events
+from bns.hardware.hardware_log import events
 from bns.measurements import write_measurements
 from bns.robots import load_robot
 from bns.spec import RunSpec

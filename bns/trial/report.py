@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from bns.spec import RADII_CM, RunSpec
-from bns.trial.crew import Crew
+from bns.trial.driver import TrialDriver
 from bns.trial.loop import TrialResult
 
 
-def report(spec: RunSpec, result: TrialResult, crew: Crew, wall_s: float, how: Any, folder: Path, figure: Path) -> str:
+def report(
+    spec: RunSpec, result: TrialResult, driver: TrialDriver, wall_s: float, how: Any, folder: Path, figure: Path
+) -> str:
     """Lines for the terminal."""
     evals = result.run.tables["evals"]
     firsts = [f"within {cm} cm {_first(evals[f'evaluated_success_{cm}cm'])}" for cm in RADII_CM]
@@ -27,8 +29,12 @@ def report(spec: RunSpec, result: TrialResult, crew: Crew, wall_s: float, how: A
             "all goals reached: " + "; ".join(firsts),
             f"the robot waited for computations {result.waited_share:.1%} of the time; {result.rounds} rounds of training and "
             "evolution went on while it drove",
-            _stops(crew.stops_s),
-            *([f"drives that ended early: {len(crew.ends)}, the last because {crew.ends[-1]}"] if crew.ends else []),
+            _stops(driver.stops_s),
+            *(
+                [f"drives that ended early: {len(driver.ends)}, the last because {driver.ends[-1]}"]
+                if driver.ends
+                else []
+            ),
             f"measurements and journal: {folder}",
             f"path: {figure}",
         ]
@@ -38,7 +44,9 @@ def report(spec: RunSpec, result: TrialResult, crew: Crew, wall_s: float, how: A
 def _stops(seconds: list[float]) -> str:
     if not seconds:
         return "nothing was driven in this session"
-    return f"stops: {len(seconds)} confirmed, {_ms(float(np.median(seconds)))} at the median, {_ms(max(seconds))} at most"
+    return (
+        f"stops: {len(seconds)} confirmed, {_ms(float(np.median(seconds)))} at the median, {_ms(max(seconds))} at most"
+    )
 
 
 def _ms(seconds: float) -> str:
@@ -46,4 +54,6 @@ def _ms(seconds: float) -> str:
 
 
 def _first(success: np.ndarray) -> str:
-    return f"first at evaluation {int(np.argmax(success)) + 1}, {success.mean():.0%} of them" if success.any() else "never"
+    return (
+        f"first at evaluation {int(np.argmax(success)) + 1}, {success.mean():.0%} of them" if success.any() else "never"
+    )

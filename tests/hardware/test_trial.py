@@ -20,7 +20,7 @@ from rich.console import Console
 import bns
 from bns.cli.main import main
 from bns.console import view
-from bns.hardware.journal import events
+from bns.hardware.hardware_log import events
 from bns.trial.folder import past_evaluations
 
 from . import soak
