@@ -11,7 +11,7 @@ from bns.errors import HardwareError, SpecError
 from bns.hardware.emulators.faults import FaultPlan, load_plan
 from bns.hardware.rig import load_rig, shipped_rig
 from bns.robots import load_robot
-from bns.spec import RunSpec
+from bns.spec import RunSpec, robot_and_options
 from bns.tasks import default_task
 from bns.trial.experiment import drive_commands
 from bns.trial.replay import replayed
@@ -50,7 +50,8 @@ def how_of(options: argparse.Namespace) -> TrialSetup:
     for name in ("faults", "speed"):
         if not options.emulated and getattr(options, name) not in {None, 1.0}:
             raise HardwareError(f"--{name} is for --emulated; a real robot has its own.")
-    rig = shipped_rig(options.robot) if options.rig is None else load_rig(options.rig, options.robot)
+    robot, _ = robot_and_options(options.robot)
+    rig = shipped_rig(robot) if options.rig is None else load_rig(options.rig, robot)
     plan = FaultPlan() if options.faults is None else load_plan(options.faults)
     return TrialSetup(
         rig,

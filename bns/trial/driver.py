@@ -1,4 +1,4 @@
-"""Robot, operator and journal brought together: one evaluation after the other, whatever happens in between."""
+"""Robot, operator and hardware log brought together: one evaluation after the other, whatever happens in between."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Driven, Platform
 from bns.hardware.rig import Rig
-from bns.trial.loop import Evaluation
+from bns.trial.evaluation import Evaluation
 from bns.trial.operator import Decision, Operator
 
 _MOST_VOID = 3
@@ -22,7 +22,7 @@ _MOST_VOID = 3
 
 
 class TrialDriver:
-    """Implements `bns.trial.loop.Driver`. `start` (3,) is where the task, or the next drive, begins."""
+    """Implements `bns.trial.background.RobotDriver`. `start` (3,) is where the task, or the next drive, begins."""
 
     def __init__(
         self, platform: Platform, operator: Operator, rig: Rig, start: np.ndarray, clock: Clock, log: HardwareLog
@@ -65,7 +65,7 @@ class TrialDriver:
         self._log.note("evaluated", evaluation=number, rounds=rounds, **fitness)
         self._log.sync()
 
-    def told(self) -> dict[str, str]:
+    def live_text(self) -> dict[str, str]:
         """What a live view shows of robot and rig: heading -> text."""
         units = {"v": "V", "c": "°C"}
         shown = {}

@@ -14,7 +14,7 @@ from bns.hardware.hardware_log import events
 from bns.measurements import write_measurements
 from bns.robots import load_robot
 from bns.spec import RunSpec
-from bns.trial.loop import Evaluation
+from bns.trial.evaluation import Evaluation
 
 JOURNAL, MEASUREMENTS = "journal.jsonl", "measurements.csv"
 
