@@ -11,7 +11,6 @@ from bns.errors import StopNotConfirmedError, TrialPausedError
 from bns.hardware.safety import DriveEnded, Limits, Stopping, StopsAtTheEnd, Surface, Watch
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.sight import Sight, unwrapped
-from bns.trial.background import Rounds
 from bns.trial.operator import TerminalOperator, UnattendedOperator
 
 LIMITS = Limits(Surface(-1, 1, -0.5, 0.5), lost_s=0.5, late_s=1.0)
@@ -136,29 +135,3 @@ def test_where_nothing_can_be_unstable_nobody_is_asked():
 def test_headings_go_on_over_the_turn():
     assert unwrapped(-3.1, 3.1) == pytest.approx(2 * np.pi - 3.1)
     assert unwrapped(0.1, 12.5) == pytest.approx(0.1 + 4 * np.pi)
-
-
-def test_rounds_go_on_while_driving_and_end_whole():
-    count = [0]
-
-    def work():
-        time.sleep(0.01)
-        count[0] += 1
-
-    with Rounds(work, most=1000) as rounds:
-        done = rounds.while_driving(lambda: time.sleep(0.2))
-        assert done == count[0] > 3
-        assert rounds.while_driving(lambda: None) == 1
-    with Rounds(work, most=2) as rounds:
-        assert rounds.while_driving(lambda: time.sleep(0.2)) == 2
-
-
-def test_a_fault_in_training_waits_for_the_drive():
-    driven = []
-
-    def broken():
-        raise ValueError("training broke")
-
-    with Rounds(broken, most=3) as rounds, pytest.raises(ValueError, match="training broke"):
-        rounds.while_driving(lambda: driven.append(time.sleep(0.05)))
-    assert driven
