@@ -63,4 +63,5 @@ def how_of(options: argparse.Namespace) -> TrialSetup:
         options.most_rounds,
         options.until_success,
         not options.no_figures,
+        options.repeats,
     )

@@ -28,8 +28,9 @@ from bns.tasks import load_task
 from bns.trial.background import BackgroundDriver
 from bns.trial.driver import TrialDriver
 from bns.trial.evaluation import Evaluation
-from bns.trial.folder import TrialFolder, forget_unless, spec_event
+from bns.trial.folder import REPEATS, TrialFolder, forget_unless, spec_event
 from bns.trial.operator import EmulatedHands, Operator, TerminalOperator, UnattendedOperator
+from bns.trial.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
 from bns.trial.report import TrialResult, report
 from bns.worlds.robot import RobotWorld
 
@@ -50,6 +51,8 @@ class TrialSetup:
     most_rounds: int = MOST_ROUNDS
     until_success: int | None = None
     figures: bool = True
+    repeats: int | None = None
+    """How often the final controller is driven, its evaluation included; None: as often as the robot's platform says."""
 
 
 @dataclass(frozen=True)
@@ -95,12 +98,15 @@ def carry_out(spec: RunSpec, how: TrialSetup, results: Path) -> str:
 
 def _driven(spec: RunSpec, how: TrialSetup, folder: TrialFolder, past: list[Evaluation]) -> TrialResult:
     """The loop with the robot as its driver; measurements are written however it ends."""
-    started = datetime.now(UTC)
+    started, robot = datetime.now(UTC), load_robot(spec.robot)
+    start = on_floor(robot, robot.start_pose())[0]
     try:
         with Stopping() as stopping, open_rig(how, spec.seed, folder.journal, stopping) as opened:
             opened.log.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
             opened.log.sync()
-            result = _looped(spec, how, opened, past, started)
+            driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log)
+            result = _looped(spec, how, driver, past, started)
+            _repeated(spec, how, driver, folder, result)
             opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
@@ -114,11 +120,9 @@ def _driven(spec: RunSpec, how: TrialSetup, folder: TrialFolder, past: list[Eval
 
 
 def _looped(
-    spec: RunSpec, how: TrialSetup, opened: OpenedRig, past: list[Evaluation], started: datetime
+    spec: RunSpec, how: TrialSetup, driver: TrialDriver, past: list[Evaluation], started: datetime
 ) -> TrialResult:
     robot = load_robot(spec.robot)
-    start = on_floor(robot, robot.start_pose())[0]
-    driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log)
     world = RobotWorld("robot-emulated" if how.emulated else "robot")
     with (
         live_view(spec, driver.live_text) as show,
@@ -127,6 +131,19 @@ def _looped(
         result = run(spec, show, world, background)
     wall_s = (datetime.now(UTC) - started).total_seconds()
     return TrialResult(result, driver.stops_s, driver.ends, background.waited_share, background.rounds, started, wall_s)
+
+
+def _repeated(spec: RunSpec, how: TrialSetup, driver: TrialDriver, folder: TrialFolder, result: TrialResult) -> None:
+    """Drive the final controller as often as is asked for; all its paths go into the trial's folder."""
+    count = platform_module(how.rig.robot).REPEATS if how.repeats is None else how.repeats
+    if count == 1:
+        return
+    evaluation = final_evaluation(result.run.tables["evals"])
+    drives = drive_repeats(driver, folder.journal, evaluation, count)
+    robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
+    table = repeats_table(drives, evaluation, robot, task)
+    write_repeats(table, folder.path / REPEATS)
+    result.repeats.extend(bool(rows["success"].iloc[0]) for _, rows in table.groupby("repeat"))
 
 
 def _kept(spec: RunSpec, how: TrialSetup, results: Path, folder: TrialFolder, result: TrialResult) -> str:
