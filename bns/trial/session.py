@@ -156,7 +156,7 @@ def _kept(spec: RunSpec, how: TrialSetup, results: Path, folder: TrialFolder, re
 
 
 def _figures(spec: RunSpec, results: Path, folder: TrialFolder) -> str:
-    """Figures and table rows of this trial alone, on a page in its folder; what came of it, in words."""
+    """Figures and table rows of this trial alone, on a page in its folder; what came of it, as text."""
     page = folder.path / "figures"
     try:
         complaint = draw(scripts(), results, "--run", spec.run_id, "--out", str(page.absolute()), polite=False)
