@@ -14,6 +14,7 @@ import argparse
 import hashlib
 import json
 import math
+import os
 import platform
 import sys
 import tempfile
@@ -41,6 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Command line."""
     options = _parser().parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
+        if not options.quick:
+            os.environ["NUMBA_CACHE_DIR"] = (
+                f"{folder}/kernels"  # compiled afresh: what lies on disk may be of older code
+            )
         found = kept(QUICK if options.quick else FULL, Path(folder))
     if options.write:
         written = written_of(found)
@@ -134,8 +139,8 @@ def nearly(entry: Mapping[str, Any], now: Columns) -> str:
 
 def portable(item: Columns) -> Columns:
     """Names in verdicts, or what first evaluations found."""
-    if "verdict" in item:
-        return {name: item[name] for name in NAMES if name in item}
+    if set(NAMES) <= set(item):
+        return {name: item[name] for name in NAMES}
     if "evaluation" not in item or not set(FIRST) <= set(item):
         return {}
     begun = [row for row, number in enumerate(item["evaluation"]) if number == "1"]

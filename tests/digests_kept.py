@@ -215,7 +215,7 @@ def _diagnosed(data: Path, *arguments: object) -> Columns:
     }
 
 
-def _parameters(what: str, effects: Mapping[str, Mapping[str, Mapping[str, float]]]) -> dict[str, list[float]]:
+def _parameters(what: str, effects: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> dict[str, list[Any]]:
     """Value, standard error and interval of every parameter."""
     return {
         " ".join(filter(None, (what, effect, name))): [number.get(k) for k in ("value", "se", "low", "high")]
