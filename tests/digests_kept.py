@@ -272,6 +272,11 @@ def _real(folder: Path) -> list[Callable[[], Items]]:
     return [lambda: _optitrack(folder), lambda: _grass(folder)]
 
 
+def skipped(item: str) -> bool:
+    """Whether an item cannot be made here."""
+    return item.startswith("real ") and not DATA.is_dir()
+
+
 def _optitrack(folder: Path) -> Items:
     table = pd.read_parquet(DATA / "diff_drive_optitrack.parquet")
     table = table[table["trial"].isin(table["trial"].unique()[::10])]
