@@ -203,13 +203,13 @@ def _diagnosed(data: Path, *arguments: object) -> Columns:
     found |= {f"error {h}": [e[k] for k in ("before", "after", "noise_floor")] for h, e in answer["error"].items()}
     found |= _parameters("fitted", answer["parameters"])
     for one in answer["ranking"]:
-        found[f"ranked {one['name']}"] = [one[k] for k in ("gain", "gain_se", "p_value")]
+        found[f"ranked {one['name']}"] = [one[k] for k in ("elpd_diff", "dse", "p_value")]
         found |= _parameters(f"ranked {one['name']}", {"": one["parameters"]})
     found["ranking"] = [one["name"] for one in answer["ranking"]]
-    found["pattern"] = [f"{one['variable']} on {one['velocity']}" for one in answer["patterns"]]
-    found["pattern gain"] = [one["gain"] for one in answer["patterns"]]
+    found["pattern"] = [f"{one['variable']} on {one['velocity']}" for one in answer["residual_dependence"]]
+    found["pattern gain"] = [one["elpd_diff"] for one in answer["residual_dependence"]]
     found["formula"] = _formula(answer["formula"])
-    found["outbreaks"] = [len(answer["outbreaks"])]
+    found["outbreaks"] = [len(answer["outliers"])]
     return {
         name: [text_of(v) for v in (values if isinstance(values, list) else [values])] for name, values in found.items()
     }
@@ -225,7 +225,7 @@ def _parameters(what: str, effects: Mapping[str, Mapping[str, Mapping[str, Any]]
 
 
 def _formula(formula: Mapping[str, Any] | None) -> list[Any]:
-    return [] if formula is None else [formula["on"], formula["term"], *formula["values"].values(), formula["gain"]]
+    return [] if formula is None else [formula["on"], formula["term"], *formula["values"].values(), formula["elpd_diff"]]
 
 
 def _evolved(folder: Path) -> Items:
