@@ -38,7 +38,9 @@ class Driven:
 class Platform(Protocol):
     """A robot on its rig, ready to drive."""
 
-    retries: int
+    @property
+    def retries(self) -> int:
+        """How often a question was asked again so far."""
 
     def pose(self) -> np.ndarray | None:
         """Where the robot stands (3,), from several looks; None if it is not seen."""

@@ -15,8 +15,8 @@ import yaml
 from bns.errors import HardwareError, unknown_name
 from bns.hardware.safety import Limits, Surface
 
-_KEYS = ("robot", "port", "surface_m", "tracker", "lost_s", "late_s", "placed_within_m", "placed_within_rad", "driver")
 _NEEDED = ("robot", "port", "surface_m", "tracker")
+_KEYS = (*_NEEDED, "lost_s", "late_s", "silent_s", "placed_within_m", "placed_within_rad", "driver")
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def _rig(content: Mapping[str, Any], where: str) -> Rig:
     tracker = content["tracker"]
     if not isinstance(tracker, dict) or "kind" not in tracker:
         raise HardwareError(f"{where}: tracker is {tracker!r}; it needs a kind (wii, aruco or colour) and its settings.")
-    numbers = {name: _positive(where, name, content[name]) for name in ("lost_s", "late_s") if name in content}
+    numbers = {name: _positive(where, name, content[name]) for name in ("lost_s", "late_s", "silent_s") if name in content}
     limits = Limits(_surface(where, content["surface_m"]), **numbers)
     near_m = _positive(where, "placed_within_m", content.get("placed_within_m", 0.1))
     near_rad = _positive(where, "placed_within_rad", content.get("placed_within_rad", math.pi))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Callable
@@ -41,11 +42,13 @@ class Surface:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a drive must keep: the surface, how long the robot may be out of sight, how late a look may come."""
+    """What a drive must keep: the surface, how long the robot may be out of sight, how late a look may come, and how long the
+    guard of its port may hear nothing from the trial."""
 
     surface: Surface
     lost_s: float = 0.5
     late_s: float = 1.0
+    silent_s: float = 0.3
 
 
 class Watch:
@@ -75,25 +78,41 @@ class Watch:
             raise OutOfSight(f"the tracker has not seen the robot for {now_s - self._seen_s:.1f} s")
 
 
-class Stopping:
-    """Ctrl-C and SIGTERM, noted while it is open and acted on at the next look; the robot is stopped before anything else ends.
+_SIGNALS = {
+    signal.SIGINT: "interrupted",
+    signal.SIGTERM: "terminated",
+    signal.SIGHUP: "the terminal was closed",
+    signal.SIGQUIT: "quit",
+    signal.SIGTSTP: "suspended",
+}
+"""What ends a trial from outside, and how that is called."""
 
+
+class Stopping:
+    """Signals, noted while it is open and acted on at the next look; the robot is stopped before anything else ends.
+
+    Ctrl-Z suspends the process once the robot stands and its port is free; a trial that goes on after that is paused.
     In a thread other than the main one no signal arrives and nothing is taken over; `request` works from anywhere.
     """
 
     def __init__(self) -> None:
         self.reason: str | None = None
-        self._asking = False
+        self.causes: list[Callable[[], str | None]] = []
+        """Further reasons to stop, asked for at every look."""
+        self._asking = self._suspended = False
         self._former: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            self._former = {n: signal.signal(n, self._handle) for n in (signal.SIGINT, signal.SIGTERM)}
+            self._former = {n: signal.signal(n, self._handle) for n in _SIGNALS}
         return self
 
     def __exit__(self, *_error: object) -> None:
         for number, handler in self._former.items():
             signal.signal(number, handler)
+        if self._suspended:
+            self._suspended = False
+            os.kill(os.getpid(), signal.SIGTSTP)
 
     def request(self, reason: str) -> None:
         """Stop at the next look."""
@@ -101,11 +120,13 @@ class Stopping:
 
     def check(self) -> None:
         """TrialPausedError if a stop was asked for."""
+        for cause in self.causes:
+            self.reason = self.reason or cause()
         if self.reason is not None:
             raise TrialPausedError(self.reason)
 
     def ask(self, question: str) -> str:
-        """`input`, which Ctrl-C ends at once: while somebody is asked, the robot stands."""
+        """`input`, which a signal ends at once: while somebody is asked, the robot stands."""
         self._asking = True
         try:
             return input(question)
@@ -113,7 +134,8 @@ class Stopping:
             self._asking = False
 
     def _handle(self, number: int, _frame: FrameType | None) -> None:
-        self.request("interrupted" if number == signal.SIGINT else "terminated")
+        self.request(_SIGNALS[signal.Signals(number)])
+        self._suspended |= number == signal.SIGTSTP
         if self._asking:
             raise KeyboardInterrupt
 

@@ -105,14 +105,20 @@ class SerialLink:
 def open_port(port: str, baud: int) -> serial.Serial:
     """An open port; HardwareError says why there is none and what to try."""
     if not Path(port).exists():
-        raise HardwareError(f"there is no port {port}. {_ports_there_are()} Try: bns doctor")
+        raise HardwareError(no_port(port))
     try:
         return serial.Serial(port, baud, timeout=_SLICE_S, write_timeout=1.0, exclusive=True)
     except serial.SerialException as error:
-        raise HardwareError(_why_not(port, error)) from error
+        raise HardwareError(why_not_opened(port, error)) from error
 
 
-def _why_not(port: str, error: serial.SerialException) -> str:
+def no_port(port: str) -> str:
+    """That there is no such port, and which there are."""
+    return f"there is no port {port}. {_ports_there_are()} Try: bns doctor"
+
+
+def why_not_opened(port: str, error: OSError) -> str:
+    """Why a port that is there cannot be opened, and what to try."""
     if error.errno == errno.EACCES or not os.access(port, os.R_OK | os.W_OK):
         return (
             f"no permission to use {port}. Add yourself to the group that owns it (often dialout: "

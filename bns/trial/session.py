@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from types import ModuleType
 
 from bns.bootstrap.loop import run
 from bns.console import live_view
 from bns.errors import BnsError, HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
+from bns.hardware.guard import Guard, GuardedClock, GuardedPlatform
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Emulation, Platform, platform_module
 from bns.hardware.rig import Rig
@@ -34,6 +37,7 @@ from bns.trial.repeats import drive_repeats, final_evaluation, repeats_table, wr
 from bns.trial.report import TrialResult, report
 from bns.worlds.robot import RobotWorld
 
+GUARD_LOG = "guard.jsonl"
 SWEEP, SWEEP_EMULATED = "trials", "trials-emulated"
 MOST_ROUNDS = 50
 
@@ -68,21 +72,47 @@ class OpenedRig:
 @contextmanager
 def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stopping) -> Iterator[OpenedRig]:
     """Open clock, emulation, journal and platform; at the end, however it comes, the robot is stopped, seen to stand, let go."""
-    clock: Clock = EmulatedClock(how.speed) if how.emulated else RealClock()
     with ExitStack() as stack:
+        rig, hands, guard = how.rig, None, None
+        module = platform_module(rig.robot)
+        clock: Clock = EmulatedClock(how.speed)
+        if not how.emulated:
+            guard = _guard(rig, module, journal, stopping, stack)
+            clock = RealClock() if guard is None else GuardedClock(guard)
         log = stack.enter_context(HardwareLog(journal, clock))
-        module, rig, hands = platform_module(how.rig.robot), how.rig, None
-        if how.emulated:
+        if isinstance(clock, EmulatedClock):
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bns-rig-")))
             emulation: Emulation = module.emulate(rig, folder, clock, how.plan, seed)
             stack.callback(emulation.close)
             rig, hands = emulation.rig, EmulatedHands(emulation, seed)
-        platform: Platform = module.open_platform(rig, clock, log, stopping)
+        elif guard is not None:
+            rig = replace(rig, port=guard.path)
+        opened: Platform = module.open_platform(rig, clock, log, stopping)
+        platform = opened if guard is None else GuardedPlatform(opened, guard)
         stack.callback(platform.close)
         stack.enter_context(StopsAtTheEnd(platform.stop))
         yield OpenedRig(
             platform, hands or (UnattendedOperator() if how.yes else TerminalOperator(stopping.ask)), clock, log
         )
+
+
+def _guard(
+    rig: Rig, module: ModuleType, journal: Path | None, stopping: Stopping, stack: ExitStack
+) -> Guard | None:
+    """The guard of a real robot's port, where the robot's module says how it is stopped."""
+    if not hasattr(module, "stop_recipe"):
+        return None
+    log = None if journal is None else journal.with_name(GUARD_LOG)
+    guard = Guard(rig.port, module.stop_recipe(rig), rig.limits.silent_s, log)
+    stack.callback(_let_go, guard)
+    stopping.causes.append(guard.tripped)
+    return guard
+
+
+def _let_go(guard: Guard) -> None:
+    """Say goodbye; say so where it has to go on."""
+    if not guard.close():
+        print(f"the guard of the port (process {guard.process}) goes on trying to stop the robot", file=sys.stderr)
 
 
 def carry_out(spec: RunSpec, how: TrialSetup, results: Path) -> str:

@@ -12,12 +12,13 @@ from bns.hardware.clock import Clock, EmulatedClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.khepera_rig import EmulatedKheperaRig
 from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.khepera import BAUD, KheperaIII, RobotLostError, check_battery
+from bns.hardware.khepera import BAUD, STILL_M_S, KheperaIII, RobotLostError, check_battery, firmware
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
 from bns.hardware.serial_link import SerialLink
 from bns.hardware.stop import Stop
+from bns.hardware.stop_recipe import StopRecipe, khepera_recipe
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.sight import Sight, Tracker
@@ -165,6 +166,11 @@ def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stoppi
         link.close()
         raise
     return KheperaPlatform(driver, link, tracker, rig, clock, journal, stopping)
+
+
+def stop_recipe(rig: Rig) -> StopRecipe:
+    """For the guard: still by the reading of any firmware."""
+    return khepera_recipe(BAUD, int(STILL_M_S * firmware(2, 0).units_per_m_s))
 
 
 def emulate(rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> EmulatedKheperaRig:

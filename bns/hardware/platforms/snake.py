@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import HardwareError, TrialPausedError
+from bns.hardware.bridge import BAUD as BRIDGE_BAUD
 from bns.hardware.bridge import BridgeChain
 from bns.hardware.clock import Clock, EmulatedClock
+from bns.hardware.dynamixel import BAUD as BUS_BAUD
 from bns.hardware.dynamixel import Ax12Chain
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
@@ -20,6 +22,7 @@ from bns.hardware.servo_chain import ServoChain, ServoError
 from bns.hardware.snake_drive import SnakeDrive
 from bns.hardware.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
+from bns.hardware.stop_recipe import StopRecipe, ax12_recipe, bridge_recipe
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import checked, open_tracker
 
@@ -114,6 +117,14 @@ def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stoppi
         chain.close()
         raise
     return SnakePlatform(chain, eye, rig, settings, clock, journal, stopping)
+
+
+def stop_recipe(rig: Rig) -> StopRecipe:
+    """For the guard: torque off, by the wiring of the rig."""
+    settings = snake_settings(rig.driver)
+    if settings.wiring == "bridge":
+        return bridge_recipe(BRIDGE_BAUD, len(settings.ids))
+    return ax12_recipe(BUS_BAUD, settings.ids)
 
 
 def emulate(rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> EmulatedSnakeRig:
