@@ -19,6 +19,7 @@ from bns.diagnose.estimate.normal_equations import Normal, stepped
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.significance import MIN_Z, Evidence, held_out_gain
 from bns.physics.effect import Effect, Parameter
+from bns.physics.order import FORMULAS
 from bns.physics.signals import Body
 
 SHARE = "share_of_motion"
@@ -115,7 +116,7 @@ def nudge(channel: str, curve: Array, heading_rad: Array) -> Effect:
         residuals="",
         lookalikes=(),
         apply=apply,
-        rank=116,
+        after=FORMULAS,
     )
 
 
