@@ -120,6 +120,7 @@ class Registry:
         return found
 
     def _files(self) -> Iterable[Part]:
+        """The parts of ours: modules with the marker."""
         place = find_spec(self._folder)
         for folder in (place.submodule_search_locations or ()) if place else ():
             for module in pkgutil.iter_modules([folder]):

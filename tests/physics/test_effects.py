@@ -2,6 +2,7 @@
 
 import inspect
 import pkgutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,10 @@ from bns.physics import effects
 from bns.physics.differential_drive import observe, simulate
 from bns.physics.effect import STAGES, number
 from bns.physics.effects import all_effects, effect_named
-from bns.physics.order import ORDER
-from bns.registry import EFFECTS
 from bns.physics.model import Model
+from bns.physics.order import ORDER
 from bns.physics.signals import Body, Flow, Stamps, View, Wheels
+from bns.registry import EFFECTS
 
 SIGNALS = dict(zip(STAGES, (Wheels, Body, Flow, Stamps, View), strict=True))
 IDEAL = Model(wheelbase_m=0.0884)
@@ -49,7 +50,7 @@ def test_effects_act_in_the_order_of_one_tuple_and_stage_by_stage():
     listed = [name for name in ORDER if name in EFFECTS.own]
     assert len(listed) >= 20
     assert len(set(ORDER)) == len(ORDER)
-    chain = sorted(reversed(listed), key=lambda name: effect_named(name).place)
+    chain = sorted(listed[::-1], key=lambda name: effect_named(name).place)
     assert chain == listed
     stages = [STAGES.index(effect_named(name).stage) for name in listed]
     assert stages == sorted(stages)
