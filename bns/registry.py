@@ -43,33 +43,30 @@ class Part:
 
 
 class Registry:
-    """The parts of one kind: those of a folder of ours, then those of installed packages, each by name.
+    """The parts of one kind: those of a folder of ours, then those of installed packages (``bns.GROUP``), each by name.
 
-    ``marker`` is a pattern of the line that makes a module a part; its first group, if it has one, is the part's name.
+    ``marker``: how the line begins that makes a module a part; its first group, if it has one, is the part's name.
     ``attribute`` is the object in such a module ("": the module itself is the part). A part must have the attributes ``needs``.
     """
 
     def __init__(
         self, kind: str, group: str, folder: str, marker: str, attribute: str, needs: Iterable[str], error: type[BnsError]
     ) -> None:
-        self.kind, self.group, self._folder, self._error = kind, group, folder, error
-        self._marker, self._attribute, self._needs = re.compile(marker, re.MULTILINE), attribute, tuple(needs)
+        self.kind, self.group, self._folder, self._error = kind, f"bns.{group}", folder, error
+        self._marker, self._attribute, self._needs = re.compile(f"^{marker}", re.MULTILINE), attribute, tuple(needs)
         self._loaded: dict[str, Any] = {}
 
     @cached_property
-    def own(self) -> Mapping[str, Part]:
-        """Name -> part of ours, in alphabetical order."""
-        return {part.name: part for part in sorted(self._files(), key=lambda part: part.name)}
+    def own(self) -> Mapping[str, tuple[Part, ...]]:
+        """Name -> parts of ours with that name, in alphabetical order."""
+        return _by_name(self._files())
 
     @cached_property
     def announced(self) -> Mapping[str, tuple[Part, ...]]:
         """Name -> parts of that name that installed packages bring, in alphabetical order."""
         from importlib.metadata import entry_points  # noqa: PLC0415  # a twentieth of a second
 
-        found: dict[str, list[Part]] = {}
-        for entry in sorted(entry_points(group=self.group), key=lambda one: (one.name, one.value)):
-            found.setdefault(entry.name, []).append(Part(entry.name, entry=entry))
-        return {name: tuple(parts) for name, parts in found.items()}
+        return _by_name(Part(entry.name, entry=entry) for entry in entry_points(group=self.group))
 
     def names(self) -> tuple[str, ...]:
         """All names: ours in alphabetical order, then those of packages."""
@@ -81,7 +78,7 @@ class Registry:
 
     def part(self, name: str) -> Part:
         """The one part of that name, not loaded; an error lists the names there are, or both parts that share it."""
-        found = (*((self.own[name],) if name in self.own else ()), *self.announced.get(name, ()))
+        found = (*self.own.get(name, ()), *self.announced.get(name, ()))
         if not found:
             raise self._error(unknown_name(self.kind, name, self.names()))
         if len(found) > 1:
@@ -125,26 +122,29 @@ class Registry:
         for folder in (place.submodule_search_locations or ()) if place else ():
             for module in pkgutil.iter_modules([folder]):
                 file = Path(folder) / (f"{module.name}/__init__.py" if module.ispkg else f"{module.name}.py")
-                marked = self._marker.search(file.read_text(encoding="utf-8"))
-                if marked:
+                if marked := self._marker.search(file.read_text(encoding="utf-8")):
                     name = marked.group(1) if self._marker.groups else module.name.replace("_", "-")
                     yield Part(name, f"{self._folder}.{module.name}")
 
 
-EFFECTS = Registry(
-    "effect", "bns.effects", "bns.physics.effects", r"^EFFECT = ", "EFFECT", ("name", "stage", "apply"), ModelError
-)
-WORLDS = Registry("world", "bns.worlds", "bns.worlds", r"^def build\(", "", ("build",), SpecError)
-ROBOTS = Registry("robot", "bns.robots", "bns.robots", r"^ROBOT = ", "ROBOT", ("name", "networks", "bounds"), SpecError)
-EXECUTORS = Registry(
-    "executor", "bns.executors", "bns.sweep.executors", r"^def carry_out\(", "", ("place", "carry_out"), ClusterError
-)
+def _by_name(parts: Iterable[Part]) -> dict[str, tuple[Part, ...]]:
+    found: dict[str, list[Part]] = {}
+    for part in sorted(parts, key=lambda one: (one.name, one.origin)):
+        found.setdefault(part.name, []).append(part)
+    return {name: tuple(same) for name, same in found.items()}
+
+
+EFFECTS = Registry("effect", "effects", "bns.physics.effects", "EFFECT = ", "EFFECT", ("name", "stage", "apply"), ModelError)
+WORLDS = Registry("world", "worlds", "bns.worlds", r"def build\(", "", ("build",), SpecError)
+ROBOTS = Registry("robot", "robots", "bns.robots", "ROBOT = ", "ROBOT", ("name", "networks", "bounds"), SpecError)
+EXECUTORS = Registry("executor", "executors", "bns.sweep.executors", r"def carry_out\(", "", ("place", "carry_out"), ClusterError)
 TRACKERS = Registry(
-    "kind of tracker", "bns.trackers", "bns.hardware.tracking", r"^SETTINGS = ", "", ("SETTINGS", "open_tracker"), HardwareError
-)
-PLATFORMS = Registry(
-    "robot with a driver", "bns.platforms", "bns.hardware.platforms", r"^def open_platform\(", "", ("open_platform",),
+    "kind of tracker", "trackers", "bns.hardware.tracking", "SETTINGS = ", "", ("SETTINGS", "open_tracker", "emulate"),
     HardwareError,
 )  # fmt: skip
-FIGURES = Registry("figure", "bns.figures", "analysis", r'^NAME = "([^"]+)"', "", ("NAME", "PAPER", "draw"), SpecError)
-APPROACHES = Registry("approach", "bns.approaches", "bns.approaches", r"^def run\(", "", ("run",), SpecError)
+PLATFORMS = Registry(
+    "robot with a driver", "platforms", "bns.hardware.platforms", r"def open_platform\(", "", ("open_platform", "emulate", "RIG"),
+    HardwareError,
+)  # fmt: skip
+FIGURES = Registry("figure", "figures", "analysis", r'NAME = "([^"]+)"', "", ("NAME", "PAPER", "draw"), SpecError)
+APPROACHES = Registry("approach", "approaches", "bns.approaches", r"def run\(", "", ("run",), SpecError)

@@ -62,7 +62,7 @@ class _Tasks(Registry):
         return found
 
 
-TASKS = _Tasks("task", "bns.tasks", "bns.tasks", "", "", (), SpecError)
+TASKS = _Tasks("task", "tasks", "bns.tasks", "", "", (), SpecError)
 
 
 def task_names(robot: str) -> tuple[str, ...]:
