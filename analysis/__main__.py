@@ -13,9 +13,9 @@ from rich.console import Console
 from rich.progress import track
 
 from analysis.gallery import write_page
-from analysis.publish import forget_all_but, forget_skipped, publish_drawn, publish_skipped
-from analysis.store import NoDataError, Store
-from analysis.words import place
+from analysis.labels import source_position
+from analysis.publish import forget_all_but, forget_skipped, publish_figure, publish_skipped
+from analysis.results import NoDataError, Results
 from bns.errors import BnsError, SpecError
 from bns.registry import FIGURES
 
@@ -33,7 +33,7 @@ def figures(broken: list[str] | None = None) -> dict[str, Any]:
             if broken is None:
                 raise
             broken.append(str(fault))
-    return dict(sorted(found.items(), key=lambda one: place(one[1].PAPER)))
+    return dict(sorted(found.items(), key=lambda one: source_position(one[1].PAPER)))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if wanted.run is not None:
             modules = {name: module for name, module in modules.items() if getattr(module, "OF_A_RUN", False)}
         if not wanted.page:
-            failed = not _draw_all(modules, Store(wanted.results, wanted.run), out, everything=wanted.only is None)
+            failed = not _draw_all(modules, Results(wanted.results, wanted.run), out, everything=wanted.only is None)
         print(f"page: {write_page(out, wanted.refresh)}")
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -70,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _draw_all(modules: dict[str, Any], store: Store, out: Path, *, everything: bool) -> bool:
+def _draw_all(modules: dict[str, Any], store: Results, out: Path, *, everything: bool) -> bool:
     """Whether every script could be carried through: one that cannot does not cost the others their figures."""
     made, failed = set(), False
     console = Console(stderr=True)
@@ -78,7 +78,7 @@ def _draw_all(modules: dict[str, Any], store: Store, out: Path, *, everything: b
         try:
             forget_skipped(name, out)
             for drawn in module.draw(store):
-                place = publish_drawn(drawn, module.PAPER, store, out)
+                place = publish_figure(drawn, module.PAPER, store, out)
                 print(f"{place}  ({module.PAPER}, n = {drawn.n:,} runs)")
                 made.add(drawn.name)
         except NoDataError as reason:

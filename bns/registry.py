@@ -137,7 +137,7 @@ def _by_name(parts: Iterable[Part]) -> dict[str, tuple[Part, ...]]:
 EFFECTS = Registry("effect", "effects", "bns.physics.effects", "EFFECT = ", "EFFECT", ("name", "stage", "apply"), ModelError)
 WORLDS = Registry("world", "worlds", "bns.worlds", r"def build\(", "", ("build",), SpecError)
 ROBOTS = Registry("robot", "robots", "bns.robots", "ROBOT = ", "ROBOT", ("name", "networks", "bounds"), SpecError)
-EXECUTORS = Registry("executor", "executors", "bns.sweep.executors", r"def carry_out\(", "", ("place", "carry_out"), ClusterError)
+EXECUTORS = Registry("executor", "executors", "bns.sweep.executors", r"def carry_out\(", "", ("carry_out",), ClusterError)
 TRACKERS = Registry(
     "kind of tracker", "trackers", "bns.hardware.tracking", "SETTINGS = ", "", ("SETTINGS", "open_tracker", "emulate"),
     HardwareError,

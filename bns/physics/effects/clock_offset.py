@@ -28,5 +28,5 @@ EFFECT = Effect(
         "command-delay": "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
     },
     apply=apply,
-    may_differ=True,
+    per_trial_allowed=True,
 )

@@ -1,6 +1,6 @@
-"""Ways to carry out a sweep. Each is a module of this folder, or of an installed package, with two functions.
+"""Backends that carry out a sweep. Each is a module of this folder, or of an installed package, with two functions.
 
-``place(request)`` says what would run where (`Placement`); ``carry_out(sweep, request)`` does it and gives a `Summary`.
+``placement(request)`` says what would run where (`Placement`); ``carry_out(sweep, request)`` does it and gives a `Summary`.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
 
 
-class Way(Protocol):
+class Backend(Protocol):
     """What every executor has."""
 
-    def place(self, request: Request) -> Placement:
+    def placement(self, request: Request) -> Placement:
         """What would run where."""
 
     def carry_out(self, sweep: Sweep, request: Request) -> Summary:
@@ -29,10 +29,10 @@ def executor_names() -> tuple[str, ...]:
     return EXECUTORS.names()
 
 
-def load_executor(name: str) -> Way:
-    """The way called ``name``; ClusterError if there is none or its libraries are not installed."""
+def load_executor(name: str) -> Backend:
+    """The backend called ``name``; ClusterError if there is none or its libraries are not installed."""
     try:
-        way: Way = EXECUTORS.load(name)
+        backend: Backend = EXECUTORS.load(name)
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("bns"):
             raise
@@ -40,4 +40,4 @@ def load_executor(name: str) -> Way:
             f"--executor {name} needs the library {error.name}, which is not installed. Install it with: "
             "pip install 'bns[cluster]'"
         ) from error
-    return way
+    return backend
