@@ -239,6 +239,10 @@ def run(options: argparse.Namespace) -> int:
 
 def trial(options: argparse.Namespace) -> int:
     """A run whose world is a robot; codes 0 done, 2 bad input, 3 paused, 4 a robot that may still be moving."""
+    from bns.extras import require
+
+    if options.replay is None:
+        require("robot", "serial", "dynamixel_sdk", "cv2")
     from bns.cli.trial import carried_out
 
     _say_if_compiling()

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Camera, Frame, FrameTracker, open_camera
@@ -17,6 +17,9 @@ from bns.hardware.tracking.kinds import Settings
 from bns.hardware.tracking.lens import Lens
 from bns.hardware.tracking.rigid import fit
 from bns.hardware.tracking.sight import Sight
+
+with extra("robot"):
+    import cv2
 
 SETTINGS = Settings(("camera", "calibration", "side_m", "height_m"), ("number",), ("side_m", "height_m"))
 _WORST_SHARE = 0.1

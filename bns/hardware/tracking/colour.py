@@ -7,16 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Frame, FrameTracker, open_camera
 from bns.hardware.tracking.kinds import Settings
 from bns.hardware.tracking.lens import Lens
 from bns.hardware.tracking.sight import Sight
+
+with extra("robot"):
+    import cv2
 
 SETTINGS = Settings(
     ("camera", "calibration", "diameter_m", "height_m"),

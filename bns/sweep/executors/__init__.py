@@ -10,6 +10,7 @@ import pkgutil
 from typing import Protocol
 
 from bns.errors import ClusterError, unknown_name
+from bns.extras import MissingExtraError
 from bns.sweep.grid import Sweep
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
@@ -36,10 +37,5 @@ def load_executor(name: str) -> Way:
         raise ClusterError(unknown_name("executor", name, executor_names()))
     try:
         return importlib.import_module(f"{__name__}.{name}")
-    except ModuleNotFoundError as error:
-        if (error.name or "").startswith("bns"):
-            raise
-        raise ClusterError(
-            f"--executor {name} needs the library {error.name}, which is not installed. Install it with: "
-            "pip install 'bns[cluster]'"
-        ) from error
+    except MissingExtraError as error:
+        raise ClusterError(f"--executor {name}: {error}") from error
