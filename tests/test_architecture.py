@@ -11,7 +11,7 @@ import bns
 
 PACKAGE = Path(bns.__file__).parent
 FLOORS = (
-    {"errors", "extras", "spec", "measurements", "__init__"},
+    {"errors", "examples", "extras", "shipped", "spec", "measurements", "__init__"},
     {"engine"},
     {"tasks"},
     {"robots"},
