@@ -73,7 +73,7 @@ closing-the-gap: setup ## from a run on a robot to a mended model, and how contr
 	$(BIN)/bns run --world $(GAP)/robot.yaml --task circle --seed 1000 --evaluations 30 --measurements $(OUT)/log.parquet \
 		--save-snn $(OUT)/networks.safetensors --results $(OUT)
 	$(BIN)/bns diagnose $(OUT)/log.parquet --model $(GAP)/drawing.yaml --figures $(OUT)/figures
-	$(BIN)/bns add wheel-mismatch motor-lag --model $(GAP)/drawing.yaml --data $(OUT)/log.parquet -o $(OUT)/mended.yaml --figures $(OUT)/figures
+	$(BIN)/bns add $(OUT)/log.parquet wheel-mismatch motor-lag --model $(GAP)/drawing.yaml -o $(OUT)/mended.yaml --figures $(OUT)/figures
 	$(BIN)/bns sweep $(GAP)/before.yaml $(GAP)/after.yaml $(GAP)/direct.yaml --results $(OUT)
 	$(BIN)/python -m analysis.transfer "gap-before=the drawing" "gap-after=the mended model" \
 		--reference "gap-direct=the robot itself" --to $(GAP)/robot.yaml --results $(OUT) --out $(OUT)/figures

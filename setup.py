@@ -2,7 +2,6 @@
 
 from setuptools import find_packages, setup
 
-SHIPPED = ("analysis", "sweeps")
-
-inside = {f"bns._shipped.{name}": name.replace(".", "/") for name in (*SHIPPED, *(f"analysis.{one}" for one in find_packages("analysis")))}
+shipped = ("sweeps", "analysis", *(f"analysis/{name}" for name in find_packages("analysis")))
+inside = {f"bns._shipped.{folder.replace('/', '.')}": folder for folder in shipped}
 setup(packages=[*find_packages(include=["bns", "bns.*"]), *inside], package_dir=inside)

@@ -1,4 +1,4 @@
-"""The sample log of `bns example`: a world of the hidden effects, written as a lab's tracker might. Again: python -m tests.sample_log"""
+"""The sample log of `bns example`: a world of the hidden effects, as a lab might log it. Anew: python -m tests.sample_log"""
 
 import numpy as np
 import pandas as pd
@@ -8,9 +8,7 @@ from tests.hidden_effects.camera import Layout
 from tests.hidden_effects.world import World
 
 LOG = FOLDER / "khepera-log.csv"
-WORLD = World(
-    "sample-log", "single", hidden={"motor-lag": {"tau_s": 0.2}}, trials=14, layout=Layout(rows="frames")
-)  # fmt: skip
+WORLD = World("sample-log", "single", hidden={"motor-lag": {"tau_s": 0.2}}, trials=14, layout=Layout(rows="frames"))
 
 
 def written() -> str:

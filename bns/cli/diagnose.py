@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import yaml
 
+from bns.cli.parser import Parser, data_first
 from bns.errors import DataError
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from bns.api.measurements import Measurements
     from bns.api.model import Given
 
-Adder = Callable[[str, Callable[[argparse.Namespace], int], str], argparse.ArgumentParser]
+Adder = Callable[[str, Callable[[argparse.Namespace], int], str], Parser]
 
 
 def add_commands(command: Adder) -> None:
@@ -39,6 +40,8 @@ def add_commands(command: Adder) -> None:
         "diagnose", diagnose, "which physical effect a model lacks, how sure that is, and what else it could be"
     )
     more = command("add", add, "add effects to a model, fit it to measurements, and show the error before and after")
+    more.rewrite = data_first
+    more.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
     more.add_argument(
         "effects", nargs="+", metavar="EFFECT", help="names of effects, Python files, or one name with --term"
     )
@@ -52,7 +55,6 @@ def add_commands(command: Adder) -> None:
         help="every trial has a value of its own (clock-offset: clocks set anew each time)",
     )
     more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the mended model")
-    more.add_argument("--data", type=Path, required=True, metavar="FILE", help="measurements (.csv or .parquet)")
     more.add_argument("--json", action="store_true", help="one JSON object on stdout")
     for one in (held, found):
         one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")

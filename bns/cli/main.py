@@ -18,10 +18,10 @@ from bns.cli import results as looking
 from bns.cli import simulators as simulating
 from bns.cli import sweep as sweeping
 from bns.cli.compiling import say_if_compiling
+from bns.cli.option_types import add_spec_options, duration, positive
 from bns.cli.parser import SHELLS, Completion, Parser, add_results
 from bns.cli.sweep_options import DEVICES
 from bns.cli.trial_options import add_looking_options, add_trial_options
-from bns.cli.option_types import add_spec_options, duration, positive
 from bns.errors import BnsError
 from bns.spec import FIELDS, RunSpec
 
@@ -80,7 +80,7 @@ def _parser() -> Parser:
         "--print-completion", choices=SHELLS, action=Completion, help="print what completes this command line in a shell"
     )
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
-    parser.set_defaults(command=lambda _: parser.print_help() or 0)
+    parser.set_defaults(command=_help_of(parser))
 
     def command(name: str, function: Callable[[argparse.Namespace], int], text: str) -> Parser:
         added = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
@@ -95,6 +95,14 @@ def _parser() -> Parser:
     simulating.add_commands(command)
     listing.add_commands(command)
     return parser
+
+
+def _help_of(parser: Parser) -> Callable[[argparse.Namespace], int]:
+    def show(_options: argparse.Namespace) -> int:
+        parser.print_help()
+        return 0
+
+    return show
 
 
 def _add_single_runs(command: measuring.Adder) -> None:

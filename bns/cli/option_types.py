@@ -7,6 +7,7 @@ import json
 import math
 import re
 from collections.abc import Callable
+from decimal import Decimal
 
 from bns.errors import SpecError
 from bns.spec import FIELDS, checked, field_type
@@ -71,8 +72,8 @@ def _plain(value: object) -> object:
         return [_plain(one) for one in value]
     if hasattr(value, "tolist"):  # numpy's numbers and arrays
         return _plain(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
+    if isinstance(value, float | Decimal):
+        return float(value) if math.isfinite(value) else None
     if hasattr(value, "isoformat"):
         return None if value != value else value.isoformat()  # noqa: PLR0124  # pandas' time that is none
     return value if value is None or isinstance(value, bool | int | str) else str(value)

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 SHELLS = ("bash", "zsh", "tcsh")
 
@@ -19,7 +19,7 @@ class Parser(argparse.ArgumentParser):
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, allow_abbrev=False, **options)
+        super().__init__(*arguments, **{**options, "allow_abbrev": False})
         self.rewrite: Callable[[list[str]], list[str]] = list
 
     def parse_known_args(  # type: ignore[override]  # only as it is called here
@@ -62,10 +62,6 @@ class Parser(argparse.ArgumentParser):
                 return dict(action.choices)
         return {}
 
-    def error(self, message: str) -> NoReturn:
-        """Usage and message on stderr; code 2."""
-        super().error(message)
-
 
 def _meant(given: str, valid: Iterable[str]) -> str:
     names = list(valid)
@@ -96,18 +92,29 @@ def _mark_files(parser: argparse.ArgumentParser, file: object, folder: object) -
             action.complete = folder if action.metavar == "DIR" else file  # type: ignore[attr-defined]  # shtab's
 
 
-class OldSpelling(argparse.Action):
-    """An argument that is written otherwise today: it works, with a warning. ``metavar`` is today's spelling."""
+class OldFolder(argparse.Action):
+    """A folder that is written as an option today: it works, with a warning. ``metavar`` is the option."""
 
     def __call__(self, parser: argparse.ArgumentParser, options: Any, value: Any, _name: str | None = None) -> None:
         """Take the value over."""
         warn_old(parser.prog, str(value), f"{self.metavar} {value}")
-        setattr(options, self.dest, value)
+        setattr(options, self.dest, Path(value))  # no `type`: that would convert the absence, too
 
 
 def warn_old(command: str, old: str, new: str) -> None:
     """Say on stderr what to write from the next release on."""
     print(f"bns: warning: {command} … {old} is an old spelling, gone in the next release; write {new}", file=sys.stderr)
+
+
+def data_first(words: list[str]) -> list[str]:
+    """``EFFECT … --data FILE``, as `bns add` was once written, as ``FILE EFFECT …``, with a warning."""
+    for place, word in enumerate(words):
+        option, equals, value = word.partition("=")
+        if option == "--data" and (equals or place + 1 < len(words)):
+            file, rest = (value, words[place + 1 :]) if equals else (words[place + 1], words[place + 2 :])
+            warn_old("bns add", f"--data {file}", f"bns add {file} EFFECT")
+            return [file, *words[:place], *rest]
+    return words
 
 
 def add_results(parser: argparse.ArgumentParser, *, once_positional: bool = False) -> None:
@@ -117,6 +124,5 @@ def add_results(parser: argparse.ArgumentParser, *, once_positional: bool = Fals
     )
     if once_positional:
         parser.add_argument(
-            "results", nargs="?", type=Path, default=argparse.SUPPRESS, action=OldSpelling, metavar="--results",
-            help=argparse.SUPPRESS,
+            "results", nargs="?", default=argparse.SUPPRESS, action=OldFolder, metavar="--results", help=argparse.SUPPRESS
         )  # fmt: skip

@@ -7,8 +7,8 @@ import sys
 from dataclasses import asdict
 
 from bns.cli.diagnose import Adder
-from bns.cli.parser import add_results
 from bns.cli.option_types import as_json, duration
+from bns.cli.parser import add_results
 
 
 def add_commands(command: Adder) -> None:

@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 from bns.cli.diagnose import Adder
-from bns.cli.parser import add_results
 from bns.cli.option_types import positive
+from bns.cli.parser import add_results
 
 
 def add_commands(command: Adder) -> None:

@@ -8,9 +8,9 @@ from dataclasses import asdict
 
 from bns.cli.compiling import say_if_compiling
 from bns.cli.diagnose import Adder
+from bns.cli.option_types import as_json, duration, positive
 from bns.cli.parser import add_results
 from bns.cli.sweep_options import add_cluster_options, request_of, way_of
-from bns.cli.option_types import as_json, duration, positive
 from bns.spec import RunSpec
 
 INTERRUPTED, TERMINATED = 130, 143

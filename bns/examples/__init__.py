@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bns.errors import BnsError
 
-FOLDER = Path(__file__).resolve().parent
+FOLDER = Path(__file__).resolve().parent / "files"
 FILES = ("README.md", "khepera-log.csv", "khepera-log.csv.import.yaml", "my-sweep.yaml", "example.py")
 
 
