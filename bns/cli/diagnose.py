@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import yaml
-
 from bns.cli.parser import Parser, data_first
 from bns.errors import DataError
 
@@ -101,6 +99,8 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
 
 def import_(options: argparse.Namespace) -> int:
     """A log as a table of measurements; the mapping is kept beside it."""
+    import yaml
+
     from bns.diagnose.data.apply_mapping import applied
     from bns.diagnose.data.checks import checked
     from bns.diagnose.data.guess_mapping import drafted
