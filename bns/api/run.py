@@ -56,7 +56,10 @@ class Parameters(TypedDict, total=False):
 
 @dataclass(frozen=True, repr=False)
 class RunResult(Shown):
-    """A run. ``result`` holds its arrays as they left the loop; ``files`` what was written, by its kind (path, moving picture)."""
+    """A run.
+
+    ``result`` holds its arrays as they left the loop; ``files`` what was written, by its kind (path, moving picture).
+    """
 
     spec: RunSpec
     result: loop.RunResult
@@ -70,7 +73,7 @@ class RunResult(Shown):
 
     @cached_property
     def evals(self) -> pd.DataFrame:
-        """A row an evaluation, with the columns of `bns.load(results)`."""
+        """A row an evaluation, with the columns of `bns.load(results)` but those of the spec."""
         return pd.DataFrame(self.result.tables["evals"])
 
     def table(self, name: str) -> pd.DataFrame:
@@ -114,11 +117,13 @@ class RunResult(Shown):
     def plot(self, ax: Axes | None = None) -> Axes:
         """The path of the fittest controller: as the robot drove it (solid) and as its networks saw it (dashed), cm."""
         robot, task = load_robot(self.spec.robot), load_task(self.spec.robot, self.spec.task)
-        return drawn(ax, lambda axes: path_axes(axes, self.spec, task, robot, self.result), (COLUMN_IN, COLUMN_IN + 0.4))
+        return drawn(
+            ax, lambda axes: path_axes(axes, self.spec, task, robot, self.result), (COLUMN_IN, COLUMN_IN + 0.4)
+        )
 
     def _line(self) -> str:
-        count, reached = self.spec.evaluations, "all goals reached" if self.success else "not all goals reached"
-        return f"{self.spec.robot}, {self.spec.task}, seed {self.spec.seed}, {count} evaluations in {self.wall_s:.1f} s: {reached}"
+        s, reached = self.spec, "all goals reached" if self.success else "not all goals reached"
+        return f"{s.robot}, {s.task}, seed {s.seed}, {s.evaluations} evaluations in {self.wall_s:.1f} s: {reached}"
 
 
 def run(

@@ -108,7 +108,7 @@ class Sweep(Shown):
         robot: str,
         *,
         grid: Combos | None = None,
-        zip: Combos | None = None,  # noqa: A002  # the word of the sweep files
+        zip: Combos | None = None,
         fixed: Mapping[str, Any] | None = None,
         exclude: Iterable[Mapping[str, Any]] | None = None,
         include: Iterable[Mapping[str, Any]] | None = None,
@@ -123,7 +123,7 @@ class Sweep(Shown):
     @classmethod
     def from_file(cls, path: _Path) -> Sweep:
         """The sweep of a file; SpecError that begins with ``file:line:`` for whatever is wrong in it."""
-        return cls._of(load_sweep(path))
+        return cls._of(load_sweep(Path(path)))
 
     @classmethod
     def _of(cls, described: Described) -> Sweep:
@@ -199,7 +199,7 @@ class Sweep(Shown):
 
     def plan(self, results: _Path = "results", *, jobs: int | None = None) -> SweepPlan:
         """What is left to do and what it would take; nothing is written. Without stored runs one short run is timed."""
-        place = load_executor("joblib").place(Request(results=Path(results), jobs=jobs))
+        place = load_executor("joblib").placement(Request(results=Path(results), jobs=jobs))
         return SweepPlan(foretell(self._described, Path(results), place.workers), place)
 
     def status(self, results: _Path = "results") -> pd.DataFrame:
@@ -232,7 +232,9 @@ def _parsed(tree: dict[str, Any]) -> Described:
         text = yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
         return parse_sweep(text, where)
     except yaml.YAMLError as fault:
-        raise SpecError(f"A sweep is made of numbers, texts and lists, and this holds something else: {fault}.") from fault
+        raise SpecError(
+            f"A sweep is made of numbers, texts and lists, and this holds something else: {fault}."
+        ) from fault
     except SpecError as fault:
         raise SpecError(re.sub(rf"^{_WHERE}:\d+: ", "", str(fault))) from None
 
@@ -247,5 +249,7 @@ def _way(device: str, executor: str | None, jobs: int | None) -> str:
     if device == "cpu":
         return executor or "joblib"
     if executor not in {None, device} or jobs is not None:
-        raise SpecError(f"The device {device} is the GPU of this machine; leave out jobs and executor, or take device='cpu'.")
+        raise SpecError(
+            f"The device {device} is the GPU of this machine; leave out jobs and executor, or take device='cpu'."
+        )
     return device
