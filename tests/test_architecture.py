@@ -23,6 +23,7 @@ FLOORS = (
     {"sweep"},
     {"diagnose", "plotting", "console"},
     {"trial"},
+    {"api"},
     {"cli"},
     {"__main__"},
 )

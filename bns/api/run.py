@@ -199,7 +199,7 @@ def run_spec(
     if keep is not None:
         with patient_writer(Path(keep), sweep):
             _check_world(spec, Path(keep), sweep, world.digest)
-    result = _carried_out(spec, logged or world, device, _telling(spec, progress, on_evaluation), keep, sweep)
+    result = _carried_out(spec, logged or world, device, telling(spec, progress, on_evaluation), keep, sweep)
     if logged is not None and table is not None:
         logged.write(table)
     if networks is not None:
@@ -222,9 +222,10 @@ def _carried_out(
     return RunResult(spec, result, wall_s, {})
 
 
-def _telling(
+def telling(
     spec: RunSpec, progress: Progress | None, on_evaluation: Callable[[Row], None] | None
 ) -> Callable[[Row], None]:
+    """What is called with each evaluation's row: both of them."""
     told, seen = progress or silent, on_evaluation or (lambda _row: None)
 
     def tell(row: Row) -> None:
