@@ -17,16 +17,14 @@ from matplotlib.axes import Axes
 
 from bns.api.common.shown import Progress, Shown, drawn, silent
 from bns.bootstrap import loop
-from bns.errors import ModelError, SpecError
+from bns.errors import ModelError, SpecError, unknown_name
 from bns.measurements import check_table_name
 from bns.plotting.style import COLUMN_IN, path_axes, path_figure
 from bns.robots import load_robot
 from bns.robots.simulator import StaticSimulator, check_writable, save_simulator
-from bns.spec import RADII_CM, RunSpec
-from bns.store.reader import finished
+from bns.spec import FIELDS, RADII_CM, RunSpec
 from bns.sweep import memory
-from bns.sweep.digests import WorldDigests
-from bns.sweep.single_run import keep_run, patient_writer
+from bns.sweep.single_run import check_keepable, keep_run
 from bns.tasks import default_task, load_task
 from bns.worlds import build_world
 from bns.worlds.logged import LoggedWorld
@@ -161,13 +159,21 @@ def run(
     """
     given = {"robot": robot, "task": task or default_task(load_robot(robot).name), "world": str(world), "seed": seed}
     return run_spec(
-        RunSpec(**given, **parameters),  # type: ignore[arg-type]
+        spec_of(given | dict(parameters)),
         keep=keep,
         measurements=measurements,
         device=device,
         progress=progress,
         on_evaluation=on_evaluation,
     )
+
+
+def spec_of(given: Mapping[str, Any]) -> RunSpec:
+    """The spec of parameters by name; SpecError for a name that there is none of."""
+    for name in given:
+        if name not in FIELDS:
+            raise SpecError(unknown_name("parameter", name, FIELDS))
+    return RunSpec(**given)
 
 
 def run_spec(
@@ -197,8 +203,7 @@ def run_spec(
     world = build_world(spec.world, robot)
     logged = LoggedWorld(world, robot) if table is not None else None
     if keep is not None:
-        with patient_writer(Path(keep), sweep):
-            _check_world(spec, Path(keep), sweep, world.digest)
+        check_keepable(spec, Path(keep), sweep, world.digest)
     result = _carried_out(spec, logged or world, device, telling(spec, progress, on_evaluation), keep, sweep)
     if logged is not None and table is not None:
         logged.write(table)
@@ -264,13 +269,6 @@ def check_renderable(spec: RunSpec, world: Any, path: Path) -> None:
         raise ModelError(f"the {spec.world} world of {spec.robot} has nothing to render; leave --render out.")
     check_writable(path)
     world.check_picture(path)
-
-
-def _check_world(spec: RunSpec, results: Path, sweep: str, digest: str) -> None:
-    if finished(results, sweep):
-        digests = WorldDigests(results, sweep)
-        digests.read()
-        digests.compare(spec.task, spec.world, digest)
 
 
 def _text(r: RunResult) -> str:

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 
 from bns.api.common.shown import Progress, Shown
 from bns.api.measurements import Measurements
-from bns.api.run import Parameters, Row, RunResult, telling
+from bns.api.run import Parameters, Row, RunResult, spec_of, telling
 from bns.errors import HardwareError, SpecError
 from bns.hardware.emulators.faults import FaultPlan, load_plan
 from bns.hardware.rig import load_rig, shipped_rig
@@ -123,7 +123,7 @@ def trial_spec(robot: str, task: str | None = None, *, record: str = "paths", **
             "record is 'full'; a robot drives no probes and no fittest of a generation: take evals or paths."
         )
     named = task or default_task(load_robot(robot).name)
-    return RunSpec(robot=robot, task=named, world="robot", record=record, **parameters)
+    return spec_of({**parameters, "robot": robot, "task": named, "world": "robot", "record": record})
 
 
 def trial_setup(
