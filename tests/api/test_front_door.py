@@ -87,7 +87,7 @@ def test_every_name_is_listed_there_and_documented():
 
 
 def test_functions_whose_folder_has_their_name_stay_functions_and_folders():
-    import bns.diagnose.data.load as load
+    import bns.diagnose.data.load as load  # noqa: PLR0402  # the form that walks through the folders
     from bns.trial import folder
 
     assert callable(bns.diagnose)
@@ -180,7 +180,7 @@ def test_a_sweep_in_python_is_that_of_a_file(tmp_path, results):
     assert results["swept"].finished
     assert results["swept"].load("runs")["status"].tolist() == ["ok", "ok"]
     assert results["sweep"].status(results["swept"].results)["done"].tolist() == [2]
-    with pytest.raises(bns.SpecError, match="^unknown parameter 'mutation_rat'"):
+    with pytest.raises(bns.SpecError, match=r"^unknown parameter 'mutation_rat'"):
         bns.Sweep("s", "khepera", grid={"mutation_rat": [0.1]})
     with pytest.raises(bns.SpecError, match="something else"):
         bns.Sweep("s", "khepera", fixed={"task": object()})
