@@ -15,10 +15,10 @@ from bns.api.common.provenance import provenance
 from bns.api.common.shown import Progress, Shown, drawn, ticks
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
-from bns.diagnose.adding import Mended, add_effects, effect_from
+from bns.diagnose.adding import ExtendedModel, add_effects, effect_from
 from bns.diagnose.diagnosis import numbers_of
-from bns.diagnose.report.figures import ladder_axes
-from bns.diagnose.report.text import mended_text
+from bns.diagnose.report.figures import error_by_step_axes
+from bns.diagnose.report.text import extension_text
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 
@@ -30,7 +30,7 @@ class AddResult(Shown):
     """A model with effects added and all its numbers refitted."""
 
     ready: Prepared
-    extended: Mended
+    extended: ExtendedModel
 
     @property
     def model(self) -> Model:
@@ -41,33 +41,34 @@ class AddResult(Shown):
     def errors(self) -> pd.DataFrame:
         """Position error on trials held out (m, root mean square): a row a step (nominal, each effect added in turn, noise
         floor), a column a horizon."""
-        steps = {rung.name: dict(rung.error) for rung in self.extended.ladder}
+        steps = {step.name: dict(step.error) for step in self.extended.error_by_step}
         return pd.DataFrame({**steps, "noise floor": dict(self.extended.floor)}).T.rename_axis("step")
 
     def summary(self) -> str:
-        """The error ladder, and the numbers."""
-        return mended_text(self.extended)
+        """The error by step, and the numbers."""
+        return extension_text(self.extended)
 
     def to_json(self) -> dict[str, Any]:
         """One object of plain values, the same that `bns add --json` prints."""
         return {
             "model": self.extended.model.name,
-            "effects": [rung.name for rung in self.extended.ladder[1:]],
+            "effects": [step.name for step in self.extended.error_by_step[1:]],
             "parameters": numbers_of(self.extended.fit),
-            "error": {rung.name: {h: float(v) for h, v in rung.error.items()} for rung in self.extended.ladder},
+            "error": {step.name: {h: float(v) for h, v in step.error.items()} for step in self.extended.error_by_step},
             "noise_floor": {h: float(v) for h, v in self.extended.floor.items()},
             "provenance": provenance(self.ready.model, self.ready.log.sha256),
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """The error at every step of the ladder, a line a horizon; dotted: the noise floor."""
-        return drawn(ax, lambda axes: ladder_axes(axes, self.extended), (5.4, 3.0))
+        """The error at every step of the way, a line a horizon; dotted: the noise floor."""
+        return drawn(ax, lambda axes: error_by_step_axes(axes, self.extended), (5.4, 3.0))
 
     def _line(self) -> str:
-        first, last = self.extended.ladder[0].error, self.extended.ladder[-1].error
-        added = " + ".join(rung.name for rung in self.extended.ladder[1:])
+        first, last = self.extended.error_by_step[0].error, self.extended.error_by_step[-1].error
+        added = " + ".join(step.name for step in self.extended.error_by_step[1:])
         horizon = self.ready.predictor.near
-        return f"{self.ready.model.name} + {added}: {1e3 * first[horizon]:.1f} mm to {1e3 * last[horizon]:.1f} mm, {horizon} ahead"
+        fell = f"{1e3 * first[horizon]:.1f} mm to {1e3 * last[horizon]:.1f} mm"
+        return f"{self.ready.model.name} + {added}: {fell}, {horizon} ahead"
 
 
 def add(

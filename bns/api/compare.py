@@ -18,7 +18,7 @@ from bns.diagnose.comparison import compare as held_against
 from bns.diagnose.predict.networks import NetworkPredictor
 from bns.diagnose.report.figures import curve_axes, curves_of
 from bns.diagnose.report.network_text import network_errors_text
-from bns.diagnose.report.text import comparison_text
+from bns.diagnose.report.text import ahead, comparison_text
 from bns.diagnose.residuals.network_errors import NetworkErrors, why_wrong
 from bns.errors import DataError
 
@@ -46,9 +46,11 @@ class CompareResult(Shown):
         return table.rename_axis("horizon")
 
     @property
-    def patterns(self) -> pd.DataFrame:
+    def residual_dependence(self) -> pd.DataFrame:
         """What a free curve along each variable would explain: variable, velocity, share (of the loss), p_value."""
-        return pd.DataFrame(self.to_json()["patterns"], columns=["variable", "velocity", "share", "p_value"])
+        return pd.DataFrame(
+            self.comparison.as_json()["residual_dependence"], columns=["variable", "velocity", "share", "p_value"]
+        )
 
     @property
     def worst(self) -> pd.DataFrame:
@@ -75,13 +77,16 @@ class CompareResult(Shown):
         curves = curves_of(self.comparison, variable, direction)
         if not curves:
             known = ", ".join(dict.fromkeys(curve.variable for curve in self.comparison.curves)) or "none"
-            raise DataError(f"There is no curve along {variable or 'any variable'} {direction or ''}; there are: {known}.")
+            raise DataError(
+                f"There is no curve along {variable or 'any variable'} {direction or ''}; there are: {known}."
+            )
         return drawn(ax, lambda axes: curve_axes(axes, curves[0], self.comparison))
 
     def _line(self) -> str:
-        near = self.comparison.errors[self.comparison.near]
+        c = self.comparison
+        near = c.errors[c.near]
         error = f"{1e3 * near['position_m']:.1f} mm off" if near.get("windows") else "nothing to compare"
-        return f"{self.comparison.model} on {self.log.name}: {error} {self.comparison.near} ahead, {self.comparison.trials} trials"
+        return f"{c.model} on {self.log.name}: {error}, {ahead(c.near)} ahead, {c.trials} trials"
 
 
 def compare(log: Log, model: Given, *, progress: Progress | None = None) -> CompareResult:

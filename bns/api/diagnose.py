@@ -70,10 +70,10 @@ class DiagnoseResult(Shown):
         rows = [
             {
                 "rank": place,
-                "elpd_diff": entry["gain"],
-                "dse": entry["gain_se"],
+                "elpd_diff": entry["elpd_diff"],
+                "dse": entry["dse"],
                 "p_value": entry["p_value"],
-                "rejected_because": entry["veto"],
+                "rejected_because": entry["rejected_because"],
                 "values": {name: number["value"] for name, number in entry["parameters"].items()},
             }
             for place, entry in enumerate(ranked)
@@ -85,7 +85,9 @@ class DiagnoseResult(Shown):
     def parameters(self) -> pd.DataFrame:
         """The numbers of the accepted effects: effect, parameter, value, se, low, high (95 % interval), unit, at_bound."""
         listed = self.diagnosis.as_json()["parameters"]
-        rows = [{"effect": e, "parameter": p, **number} for e, numbers in listed.items() for p, number in numbers.items()]
+        rows = [
+            {"effect": e, "parameter": p, **number} for e, numbers in listed.items() for p, number in numbers.items()
+        ]
         return pd.DataFrame(rows, columns=["effect", "parameter", "value", "se", "low", "high", "unit", "at_bound"])
 
     @property
@@ -103,7 +105,7 @@ class DiagnoseResult(Shown):
 
     def plot(self, ax: Axes | None = None, most: int = 12) -> Axes:
         """What each effect earns on trials held out, with 95 % intervals. DataError where there was too little to search."""
-        if self.diagnosis.found is None:
+        if self.diagnosis.selection is None:
             raise DataError(f"Nothing was ranked: {'; '.join(self.notes)}")
         return drawn(ax, lambda axes: ranking_axes(axes, self.diagnosis, most), (5.4, 3.8))
 

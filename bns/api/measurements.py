@@ -122,16 +122,18 @@ def as_measurements(log: Log) -> Measurements:
     return log if isinstance(log, Measurements) else Measurements(log)
 
 
-def _read(
-    log: Log, more: tuple[str | PathLike[str], ...], robot: str | None, mapping: Rules | None
-) -> Measured:
+def _read(log: Log, more: tuple[str | PathLike[str], ...], robot: str | None, mapping: Rules | None) -> Measured:
     if isinstance(log, Measurements):
         if more or robot or mapping:
-            raise DataError("These measurements are read already; give the files themselves to choose a robot or a mapping.")
+            raise DataError(
+                "These measurements are read already; give the files themselves to choose a robot or a mapping."
+            )
         return log.measured
     if isinstance(log, pd.DataFrame):
         if more:
-            raise DataError("A table and files cannot be taken together; join them with pandas.concat, or give files only.")
+            raise DataError(
+                "A table and files cannot be taken together; join them with pandas.concat, or give files only."
+            )
         return measured_table(_mapped(log, mapping, Path()), _TABLE, robot=robot)
     files = [Path(each) for each in ([log] if isinstance(log, str | PathLike) else log)] + [Path(each) for each in more]
     if not files:
@@ -146,5 +148,7 @@ def _read(
 def _mapped(table: pd.DataFrame, mapping: Rules | None, folder: Path) -> pd.DataFrame:
     if mapping is None:
         return table
-    rules = checked_mapping(dict(mapping), Path("mapping")) if isinstance(mapping, Mapping) else load_mapping(Path(mapping))
+    rules = (
+        checked_mapping(dict(mapping), Path("mapping")) if isinstance(mapping, Mapping) else load_mapping(Path(mapping))
+    )
     return applied(table, rules, folder, read_table)

@@ -44,11 +44,11 @@ class ProposeResult(Shown):
         return self.proposal.commands()
 
     @property
-    def contests(self) -> pd.DataFrame:
+    def model_pairs(self) -> pd.DataFrame:
         """A row a pair of explanations: first, second, power (chance of a decision), minutes (until nine in ten decide),
-        times_faster (than plain random commands), alike (no commands tell them apart), already (decided so far),
-        other_measurements."""
-        return pd.DataFrame([vars(contest) for contest in self.proposal.contests])
+        times_faster (than plain random commands), indistinguishable (no commands tell them apart), already_decided (so far),
+        independent_measurements."""
+        return pd.DataFrame([vars(pair) for pair in self.proposal.model_pairs])
 
     @property
     def power(self) -> float:
@@ -80,8 +80,8 @@ class ProposeResult(Shown):
 
     def _line(self) -> str:
         minutes = float(self.proposal.plan.lasting_s.sum() / 60)
-        rivals = " / ".join(rival.title for rival in self.proposal.rivals)
-        return f"{len(self.proposal.plan)} trials, {minutes:.1f} min, decide with a chance of {self.power:.0%} between {rivals}"
+        models = " / ".join(model.title for model in self.proposal.competing_models)
+        return f"{len(self.proposal.plan)} trials, {minutes:.1f} min, decide with a chance of {self.power:.0%} between {models}"
 
 
 def propose(
@@ -140,5 +140,7 @@ def checked_minutes(minutes: float) -> None:
 def checked_output(path: Path, what: str, ending: str) -> Path:
     """The path; DataError unless a file of that ending can be written there."""
     if path.suffix != ending or not path.absolute().parent.is_dir():
-        raise DataError(f"{what} cannot be written to {path}; give a name that ends in {ending}, in a folder that is there.")
+        raise DataError(
+            f"{what} cannot be written to {path}; give a name that ends in {ending}, in a folder that is there."
+        )
     return path

@@ -35,7 +35,9 @@ class ReportResult(Shown):
     def summary(self) -> str:
         """Verdict, and where the page is."""
         size = f"{self.bytes / 1e6:.1f} MB"
-        return f"verdict: {self.verdict}\nwritten to {self.path} ({size}): one file, to be opened in a browser or mailed"
+        return (
+            f"verdict: {self.verdict}\nwritten to {self.path} ({size}): one file, to be opened in a browser or mailed"
+        )
 
     def __fspath__(self) -> str:
         return fspath(self.path)
@@ -104,4 +106,3 @@ def repeated(data: str, model: str, wheelbase_m: float | None = None) -> dict[st
     """The words of a command line that the next ones repeat."""
     base = [] if wheelbase_m is None else ["--wheelbase", f"{wheelbase_m:g}"]
     return {"data": shlex.quote(data), "model": shlex.join(["--model", model, *base])}
-

@@ -17,16 +17,14 @@ from matplotlib.axes import Axes
 
 from bns.api.common.shown import Progress, Shown, drawn, silent
 from bns.bootstrap import loop
-from bns.errors import ModelError, SpecError
+from bns.errors import ModelError, SpecError, unknown_name
 from bns.measurements import check_table_name
 from bns.plotting.style import COLUMN_IN, path_axes, path_figure
 from bns.robots import load_robot
 from bns.robots.simulator import StaticSimulator, check_writable, save_simulator
-from bns.spec import RADII_CM, RunSpec
-from bns.store.reader import finished
+from bns.spec import FIELDS, RADII_CM, RunSpec
 from bns.sweep import memory
-from bns.sweep.digests import WorldDigests
-from bns.sweep.single_run import keep_run, patient_writer
+from bns.sweep.single_run import check_keepable, keep_run
 from bns.tasks import default_task, load_task
 from bns.worlds import build_world
 from bns.worlds.logged import LoggedWorld
@@ -56,7 +54,10 @@ class Parameters(TypedDict, total=False):
 
 @dataclass(frozen=True, repr=False)
 class RunResult(Shown):
-    """A run. ``result`` holds its arrays as they left the loop; ``files`` what was written, by its kind (path, moving picture)."""
+    """A run.
+
+    ``result`` holds its arrays as they left the loop; ``files`` what was written, by its kind (path, moving picture).
+    """
 
     spec: RunSpec
     result: loop.RunResult
@@ -70,7 +71,7 @@ class RunResult(Shown):
 
     @cached_property
     def evals(self) -> pd.DataFrame:
-        """A row an evaluation, with the columns of `bns.load(results)`."""
+        """A row an evaluation, with the columns of `bns.load(results)` but those of the spec."""
         return pd.DataFrame(self.result.tables["evals"])
 
     def table(self, name: str) -> pd.DataFrame:
@@ -114,11 +115,13 @@ class RunResult(Shown):
     def plot(self, ax: Axes | None = None) -> Axes:
         """The path of the fittest controller: as the robot drove it (solid) and as its networks saw it (dashed), cm."""
         robot, task = load_robot(self.spec.robot), load_task(self.spec.robot, self.spec.task)
-        return drawn(ax, lambda axes: path_axes(axes, self.spec, task, robot, self.result), (COLUMN_IN, COLUMN_IN + 0.4))
+        return drawn(
+            ax, lambda axes: path_axes(axes, self.spec, task, robot, self.result), (COLUMN_IN, COLUMN_IN + 0.4)
+        )
 
     def _line(self) -> str:
-        count, reached = self.spec.evaluations, "all goals reached" if self.success else "not all goals reached"
-        return f"{self.spec.robot}, {self.spec.task}, seed {self.spec.seed}, {count} evaluations in {self.wall_s:.1f} s: {reached}"
+        s, reached = self.spec, "all goals reached" if self.success else "not all goals reached"
+        return f"{s.robot}, {s.task}, seed {s.seed}, {s.evaluations} evaluations in {self.wall_s:.1f} s: {reached}"
 
 
 def run(
@@ -156,13 +159,21 @@ def run(
     """
     given = {"robot": robot, "task": task or default_task(load_robot(robot).name), "world": str(world), "seed": seed}
     return run_spec(
-        RunSpec(**given, **parameters),  # type: ignore[arg-type]
+        spec_of(given | dict(parameters)),
         keep=keep,
         measurements=measurements,
         device=device,
         progress=progress,
         on_evaluation=on_evaluation,
     )
+
+
+def spec_of(given: Mapping[str, Any]) -> RunSpec:
+    """The spec of parameters by name; SpecError for a name that there is none of."""
+    for name in given:
+        if name not in FIELDS:
+            raise SpecError(unknown_name("parameter", name, FIELDS))
+    return RunSpec(**given)
 
 
 def run_spec(
@@ -192,9 +203,8 @@ def run_spec(
     world = build_world(spec.world, robot)
     logged = LoggedWorld(world, robot) if table is not None else None
     if keep is not None:
-        with patient_writer(Path(keep), sweep):
-            _check_world(spec, Path(keep), sweep, world.digest)
-    result = _carried_out(spec, logged or world, device, _telling(spec, progress, on_evaluation), keep, sweep)
+        check_keepable(spec, Path(keep), sweep, world.digest)
+    result = _carried_out(spec, logged or world, device, telling(spec, progress, on_evaluation), keep, sweep)
     if logged is not None and table is not None:
         logged.write(table)
     if networks is not None:
@@ -217,9 +227,10 @@ def _carried_out(
     return RunResult(spec, result, wall_s, {})
 
 
-def _telling(
+def telling(
     spec: RunSpec, progress: Progress | None, on_evaluation: Callable[[Row], None] | None
 ) -> Callable[[Row], None]:
+    """What is called with each evaluation's row: both of them."""
     told, seen = progress or silent, on_evaluation or (lambda _row: None)
 
     def tell(row: Row) -> None:
@@ -258,13 +269,6 @@ def check_renderable(spec: RunSpec, world: Any, path: Path) -> None:
         raise ModelError(f"the {spec.world} world of {spec.robot} has nothing to render; leave --render out.")
     check_writable(path)
     world.check_picture(path)
-
-
-def _check_world(spec: RunSpec, results: Path, sweep: str, digest: str) -> None:
-    if finished(results, sweep):
-        digests = WorldDigests(results, sweep)
-        digests.read()
-        digests.compare(spec.task, spec.world, digest)
 
 
 def _text(r: RunResult) -> str:

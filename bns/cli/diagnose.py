@@ -157,7 +157,7 @@ def diagnose(options: argparse.Namespace) -> int:
 
     found = diagnosed(options)
     print(json.dumps(found.to_json()) if options.json else found.summary())
-    if found.diagnosis.found is not None:
+    if found.diagnosis.selection is not None:
         _drawn(options, lambda folder: diagnosis_figure(found.diagnosis, folder / "diagnosis"))
     return 0
 
@@ -177,7 +177,7 @@ def add(options: argparse.Namespace) -> int:
     """An extended model, as a new file."""
     from bns.api.add import add as fitted
     from bns.api.model import checked_target
-    from bns.diagnose.report.figures import ladder_figure
+    from bns.diagnose.report.figures import error_by_step_figure
 
     checked_target(options.output)
     model, log = model_of(options), log_of(options)
@@ -196,7 +196,7 @@ def add(options: argparse.Namespace) -> int:
     print(json.dumps(result.to_json()) if options.json else result.summary())
     if not options.json:
         print(f"written to {options.output}; the model before is as it was ({options.model})")
-    _drawn(options, lambda folder: ladder_figure(result.extended, folder / "ladder"))
+    _drawn(options, lambda folder: error_by_step_figure(result.extended, folder / "ladder"))
     return 0
 
 

@@ -10,7 +10,7 @@ from bns.cli.compiling import say_if_compiling
 from bns.cli.diagnose import Adder
 from bns.cli.option_types import as_json, duration, positive
 from bns.cli.parser import add_results
-from bns.cli.sweep_options import add_cluster_options, request_of, way_of
+from bns.cli.sweep_options import add_cluster_options, backend_name, request_of
 from bns.spec import RunSpec
 
 INTERRUPTED, TERMINATED = 130, 143
@@ -56,11 +56,11 @@ def sweep(options: argparse.Namespace) -> int:
 
     files = [load_sweep(file) for file in options.files]
     sweeps = in_turn(files, options.results, options.confirm_top)
-    way = load_executor(way_of(options))
+    backend = load_executor(backend_name(options))
     with SweepProgress() as bar:
         request = request_of(options, bar)
         if options.dry_run:
-            place = way.place(request)
+            place = backend.placement(request)
             for one in sweeps:
                 estimate = foretell(
                     one, options.results, place.workers, options.shard, retry_failed=options.retry_failed
@@ -71,7 +71,7 @@ def sweep(options: argparse.Namespace) -> int:
             say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files))
         failed = 0
         for one in sweeps:
-            summary = way.carry_out(one, request)
+            summary = backend.carry_out(one, request)
             print(summed_up(summary, options.results), file=sys.stderr)
             failed += summary.new_failed
             if summary.stopped_by in {"interrupt", "terminated"}:

@@ -28,7 +28,9 @@ def pose_of(text: str | None) -> tuple[float, float, float] | None:
         return None
     numbers = _numbers(text, 3)
     if numbers is None:
-        raise DataError(f"--start {text!r} is no pose; write X,Y,DEGREES (metres; 0 faces east, 90 north): --start 0,0,90")
+        raise DataError(
+            f"--start {text!r} is no pose; write X,Y,DEGREES (metres; 0 faces east, 90 north): --start 0,0,90"
+        )
     x, y, degrees = numbers
     return x, y, math.radians(degrees)
 

@@ -10,11 +10,11 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 from bns.errors import HardwareError
-from bns.hardware.journal import events
+from bns.hardware.hardware_log import events
 from bns.measurements import write_measurements
 from bns.robots import load_robot
 from bns.spec import RunSpec
-from bns.trial.loop import Evaluation
+from bns.trial.evaluation import Evaluation
 
 JOURNAL, MEASUREMENTS = "journal.jsonl", "measurements.csv"
 

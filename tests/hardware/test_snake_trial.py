@@ -16,7 +16,7 @@ from bns.cli.main import main
 from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.doctor import examine
 from bns.hardware.emulators.faults import Fault, FaultPlan
-from bns.hardware.journal import Journal, events
+from bns.hardware.hardware_log import HardwareLog, events
 from bns.hardware.platforms import snake
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
@@ -45,7 +45,7 @@ def rigged(tmp_path, clock):
         rig = replace(rig, driver={**rig.driver, **driver}, limits=limits)
         emulation = snake.emulate(rig, Path(tempfile.mkdtemp(dir=tmp_path)), clock, FaultPlan(faults, 1), 0)
         opened.append(emulation)
-        journal = Journal(tmp_path / f"snake{len(opened)}.jsonl", clock)
+        journal = HardwareLog(tmp_path / f"snake{len(opened)}.jsonl", clock)
         platform = snake.open_platform(emulation.rig, clock, journal, stopping or Stopping())
         opened.extend([journal, platform])
         return SimpleNamespace(platform=platform, emulation=emulation, journal=journal)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from os import PathLike, fspath
+from os import fspath
+from pathlib import Path
 
 from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
@@ -83,7 +84,7 @@ def are_networks(model: Given) -> bool:
     return _networks(model) is not None
 
 
-def _networks(model: Given) -> tuple[str | PathLike[str], str] | None:
+def _networks(model: Given) -> tuple[Path, str] | None:
     return None if isinstance(model, physics.Model) else networks_file(fspath(model), model_names())
 
 

@@ -43,11 +43,15 @@ class NotebookAxes(Axes):
 
     def _repr_png_(self) -> bytes:
         picture = io.BytesIO()
-        self.figure.savefig(picture, format="png", dpi=120, metadata={"Software": None})
+        figure = self.get_figure(root=True)
+        assert figure is not None
+        figure.savefig(picture, format="png", dpi=120, metadata={"Software": None})
         return picture.getvalue()
 
 
-def drawn(ax: Axes | None, draw: Callable[[Axes], object], size_in: tuple[float, float] = (COLUMN_IN * 1.4, COLUMN_IN)) -> Axes:
+def drawn(
+    ax: Axes | None, draw: Callable[[Axes], object], size_in: tuple[float, float] = (COLUMN_IN * 1.4, COLUMN_IN)
+) -> Axes:
     """``draw`` onto ``ax`` in its own style; without one onto new axes in the package's style, known to nobody else."""
     if ax is not None:
         draw(ax)

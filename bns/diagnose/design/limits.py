@@ -21,8 +21,8 @@ def arena_of(
 ) -> Arena:
     """The arena: where the robot was seen, or ``size`` (width, height in m) around it; and the start of every trial.
 
-    The start is ``start`` (x_m, y_m, heading_rad), else where the trials seen so far started if that was one place, else the arena's
-    middle, facing north. DataError for what is no arena or start.
+    The start is ``start`` (x_m, y_m, heading_rad), else where the trials seen so far started if that was one place, else
+    the arena's middle, facing north. DataError for what is no arena or start.
     """
     begins = tracks.pose[tracks.first[:-1]]
     middle = np.median(begins[:, :2], axis=0)
@@ -53,8 +53,8 @@ def bounds_of(tracks: Tracks, model: Model, speeds: tuple[float, float] | None =
     lasting = tracks.duration_s > 0
     if not lasting.any():
         raise DataError("No command of these measurements lasts any time; log poses before and after commands.")
-    told = np.concatenate([tracks.left_m_s[lasting], tracks.right_m_s[lasting]])
-    low, high = float(told.min()), float(told.max())
+    commanded = np.concatenate([tracks.left_m_s[lasting], tracks.right_m_s[lasting]])
+    low, high = float(commanded.min()), float(commanded.max())
     short, long = (float(v) for v in np.quantile(tracks.duration_s[lasting], [0.02, 0.98]))
     name = str(model.provenance.get("begun_from", model.name)).removesuffix("-world")
     robot = load_robot(name) if name in robot_names() else None

@@ -1,8 +1,9 @@
-"""The first trials of a proposed experiment, as each rival foresees them."""
+"""The first trials of a proposed experiment, as each competing model predicts them."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +11,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Tracks
-from bns.diagnose.design.planned import foreseen, planned_tracks
+from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
 from bns.diagnose.design.proposal import Proposal
 from bns.plotting.style import GREY, OKABE_ITO, lettered, panels, save, style
 
@@ -43,17 +44,20 @@ def _foreseen(p: Proposal, trials: NDArray[np.int64]) -> list[Tracks]:
     """What each explanation says of these trials."""
     plan = p.plan.only(trials)
     tracks = planned_tracks(plan, p.arena.start, _FRAME_S, np.zeros(len(plan)))
-    return [foreseen(rival.fit.model, tracks).tracks for rival in p.rivals]
+    return [noise_free_predictor(competitor.fit.model, tracks).tracks for competitor in p.competing_models]
 
 
 def _draw_trial(axis: Axes, p: Proposal, seen: list[Tracks], trial: int) -> None:
     a = p.arena
     size = (100 * (a.x_high_m - a.x_low_m), 100 * (a.y_high_m - a.y_low_m))
     axis.add_patch(Rectangle((100 * a.x_low_m, 100 * a.y_low_m), *size, fill=False, edgecolor=GREY, linestyle=":"))
-    for number, (rival, each) in enumerate(zip(p.rivals, seen, strict=True)):
+    for number, (competitor, each) in enumerate(zip(p.competing_models, seen, strict=True)):
         pose = 100 * each.pose[each.first[trial] : each.first[trial + 1], :2]
-        look = {"color": OKABE_ITO[number % len(OKABE_ITO)], "linestyle": ("-", "--", "-.", ":")[number % 4]}
-        axis.plot(*pose.T, label=rival.title, **look)
+        look: dict[str, Any] = {
+            "color": OKABE_ITO[number % len(OKABE_ITO)],
+            "linestyle": ("-", "--", "-.", ":")[number % 4],
+        }
+        axis.plot(*pose.T, label=competitor.title, **look)
         axis.plot(*pose[-1], "o", color=look["color"])
     axis.plot(100 * a.start[0], 100 * a.start[1], "k^")
     axis.set(aspect="equal", xlabel="x, east (cm)", ylabel="y, north (cm)")
