@@ -69,6 +69,7 @@ def trial(
     resume: bool = False,
     most_rounds: int = MOST_ROUNDS,
     until_success: int | None = None,
+    repeats: int | None = None,
     figures: bool = False,
     progress: Progress | None = None,
     on_evaluation: Callable[[Row], None] | None = None,
@@ -89,6 +90,7 @@ def trial(
         resume: go on from the last evaluation driven.
         most_rounds: of training and evolution while one controller drives.
         until_success: end when so many driven controllers in a row have reached all goals.
+        repeats: how often the final controller is driven (default: as the robot's study has it); kept in repeats.csv.
         figures: also draw the trial's page of figures.
         progress: told the share that is done and the evaluation.
         on_evaluation: called with each evaluation's row.
@@ -111,6 +113,7 @@ def trial(
         most_rounds=most_rounds,
         until_success=until_success,
         figures=figures,
+        repeats=repeats,
     )
     spec = trial_spec(robot, task, seed=seed, **parameters)
     return driven(spec, setup, results, progress=progress, on_evaluation=on_evaluation)
@@ -138,6 +141,7 @@ def trial_setup(
     most_rounds: int = MOST_ROUNDS,
     until_success: int | None = None,
     figures: bool = True,
+    repeats: int | None = None,
 ) -> TrialSetup:
     """Rig, clock and operator; HardwareError for what does not go together."""
     if rig is None and not emulated:
@@ -162,6 +166,7 @@ def trial_setup(
         most_rounds,
         until_success,
         figures,
+        repeats,
     )
 
 

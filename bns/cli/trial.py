@@ -35,4 +35,5 @@ def setup_of(options: argparse.Namespace) -> TrialSetup:
         most_rounds=options.most_rounds,
         until_success=options.until_success,
         figures=not options.no_figures,
+        repeats=options.repeats,
     )

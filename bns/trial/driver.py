@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,19 @@ from bns.trial.operator import Decision, Operator
 
 _MOST_VOID = 3
 """So many drives without a single finished command, one after the other, and the trial pauses."""
+
+
+REPEATED = "repeat-"
+"""Before the kinds of events of a controller that is driven once more: they are no evaluation."""
+
+
+@dataclass(frozen=True)
+class _Purpose:
+    """What a drive is for: in kinds of events, in text, and in numbers of events."""
+
+    prefix: str
+    text: str
+    numbers: Mapping[str, int]
 
 
 class TrialDriver:
@@ -40,24 +54,34 @@ class TrialDriver:
 
     def evaluate(self, number: int, controller: np.ndarray) -> Evaluation:
         """Drive a controller until there is an evaluation to keep."""
+        return self._kept(_Purpose("", f"evaluation {number}", {"evaluation": number}), controller)
+
+    def repeat(self, number: int, again: int, controller: np.ndarray) -> Evaluation:
+        """Drive the controller of an evaluation once more, for the `again`-th time (2, 3, ...), until it is to be kept."""
+        numbers = {"evaluation": number, "repeat": again}
+        return self._kept(
+            _Purpose(REPEATED, f"drive {again} of the controller of evaluation {number}", numbers), controller
+        )
+
+    def _kept(self, purpose: _Purpose, controller: np.ndarray) -> Evaluation:
         void = 0
         while True:
             self._ready(void)
-            driven = self._drive(number, controller)
+            driven = self._drive(purpose, controller)
             if not len(driven.commands):
                 void += 1
-                self._log.note("discarded", evaluation=number, why=driven.ended)
+                self._note(purpose, "discarded", why=driven.ended)
                 if void == _MOST_VOID:
                     raise TrialPausedError(f"{void} drives in a row ended before a command was over: {driven.ended}")
                 continue
-            decision = self._asked(number, controller, driven)
+            decision = self._asked(purpose.text, controller, driven)
             if decision.answer == "next":
                 self.marked = len(decision.unstable) if driven.spans_s else None
                 if decision.unstable:
-                    self._log.note("marked", evaluation=number, unstable=decision.unstable)
+                    self._note(purpose, "marked", unstable=decision.unstable)
                     self._log.sync()
                 return Evaluation(controller, driven.commands, driven.poses, unstable=decision.unstable)
-            self._log.note("discarded", evaluation=number, why=decision.answer)
+            self._note(purpose, "discarded", why=decision.answer)
 
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         """Note it, durably."""
@@ -78,16 +102,19 @@ class TrialDriver:
             shown["last stop"] = f"{1000 * self.stops_s[-1]:.0f} ms"
         return shown | {"ended early": str(len(self.ends))}
 
-    def _drive(self, number: int, controller: np.ndarray) -> Driven:
+    def _note(self, purpose: _Purpose, kind: str, **what: Any) -> None:
+        self._log.note(purpose.prefix + kind, **purpose.numbers, **what)
+
+    def _drive(self, purpose: _Purpose, controller: np.ndarray) -> Driven:
         self.readings = self._platform.readings()
         session_s = self._clock.now_s() - self._began_s
         driven = self._platform.drive(controller)
         self.stops_s.append(driven.stop.seconds)
         if driven.ended:
             self.ends.append(driven.ended)
-        self._log.note(
+        self._note(
+            purpose,
             "driven",
-            evaluation=number,
             picked=controller.tolist(),
             commands=driven.commands.tolist(),
             poses=driven.poses.tolist(),
@@ -99,10 +126,10 @@ class TrialDriver:
         self._log.sync()
         return driven
 
-    def _asked(self, number: int, controller: np.ndarray, driven: Driven) -> Decision:
+    def _asked(self, text: str, controller: np.ndarray, driven: Driven) -> Decision:
         began = time.perf_counter()
         part = f"{len(driven.commands)} of {len(controller)} commands" + (f" ({driven.ended})" if driven.ended else "")
-        decision = self._operator.accept(f"evaluation {number}: {part} in {driven.seconds:.0f} s", driven.spans_s)
+        decision = self._operator.accept(f"{text}: {part} in {driven.seconds:.0f} s", driven.spans_s)
         self.placing_s += time.perf_counter() - began
         return decision
 

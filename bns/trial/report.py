@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 
 import numpy as np
@@ -17,7 +17,8 @@ class TrialResult:
     """The run, and how this session of it went.
 
     stops_s: how long each confirmed stop took; ends: why drives ended early; waited_share: of the time, that the robot
-    waited for computations; rounds: of training and evolution that went on while it drove; wall_s: how long it took.
+    waited for computations; rounds: of training and evolution that went on while it drove; wall_s: how long it took;
+    repeats: success of each drive of the final controller, if it was driven more than once.
     """
 
     run: RunResult
@@ -27,6 +28,7 @@ class TrialResult:
     rounds: int
     started: datetime
     wall_s: float
+    repeats: list[bool] = field(default_factory=list)
 
 
 def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
@@ -45,7 +47,14 @@ def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
         "evolution went on while it drove",
         _stops(result.stops_s),
         *([early] if early else []),
+        *_repeats(result.repeats),
     ]
+
+
+def _repeats(successes: Sequence[bool]) -> list[str]:
+    if not successes:
+        return []
+    return [f"final controller driven {len(successes)} times: all goals reached in {sum(successes)} of them"]
 
 
 def _stops(seconds: Sequence[float]) -> str:

@@ -29,8 +29,9 @@ from bns.tasks import load_task
 from bns.trial.background import BackgroundDriver
 from bns.trial.driver import TrialDriver
 from bns.trial.evaluation import Evaluation
-from bns.trial.folder import TrialFolder, forget_unless, spec_event
+from bns.trial.folder import REPEATS, TrialFolder, forget_unless, spec_event
 from bns.trial.operator import EmulatedHands, Operator, TerminalOperator, UnattendedOperator
+from bns.trial.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
 from bns.trial.report import TrialResult, report
 from bns.worlds.robot import RobotWorld
 
@@ -51,6 +52,8 @@ class TrialSetup:
     most_rounds: int = MOST_ROUNDS
     until_success: int | None = None
     figures: bool = True
+    repeats: int | None = None
+    """How often the final controller is driven, its evaluation included; None: as often as the robot's platform says."""
 
 
 @dataclass(frozen=True)
@@ -110,12 +113,15 @@ def _driven(
     spec: RunSpec, how: TrialSetup, folder: TrialFolder, past: list[Evaluation], on_evaluation: Progress
 ) -> TrialResult:
     """The loop with the robot as its driver; measurements are written however it ends."""
-    started = datetime.now(UTC)
+    started, robot = datetime.now(UTC), load_robot(spec.robot)
+    start = on_floor(robot, robot.start_pose())[0]
     try:
         with Stopping() as stopping, open_rig(how, spec.seed, folder.journal, stopping) as opened:
             opened.log.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
             opened.log.sync()
-            result = _looped(spec, how, opened, past, started, on_evaluation)
+            driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log)
+            result = _looped(spec, how, driver, past, started, on_evaluation)
+            _repeated(spec, how, driver, folder, result)
             opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
@@ -131,14 +137,12 @@ def _driven(
 def _looped(
     spec: RunSpec,
     how: TrialSetup,
-    opened: OpenedRig,
+    driver: TrialDriver,
     past: list[Evaluation],
     started: datetime,
     on_evaluation: Progress,
 ) -> TrialResult:
     robot = load_robot(spec.robot)
-    start = on_floor(robot, robot.start_pose())[0]
-    driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log)
     world = RobotWorld("robot-emulated" if how.emulated else "robot")
     with (
         live_view(spec, driver.live_text) as show,
@@ -154,6 +158,19 @@ def _looped(
     return TrialResult(result, driver.stops_s, driver.ends, background.waited_share, background.rounds, started, wall_s)
 
 
+def _repeated(spec: RunSpec, how: TrialSetup, driver: TrialDriver, folder: TrialFolder, result: TrialResult) -> None:
+    """Drive the final controller as often as is asked for; all its paths go into the trial's folder."""
+    count = platform_module(how.rig.robot).REPEATS if how.repeats is None else how.repeats
+    if count == 1:
+        return
+    evaluation = final_evaluation(result.run.tables["evals"])
+    drives = drive_repeats(driver, folder.journal, evaluation, count)
+    robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
+    table = repeats_table(drives, evaluation, robot, task)
+    write_repeats(table, folder.path / REPEATS)
+    result.repeats.extend(bool(rows["success"].iloc[0]) for _, rows in table.groupby("repeat"))
+
+
 def _kept(spec: RunSpec, how: TrialSetup, results: Path, folder: TrialFolder, result: TrialResult) -> KeptTrial:
     keep_run(spec, result.run, results, SWEEP_EMULATED if how.emulated else SWEEP, result.started, result.wall_s)
     robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
@@ -165,7 +182,7 @@ def _kept(spec: RunSpec, how: TrialSetup, results: Path, folder: TrialFolder, re
 
 
 def _figures(spec: RunSpec, results: Path, folder: TrialFolder) -> str:
-    """Figures and table rows of this trial alone, on a page in its folder; what came of it, in words."""
+    """Figures and table rows of this trial alone, on a page in its folder; what came of it, as text."""
     page = folder.path / "figures"
     try:
         complaint = draw(scripts(), results, "--run", spec.run_id, "--out", str(page.absolute()), polite=False)

@@ -168,11 +168,13 @@ def call(*arguments):
 
 
 def test_from_command_to_table_and_replay(tmp_path, capsys):
-    asked = [option for option in TRIAL if option != "--no-figures"]
+    assert TRIAL[-2:] == ["--repeats", "1"]
+    asked = [option for option in TRIAL[:-2] if option != "--no-figures"]  # as often as a snake is driven
     assert call(*asked, "--evaluations", 2, "--results", tmp_path) == 0
     said = capsys.readouterr().out
     assert "snake, two-regions, seed 0, emulated" in said
-    assert "stops: 2 confirmed" in said
+    assert "stops: 4 confirmed" in said
+    assert "final controller driven 3 times" in said
     [journal] = (tmp_path / "trials").glob("*/journal.jsonl")
     table = pd.read_csv(journal.parent / "measurements.csv")
     assert set(load_robot("snake").measured_columns) <= set(table)
@@ -188,6 +190,10 @@ def test_from_command_to_table_and_replay(tmp_path, capsys):
     marked = {e["evaluation"]: e["unstable"] for e in events(journal, "marked")}
     assert {n: list(e.unstable) for n, e in enumerate(past_evaluations(journal), 1) if e.unstable} == marked
     assert (journal.parent / "path.png").exists()
+    repeats = pd.read_csv(journal.parent / "repeats.csv")
+    assert repeats["repeat"].unique().tolist() == [1, 2, 3]
+    starts = repeats.loc[repeats["step"] == 0, ["x_m", "y_m", "heading_rad"]]
+    np.testing.assert_allclose(starts, [[0.3, 0.0, 0.0]] * 3, atol=1e-9)
     assert f"figures: {journal.parent / 'figures' / 'index.html'}" in said
     assert {"paths-snake-two-regions.png", "trials-snake.png"} <= {f.name for f in (journal.parent / "figures").iterdir()}
 

@@ -27,6 +27,9 @@ _TICK_S = 0.1
 _HEARTBEATS = 5
 """Every so many looks the robot is asked for its speed: a dead link is noticed within half a second, not at the next command."""
 
+REPEATS = 1
+"""How often a trial drives its final controller, unless it is told otherwise: the source shows one drive of it (section 4.3)."""
+
 
 class KheperaPlatform:
     """Implements `bns.hardware.platform.Platform`. Commands are (left, right, duration) in the robot module's units."""

@@ -23,6 +23,9 @@ from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import checked, open_tracker
 
+REPEATS = 3
+"""How often a trial drives its final controller, unless it is told otherwise: the source drove it three times (section 5.7)."""
+
 
 class SnakePlatform:
     """Implements `bns.hardware.platform.Platform`. Commands are cycles (n, 5), poses observations (n, 9) of the robot module."""
