@@ -68,7 +68,9 @@ def table_sha256(table: pd.DataFrame) -> str:
             numbers[np.isnan(numbers)] = np.nan
             whole.update(numbers.astype("<f8").tobytes())
         else:
-            whole.update("\0".join("" if missing else str(v) for v, missing in zip(values, values.isna(), strict=True)).encode())
+            whole.update(
+                "\0".join("" if missing else str(v) for v, missing in zip(values, values.isna(), strict=True)).encode()
+            )
     return whole.hexdigest()
 
 
