@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
@@ -18,12 +19,19 @@ from bns.hardware.platform import platform_module
 from bns.hardware.rig import Rig, load_rig, shipped_rig
 from bns.hardware.tracking.calibration import Board, calibrate
 from bns.hardware.tracking.camera import StreamCamera
+from bns.hardware.tracking.kinds import checked
+from bns.hardware.tracking.wii import LEDS_M
+from bns.hardware.tracking.wii import open_tracker as open_wii
+from bns.hardware.tracking.wii_calibration import checked_tracker, hanging, look_at_lights
+from bns.robots.khepera import START
 
 _PRINT_PX_PER_M = 300 / 0.0254
 
 
 def calibrated(options: argparse.Namespace) -> str:
     """Carry out `bns calibrate`; a report in words."""
+    if options.wii:
+        return _hung(options)
     if not 5.0 <= options.square_mm <= 1000.0:
         raise HardwareError(f"--square-mm is {options.square_mm:g}; measure the printed square, 5 to 1000 mm.")
     board = Board(square_m=options.square_mm / 1000, marker_m=0.75 * options.square_mm / 1000)
@@ -40,6 +48,22 @@ def calibrated(options: argparse.Namespace) -> str:
         f"calibrated from {found.views} views, RMS {found.rms_px:.2f} pixels; the camera is {height_m:.2f} m above the floor\n"
         f"written to {options.output}; name it in the rig's tracker as calibration"
     )
+
+
+def _hung(options: argparse.Namespace) -> str:
+    """How the Wii remote hangs, seen from a robot that stands on the task's start."""
+    if options.rig is None:
+        raise HardwareError("--wii needs --rig FILE: its tracker names the remote, its height and the LEDs.")
+    rig = load_rig(options.rig, "khepera")
+    clock, height_m = RealClock(), checked_tracker(rig.tracker)
+    leds_m = np.asarray(rig.tracker.get("leds_m", LEDS_M), np.float64)
+    tracker = open_wii(checked(rig.tracker), clock)
+    try:
+        input("Put the robot on the start, its nose to the north (up on the tasks' drawings); then Enter: ")
+        found = hanging(look_at_lights(tracker, clock, len(leds_m)), np.array(START), height_m, leds_m)
+    finally:
+        tracker.close()
+    return f"write these into the tracker of {options.rig}:\n{found.in_words()}"
 
 
 def _printed(board: Board, path: Path) -> str:

@@ -51,6 +51,10 @@ def add_looking_options(
     source.add_argument(
         "--print-board", type=Path, metavar="FILE", help="write the board to be printed (PNG), true to size"
     )
+    source.add_argument(
+        "--wii", action="store_true", help="find how the Wii remote of --rig hangs: mirror, orientation, place, view"
+    )
+    calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii")
     calibrating.add_argument(
         "--floor", type=Path, metavar="FILE", help="picture of the board on the floor (default: the last)"
     )

@@ -45,7 +45,8 @@ def emulated_tracker(
     checked(settings)
     if settings["kind"] == "wii":
         path = folder / "wiimote"
-        return {**settings, "device": str(path)}, WiiEmulator(path, pose, overhead(settings), clock, faults, seed)
+        remote = WiiEmulator(path, pose, overhead(settings), clock, faults, seed)
+        return {**settings, "device": str(path), "battery": str(remote.battery)}, remote
     return emulated_camera(settings, folder, lambda now_s: worn(settings, pose(now_s)), clock, faults, seed)
 
 
