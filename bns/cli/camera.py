@@ -22,8 +22,7 @@ from bns.hardware.tracking.camera import StreamCamera
 from bns.hardware.tracking.kinds import checked
 from bns.hardware.tracking.wii import LEDS_M
 from bns.hardware.tracking.wii import open_tracker as open_wii
-from bns.hardware.tracking.wii_calibration import checked_tracker, hanging, look_at_lights
-from bns.robots.khepera import START
+from bns.hardware.tracking.wii_calibration import ON_THE_START, checked_tracker, hanging, look_at_lights
 
 _PRINT_PX_PER_M = 300 / 0.0254
 
@@ -60,7 +59,7 @@ def _hung(options: argparse.Namespace) -> str:
     tracker = open_wii(checked(rig.tracker), clock)
     try:
         input("Put the robot on the start, its nose to the north (up on the tasks' drawings); then Enter: ")
-        found = hanging(look_at_lights(tracker, clock, len(leds_m)), np.array(START), height_m, leds_m)
+        found = hanging(look_at_lights(tracker, clock, len(leds_m)), ON_THE_START, height_m, leds_m)
     finally:
         tracker.close()
     return f"write these into the tracker of {options.rig}:\n{found.in_words()}"

@@ -15,9 +15,8 @@ from bns.hardware.tracking.evdev import EVENT, device_file, input_devices
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.rigid import best_fit, fit, placed
 from bns.hardware.tracking.wii import LEDS_M, Overhead, WiiTracker, overhead
-from bns.hardware.tracking.wii_calibration import hanging, look_at_lights
+from bns.hardware.tracking.wii_calibration import ON_THE_START, hanging, look_at_lights
 from bns.hardware.tracking.wii_pulse import Pulse, battery_of
-from bns.robots.khepera import START
 
 CAMERA = Overhead(2.4, 0.75)
 POSE = np.array([0.2, -0.1, 0.7])
@@ -254,7 +253,7 @@ def test_lights_that_tell_nothing_of_how_it_hangs(remote, clock):
 
 def test_calibrate_asks_for_the_rig_and_writes_what_it_found(tmp_path, monkeypatch, capsys):
     clock = EmulatedClock(np.inf)
-    start = np.array(START)
+    start = ON_THE_START
     emulator = WiiEmulator(tmp_path / "remote", lambda _t: start, Overhead(1.8, 0.7, mirror=True), clock)
     rig = tmp_path / "rig.yaml"
     text = "robot: khepera\nport: x\nsurface_m: {x: [-0.5, 0.5], y: [-0.5, 0.5]}\n"

@@ -18,6 +18,8 @@ from bns.hardware.clock import Clock
 from bns.hardware.tracking.rigid import placed
 from bns.hardware.tracking.wii import HEIGHT_PX, LEDS_M, WIDTH_PX, Overhead, WiiTracker
 
+ON_THE_START = np.array([0.0, 0.0, math.pi / 2])
+"""Where the robot stands meanwhile: on the task's origin, its nose to the north."""
 _WORST_M, _CLEARLY = 0.004, 3.0
 _LOOKS, _BETWEEN_S, _PATIENCE = 50, 0.02, 10
 _SETTLED_PX = 3.0
