@@ -16,7 +16,7 @@ from bns import __version__
 from bns.cli import diagnose as measuring
 from bns.cli import report as reporting
 from bns.cli.sweep_options import DEVICES, add_cluster_options, backend_name, request_of
-from bns.cli.trial_options import add_looking_options, add_trial_options
+from bns.cli.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.errors import BnsError, SpecError
 from bns.spec import FIELDS, RunSpec, checked, field_type
 
@@ -109,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     ill.add_argument(
         "--rig", type=Path, metavar="FILE", help="your set-up (YAML): its robot and tracker are asked, too"
     )
+    add_servo_options(command("servos", servos, "set up AX-12 servos: who answers, their ids, their settings"))
     many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
     many.add_argument("files", nargs="+", type=Path, metavar="FILE", help="sweep files (YAML), taken in this order")
     many.add_argument(
@@ -301,6 +302,13 @@ def sweep(options: argparse.Namespace) -> int:
             if summary.stopped_by in {"interrupt", "terminated"}:
                 return _INTERRUPTED if summary.stopped_by == "interrupt" else _TERMINATED
     return 1 if failed else 0
+
+
+def servos(options: argparse.Namespace) -> int:
+    """Set up servos."""
+    from bns.cli.servos import served
+
+    return served(options)
 
 
 def plan(options: argparse.Namespace) -> int:

@@ -68,3 +68,24 @@ def add_looking_options(
         "--seconds", type=duration, default=5.0, metavar="TIME", help="how long to look (default: 5s)"
     )
     tracking.add_argument("--frames", type=Path, metavar="DIR", help="write annotated frames into this folder")
+
+
+def add_servo_options(parser: argparse.ArgumentParser) -> None:
+    """Of `bns servos`: `scan`, `set-id` and `check`, each at a port."""
+    parts = parser.add_subparsers(title="what to do", metavar="scan|set-id|check", required=True)
+
+    def part(name: str, text: str) -> argparse.ArgumentParser:
+        added = parts.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+        added.add_argument("--port", required=True, metavar="DEVICE", help="the bus adapter, as /dev/ttyUSB0")
+        added.set_defaults(part=name)
+        return added
+
+    part("scan", "list the servos that answer").add_argument(
+        "--all-bauds", action="store_true", help="at all rates that a servo can be set to (minutes)"
+    )
+    new = part("set-id", "give the one servo that is connected a number")
+    new.add_argument("id", type=int, metavar="ID", help="its new number, 0 to 252")
+    new.add_argument("--from", type=int, dest="old", metavar="ID", help="its present number, where several are connected")
+    part("check", "say what of the servos' settings is not as a drive needs it").add_argument(
+        "--mend", action="store_true", help="write return delay, status return level and angle limits first"
+    )
