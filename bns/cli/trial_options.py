@@ -56,8 +56,22 @@ def add_looking_options(
     )
     calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii")
     calibrating.add_argument(
-        "--floor", type=Path, metavar="FILE", help="picture of the board on the floor (default: the last)"
+        "--floor",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help="pictures of the board flat on the floor: on the start first, then elsewhere (default: the last of --frames)",
     )
+    calibrating.add_argument(
+        "--places", type=positive, default=3, metavar="N", help="places on the floor to lay the board on (default: 3)"
+    )
+    calibrating.add_argument("--measured-mm", type=float, metavar="MM", help="width of the whole printed board, as measured")
+    calibrating.add_argument("--size", metavar="WxH", help="of the camera's pictures (default: 1280x720, or what it has)")
+    for name in ("exposure", "focus", "white-balance"):
+        calibrating.add_argument(
+            f"--{name}", type=float, metavar="N", help="fix it, as the camera's driver counts (v4l2-ctl -L)"
+        )
     calibrating.add_argument("--square-mm", type=float, default=68.0, help="side of a printed square (default: 68, A3)")
     calibrating.add_argument("--views", type=positive, default=15, help="views to take (default: 15)")
     calibrating.add_argument("-o", "--output", type=Path, default=Path("camera.json"), metavar="FILE")

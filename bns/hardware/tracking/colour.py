@@ -16,11 +16,12 @@ from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Frame, FrameTracker, open_camera
 from bns.hardware.tracking.kinds import Settings
 from bns.hardware.tracking.lens import Lens
+from bns.hardware.tracking.picture import SETTINGS as PICTURE
 from bns.hardware.tracking.sight import Sight
 
 SETTINGS = Settings(
     ("camera", "calibration", "diameter_m", "height_m"),
-    ("distance_m", "yellow", "green"),
+    ("distance_m", "yellow", "green", *PICTURE),
     ("diameter_m", "height_m", "distance_m"),
 )
 YELLOW, GREEN = (20, 38), (50, 85)
