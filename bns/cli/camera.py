@@ -8,10 +8,10 @@ import tempfile
 from contextlib import ExitStack
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.looking import from_folder, views, watch
@@ -24,6 +24,9 @@ from bns.hardware.tracking.picture import SETTINGS as PICTURE
 from bns.hardware.tracking.wii import LEDS_M
 from bns.hardware.tracking.wii import open_tracker as open_wii
 from bns.hardware.tracking.wii_calibration import ON_THE_START, checked_tracker, hanging, look_at_lights
+
+with extra("robot"):
+    import cv2
 
 _PRINT_PX_PER_M = 300 / 0.0254
 _SIZE_PX = (1280, 720)

@@ -7,20 +7,22 @@ mean: the AX-12's manual, control table. The makers' highest voltage is 12 V.
 from __future__ import annotations
 
 import os
-import termios
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
-
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.ax12_table import REGISTERS
 from bns.hardware.clock import Clock
 from bns.hardware.doctor import Finding, latency_of
 from bns.hardware.dynamixel import BAUD
 from bns.hardware.dynamixel_port import ClockedPort
 from bns.hardware.servo_chain import ServoLimits
+from bns.hardware.terminal_error import TerminalError
+
+with extra("robot"):
+    from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
 
 BAUDS = (1_000_000, 57_600, 115_200, 500_000, 400_000, 250_000, 200_000, 19_200, 9_600)
 """That a servo can be set to; the first is how it comes, the second how newer kinds come."""
@@ -60,7 +62,7 @@ class ServoBus:
         """Go on at this rate; HardwareError if the port cannot be opened or set to it."""
         try:
             opened = self._line.setBaudRate(baud)
-        except (OSError, ValueError, termios.error) as error:
+        except (OSError, ValueError, TerminalError) as error:
             raise HardwareError(f"{self.port} cannot be opened: {error}. Is it used by another program?") from error
         if not opened:
             raise HardwareError(f"{self.port} cannot be set to {baud} baud; another adapter may be needed.")
@@ -150,7 +152,7 @@ class ServoBus:
                 answer = call()
             except IndexError:  # the SDK reads past the end of a status packet that is too short
                 answer = (0, COMM_RX_TIMEOUT + 1, 0)
-            except (OSError, termios.error) as error:
+            except (OSError, TerminalError) as error:
                 raise HardwareError(f"the port {self.port} is gone ({error}).") from error
             finally:
                 self._line.is_using = False

@@ -12,7 +12,7 @@ from bns.hardware.bridge_frames import HELLO, MOVE, START, STATE, STOP, WATCHDOG
 from bns.hardware.emulators.bridge import BOOT_S, BridgeEmulator
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.emulators.servo import Servo
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.servo_chain import ServoError, ServoLimits
 from tests.hardware.simulated_board import Board, BoardClock, build, lacking
 
@@ -48,7 +48,7 @@ def driven():
 
     def build(board, count=3, limits=None):
         clock = BoardClock(board)
-        opened.append(BridgeChain(board.path, count, clock, Journal(None, clock), limits))
+        opened.append(BridgeChain(board.path, count, clock, HardwareLog(None, clock), limits))
         return opened[-1]
 
     yield build

@@ -11,7 +11,7 @@ from bns.errors import HardwareError
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.camera import CameraEmulator
 from bns.hardware.emulators.scene import Patch, Scene, disc, flat, tag
-from bns.hardware.journal import Journal, events
+from bns.hardware.hardware_log import HardwareLog, events
 from bns.hardware.tracking.aruco import ArucoDetector
 from bns.hardware.tracking.calibration import (
     Board,
@@ -298,7 +298,7 @@ def test_a_camera_is_set_and_read_back(monkeypatch, tmp_path, clock):
     Calibration(lens, 0.1, 12, "0", picture={"exposure": 300.0, "white_balance": 4600.0}).save(tmp_path / "c.json")
     settings = {"kind": "aruco", "camera": 0, "calibration": str(tmp_path / "c.json"), "side_m": 0.09, "height_m": 0.06}
     tracker = open_tracker(settings | {"exposure": 250}, clock)
-    journal = Journal(tmp_path / "j.jsonl", clock)
+    journal = HardwareLog(tmp_path / "j.jsonl", clock)
     Eye(tracker, clock, journal, 0.0).close()
     journal.close()
     (noted,) = events(tmp_path / "j.jsonl", "tracker")

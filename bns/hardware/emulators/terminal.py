@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import select
 import sys
-import termios
 import threading
 import time
-import tty
 from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol, Self
@@ -39,6 +36,9 @@ def put_through(master: int, slave: int, data: bytes) -> None:
 
 
 def _waiting(slave: int) -> int:
+    import fcntl  # noqa: PLC0415  # Windows has neither
+    import termios  # noqa: PLC0415
+
     return int.from_bytes(fcntl.ioctl(slave, termios.FIONREAD, bytes(4)), sys.byteorder)
 
 
@@ -64,6 +64,8 @@ class PseudoTerminal:
         """A new line in the place of the one that was cut."""
         with self._lock:
             self.cut()
+            import tty  # noqa: PLC0415  # Windows has no pseudo-terminals
+
             self._master, self._slave = os.openpty()
             tty.setraw(self._slave)
             os.set_blocking(self._master, False)  # a host that does not read must not stop the pump

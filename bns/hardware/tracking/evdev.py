@@ -5,7 +5,6 @@ Formats: include/uapi/linux/input.h and input-event-codes.h; Documentation/input
 
 from __future__ import annotations
 
-import fcntl
 import struct
 from pathlib import Path
 from typing import NamedTuple
@@ -55,6 +54,8 @@ def device_file(name: str, root: Path = CLASS) -> str:
 
 def absolute(file: int, axis: int) -> int | None:
     """What the kernel remembers as the value of an axis (EVIOCGABS); None of a file that is no input device."""
+    import fcntl  # noqa: PLC0415  # Windows has none
+
     try:
         return int(_ABSINFO.unpack(fcntl.ioctl(file, _READ | 0x40 + axis, bytes(_ABSINFO.size)))[0])
     except OSError:

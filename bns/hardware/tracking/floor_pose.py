@@ -11,12 +11,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
+from bns.extras import extra
 from bns.hardware.tracking.lens import Lens
 from bns.hardware.tracking.rigid import fit, placed
+
+with extra("robot"):
+    import cv2
 
 _KEPT_BACK = 4  # every fourth corner
 

@@ -9,9 +9,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import cv2
-
 from bns.errors import HardwareError
+from bns.extras import extra
+
+with extra("robot"):
+    import cv2
 
 SETTINGS = ("exposure", "focus", "white_balance")
 _MANUAL_EXPOSURE = 1.0  # V4L2_EXPOSURE_MANUAL, as OpenCV hands it on

@@ -12,17 +12,22 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.evdev import ABS_HAT0X, EV_ABS, EV_SYN, EVENT, SYN_DROPPED, SYN_REPORT, absolute, device_file
-from bns.hardware.tracking.kinds import Settings
+from bns.hardware.tracking.kinds import Device, Pose, Settings
 from bns.hardware.tracking.rigid import best_fit
 from bns.hardware.tracking.sight import Sight
 from bns.hardware.tracking.wii_pulse import Pulse, battery_of
+
+if TYPE_CHECKING:
+    from bns.hardware.clock import EmulatedClock
+    from bns.hardware.emulators.faults import Faults
 
 KERNEL_NAME = "Nintendo Wii Remote IR"
 SETTINGS = Settings(
@@ -163,3 +168,14 @@ def open_tracker(settings: Mapping[str, Any], clock: Clock) -> WiiTracker:
     battery = settings.get("battery") or battery_of(device)
     pulse = None if battery is None else Pulse(battery, clock)
     return WiiTracker(device, camera, clock, np.asarray(settings.get("leds_m", LEDS_M), np.float64), pulse)
+
+
+def emulate(
+    settings: Mapping[str, Any], folder: Path, pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
+) -> tuple[dict[str, Any], Device]:
+    """A pipe into which an emulated remote writes what it sees."""
+    from bns.hardware.emulators.wii import WiiEmulator  # noqa: PLC0415  # a real robot needs no emulators
+
+    path = folder / "wiimote"
+    remote = WiiEmulator(path, pose, overhead(settings), clock, faults, seed)
+    return {**settings, "device": str(path), "battery": str(remote.battery)}, remote
