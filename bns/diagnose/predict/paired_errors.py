@@ -1,0 +1,181 @@
+"""The one error that is shown: all models of a table, a verdict or a page, judged on the same windows.
+
+Windows are left out by the data's own evidence alone (a jump of the tracker, `tracker_faults`), before any model is asked, and
+counted. The change from one model to the next is paired by trial: a bootstrap draws whole trials, the same for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.data.tracker_faults import jumps, spans_jump
+from bns.diagnose.data.tracking_noise import TrackingNoise, tracking_noise
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.predict.horizons import errors_of
+
+DRAWS = 1000
+"""Bootstrap samples: the ends of a 95 % interval are then known to 10 % of its width."""
+FEWEST_TRIALS = 5
+"""Fewer trials give no interval: a bootstrap of four has 35 different samples."""
+_SEED = 20_260_101
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """Errors of one model over the windows of a horizon: root mean square and median of the position (m), of heading (rad)."""
+
+    name: str
+    rms_m: float
+    median_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """Root mean square error of a model minus that of the one before it (m), with its 95 % interval; NaN where unknown."""
+
+    change_m: float
+    low_m: float
+    high_m: float
+
+    @property
+    def fell(self) -> bool:
+        """The error is lower, whatever the luck of the trials."""
+        return self.change_m < 0 and not self.high_m >= 0
+
+    @property
+    def rose(self) -> bool:
+        """The error is higher, whatever the luck of the trials."""
+        return self.change_m > 0 and not self.low_m <= 0
+
+
+@dataclass(frozen=True)
+class HorizonErrors:
+    """All models at one horizon. ``windows`` were judged, ``left_out`` span a jump of the tracker.
+
+    ``changes[i]`` leads from model i to model i + 1; ``total`` from the first to the last.
+    """
+
+    horizon: str
+    windows: int
+    left_out: int
+    models: tuple[ModelError, ...]
+    changes: tuple[Change, ...]
+    total: Change | None
+    noise_floor_m: float
+
+
+@dataclass(frozen=True)
+class PairedErrors:
+    """`HorizonErrors` at every horizon, the noise that the tracks show (None: they cannot tell), and how many trials there are."""
+
+    horizons: Mapping[str, HorizonErrors]
+    noise: TrackingNoise | None
+    trials: int
+
+    def of(self, name: str) -> dict[str, ModelError]:
+        """One model's errors at every horizon."""
+        return {h: next(m for m in e.models if m.name == name) for h, e in self.horizons.items()}
+
+    @property
+    def falls(self) -> bool:
+        """From the first model to the last the error falls: at one horizon for certain, and at none does it rise for certain."""
+        totals = [e.total for e in self.horizons.values() if e.total is not None and e.windows]
+        return any(t.fell for t in totals) and not any(t.rose for t in totals)
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values; metres and radians."""
+        return {h: _horizon_json(e) for h, e in self.horizons.items()}
+
+
+def paired_errors(predictor: Predictor, models: Sequence[tuple[str, Steps]]) -> PairedErrors:
+    """Judge what several models predict, in their order, on the same windows.
+
+    ``predictor`` holds all poses of the tracks; each model's steps are of its frames.
+    """
+    jumped, noise = jumps(predictor.tracks), tracking_noise(predictor.tracks)
+    horizons = {h: _at_horizon(predictor, h, models, jumped, noise) for h in predictor.horizons}
+    return PairedErrors(horizons, noise, len(predictor.tracks))
+
+
+def _at_horizon(
+    predictor: Predictor,
+    horizon: str,
+    models: Sequence[tuple[str, Steps]],
+    jumped: NDArray[np.bool_],
+    noise: TrackingNoise | None,
+) -> HorizonErrors:
+    trials = len(predictor.tracks)
+    start, end = predictor.windows(horizon)
+    kept = ~spans_jump(jumped, start, end) if len(start) else np.zeros(0, dtype=bool)
+    errors = [(name, errors_of(predictor, steps, horizon)) for name, steps in models]
+    summaries = tuple(
+        ModelError(name, _rms(e.position_m[kept]), _median(e.position_m[kept]), _rms(e.heading_rad[kept])) for name, e in errors
+    )
+    squares = [
+        np.bincount(predictor.tracks.trial[start[kept]], e.position_m[kept] ** 2, minlength=trials) for _, e in errors
+    ]
+    counts = np.bincount(predictor.tracks.trial[start[kept]], minlength=trials)
+    changes = tuple(_change(a, b, counts) for a, b in zip(squares[:-1], squares[1:], strict=True))
+    total = _change(squares[0], squares[-1], counts) if len(squares) > 1 else None
+    pose = predictor.tracks.pose
+    distance = np.hypot(*(pose[end[kept], :2] - pose[start[kept], :2]).T)
+    floor = noise.error_m(distance) if noise is not None else float("nan")
+    return HorizonErrors(horizon, int(kept.sum()), int((~kept).sum()), summaries, changes, total, floor)
+
+
+def _change(before: Array, after: Array, counts: NDArray[np.int64]) -> Change:
+    """``before``, ``after`` (trials,): sums of squares; ``counts`` (trials,): of so many windows."""
+    used = counts > 0
+    before, after, windows = before[used], after[used], counts[used].astype(float)
+    if not len(windows):
+        return Change(float("nan"), float("nan"), float("nan"))
+    change = float(np.sqrt(after.sum() / windows.sum()) - np.sqrt(before.sum() / windows.sum()))
+    if len(windows) < FEWEST_TRIALS:
+        return Change(change, float("nan"), float("nan"))
+    drawn = np.random.default_rng(_SEED).multinomial(len(windows), np.full(len(windows), 1 / len(windows)), size=DRAWS)
+    total = drawn @ windows
+    drawn_change = np.sqrt(drawn @ after / total) - np.sqrt(drawn @ before / total)
+    low, high = np.quantile(drawn_change, [0.025, 0.975])
+    return Change(change, float(low), float(high))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt((values * values).mean())) if len(values) else float("nan")
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values)) if len(values) else float("nan")
+
+
+def _horizon_json(e: HorizonErrors) -> dict[str, Any]:
+    return {
+        "windows": e.windows,
+        "windows_left_out": e.left_out,
+        "noise_floor_m": _plain(e.noise_floor_m),
+        "models": [
+            {
+                "name": m.name,
+                "position_rms_m": _plain(m.rms_m),
+                "position_median_m": _plain(m.median_m),
+                "heading_rms_rad": _plain(m.heading_rad),
+            }
+            for m in e.models
+        ],
+        "changes": [_change_json(c) for c in e.changes],
+        "total_change": None if e.total is None else _change_json(e.total),
+    }
+
+
+def _change_json(c: Change) -> dict[str, Any]:
+    return {"change_m": _plain(c.change_m), "low_m": _plain(c.low_m), "high_m": _plain(c.high_m)}
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
