@@ -82,7 +82,7 @@ def asked(world, networks, trials=40):
 def test_the_planted_reason_is_named(world, kept, verdict, variable):
     why = asked(world, trained(world, kept))
     assert why.verdict == verdict
-    assert [one.variable for one in why.unseen[:1]] == ([variable] if variable else [])
+    assert [one.variable for one in why.missing_inputs[:1]] == ([variable] if variable else [])
     assert sum(why.share.values()) == pytest.approx(1.0)
     assert (why.share["thin data"] > 0.8) == (kept is not None)
 
@@ -100,7 +100,7 @@ def test_in_words_numbers_and_a_figure(tmp_path, capsys):
     assert main(["compare", *given[:3], "--json"]) == 0
     causes = json.loads(capsys.readouterr().out)["causes"]
     assert causes["verdict"] == ["inputs-cannot-know"]
-    assert causes["unseen"][0]["variable"] == "heading_rad"
+    assert causes["missing_inputs"][0]["variable"] == "heading_rad"
 
 
 def test_few_commands_among_the_patterns_are_no_verdict():
