@@ -11,13 +11,13 @@ from scipy.stats import t as student
 
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import Tracks
-from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
+from bns.diagnose.estimate.cross_validation import judged_errors
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.predict.horizons import HORIZONS, noise_floor
+from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
@@ -44,7 +44,8 @@ class Diagnosis:
     residual_dependence: tuple[ResidualDependence, ...] = ()
     rest: Unexplained = NOTHING_LEFT
     formula: Formula | None = None
-    error: Mapping[str, Mapping[str, float]] | None = None
+    errors: PairedErrors | None = None
+    """Of the model as given and, where effects were accepted, of the model with them: on trials held out."""
     notes: tuple[str, ...] = ()
 
     @property
@@ -67,7 +68,8 @@ class Diagnosis:
             "ties": ties_of(selection) if selection else [],
             "explanations": [list(selection.accepted), *map(list, selection.competing_models)] if selection else [],
             "ranking": [_ranked(c) for c in (selection.steps[0].ranking if selection else ())],
-            "error": {h: {name: _plain(v) for name, v in e.items()} for h, e in (self.error or {}).items()},
+            "error": before_and_after(self.errors) if self.errors else {},
+            "tracking_noise": noise_json(self.errors) if self.errors else None,
             "formula": self._formula(),
             "residual_dependence": [_pattern(p) for p in self.residual_dependence],
             "outliers": [vars(o) for o in self.rest.outliers],
@@ -122,7 +124,7 @@ def diagnose(
         tuple(dependence[:12]),
         rest,
         formula,
-        errors_before_and_after(selection),
+        errors,
         tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs)),
     )
 
@@ -174,19 +176,36 @@ def _hint(selection: SelectionResult, trials: int) -> Candidate | None:
     return near[0] if near else None
 
 
-def errors_before_and_after(selection: SelectionResult) -> dict[str, dict[str, float]]:
-    """Held-out position error (m) at every horizon: nominal model, with the accepted effects, and what noise alone would show."""
+def errors_before_and_after(selection: SelectionResult, given: Model) -> PairedErrors:
+    """Of the model as given, and of the accepted one with its numbers fitted to other trials, on the same windows."""
     predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
-    before = errors_at_horizons(predictor, held_out_steps(predictor, pose_filter, selection.nominal.model))
-    after = errors_at_horizons(predictor, held_out_steps(predictor, pose_filter, selection.fit.model))
-    return {
-        h: {
-            "before": before[h],
-            "after": after[h],
-            "noise_floor": noise_floor(predictor, pose_filter.noise, h).get("position_m", float("nan")),
+    after = [(WITH_EFFECTS, selection.fit.model)] if selection.accepted else []
+    return judged_errors(predictor, pose_filter, given, after)
+
+
+def before_and_after(errors: PairedErrors) -> dict[str, dict[str, float | int | None]]:
+    """At every horizon: root mean square and median before and after (m), the change with its interval, windows, noise."""
+    out: dict[str, dict[str, float | int | None]] = {}
+    for horizon, e in errors.horizons.items():
+        before, after, change = e.models[0], e.models[-1], e.total
+        out[horizon] = {
+            "before": _plain(before.rms_m),
+            "after": _plain(after.rms_m),
+            "noise_floor": _plain(e.noise_floor_m),
+            "median_before": _plain(before.median_m),
+            "median_after": _plain(after.median_m),
+            "change": _plain(change.change_m) if change else None,
+            "change_low": _plain(change.low_m) if change else None,
+            "change_high": _plain(change.high_m) if change else None,
+            "windows": e.windows,
+            "windows_left_out": e.left_out,
         }
-        for h in HORIZONS
-    }
+    return out
+
+
+def noise_json(errors: PairedErrors) -> dict[str, float | str] | None:
+    """What the tracks themselves say of their noise; None where they cannot."""
+    return None if errors.noise is None else dict(vars(errors.noise))
 
 
 def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:

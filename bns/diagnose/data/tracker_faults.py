@@ -6,6 +6,7 @@ tracker took another marker, or somebody moved the robot. A window that spans on
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,11 +26,18 @@ AROUND_S = 1.0
 """The wheels' fastest command within a second either way counts: a robot may lag, and clocks may differ."""
 
 
+def with_jumps(tracks: Tracks) -> Tracks:
+    """The tracks with their jumps marked; as they are where there is none."""
+    found = jumps(tracks)
+    return replace(tracks, jumped=found) if found.any() else tracks
+
+
 def jumps(tracks: Tracks) -> NDArray[np.bool_]:
     """Frames (frames,) whose pose no drive leads to from the frame before."""
     found = np.zeros(len(tracks.t_s), dtype=bool)
     moved, turned = _changes(tracks.pose)
-    inner = ~tracks.is_first[1:]
+    inner = np.ones(len(moved), dtype=bool)
+    inner[tracks.first[1:-1] - 1] = False
     usual = _usual(moved[inner], turned[inner])
     for trial, (a, b) in enumerate(pairwise(tracks.first)):
         if b - a > 1:
@@ -37,9 +45,11 @@ def jumps(tracks: Tracks) -> NDArray[np.bool_]:
     return found
 
 
-def spans_jump(jumped: NDArray[np.bool_], start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.bool_]:
+def spans_jump(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Windows (windows,) from frame ``start`` to frame ``end`` with a jump on the way."""
-    count = np.concatenate([[0], np.cumsum(jumped)])
+    if tracks.jumped is None:
+        return np.zeros(len(start), dtype=bool)
+    count = np.concatenate([[0], np.cumsum(tracks.jumped)])
     return np.asarray(count[end + 1] > count[start + 1])
 
 

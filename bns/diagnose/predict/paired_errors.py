@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.tracker_faults import jumps, spans_jump
+from bns.diagnose.data.tracker_faults import spans_jump
 from bns.diagnose.data.tracking_noise import TrackingNoise, tracking_noise
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor, Steps
@@ -28,10 +28,15 @@ _SEED = 20_260_101
 
 @dataclass(frozen=True)
 class ModelError:
-    """Errors of one model over the windows of a horizon: root mean square and median of the position (m), of heading (rad)."""
+    """Errors of one model over the windows of a horizon.
+
+    Root mean square of the position with its 95 % interval, its median (m), and the root mean square of the heading (rad).
+    """
 
     name: str
     rms_m: float
+    low_m: float
+    high_m: float
     median_m: float
     heading_rad: float
 
@@ -99,8 +104,8 @@ def paired_errors(predictor: Predictor, models: Sequence[tuple[str, Steps]]) -> 
 
     ``predictor`` holds all poses of the tracks; each model's steps are of its frames.
     """
-    jumped, noise = jumps(predictor.tracks), tracking_noise(predictor.tracks)
-    horizons = {h: _at_horizon(predictor, h, models, jumped, noise) for h in predictor.horizons}
+    noise = tracking_noise(predictor.tracks)
+    horizons = {h: _at_horizon(predictor, h, models, noise) for h in predictor.horizons}
     return PairedErrors(horizons, noise, len(predictor.tracks))
 
 
@@ -108,42 +113,71 @@ def _at_horizon(
     predictor: Predictor,
     horizon: str,
     models: Sequence[tuple[str, Steps]],
-    jumped: NDArray[np.bool_],
     noise: TrackingNoise | None,
 ) -> HorizonErrors:
-    trials = len(predictor.tracks)
+    tracks, trials = predictor.tracks, len(predictor.tracks)
     start, end = predictor.windows(horizon)
-    kept = ~spans_jump(jumped, start, end) if len(start) else np.zeros(0, dtype=bool)
+    kept = ~spans_jump(tracks, start, end)
     errors = [(name, errors_of(predictor, steps, horizon)) for name, steps in models]
+    of_trial = tracks.trial[start[kept]]
+    squares = [np.bincount(of_trial, e.position_m[kept] ** 2, minlength=trials) for _, e in errors]
+    counts = np.bincount(of_trial, minlength=trials)
+    draws = _Draws.over(counts)
     summaries = tuple(
-        ModelError(name, _rms(e.position_m[kept]), _median(e.position_m[kept]), _rms(e.heading_rad[kept])) for name, e in errors
+        ModelError(
+            name,
+            _rms(e.position_m[kept]),
+            *draws.interval(draws.rms(square)),
+            _median(e.position_m[kept]),
+            _rms(e.heading_rad[kept]),
+        )
+        for (name, e), square in zip(errors, squares, strict=True)
     )
-    squares = [
-        np.bincount(predictor.tracks.trial[start[kept]], e.position_m[kept] ** 2, minlength=trials) for _, e in errors
-    ]
-    counts = np.bincount(predictor.tracks.trial[start[kept]], minlength=trials)
-    changes = tuple(_change(a, b, counts) for a, b in zip(squares[:-1], squares[1:], strict=True))
-    total = _change(squares[0], squares[-1], counts) if len(squares) > 1 else None
-    pose = predictor.tracks.pose
+    changes = tuple(_change(a, b, draws) for a, b in zip(squares[:-1], squares[1:], strict=True))
+    total = _change(squares[0], squares[-1], draws) if len(squares) > 1 else None
+    pose = tracks.pose
     distance = np.hypot(*(pose[end[kept], :2] - pose[start[kept], :2]).T)
     floor = noise.error_m(distance) if noise is not None else float("nan")
     return HorizonErrors(horizon, int(kept.sum()), int((~kept).sum()), summaries, changes, total, floor)
 
 
-def _change(before: Array, after: Array, counts: NDArray[np.int64]) -> Change:
-    """``before``, ``after`` (trials,): sums of squares; ``counts`` (trials,): of so many windows."""
-    used = counts > 0
-    before, after, windows = before[used], after[used], counts[used].astype(float)
-    if not len(windows):
+@dataclass(frozen=True)
+class _Draws:
+    """Bootstrap samples of the trials that have windows: how often each was drawn (draws, trials), and of how many windows."""
+
+    used: NDArray[np.bool_]
+    windows: Array
+    drawn: NDArray[np.int64] | None
+
+    @classmethod
+    def over(cls, counts: NDArray[np.int64]) -> _Draws:
+        used = counts > 0
+        n = int(used.sum())
+        enough = n >= FEWEST_TRIALS
+        drawn = np.random.default_rng(_SEED).multinomial(n, np.full(n, 1 / n), size=DRAWS) if enough else None
+        return cls(used, counts[used].astype(float), drawn)
+
+    def rms(self, squares: Array) -> Array:
+        """Root mean square of every sample, (draws,); ``squares`` (trials,): sums of squares. Empty where trials are few."""
+        if self.drawn is None:
+            return np.zeros(0)
+        out: Array = np.sqrt(self.drawn @ squares[self.used] / (self.drawn @ self.windows))
+        return out
+
+    @staticmethod
+    def interval(values: Array) -> tuple[float, float]:
+        """The middle 95 %; NaN of nothing."""
+        low, high = np.quantile(values, [0.025, 0.975]) if len(values) else (np.nan, np.nan)
+        return float(low), float(high)
+
+
+def _change(before: Array, after: Array, draws: _Draws) -> Change:
+    """``before``, ``after`` (trials,): sums of squares."""
+    windows = draws.windows.sum()
+    if not windows:
         return Change(float("nan"), float("nan"), float("nan"))
-    change = float(np.sqrt(after.sum() / windows.sum()) - np.sqrt(before.sum() / windows.sum()))
-    if len(windows) < FEWEST_TRIALS:
-        return Change(change, float("nan"), float("nan"))
-    drawn = np.random.default_rng(_SEED).multinomial(len(windows), np.full(len(windows), 1 / len(windows)), size=DRAWS)
-    total = drawn @ windows
-    drawn_change = np.sqrt(drawn @ after / total) - np.sqrt(drawn @ before / total)
-    low, high = np.quantile(drawn_change, [0.025, 0.975])
-    return Change(change, float(low), float(high))
+    change = float(np.sqrt(after.sum() / windows) - np.sqrt(before.sum() / windows))
+    return Change(change, *draws.interval(draws.rms(after) - draws.rms(before)))
 
 
 def _rms(values: Array) -> float:
@@ -163,6 +197,8 @@ def _horizon_json(e: HorizonErrors) -> dict[str, Any]:
             {
                 "name": m.name,
                 "position_rms_m": _plain(m.rms_m),
+                "position_rms_low_m": _plain(m.low_m),
+                "position_rms_high_m": _plain(m.high_m),
                 "position_median_m": _plain(m.median_m),
                 "heading_rms_rad": _plain(m.heading_rad),
             }
