@@ -8,7 +8,7 @@ import numpy as np
 
 from bns.engine.evolution import Population, pick, rank, tournament_cdf
 from bns.engine.philox import Key, Purpose
-from bns.robots.base import Luck, Robot, Scores
+from bns.robots.base import RandomStream, Robot, Scores
 from bns.spec import RunSpec
 from bns.tasks import Task
 
@@ -42,7 +42,7 @@ class Evolver:
     def start(cls, robot: Robot, task: Task, key: Key, spec: RunSpec, weights: np.ndarray) -> Evolver:
         """A random population, scored on untrained networks."""
         population = robot.initial_population(key, spec.population_size, spec.min_commands, spec.max_commands)
-        return cls(robot, task, key, spec, population, robot.score(population, weights, task, Luck(key, 0)))
+        return cls(robot, task, key, spec, population, robot.score(population, weights, task, RandomStream(key, 0)))
 
     def __post_init__(self) -> None:
         self.order = rank(self.scores.fitness)
@@ -80,8 +80,8 @@ class Evolver:
                 self.history.append(Generation(self.generations, self.fittest(), self.best_fitness, self.mean_fitness))
 
     def _score(self, weights: np.ndarray, parents: Scores | None = None) -> None:
-        luck = Luck(self.key, self.generations)
-        self.scores = self.robot.score(self.population, weights, self.task, luck, parents)
+        stream = RandomStream(self.key, self.generations)
+        self.scores = self.robot.score(self.population, weights, self.task, stream, parents)
         self.order = rank(self.scores.fitness)
         self.failures += self.scores.failures
 

@@ -9,7 +9,7 @@ import pytest
 from bns.cli.main import main
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.networks import NetworkPredictor
-from bns.diagnose.residuals.missing_inputs import Commands, explained
+from bns.diagnose.residuals.missing_inputs import Commands, find_missing_inputs
 from bns.diagnose.residuals.network_errors import nearness, why_wrong
 from bns.engine.philox import Key
 from bns.engine.rprop import Rprop
@@ -131,8 +131,8 @@ def drifting(seed, slope):
 
 
 def test_a_planted_variable_is_found_with_its_share_and_luck_is_not():
-    named, alone, share = explained(drifting(0, 4.0))
+    named, alone, share = find_missing_inputs(drifting(0, 4.0))
     assert [one.variable for one in named] == ["t"] == [alone[0].variable]
     assert share == pytest.approx(16 / 12 / (16 / 12 + 1), abs=0.08)
     for seed in range(5):
-        assert explained(drifting(seed, 0.0))[0] == []
+        assert find_missing_inputs(drifting(seed, 0.0))[0] == []

@@ -15,7 +15,7 @@ from bns.diagnose.design.limits import arena_of, bounds_of
 from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
 from bns.diagnose.design.power import ExpectedGain, PastTrials, decision_probability, minutes_needed, power
 from bns.diagnose.design.proposal import propose
-from bns.diagnose.design.search import Pool, chosen
+from bns.diagnose.design.search import Pool, select_trials
 from bns.diagnose.design.sequences import (
     Arena,
     Bounds,
@@ -208,7 +208,7 @@ def test_short_trials_are_chosen_where_each_tells_enough_and_long_ones_where_not
     for long_tells, lasting in ((2.0, 3.0), (20.0, 9.0)):
         each = np.repeat([50.0, 50.0 * long_tells] if lasting == 3.0 else [0.1, 0.1 * long_tells], 20)
         one = Discrimination(each, np.zeros((40, 0)), np.zeros((40, 0, 0)), none, none, 0)
-        first = chosen(Pool(plan, {(0, 1): (one, one)}), 12.0, {(0, 1): PastTrials()})[:3]
+        first = select_trials(Pool(plan, {(0, 1): (one, one)}), 12.0, {(0, 1): PastTrials()})[:3]
         assert plan.lasting_s[first].tolist()[0] == lasting
 
 

@@ -23,7 +23,7 @@ from bns.diagnose.design.competing_models import competing_models_of, refitted
 from bns.diagnose.design.limits import arena_of, bounds_of
 from bns.diagnose.design.power import distinguished
 from bns.diagnose.design.proposal import propose
-from bns.diagnose.design.sequences import Arena, Bounds, Sequences, drawn, uniform
+from bns.diagnose.design.sequences import Arena, Bounds, Sequences, draw_sequences, uniform
 from bns.diagnose.diagnosis import Diagnosis, diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import paired_elpd_diff
@@ -174,7 +174,7 @@ def measured_case(case: Case, seed: int) -> dict[str, object] | None:
 def random_plan(arena: Arena, bounds: Bounds, seed: int) -> Sequences:
     """Plain random trials that fill the time."""
     trials = int(np.ceil(60 * MINUTES / bounds.trial_s))
-    return drawn(luck(seed, "random"), trials, bounds, arena, ROBOT.wheelbase_m, uniform(bounds))
+    return draw_sequences(luck(seed, "random"), trials, bounds, arena, ROBOT.wheelbase_m, uniform(bounds))
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -119,7 +119,7 @@ def propose(
     seed: int = 0,
     tick: Callable[[str], None] = lambda _: None,
 ) -> Proposal:
-    """The experiment of about ``minutes`` of driving that discriminates between the diagnosis' models; DataError if there are none."""
+    """The experiment of about ``minutes`` that discriminates between the diagnosis' models; DataError if there are none."""
     tick("competing models")
     competing_models = competing_models_of(d)
     if len(competing_models) < 2:

@@ -11,7 +11,7 @@ from bns.engine.evolution import Population, diversity
 from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import predict
 from bns.errors import SpecError
-from bns.robots.base import Luck, Recipe, Scores, turned
+from bns.robots.base import RandomStream, Scores, StagedTraining, turned
 from bns.robots.snake import cycles, path, posture, table
 from bns.robots.snake.rollout import evaluate
 from bns.robots.snake.rules import (
@@ -44,7 +44,7 @@ class Snake:
     input_count = 4
     sigmoid_output = True
     repeats_inputs = True
-    recipe: Recipe | None = Recipe(400, 20, 3, 20, 4, 12_000, (0.08, 0.08, 0.08, 0.08, 0.0))
+    recipe: StagedTraining | None = StagedTraining(400, 20, 3, 20, 4, 12_000, (0.08, 0.08, 0.08, 0.08, 0.0))
     """Section 5.4.1; the noise of the substitute world is 8 cm on every displacement (section 5.8)."""
     radii_m: tuple[float, ...] = ()
     bounds = BOUNDS
@@ -140,9 +140,10 @@ class Snake:
         return in_full[: path.judge(self.poses(self.displacements(outputs), in_full), task)[2]]
 
     def score(
-        self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None
+        self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
+        parents: Scores | None = None,
     ) -> Scores:
-        """Mean fitness over ten noisy evaluations, all controllers under the same noise; without luck there is none."""
+        """Mean fitness over ten noisy evaluations, all controllers under the same noise; without a stream there is none."""
         commands = population.commands
         n, length, _ = commands.shape
         moves = np.ascontiguousarray(
@@ -150,7 +151,7 @@ class Snake:
         )
         fitness, reached, used = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int32)
         half = (task.region_m / 2, task.surface_m[0] / 2, task.surface_m[1] / 2)
-        noise = self._noise(luck, length * MOST_REPEATS)
+        noise = self._noise(stream, length * MOST_REPEATS)
         repeats = np.ascontiguousarray(commands[..., REPEATS])
         moved = self._population_changes(commands)
         failures = evaluate(moves, moved, self.rigid, repeats, noise, task.goals_m, *half, fitness, reached, used)
@@ -166,10 +167,10 @@ class Snake:
         return np.ascontiguousarray(posture.changes(commands.reshape(n * length, -1), before).T)
 
     @staticmethod
-    def _noise(luck: Luck | None, steps: int) -> np.ndarray:
-        if luck is None:
+    def _noise(stream: RandomStream | None, steps: int) -> np.ndarray:
+        if stream is None:
             return np.empty((0, steps, 4))
-        return normals(luck.key, Purpose.ROLLOUT_NOISE, luck.step, NOISY_EVALUATIONS, steps) * NOISE_SD_M
+        return normals(stream.key, Purpose.ROLLOUT_NOISE, stream.step, NOISY_EVALUATIONS, steps) * NOISE_SD_M
 
     def breed(
         self,
