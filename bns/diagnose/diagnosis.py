@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,14 @@ from scipy.stats import t as student
 
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import Tracks
-from bns.diagnose.estimate.cross_validation import judged_errors
+from bns.diagnose.estimate.cross_validation import Judged, judged_errors
 from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.predict.paired_errors import PairedErrors
+from bns.diagnose.predict.paired_errors import PairedErrors, noise_json
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
@@ -31,6 +32,9 @@ FEW_TRIALS = 40
 _HINT = 3.0
 """A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
 
+
+WITH_EFFECTS = "with the effects"
+"""The name of the refitted model in tables of errors."""
 
 NOTHING_LEFT = Unexplained((), None, ())
 
@@ -98,12 +102,18 @@ def diagnose(
     extra: Mapping[str, Effect] | None = None,
     tick: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
-    """What the model lacks on these tracks."""
+    """What the model lacks on these tracks. A set of effects with which the held-out error does not fall is withdrawn."""
     search = StepwiseSelection(predictor, model, extra, tick)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
-    selection = search.run()
+    selection = refitted(search.run(), predictor, model)
+    tick("errors on trials held out")
+    errors = errors_before_and_after(selection, model)
+    withdrawn: tuple[str, ...] = ()
+    if selection.accepted and not errors.falls:
+        withdrawn, selection = selection.accepted, selection.withdrawn()
+        errors = errors_before_and_after(selection, model)
     tick("what is left")
     dependence = residual_dependence(selection.problem, selection.fit)
     rest = unexplained(selection.problem, selection.fit, dependence)
@@ -117,7 +127,6 @@ def diagnose(
         effect for name, effect in listed(selection.nominal.model, extra).items() if name not in selection.accepted
     ]
     pairs = [] if rest.any else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
-    tick("errors on trials held out")
     return Diagnosis(
         verdict,
         selection,
@@ -125,7 +134,7 @@ def diagnose(
         rest,
         formula,
         errors,
-        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs)),
+        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn)),
     )
 
 
@@ -176,10 +185,20 @@ def _hint(selection: SelectionResult, trials: int) -> Candidate | None:
     return near[0] if near else None
 
 
+def refitted(selection: SelectionResult, predictor: Predictor, given: Model) -> SelectionResult:
+    """The result with the numbers that `fit_set` finds for its effects: those that `bns add` gives for the same names."""
+    chosen = {a.effect.name: a.effect for a in selection.fit.model.effects}
+    if not selection.accepted or selection.fit.model.per_trial_effect is not None:
+        return selection
+    effects = [chosen[name] for name in selection.accepted]
+    problem, fit, _ = fit_set(predictor, given, effects, known=selection.fit.model)
+    return replace(selection, problem=problem, nominal=problem.fit(given), fit=fit)
+
+
 def errors_before_and_after(selection: SelectionResult, given: Model) -> PairedErrors:
     """Of the model as given, and of the accepted one with its numbers fitted to other trials, on the same windows."""
     predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
-    after = [(WITH_EFFECTS, selection.fit.model)] if selection.accepted else []
+    after = [Judged(WITH_EFFECTS, selection.fit.model, pose_filter)] if selection.accepted else []
     return judged_errors(predictor, pose_filter, given, after)
 
 
@@ -201,11 +220,6 @@ def before_and_after(errors: PairedErrors) -> dict[str, dict[str, float | int | 
             "windows_left_out": e.left_out,
         }
     return out
-
-
-def noise_json(errors: PairedErrors) -> dict[str, float | str] | None:
-    """What the tracks themselves say of their noise; None where they cannot."""
-    return None if errors.noise is None else dict(vars(errors.noise))
 
 
 def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:

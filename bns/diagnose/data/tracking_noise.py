@@ -45,6 +45,8 @@ class TrackingNoise:
 
 def tracking_noise(tracks: Tracks) -> TrackingNoise | None:
     """The noise of these tracks; None where they cannot tell (poses at the ends of commands alone, say)."""
+    if not (tracks.left_m_s.any() or tracks.right_m_s.any()):
+        return None  # no wheels, or a robot that was never told to move
     rest = list(_at_rest(tracks))
     if sum(map(len, rest)) >= FEWEST_AT_REST:
         return _pooled(rest, "at rest")
@@ -59,7 +61,7 @@ def _at_rest(tracks: Tracks) -> Iterator[Array]:
         for k in np.flatnonzero(still):
             begin = ends[k] - tracks.duration_s[trial][k] + SETTLED_S
             inside = (t_s >= begin) & (t_s <= ends[k])
-            if inside.sum() >= 5:  # noqa: PLR2004  # fewer share their mean with their noise
+            if inside.sum() >= 5:  # fewer share their mean with their noise
                 yield _centred(tracks.pose[a:b][inside])
 
 
@@ -102,4 +104,3 @@ def _residual_maker(width: int, order: int) -> Array:
     powers = np.vander(np.linspace(-1, 1, width), order + 1)
     out: Array = np.eye(width) - powers @ np.linalg.pinv(powers)
     return out
-

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,13 +42,20 @@ def held_out_steps(predictor: Predictor, pose_filter: Filter, model: Model) -> S
     return Steps(body, drift)
 
 
-def judged_errors(
-    predictor: Predictor, pose_filter: Filter, given: Model, extended: Sequence[tuple[str, Model]]
-) -> PairedErrors:
+@dataclass(frozen=True)
+class Judged:
+    """A model whose numbers were fitted, by a name, and the filter of the problem that they were fitted to."""
+
+    name: str
+    model: Model
+    pose_filter: Filter
+
+
+def judged_errors(predictor: Predictor, pose_filter: Filter, given: Model, extended: Sequence[Judged]) -> PairedErrors:
     """Errors of a model as given, and of models whose numbers were fitted, each on trials held out; all on the same windows.
 
-    The first one is "as given": what `bns compare` shows of the same model and data.
+    The first one is `AS_GIVEN`: what `bns compare` shows of the same model and data.
     """
     steps = [(AS_GIVEN, steps_of(predictor, pose_filter, given))]
-    steps += [(name, held_out_steps(predictor, pose_filter, model)) for name, model in extended]
+    steps += [(one.name, held_out_steps(predictor, one.pose_filter, one.model)) for one in extended]
     return paired_errors(predictor, steps)

@@ -29,6 +29,11 @@ class Errors:
     left_m: Array
     heading_rad: Array
 
+    def only(self, kept: NDArray[np.bool_]) -> Errors:
+        """Some of the windows."""
+        parts = (self.trial, self.start, self.end, self.forward_m, self.left_m, self.heading_rad)
+        return Errors(*(part[kept] for part in parts))
+
     @property
     def position_m(self) -> Array:
         """Distance between predicted and measured position, (windows,)."""

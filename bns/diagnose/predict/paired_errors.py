@@ -17,7 +17,7 @@ from bns.diagnose.data.tracker_faults import spans_jump
 from bns.diagnose.data.tracking_noise import TrackingNoise, tracking_noise
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor, Steps
-from bns.diagnose.predict.horizons import errors_of
+from bns.diagnose.predict.horizons import Errors, errors_of
 
 DRAWS = 1000
 """Bootstrap samples: the ends of a 95 % interval are then known to 10 % of its width."""
@@ -50,6 +50,12 @@ class Change:
     high_m: float
 
     @property
+    def certainty(self) -> float:
+        """Size of the change in widths of its interval; 0 where there is no interval."""
+        width = self.high_m - self.low_m
+        return abs(self.change_m) / width if width > 0 else 0.0
+
+    @property
     def fell(self) -> bool:
         """The error is lower, whatever the luck of the trials."""
         return self.change_m < 0 and not self.high_m >= 0
@@ -58,6 +64,14 @@ class Change:
     def rose(self) -> bool:
         """The error is higher, whatever the luck of the trials."""
         return self.change_m > 0 and not self.low_m <= 0
+
+
+_UNKNOWN = Change(float("nan"), float("nan"), float("nan"))
+
+
+def _falls(changes: Sequence[Change]) -> bool:
+    known = [c for c in changes if np.isfinite(c.change_m)]
+    return bool(known) and max(known, key=lambda c: c.certainty).change_m < 0 and not any(c.rose for c in known)
 
 
 @dataclass(frozen=True)
@@ -75,6 +89,11 @@ class HorizonErrors:
     total: Change | None
     noise_floor_m: float
 
+    def change_between(self, before: str, after: str) -> Change:
+        """Of two models next to each other."""
+        names = [m.name for m in self.models]
+        return self.changes[names.index(before)] if names.index(after) == names.index(before) + 1 else _UNKNOWN
+
 
 @dataclass(frozen=True)
 class PairedErrors:
@@ -90,9 +109,12 @@ class PairedErrors:
 
     @property
     def falls(self) -> bool:
-        """From the first model to the last the error falls: at one horizon for certain, and at none does it rise for certain."""
-        totals = [e.total for e in self.horizons.values() if e.total is not None and e.windows]
-        return any(t.fell for t in totals) and not any(t.rose for t in totals)
+        """Does the error fall from the first model to the last? By the horizon at which that is surest; at none may it rise for sure."""
+        return _falls([e.total for e in self.horizons.values() if e.total is not None])
+
+    def between(self, before: str, after: str) -> bool:
+        """Does the error fall from one model to the one that follows it? As `falls`."""
+        return _falls([c for e in self.horizons.values() for c in [e.change_between(before, after)]])
 
     def as_json(self) -> dict[str, Any]:
         """Plain values; metres and radians."""
@@ -104,9 +126,26 @@ def paired_errors(predictor: Predictor, models: Sequence[tuple[str, Steps]]) -> 
 
     ``predictor`` holds all poses of the tracks; each model's steps are of its frames.
     """
-    noise = tracking_noise(predictor.tracks)
+    noise = _noise_of(predictor)
     horizons = {h: _at_horizon(predictor, h, models, noise) for h in predictor.horizons}
     return PairedErrors(horizons, noise, len(predictor.tracks))
+
+
+def judged_windows(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
+    """One model's errors over the windows that are judged, one row each."""
+    errors = errors_of(predictor, steps, horizon)
+    return errors.only(~spans_jump(predictor.tracks, errors.start, errors.end))
+
+
+def noise_json(errors: PairedErrors) -> dict[str, float | str] | None:
+    """What the tracks themselves say of their noise; None where they cannot."""
+    return None if errors.noise is None else dict(vars(errors.noise))
+
+
+def _noise_of(predictor: Predictor) -> TrackingNoise | None:
+    if predictor.tracking is not None:
+        return TrackingNoise(*predictor.tracking, "as the tracks tell")
+    return tracking_noise(predictor.tracks)
 
 
 def _at_horizon(
@@ -120,7 +159,9 @@ def _at_horizon(
     kept = ~spans_jump(tracks, start, end)
     errors = [(name, errors_of(predictor, steps, horizon)) for name, steps in models]
     of_trial = tracks.trial[start[kept]]
-    squares = [np.bincount(of_trial, e.position_m[kept] ** 2, minlength=trials) for _, e in errors]
+    squares: list[Array] = [
+        np.bincount(of_trial, e.position_m[kept] ** 2, minlength=trials).astype(np.float64) for _, e in errors
+    ]
     counts = np.bincount(of_trial, minlength=trials)
     draws = _Draws.over(counts)
     summaries = tuple(
@@ -175,7 +216,7 @@ def _change(before: Array, after: Array, draws: _Draws) -> Change:
     """``before``, ``after`` (trials,): sums of squares."""
     windows = draws.windows.sum()
     if not windows:
-        return Change(float("nan"), float("nan"), float("nan"))
+        return _UNKNOWN
     change = float(np.sqrt(after.sum() / windows) - np.sqrt(before.sum() / windows))
     return Change(change, *draws.interval(draws.rms(after) - draws.rms(before)))
 
@@ -192,15 +233,15 @@ def _horizon_json(e: HorizonErrors) -> dict[str, Any]:
     return {
         "windows": e.windows,
         "windows_left_out": e.left_out,
-        "noise_floor_m": _plain(e.noise_floor_m),
+        "noise_floor_m": plain(e.noise_floor_m),
         "models": [
             {
                 "name": m.name,
-                "position_rms_m": _plain(m.rms_m),
-                "position_rms_low_m": _plain(m.low_m),
-                "position_rms_high_m": _plain(m.high_m),
-                "position_median_m": _plain(m.median_m),
-                "heading_rms_rad": _plain(m.heading_rad),
+                "position_rms_m": plain(m.rms_m),
+                "position_rms_low_m": plain(m.low_m),
+                "position_rms_high_m": plain(m.high_m),
+                "position_median_m": plain(m.median_m),
+                "heading_rms_rad": plain(m.heading_rad),
             }
             for m in e.models
         ],
@@ -210,8 +251,9 @@ def _horizon_json(e: HorizonErrors) -> dict[str, Any]:
 
 
 def _change_json(c: Change) -> dict[str, Any]:
-    return {"change_m": _plain(c.change_m), "low_m": _plain(c.low_m), "high_m": _plain(c.high_m)}
+    return {"change_m": plain(c.change_m), "low_m": plain(c.low_m), "high_m": plain(c.high_m)}
 
 
-def _plain(value: float) -> float | None:
+def plain(value: float) -> float | None:
+    """A float that JSON knows."""
     return float(value) if np.isfinite(value) else None
