@@ -166,7 +166,7 @@ def test_what_is_the_same_from_outside_is_said_to_be_so():
     proposal = propose(d, arena_of(predictor.tracks, None, None), bounds_of(predictor.tracks, NOMINAL, None), 5)
     [pair] = [c for c in proposal.model_pairs if {c.first, c.second} == {"command-delay", "clock-offset"}]
     assert pair.indistinguishable
-    assert any("LED" in other for other in pair.other_measurements)
+    assert any("LED" in other for other in pair.independent_measurements)
     assert "no sequence of commands tells them apart" in proposal_text(proposal)
     assert len(proposal.plan) == 0
     assert proposal.power == 0
