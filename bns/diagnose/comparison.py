@@ -48,8 +48,11 @@ class Curve:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `compare` found. ``judged``: the errors as every other command shows them; ``errors`` by direction;
-    ``near``: the horizon of the worst moments and the curves; ``scores``: how well each network agrees, where the model is networks of cycles."""
+    """What `compare` found.
+
+    ``errors``: over the windows that are judged, by direction; ``judged``: the same as every other command shows them; ``near``:
+    the horizon of the worst moments and the curves; ``scores``: how well each network agrees, where the model is networks.
+    """
 
     model: str
     trials: int

@@ -50,7 +50,7 @@ def fit_set(
 def _begun_again(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> Fit:
     """Every effect of several from its own best start, beside the others as fitted."""
     for effect in effects if len(effects) > 1 else ():
-        lacking = problem.fit(fit.model.without(effect.name), known=fit.jacobian_by_parameter)
+        lacking = problem.fit(fit.model.without(effect.name), nearby=fit.jacobian_by_parameter)
         again = fit_with(problem, lacking, effect)
         if again.loss < fit.loss - BETTER:
             fit = again

@@ -31,8 +31,8 @@ class Errors:
 
     def only(self, kept: NDArray[np.bool_]) -> Errors:
         """Some of the windows."""
-        parts = (self.trial, self.start, self.end, self.forward_m, self.left_m, self.heading_rad)
-        return Errors(*(part[kept] for part in parts))
+        frames = self.trial[kept], self.start[kept], self.end[kept]
+        return Errors(*frames, self.forward_m[kept], self.left_m[kept], self.heading_rad[kept])
 
     @property
     def position_m(self) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -97,7 +98,7 @@ class HorizonErrors:
 
 @dataclass(frozen=True)
 class PairedErrors:
-    """`HorizonErrors` at every horizon, the noise that the tracks show (None: they cannot tell), and how many trials there are."""
+    """`HorizonErrors` at every horizon, the noise that the tracks show (None: they cannot tell), the number of trials."""
 
     horizons: Mapping[str, HorizonErrors]
     noise: TrackingNoise | None
@@ -109,7 +110,10 @@ class PairedErrors:
 
     @property
     def falls(self) -> bool:
-        """Does the error fall from the first model to the last? By the horizon at which that is surest; at none may it rise for sure."""
+        """Does the error fall from the first model to the last?
+
+        The horizon at which the change is surest decides; at none may it rise for certain.
+        """
         return _falls([e.total for e in self.horizons.values() if e.total is not None])
 
     def between(self, before: str, after: str) -> bool:
@@ -174,7 +178,7 @@ def _at_horizon(
         )
         for (name, e), square in zip(errors, squares, strict=True)
     )
-    changes = tuple(_change(a, b, draws) for a, b in zip(squares[:-1], squares[1:], strict=True))
+    changes = tuple(_change(a, b, draws) for a, b in pairwise(squares))
     total = _change(squares[0], squares[-1], draws) if len(squares) > 1 else None
     pose = tracks.pose
     distance = np.hypot(*(pose[end[kept], :2] - pose[start[kept], :2]).T)

@@ -90,7 +90,7 @@ def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12) -> Path:
 
 @style()
 def error_by_step_figure(m: ExtendedModel, path: Path) -> Path:
-    """Errors on the same held-out windows: the model as given, then each effect added in turn; one line a horizon, noise dotted."""
+    """Errors on the same held-out windows, as given and with each effect added in turn; one line a horizon, noise dotted."""
     names = [name if index == 0 else f"+ {name}" for index, name in enumerate(m.names)]
     figure = Figure(figsize=(PAGE_IN * 0.75, 3.0))
     axes = figure.subplots()

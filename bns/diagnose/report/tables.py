@@ -69,7 +69,8 @@ def improvement_text(d: Diagnosis) -> str:
     ahead = "a second" if e.horizon == "1s" else "a command"
     known = "With it" if d.verdict != "unlisted" else "With the known effects alone"
     noise = f" (tracking noise alone: {_mm(e.noise_floor_m)} mm)" if np.isfinite(e.noise_floor_m) else ""
-    return f"{known}, predictions {ahead} ahead are {_mm(e.models[-1].rms_m)} mm off instead of {_mm(e.models[0].rms_m)} mm{noise}."
+    before, after = _mm(e.models[0].rms_m), _mm(e.models[-1].rms_m)
+    return f"{known}, predictions {ahead} ahead are {after} mm off instead of {before} mm{noise}."
 
 
 def error_by_step_table(m: ExtendedModel) -> Table:

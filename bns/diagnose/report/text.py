@@ -127,9 +127,10 @@ def _comparison(c: Comparison) -> Iterator[str]:
     yield f"  {'horizon':10}{'position mm':>14}{'forward':>10}{'left':>10}{'heading deg':>13}{'noise mm':>10}{'windows':>9}"
     for horizon, e in c.errors.items():
         if e["windows"]:
+            noise = f"{1e3 * c.noise_floor_m(horizon):10.2f}" if np.isfinite(c.noise_floor_m(horizon)) else f"{'?':>10}"
             yield (
                 f"  {horizon:10}{1e3 * e['position_m']:8.2f} ±{1e3 * e['position_se_m']:4.2f}{1e3 * e['forward_m']:10.2f}"
-                f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{1e3 * c.noise_floor_m(horizon):10.2f}{e['windows']:9.0f}"
+                f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{noise}{e['windows']:9.0f}"
             )
     yield "  (noise: what tracking noise alone would show, from the tracks; the drive's own scatter comes on top)"
     yield "\nwhere it fails: what a free curve along each variable would explain, on trials held out:"
