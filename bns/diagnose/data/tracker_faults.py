@@ -20,16 +20,27 @@ WAYS = 3.0
 """Nor is a change of less than three times the way of the faster wheel: no slip or gear error is as large."""
 USUAL = 12.0
 """Nor is one of less than twelve times what is usual in the trial (median): fast robots and coarse trackers differ."""
+MOST_CUT = 0.2
+"""No more of the poses than this is given up for what comes after a jump: the cost in precision is then under 12 %."""
 FEWEST_FRAMES = 20
 """A trial with fewer frames takes what is usual from all trials."""
 AROUND_S = 1.0
 """The wheels' fastest command within a second either way counts: a robot may lag, and clocks may differ."""
 
 
-def with_jumps(tracks: Tracks) -> Tracks:
-    """The tracks with their jumps marked; as they are where there is none."""
+def without_faults(tracks: Tracks) -> Tracks:
+    """The tracks without what comes after a jump in its trial: where the marker is wrong, its heading is wrong as well.
+
+    Where that would take more than `MOST_CUT` of all poses, jumps are the tracker's habit: they are marked (`Tracks.jumped`),
+    and everything goes on from where the tracker sees the robot.
+    """
     found = jumps(tracks)
-    return replace(tracks, jumped=found) if found.any() else tracks
+    if not found.any():
+        return tracks
+    seen_before = np.cumsum(found) - np.repeat(np.cumsum(found)[tracks.first[:-1]], np.diff(tracks.first)) > 0
+    if seen_before.mean() > MOST_CUT:
+        return replace(tracks, jumped=found)
+    return tracks.at_frames([np.flatnonzero(~seen_before[a:b]) + a for a, b in pairwise(tracks.first)])
 
 
 def jumps(tracks: Tracks) -> NDArray[np.bool_]:

@@ -66,7 +66,7 @@ class Tracks:
         """Some of the trials, in the order of ``chosen``."""
         selected = [np.arange(self.first[i], self.first[i + 1]) for i in chosen]
         return replace(
-            self._at(selected),
+            self.at_frames(selected),
             names=tuple(self.names[i] for i in chosen),
             left_m_s=self.left_m_s[chosen],
             right_m_s=self.right_m_s[chosen],
@@ -76,14 +76,14 @@ class Tracks:
 
     def thinned(self, every: int) -> Tracks:
         """Every so-manieth frame of each trial, its last one too; the commands stay as they are."""
-        return self._at(
+        return self.at_frames(
             [
                 np.unique(np.append(np.arange(a, b, every), b - 1)) if b > a else np.arange(a, b)
                 for a, b in pairwise(self.first)
             ]
         )
 
-    def _at(self, selected: Sequence[NDArray[np.int64]]) -> Tracks:
+    def at_frames(self, selected: Sequence[NDArray[np.int64]]) -> Tracks:
         """These frames, an array a trial."""
         frames = np.concatenate(selected)
         return replace(

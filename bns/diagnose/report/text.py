@@ -72,8 +72,11 @@ def _errors(errors: PairedErrors | None) -> Iterator[str]:
     yield from error_lines(errors)
 
 
-def error_lines(errors: PairedErrors) -> Iterator[str]:
-    """A table of the errors of models in turn, one row a horizon and model, with the change from the one before."""
+def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
+    """A table of the errors of models in turn, one row a horizon and model, with the change from the one before.
+
+    ``before_added``: stands before the names of all models but the first.
+    """
     yield f"  {'horizon':10}{'model':26}{'error':>16}{'change (95 %)':>30}{'noise':>8}{'windows':>9}"
     for horizon, e in errors.horizons.items():
         if not e.windows:
@@ -82,8 +85,8 @@ def error_lines(errors: PairedErrors) -> Iterator[str]:
             change = _change(e.changes[index - 1]) if index else ""
             noise = f"{1e3 * e.noise_floor_m:8.2f}" if np.isfinite(e.noise_floor_m) else f"{'?':>8}"
             ends = f"{noise}{e.windows:9d}" if index == 0 else ""
-            error = f"{_mm(m.rms_m):>8} ({_mm(m.median_m):>5})"
-            yield f"  {horizon if index == 0 else '':10}{m.name:26}{error}{change:>30}{ends}".rstrip()
+            error, name = f"{_mm(m.rms_m):>8} ({_mm(m.median_m):>5})", (before_added if index else "") + m.name
+            yield f"  {horizon if index == 0 else '':10}{name:26}{error}{change:>30}{ends}".rstrip()
     if any(e.left_out for e in errors.horizons.values()):
         left_out = ", ".join(f"{e.left_out} at {h}" for h, e in errors.horizons.items() if e.left_out)
         yield f"  (left out, since the tracker jumps within them: {left_out})"
@@ -166,7 +169,7 @@ def _scores(scores: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
 def extension_text(m: ExtendedModel) -> str:
     """The error by step on held-out trials, and the numbers."""
     lines = ["position error on held-out trials, mm: root mean square (median), all on the same windows:"]
-    lines += error_lines(m.errors)
+    lines += error_lines(m.errors, "+ ")
     for effect, numbers in numbers_of(m.fit).items():
         lines += [f"  {effect}: {name} = {n['value']:.5g} ± {n['se']:.2g} {n['unit']}" for name, n in numbers.items()]
     lines += [f"  warning: {text}" for text in m.warnings]
