@@ -10,9 +10,11 @@ from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import Unexplained
-from bns.diagnose.select.stepwise import Candidate, SelectionResult
+from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.physics.effects import all_effects
 
+MOST_EFFECTS = 6
+"""Effects that a selection accepts at most: beyond, each one mends what the others left of a seventh."""
 NOTABLE = 0.01
 """An effect that would have earned this share of the loss, but is rejected, is mentioned."""
 
@@ -30,6 +32,10 @@ def notes_on(
 
     ``longer``: explanations with one effect more that fit as well; ``withdrawn``: effects with which the error does not fall.
     """
+    for name, why in selection.implausible.items():
+        yield f"{name} fits best, and implausibly: {why}. No other set predicts as well: check it by an independent measurement."
+    if len(selection.accepted) >= MOST_EFFECTS:
+        yield f"The search ends at {MOST_EFFECTS} effects; there may be more."
     if withdrawn:
         yield (
             f"{' with '.join(withdrawn)} would fit better by likelihood, but predictions of trials held out get no better "

@@ -23,7 +23,8 @@ from bns.diagnose.residuals.along_variables import ResidualDependence, residual_
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
 from bns.diagnose.select.equivalents import equivalent_pairs
-from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, Candidate, SelectionResult, StepwiseSelection
+from bns.diagnose.select.result import Candidate, SelectionResult
+from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
 from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
 
@@ -68,6 +69,7 @@ class Diagnosis:
         return {
             "verdict": self.verdict,
             "effects": list(self.effects),
+            "implausible": selection.implausible if selection else {},
             "parameters": numbers_of(selection.fit) if selection else {},
             "ties": ties_of(selection) if selection else [],
             "explanations": [list(selection.accepted), *map(list, selection.competing_models)] if selection else [],

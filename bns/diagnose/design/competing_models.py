@@ -11,7 +11,7 @@ from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.residuals.symbolic import NAME as FORMULA
-from bns.diagnose.select.stepwise import SelectionResult
+from bns.diagnose.select.result import SelectionResult
 from bns.physics.effect import Effect
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
