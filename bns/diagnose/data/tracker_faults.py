@@ -38,7 +38,7 @@ def without_faults(tracks: Tracks) -> Tracks:
     if not found.any():
         return tracks
     count = np.cumsum(found)
-    since_start = count - np.repeat(count[tracks.first[:-1]], np.diff(tracks.first))
+    since_start: NDArray[np.int64] = count - np.repeat(count[tracks.first[:-1]], np.diff(tracks.first))
     seen_before: NDArray[np.bool_] = np.asarray(since_start > 0)
     if seen_before.mean() > MOST_CUT:
         return replace(tracks, jumped=found)
