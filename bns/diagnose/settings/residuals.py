@@ -83,8 +83,8 @@ class Residuals:
     fault_jump: float = setting(
         20.0,
         "standard deviations",
-        "A position off by more within a frame, and by `fault_ways`, is a mistaken marker, and what lies within `outlier_frames` of "
-        f"it says nothing of the robot; {BY_HAND}.",
+        "A position off by more within a frame, and by `fault_ways`, is a mistaken marker, and what lies within `outlier_frames` "
+        f"of it says nothing of the robot; {BY_HAND}.",
     )
     fault_ways: float = setting(
         3.0, "1", "And by more than three times the way of the wheels: no robot does this within a frame."
