@@ -24,14 +24,14 @@ from bns.diagnose.residuals.unexplained import Unexplained, unexplained
 from bns.diagnose.select.equivalents import equivalent_pairs
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
+from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import before_and_after, dependence_values, numbers_of, ranked_values, ties_of
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
 VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
-FEW_TRIALS = 40
-_HINT = 3.0
-"""A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
+FEW_TRIALS = DEFAULTS.verdict.few_trials
+_HINT = DEFAULTS.verdict.hint
 
 
 WITH_EFFECTS = "with the effects"

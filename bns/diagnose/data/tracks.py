@@ -12,14 +12,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bns.diagnose.settings import DEFAULTS
 from bns.measurements import BEFORE, COMMANDS, POSE, SESSION
 
 Array = NDArray[np.float64]
 
-MOST_FRAMES = 16_000
-"""More frames than these are thinned out before a search: it takes time in proportion, and neighbours say the same."""
-RUN_UP_S = 5.0
-"""How long a robot that was in motion when its trial began is taken to have driven like that: any lag has settled."""
+MOST_FRAMES = DEFAULTS.data.most_frames
+RUN_UP_S = DEFAULTS.data.run_up_s
 
 
 @dataclass(frozen=True)

@@ -9,16 +9,14 @@ from itertools import product
 import numpy as np
 
 from bns.diagnose.estimate.fit import Fit, Problem, StartingPoint
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
 
-_SHARES = (0.01, 0.05, 0.2)
-"""Starts of an ordinary number: these shares of the way from neutral to either end of what is plausible."""
-NOTHING = 5e-3
-"""A gain of fewer trials' losses than this, over all trials, is not worth a fit: it would not count (`stepwise.MIN_GAIN`)."""
-_LIMITS = 30
-"""Starts of a number that is neutral at infinity: so many, evenly spaced on a logarithmic scale."""
+_SHARES = DEFAULTS.estimate.start_shares
+NOTHING = DEFAULTS.estimate.start_nothing
+_LIMITS = DEFAULTS.estimate.start_limits
 
 
 def listed(model: Model, extra: Mapping[str, Effect] | None = None) -> dict[str, Effect]:

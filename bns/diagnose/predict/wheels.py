@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array, Tracks, slimmed
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import HORIZONS, windows
+from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
 from bns.physics.differential_drive import taken_at
 from bns.physics.effect import Effect
@@ -21,11 +22,9 @@ from bns.physics.model import ActiveEffect, Model
 from bns.physics.motion import flow_of, wheel_motion, with_body_effects
 from bns.physics.signals import Body, Conditions, View
 
-RECENT_S = 0.15
-"""How fast an event fades in the variables that say what has just happened: soon it does nothing any more."""
-_COARSE_S = 0.1
-_TAIL_S = 1.0
-"""What the last row says, a command or none, is in force this long: poses may be stamped early."""
+RECENT_S = DEFAULTS.predict.recent_s
+_COARSE_S = DEFAULTS.predict.coarse_s
+_TAIL_S = DEFAULTS.predict.tail_s
 _KEPT = 500_000
 """Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
 _MOVING = ("wheel", "body")

@@ -11,6 +11,7 @@ from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
+from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, ties_of
 from bns.physics.decoys import DECOYS
 from bns.physics.effects import all_effects
@@ -22,7 +23,7 @@ _VERDICTS = {
     "unlisted": "Something is missing that no listed effect explains.",
     "insufficient-data": "These measurements do not suffice for a verdict.",
 }
-_SHOWN = 8
+_SHOWN = DEFAULTS.report.rows
 
 
 def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:

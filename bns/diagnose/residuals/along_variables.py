@@ -18,6 +18,7 @@ from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_after
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
 from bns.physics.order import FORMULAS
 from bns.physics.signals import Body
@@ -27,16 +28,11 @@ SHARE = "share_of_motion"
 CHANNELS = ("forward_m_s", "sideways_m_s", "yaw_rad_s", SHARE)
 WORLD = ("east_m_s", "north_m_s")
 """Velocities in the world's frame, for what a place does to the robot."""
-KNOTS = 5
-"""Bends of a free curve: at these many quantiles of the variable."""
-FIELD = 5
-"""A field over the floor has so many bumps a side."""
-PENALTIES = (1.0, 30.0)
-"""How strongly curves are drawn to zero, in expected squares of the standardised curve; the better one counts."""
-CHANCE = 0.02
-"""Chance of any false alarm over all variables and channels."""
-LEAST = 0.0015
-"""Least gain that counts, as a share of the loss."""
+KNOTS = DEFAULTS.residuals.knots
+FIELD = DEFAULTS.residuals.field_bumps
+PENALTIES = DEFAULTS.residuals.penalties
+CHANCE = DEFAULTS.residuals.chance
+LEAST = DEFAULTS.residuals.least
 
 
 @dataclass(frozen=True)
