@@ -24,8 +24,17 @@ def notes_on(
     formula: Formula | None,
     hint: Candidate | None,
     longer: Sequence[tuple[str, ...]] = (),
+    withdrawn: Sequence[str] = (),
 ) -> Iterator[str]:
-    """All notes, one sentence or two each. ``longer``: explanations with one effect more that fit as well."""
+    """All notes, one sentence or two each.
+
+    ``longer``: explanations with one effect more that fit as well; ``withdrawn``: effects with which the error does not fall.
+    """
+    if withdrawn:
+        yield (
+            f"{' with '.join(withdrawn)} would fit better by likelihood, but predictions of trials held out get no better "
+            "(root mean square of the same windows): not presented as an explanation."
+        )
     yield from _on_effects(selection, tracks)
     for names in longer:
         yield f"{' with '.join(names)} would explain as much, with one effect more."

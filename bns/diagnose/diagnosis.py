@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,14 @@ from scipy.stats import t as student
 
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import Tracks
-from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
+from bns.diagnose.estimate.cross_validation import Judged, judged_errors
 from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.predict.horizons import HORIZONS, noise_floor
+from bns.diagnose.predict.paired_errors import PairedErrors, noise_json
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
@@ -32,6 +33,9 @@ _HINT = 3.0
 """A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
 
 
+WITH_EFFECTS = "with the effects"
+"""The name of the refitted model in tables of errors."""
+
 NOTHING_LEFT = Unexplained((), None, ())
 
 
@@ -44,7 +48,8 @@ class Diagnosis:
     residual_dependence: tuple[ResidualDependence, ...] = ()
     rest: Unexplained = NOTHING_LEFT
     formula: Formula | None = None
-    error: Mapping[str, Mapping[str, float]] | None = None
+    errors: PairedErrors | None = None
+    """Of the model as given and, where effects were accepted, of the model with them: on trials held out."""
     notes: tuple[str, ...] = ()
 
     @property
@@ -67,7 +72,8 @@ class Diagnosis:
             "ties": ties_of(selection) if selection else [],
             "explanations": [list(selection.accepted), *map(list, selection.competing_models)] if selection else [],
             "ranking": [_ranked(c) for c in (selection.steps[0].ranking if selection else ())],
-            "error": {h: {name: _plain(v) for name, v in e.items()} for h, e in (self.error or {}).items()},
+            "error": before_and_after(self.errors) if self.errors else {},
+            "tracking_noise": noise_json(self.errors) if self.errors else None,
             "formula": self._formula(),
             "residual_dependence": [_pattern(p) for p in self.residual_dependence],
             "outliers": [vars(o) for o in self.rest.outliers],
@@ -96,12 +102,18 @@ def diagnose(
     extra: Mapping[str, Effect] | None = None,
     tick: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
-    """What the model lacks on these tracks."""
+    """What the model lacks on these tracks. A set of effects with which the held-out error does not fall is withdrawn."""
     search = StepwiseSelection(predictor, model, extra, tick)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
-    selection = search.run()
+    selection = refitted(search.run(), predictor, model)
+    tick("errors on trials held out")
+    errors = errors_before_and_after(selection, model)
+    withdrawn: tuple[str, ...] = ()
+    if selection.accepted and not errors.falls:
+        withdrawn, selection = selection.accepted, selection.withdrawn()
+        errors = errors_before_and_after(selection, model)
     tick("what is left")
     dependence = residual_dependence(selection.problem, selection.fit)
     rest = unexplained(selection.problem, selection.fit, dependence)
@@ -115,15 +127,14 @@ def diagnose(
         effect for name, effect in listed(selection.nominal.model, extra).items() if name not in selection.accepted
     ]
     pairs = [] if rest.any else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
-    tick("errors on trials held out")
     return Diagnosis(
         verdict,
         selection,
         tuple(dependence[:12]),
         rest,
         formula,
-        errors_before_and_after(selection),
-        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs)),
+        errors,
+        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn)),
     )
 
 
@@ -174,19 +185,41 @@ def _hint(selection: SelectionResult, trials: int) -> Candidate | None:
     return near[0] if near else None
 
 
-def errors_before_and_after(selection: SelectionResult) -> dict[str, dict[str, float]]:
-    """Held-out position error (m) at every horizon: nominal model, with the accepted effects, and what noise alone would show."""
+def refitted(selection: SelectionResult, predictor: Predictor, given: Model) -> SelectionResult:
+    """The result with the numbers that `fit_set` finds for its effects: those that `bns add` gives for the same names."""
+    chosen = {a.effect.name: a.effect for a in selection.fit.model.effects}
+    if not selection.accepted or selection.fit.model.per_trial_effect is not None:
+        return selection
+    effects = [chosen[name] for name in selection.accepted]
+    problem, fit, _ = fit_set(predictor, given, effects, known=selection.fit.model)
+    return replace(selection, problem=problem, nominal=problem.fit(given), fit=fit)
+
+
+def errors_before_and_after(selection: SelectionResult, given: Model) -> PairedErrors:
+    """Of the model as given, and of the accepted one with its numbers fitted to other trials, on the same windows."""
     predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
-    before = errors_at_horizons(predictor, held_out_steps(predictor, pose_filter, selection.nominal.model))
-    after = errors_at_horizons(predictor, held_out_steps(predictor, pose_filter, selection.fit.model))
-    return {
-        h: {
-            "before": before[h],
-            "after": after[h],
-            "noise_floor": noise_floor(predictor, pose_filter.noise, h).get("position_m", float("nan")),
+    after = [Judged(WITH_EFFECTS, selection.fit.model, pose_filter)] if selection.accepted else []
+    return judged_errors(predictor, pose_filter, given, after)
+
+
+def before_and_after(errors: PairedErrors) -> dict[str, dict[str, float | int | None]]:
+    """At every horizon: root mean square and median before and after (m), the change with its interval, windows, noise."""
+    out: dict[str, dict[str, float | int | None]] = {}
+    for horizon, e in errors.horizons.items():
+        before, after, change = e.models[0], e.models[-1], e.total
+        out[horizon] = {
+            "before": _plain(before.rms_m),
+            "after": _plain(after.rms_m),
+            "noise_floor": _plain(e.noise_floor_m),
+            "median_before": _plain(before.median_m),
+            "median_after": _plain(after.median_m),
+            "change": _plain(change.change_m) if change else None,
+            "change_low": _plain(change.low_m) if change else None,
+            "change_high": _plain(change.high_m) if change else None,
+            "windows": e.windows,
+            "windows_left_out": e.left_out,
         }
-        for h in HORIZONS
-    }
+    return out
 
 
 def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:

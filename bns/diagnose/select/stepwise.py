@@ -69,6 +69,16 @@ class SelectionResult:
     steps: tuple[SelectionStep, ...]
     competing_models: tuple[tuple[str, ...], ...] = ()
 
+    def withdrawn(self) -> SelectionResult:
+        """The result without its effects: the model as it was, its numbers refitted."""
+        return replace(
+            self, problem=problem_for(self.problem.predictor, self.nominal.model), accepted=(), competing_models=()
+        )._refitted()
+
+    def _refitted(self) -> SelectionResult:
+        fit = self.problem.fit(self.nominal.model)
+        return replace(self, nominal=fit, fit=fit)
+
 
 class StepwiseSelection:
     """A search for the effects that ``model`` lacks, on the tracks of a predictor."""
