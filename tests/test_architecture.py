@@ -11,7 +11,7 @@ import bns
 
 PACKAGE = Path(bns.__file__).parent
 FLOORS = (
-    {"errors", "spec", "measurements", "__init__"},
+    {"errors", "registry", "spec", "measurements", "__init__"},
     {"engine"},
     {"tasks"},
     {"robots"},

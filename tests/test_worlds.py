@@ -95,7 +95,7 @@ def test_what_a_robot_did_is_judged_as_if_it_had_begun_at_the_start():
 def test_a_snake_that_was_laid_down_elsewhere_is_judged_from_the_start_too():
     robot = load_robot("snake")
     did = robot.poses(np.array([[0.1, 0.02, 0.08, 0.0, 1.0], [-0.2, 0.1, 0.0, 0.1, 0.0]]))
-    elsewhere = robot.moved(np.vstack([robot.start_pose(), did]), 0.7, np.array([0.2, -0.1]))
+    elsewhere = robot.transform(np.vstack([robot.start_pose(), did]), 0.7, np.array([0.2, -0.1]))
     assert abs(elsewhere[1:, :8] - did[:, :8]).min() > 1e-3
     np.testing.assert_allclose(in_task_frame(robot, elsewhere), did, atol=1e-12)
 

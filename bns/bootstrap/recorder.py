@@ -43,7 +43,7 @@ class Recorder:
 
     def __init__(self, robot: Robot, task: Task, world: World, key: Key, spec: RunSpec) -> None:
         self._robot, self._task, self._world, self._key = robot, task, world, key
-        self._once = not getattr(world, "repeatable", True)
+        self._once = not world.repeatable
         self._full, self._with_paths = spec.record == "full", spec.record in {"paths", "full"}
         self._evals, self._paths, self._generations, self._probe_rows = (_Columns() for _ in range(4))
         self.last_poses = self.last_simulated = robot.start_pose()[:0]
@@ -60,9 +60,9 @@ class Recorder:
     def drive_evaluated(self, evaluation: int, controller: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Drive the controller picked for this evaluation; its measured poses are what the networks learn from."""
         poses = self._drive(controller, Purpose.WORLD_EVALUATED, evaluation)
-        in_world, goals = self._robot.judge(poses, self._task)
+        in_world, goals = self._robot.evaluate_path(poses, self._task)
         simulated = self._simulated(controller, weights)
-        in_simulation, _ = self._robot.judge(simulated, self._task)
+        in_simulation, _ = self._robot.evaluate_path(simulated, self._task)
         self._evaluated = {
             "evaluated_fitness_simulation": in_simulation,
             "evaluated_fitness_world": in_world,
@@ -87,7 +87,7 @@ class Recorder:
     ) -> dict[str, Any]:
         """Measure the fittest controller in the world and add this evaluation's row."""
         fittest, poses, simulated = self._fittest(evaluation, evolver, weights)
-        in_world, goals = self._robot.judge(poses, self._task)
+        in_world, goals = self._robot.evaluate_path(poses, self._task)
         in_simulation = self._evaluated["evaluated_fitness_simulation"] if self._once else evolver.best_fitness
         self.last_poses, self.last_simulated = poses, simulated
         successes = self._successes("success", poses)
@@ -164,7 +164,7 @@ class Recorder:
                 evaluation=evaluation,
                 generation=generation.number,
                 best_fitness=generation.best_fitness,
-                best_fitness_world=self._robot.judge(driven, self._task)[0],
+                best_fitness_world=self._robot.evaluate_path(driven, self._task)[0],
                 mean_fitness=generation.mean_fitness,
             )
         self._add_probes(evaluation, self._probes, weights)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from bns.sweep.digests import WorldDigests
 from bns.sweep.single_run import keep_run, patient_writer
 from bns.tasks import load_task
 from bns.worlds import build_world
+from bns.worlds.base import RenderableWorld, World
 from bns.worlds.logged import LoggedWorld
 
 
@@ -78,7 +79,7 @@ def run_by_hand(
     )
     told = _report(spec, result, wall_s, figure)
     if render is not None:
-        world.render(robot.plan(result.fittest, result.weights, task), render)  # type: ignore[attr-defined]  # checked above
+        cast(RenderableWorld, world).render(robot.plan(result.fittest, result.weights, task), render)  # checked above
         told += f"\nmoving picture: {render}"
     return told
 
@@ -100,12 +101,12 @@ def _run_on_gpu(spec: RunSpec, progress: Callable[[Mapping[str, Any]], None]) ->
     return run_there(spec, progress)
 
 
-def check_renderable(spec: RunSpec, world: Any, path: Path) -> None:
+def check_renderable(spec: RunSpec, world: World, path: Path) -> None:
     """ModelError if this world has no picture of its robot, or none in such a file."""
-    if not hasattr(world, "render"):
+    if not world.renderable:
         raise ModelError(f"the {spec.world} world of {spec.robot} has nothing to render; leave --render out.")
     check_writable(path)
-    world.check_picture(path)
+    cast(RenderableWorld, world).check_picture(path)
 
 
 def _check_world(spec: RunSpec, results: Path, sweep: str, digest: str) -> None:

@@ -123,7 +123,9 @@ class Trial:
         self._rounds += 1
 
     def _learn(self, number: int, done: Evaluation, weights: np.ndarray) -> Mapping[str, Any]:
-        poses = self.robot.marked_unstable(in_task_frame(self.robot, done.poses), done.unstable)
+        poses = in_task_frame(self.robot, done.poses)
+        if self.robot.marks_unstable:
+            poses = self.robot.marked_unstable(poses, done.unstable)
         self._world.answered(poses)
         self._recorder.drive_evaluated(number, done.commands, weights)
         self._trainer.add(done.commands, poses, number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import cast
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from bns.diagnose.design.sequences import MARGIN_M, Arena, Bounds
 from bns.errors import DataError
 from bns.physics.model import Model
 from bns.robots import load_robot, robot_names
+from bns.robots.base import TwoWheeled
 
 _TOGETHER_M = 0.15
 _TRIAL_S = (6.0, 25.0)
@@ -56,8 +58,8 @@ def bounds_of(tracks: Tracks, model: Model, speeds: str | None) -> Bounds:
     short, long = (float(v) for v in np.quantile(tracks.duration_s[lasting], [0.02, 0.98]))
     name = str(model.provenance.get("begun_from", model.name)).removesuffix("-world")
     robot = load_robot(name) if name in robot_names() else None
-    if robot is not None and hasattr(robot, "wheel_speeds_m_s"):
-        left, _, lasts = robot.wheel_speeds_m_s(np.stack([robot.bounds.low, robot.bounds.high]).astype(float))
+    if robot is not None and robot.two_wheeled:
+        left, _, lasts = cast(TwoWheeled, robot).wheel_speeds_m_s(np.stack([robot.bounds.low, robot.bounds.high]).astype(float))
         low, high = min(low, float(left[0])), max(high, float(left[1]))
         short, long = min(short, float(lasts[0])), max(long, float(lasts[1]))
     if speeds is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ from bns.hardware.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import checked, open_tracker
+
+RIG = resources.files("bns.hardware") / "rigs" / "snake.yaml"
 
 
 class SnakePlatform:
