@@ -28,7 +28,7 @@ Adder = Callable[[str, Callable[[argparse.Namespace], int], str], argparse.Argum
 def add_commands(command: Adder) -> None:
     """The parsers of these commands; ``command`` makes one of a name, a function and a text."""
     read = command("import", import_, "turn a log with other columns or units into a table of measurements")
-    read.add_argument("data", type=Path, metavar="LOG", help="a .csv or .parquet file")
+    read.add_argument("data", type=Path, metavar="LOG", help="a .csv, .parquet or .tuple file (one JSON object a line)")
     read.add_argument(
         "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml beside the log"
     )
@@ -94,6 +94,13 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="FILE.py",
         help="an effect of your own to try beside the listed ones",
+    )
+    parser.add_argument(
+        "--without-effect",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a listed effect that is not to be tried, say because it was measured apart",
     )
 
 
@@ -177,12 +184,13 @@ def diagnose(options: argparse.Namespace) -> int:
 def diagnosed(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model, Diagnosis]:
     """Data, predictor and model of the options, and the diagnosis of what the model lacks."""
     from bns.diagnose.diagnosis import diagnose as find
-    from bns.physics.effects import effect_in_file
+    from bns.physics.effects import effect_in_file, effect_named
 
+    barred = [effect_named(name).name for name in options.without_effect]
     own = {effect.name: effect for effect in map(effect_in_file, map(Path, options.also))}
     measured, predictor, model = ready(options)
     with ticking("diagnosing") as tick:
-        return measured, predictor, model, find(predictor, model, extra=own, tick=tick)
+        return measured, predictor, model, find(predictor, model, extra=own, tick=tick, barred=barred)
 
 
 def add(options: argparse.Namespace) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -101,9 +101,13 @@ def diagnose(
     *,
     extra: Mapping[str, Effect] | None = None,
     tick: Callable[[str], None] = lambda _: None,
+    barred: Collection[str] = (),
 ) -> Diagnosis:
-    """What the model lacks on these tracks. A set of effects with which the held-out error does not fall is withdrawn."""
-    search = StepwiseSelection(predictor, model, extra, tick)
+    """What the model lacks on these tracks, effects named in ``barred`` aside.
+
+    A set of effects with which the held-out error does not fall is withdrawn.
+    """
+    search = StepwiseSelection(predictor, model, extra, tick, barred)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
@@ -124,7 +128,9 @@ def diagnose(
     verdict = _verdict(selection, rest.any, hint)
     tick("longer explanations")
     others = [
-        effect for name, effect in listed(selection.nominal.model, extra).items() if name not in selection.accepted
+        effect
+        for name, effect in listed(selection.nominal.model, extra, predictor.tracks, barred).items()
+        if name not in selection.accepted
     ]
     pairs = [] if rest.any else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
     return Diagnosis(

@@ -16,6 +16,7 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import Finding, checked
 from bns.diagnose.data.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.data.mapping import mapping_beside
+from bns.diagnose.data.relative_motions import read_json_lines
 from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracks import Tracks, tracks_of
 from bns.errors import DataError
@@ -78,6 +79,8 @@ def read_table(path: Path) -> pd.DataFrame:
         if path.name.endswith((".csv", ".csv.gz")):
             separator, decimal = _written(path)
             return pd.read_csv(path, sep=separator, decimal=decimal)
+        if path.suffix == ".tuple":
+            return read_json_lines(path)
         if path.suffix == ".parquet":
             return pd.read_parquet(path)
     except (ValueError, OSError, yaml.YAMLError) as fault:

@@ -62,6 +62,13 @@ class Tracks:
         found[self.first[:-1]] = True
         return found if self.jumped is None else found | self.jumped
 
+    @cached_property
+    def relative(self) -> bool:
+        """Are these single relative motions: two poses a trial, the first one exactly zero?"""
+        return bool(
+            len(self) and (np.diff(self.first) == 2).all() and not self.pose[self.first[:-1]].any()
+        )
+
     def only(self, chosen: NDArray[np.int64]) -> Tracks:
         """Some of the trials, in the order of ``chosen``."""
         selected = [np.arange(self.first[i], self.first[i + 1]) for i in chosen]

@@ -45,6 +45,7 @@ class WheelPredictor:
         self.grid = _grid_of(tracks, dt_s)
         self.conditions = _conditions(tracks, self.grid.node_s)
         self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
+        self.conditions = replace(self.conditions, seen=np.where(_between_frames(tracks, self.grid)[..., None], self._place, np.nan))
         zero = np.zeros_like(self.grid.step_s)
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
         way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[0][:, 0]
@@ -101,6 +102,15 @@ class WheelPredictor:
         began = np.maximum.accumulate(np.where(changed, grid.node_s[:, :-1], 0.0), axis=1)
         speed, turn = (grid.left_m_s + grid.right_m_s) / 2, grid.right_m_s - grid.left_m_s
         way = np.cumsum((np.abs(grid.left_m_s) + np.abs(grid.right_m_s)) / 2 * grid.step_s, axis=1)
+        if tracks.relative:  # measured motions, each by itself: nothing began, and they have no place
+            return {
+                "left_m_s": grid.left_m_s,
+                "right_m_s": grid.right_m_s,
+                "speed_m_s": speed,
+                "wheel_difference_m_s": turn,
+                "session_s": tracks.start_s[:, None] + middle,
+                **{name: self._seen_on_grid(name) for name in self._seen() if name not in {"x_m", "y_m", "heading_rad"}},
+            }
         return {
             "left_m_s": grid.left_m_s,
             "right_m_s": grid.right_m_s,
@@ -251,6 +261,15 @@ def _conditions(tracks: Tracks, node_s: Array) -> Conditions:
         drop = np.stack([_held(tracks, volts, row, middle[row]) for row in range(len(tracks))]) - reference
         drop = -drop
     return Conditions(session_s=tracks.start_s[:, None] + middle, battery_drop_v=drop)
+
+
+def _between_frames(tracks: Tracks, grid: Grid) -> NDArray[np.bool_]:
+    """Steps that lie between the first and the last frame of their trial, (trials, steps)."""
+    lasting = np.diff(tracks.first) > 0
+    first, last = np.full(len(tracks), np.inf), np.full(len(tracks), -np.inf)
+    first[lasting], last[lasting] = tracks.t_s[tracks.first[:-1][lasting]], tracks.t_s[tracks.first[1:][lasting] - 1]
+    node = grid.node_s
+    return np.asarray((node[:, :-1] >= first[:, None] - 1e-9) & (node[:, 1:] <= last[:, None] + 1e-9))
 
 
 def _held(tracks: Tracks, values: Array, trial: int, t_s: Array) -> Array:

@@ -6,7 +6,7 @@ or beyond what is plausible is rejected with its reason.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -89,10 +89,11 @@ class StepwiseSelection:
         model: Model,
         extra: Mapping[str, Effect] | None = None,
         tick: Callable[[str], None] = lambda _: None,
+        barred: Collection[str] = (),
     ) -> None:
         self.predictor, self.model, self.tick = predictor, model.arranged(), tick
         self._extra = extra
-        self.catalogue = listed(self.model, extra)
+        self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 

@@ -1,0 +1,97 @@
+"""A wheel's axle is not in its middle, or the wheel has a bump: it turns unevenly, once in every turn.
+
+Where in its turn a wheel stands when a trial begins is not logged. Where tracks are fitted it is read from them: the headings
+of each half of a trial say where the wheel stood in the other half, so no pose is explained by itself. What remains to be
+fitted are how uneven each wheel is and how far it rolls in a turn. In a simulation the wheels begin where they are fastest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Array, Wheels
+
+_RIDGE = 1e-9
+
+
+def apply(wheels: Wheels, left_share: float, right_share: float, turn_m: float) -> Wheels:
+    """Each wheel's speed times 1 + share·cos(2·pi·way/``turn_m`` + phase)."""
+    angles = [_angle(speed, wheels.step_s, turn_m) for speed in (wheels.left_m_s, wheels.right_m_s)]
+    if wheels.conditions.seen is None or (left_share == 0.0 and right_share == 0.0):
+        waves = [np.cos(angle) for angle in angles]
+    else:
+        waves = _waves(wheels, wheels.conditions.seen[..., 2], angles)
+    return wheels.turning(
+        wheels.left_m_s * (1.0 + left_share * waves[0]), wheels.right_m_s * (1.0 + right_share * waves[1])
+    )
+
+
+def _angle(speed: Array, step_s: Array, turn_m: float) -> Array:
+    """In the middle of each step."""
+    way = speed * step_s
+    angle: Array = (np.cumsum(way, axis=1) - way / 2.0) * (2.0 * np.pi / turn_m)
+    return angle
+
+
+def _waves(wheels: Wheels, heading: Array, angles: list[Array]) -> list[Array]:
+    """cos(angle + phase) of both wheels, the phase of each half of a trial as its other half asks for.
+
+    Where a half says little of it, the wave is as much smaller as the phase is uncertain.
+    """
+    rates = [-wheels.left_m_s / wheels.wheelbase_m, wheels.right_m_s / wheels.wheelbase_m]
+    parts = [rate * wave for rate, angle in zip(rates, angles, strict=True) for wave in (np.cos(angle), np.sin(angle))]
+    columns = np.stack([_until(part, wheels.step_s) for part in parts], axis=2)
+    off = heading - _until(rates[0] + rates[1], wheels.step_s)
+    seen, known = np.isfinite(heading), wheels.trial_s
+    last = np.where(seen, known, -np.inf).max(axis=1, keepdims=True)
+    early = known < last / 2.0
+    pairs = [_pairs(columns, np.where(seen, off, 0.0), known, seen & half) for half in (~early, early)]
+    pair = np.where(early[..., None], pairs[0][:, None], pairs[1][:, None])
+    return [
+        pair[..., 2 * w] * np.cos(angle) + pair[..., 2 * w + 1] * np.sin(angle) for w, angle in enumerate(angles)
+    ]
+
+
+def _until(rate: Array, step_s: Array) -> Array:
+    """What a rate has led to in the middle of each step."""
+    way = rate * step_s
+    out: Array = np.cumsum(way, axis=1) - way / 2.0
+    return out
+
+
+def _pairs(columns: Array, off: Array, known: Array, used: Array) -> Array:
+    """Cosine and sine part of each wheel's wave, (trials, 4): least squares beside a line, then of length 1 or less."""
+    lines = np.stack([np.ones_like(known), known], axis=2)
+    design = np.concatenate([columns, lines], axis=2) * used[..., None]
+    gram = np.einsum("nki,nkj->nij", design, design)
+    scale = np.sqrt(np.maximum(np.einsum("nii->ni", gram), 1e-30))
+    gram = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(6)
+    inverse = np.linalg.inv(gram)
+    fitted = np.einsum("nij,nj->ni", inverse, np.einsum("nki,nk->ni", design, off) / scale)
+    left = (off - np.einsum("nki,ni->nk", design, fitted / scale)) * used
+    spare = np.maximum(used.sum(axis=1) - 6, 1)
+    variance = np.einsum("nii->ni", inverse)[:, :4] * ((left**2).sum(axis=1) / spare)[:, None] / scale[:, :4] ** 2
+    pair = (fitted / scale)[:, :4]
+    length2, unsure = (np.repeat(v[:, ::2] + v[:, 1::2], 2, axis=1) for v in (pair**2, variance))
+    out: Array = pair / np.sqrt(length2 + 1e-30) * (length2 / (length2 + unsure + 1e-30))
+    return out
+
+
+EFFECT = Effect(
+    name="wheel-eccentricity",
+    stage="wheel",
+    parameters=(
+        Parameter("left_share", "1", 0.0, 0.9, (0.0, 0.6), 0.0, "by which the left wheel's speed goes up and down"),
+        Parameter("right_share", "1", 0.0, 0.9, (0.0, 0.6), 0.0, "by which the right wheel's speed goes up and down"),
+        Parameter("turn_m", "m", 5e-3, 20.0, (0.02, 0.6), 0.13, "way of one turn of a wheel", size_power=1.0, resolution=1e-4),
+    ),
+    equation="w' = w·(1 + a·cos(2·pi·way/U + phase)) for each wheel",
+    residuals="The heading swings to and fro with the way driven, once in every turn of a wheel, whatever the speed.",
+    lookalikes=("wheel-mismatch", "yaw-bias"),
+    sentence="a wheel turns unevenly, once in every turn",
+    measurement="mark the wheel, roll it along a ruler, and look how high its axle stands",
+    apply=apply,
+    needs="track",
+    starts=tuple((0.06, 0.06, turn) for turn in np.geomspace(0.05, 0.35, 14).tolist()),
+)
