@@ -64,6 +64,10 @@ def _jump_findings(tracks: Tracks, usable: pd.DataFrame) -> Iterator[Finding]:
     for frame in np.flatnonzero(jumps(tracks)):
         moved = float(np.hypot(*(tracks.pose[frame] - tracks.pose[frame - 1])[:2]))
         trial = tracks.names[tracks.trial[frame]]
+        if tracks.relative:
+            text = f"the sensor's motion, {1e3 * moved:.0f} mm, is one that no drive leads to: it is left out"
+            yield Finding(trial, int(rows[frame]), text)
+            continue
         text = (
             f"the tracked pose jumps by {1e3 * moved:.0f} mm at {tracks.t_s[frame]:.2f} s and stays there: another marker was "
             "taken for the robot's, or somebody moved it; nothing is judged by the poses that follow in this trial"

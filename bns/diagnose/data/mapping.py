@@ -63,8 +63,8 @@ _SI = {
 REPEATED = ("kept", "lost")
 SPLITS = ("standing_s", "lasting_s", "gap_s")
 _LENGTHS = ("wheelbase_m", "hold_commands_s")
-MOTION = ("duration_s", "left_m", "right_m", "x_m", "y_m", "heading_rad")
-"""Of a log of single relative motions (``relative: true``): how long, the way of each wheel, and the displacement."""
+DURATION, WAYS = "duration_s", ("left_m", "right_m")
+"""Of a log of single relative motions (``relative: true``): how long each took, and the way of each wheel in it."""
 _TABLE_KEYS = ("columns", "also", *_LENGTHS, "trials", "repeated_poses", "relative")
 _ALSO_KEYS = ("file", "columns")
 _KEYS = ("from", "unit", "scale", "offset", "clockwise", "zero_deg", "up", "counts")

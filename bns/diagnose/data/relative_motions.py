@@ -12,28 +12,31 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.data.mapping import MOTION
+from bns.diagnose.data.mapping import DURATION, WAYS
 from bns.errors import DataError
 from bns.measurements import COMMANDS, POSE
 
 
 def relative_motions(table: pd.DataFrame) -> pd.DataFrame:
-    """Two rows for each row of ``table``, which has the columns `MOTION` in SI units; further columns stand in both.
+    """Two rows for each row of ``table``: duration_s, the wheels' mean speeds (or left_m, right_m: their ways), x_m, y_m, heading_rad.
 
-    Rows that lasted no time or lack a number are left out. DataError where a column is missing or none is left.
+    Further columns stand in both. Rows that lasted no time or lack a number are left out. DataError where a column is missing
+    or no row is left.
     """
-    missing = [name for name in MOTION if name not in table.columns]
+    ways = {c: table[way] / table[DURATION] for c, way in zip(COMMANDS, WAYS, strict=True) if {way, DURATION} <= set(table)}
+    rows = table.drop(columns=[way for way in WAYS if way in table]).assign(**ways)
+    wanted = [DURATION, *COMMANDS, *POSE]
+    missing = [name for name in wanted if name not in rows.columns]
     if missing:
         raise DataError(
-            f"Relative motions need entries for {', '.join(MOTION)}; the mapping lacks {', '.join(missing)}."
+            f"Relative motions need entries for {', '.join(wanted)} (or {' and '.join(WAYS)}, the ways of the wheels, instead "
+            f"of their speeds); the mapping lacks {', '.join(missing)}."
         )
-    good = np.isfinite(table[list(MOTION)].to_numpy(dtype=float)).all(axis=1) & (table["duration_s"] > 0).to_numpy()
+    good = np.isfinite(rows[wanted].to_numpy(dtype=float)).all(axis=1) & (rows[DURATION] > 0).to_numpy()
     if not good.any():
-        raise DataError("No row has a duration_s above 0 and all numbers of a motion.")
-    rows = table[good].reset_index(drop=True)
-    speeds = {c: rows[side] / rows["duration_s"] for c, side in zip(COMMANDS, ("left_m", "right_m"), strict=True)}
-    ended = rows.drop(columns=list(MOTION[:3])).assign(**speeds, t_s=rows["duration_s"])
-    ended["trial"] = np.arange(len(rows))
+        raise DataError(f"No row has a {DURATION} above 0 and all numbers of a motion.")
+    ended = rows[good].rename(columns={DURATION: "t_s"}).reset_index(drop=True)
+    ended["trial"] = np.arange(len(ended))
     began = ended.assign(t_s=0.0, **dict.fromkeys(POSE, 0.0))
     return pd.concat([began, ended]).sort_values(["trial", "t_s"], kind="stable", ignore_index=True)
 

@@ -64,10 +64,10 @@ class Tracks:
 
     @cached_property
     def relative(self) -> bool:
-        """Are these single relative motions: two poses a trial, the first one exactly zero?"""
-        return bool(
-            len(self) and (np.diff(self.first) == 2).all() and not self.pose[self.first[:-1]].any()
-        )
+        """Are these single relative motions: two poses a trial, the first one exactly zero? (One where the motion was a fault.)"""
+        frames = np.diff(self.first)
+        two = len(frames) and frames.max() == 2 and np.median(frames) == 2
+        return bool(two and not self.pose[self.first[:-1][frames > 0]].any())
 
     def only(self, chosen: NDArray[np.int64]) -> Tracks:
         """Some of the trials, in the order of ``chosen``."""

@@ -50,7 +50,9 @@ def fit_with(problem: Problem, base: Fit, effect: Effect) -> Fit:
 
 def best_start(problem: Problem, base: Fit, effect: Effect) -> StartingPoint:
     """The fitted model with the effect at the most promising of its starts, one step of least squares taken."""
-    starts = [base.model.with_active(effect, values) for values in _starts(effect, problem.predictor.tracks)]
+    lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
+    found = (tuple(np.clip(values, lows, highs).tolist()) for values in _starts(effect, problem.predictor.tracks))
+    starts = [base.model.with_active(effect, values) for values in found]
     losses = [problem.loss(start) for start in starts]
     best = int(np.argmin(losses))
     stepped = problem.gauss_newton_step(starts[best], base)
