@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
+from bns.diagnose.calibration import calibrated
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
@@ -51,6 +52,8 @@ class Diagnosis:
     errors: PairedErrors | None = None
     """Of the model as given and, where effects were accepted, of the model with them: on trials held out."""
     notes: tuple[str, ...] = ()
+    calibration: Fit | None = None
+    """Of single relative motions: all numbers of robot and sensor fitted together (`calibrated`)."""
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -78,6 +81,7 @@ class Diagnosis:
             "residual_dependence": [_pattern(p) for p in self.residual_dependence],
             "outliers": [vars(o) for o in self.rest.outliers],
             "notes": list(self.notes),
+            "calibration": numbers_of(self.calibration) if self.calibration else {},
         }
 
     def _formula(self) -> dict[str, Any] | None:
@@ -141,6 +145,7 @@ def diagnose(
         formula,
         errors,
         tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn)),
+        calibrated(predictor, model, barred),
     )
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.order import ORDER, OTHERS, place
+from bns.physics.signals import Wheels
 
 STAGES = ("wheel", "body", "world", "clock", "measure")
 """In the order in which they act; `bns.physics.signals` says what each one passes on."""
@@ -84,8 +84,8 @@ class Effect:
     """Its place in the chain, unless `bns.physics.order.ORDER` lists it: right after this entry of that tuple."""
     starts: tuple[tuple[float, ...], ...] = ()
     """Values from which a fit may begin; empty where any few values along each number do."""
-    starts_from: Callable[[NDArray[np.float64]], tuple[tuple[float, ...], ...]] | None = field(default=None, repr=False)
-    """Instead of ``starts``: from the tracked places (frames, 2), for what sits somewhere on the floor."""
+    starts_from: Callable[[Wheels], tuple[tuple[float, ...], ...]] | None = field(default=None, repr=False)
+    """Instead of ``starts``: from commands and tracked poses (`Conditions.seen`), for what sits somewhere or has a rhythm."""
     needs: str = ""
     """One of `NEEDS`."""
     needs_place: bool = False

@@ -60,6 +60,15 @@ class Wheels:
         ends: Array = np.cumsum(self.step_s, axis=1)
         return ends - self.step_s / 2.0
 
+    @property
+    def places(self) -> Array:
+        """All tracked places, (n, 2); none where nothing was tracked."""
+        if self.conditions.seen is None:
+            return np.zeros((0, 2))
+        seen = self.conditions.seen[..., :2]
+        out: Array = seen[np.isfinite(seen).all(axis=-1)]
+        return out
+
     def turning(self, left_m_s: Array, right_m_s: Array) -> Wheels:
         """The same with other speeds."""
         return replace(self, left_m_s=left_m_s, right_m_s=right_m_s)

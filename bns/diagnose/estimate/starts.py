@@ -10,6 +10,8 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.fit import Fit, Problem, StartingPoint
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
@@ -51,7 +53,7 @@ def fit_with(problem: Problem, base: Fit, effect: Effect) -> Fit:
 def best_start(problem: Problem, base: Fit, effect: Effect) -> StartingPoint:
     """The fitted model with the effect at the most promising of its starts, one step of least squares taken."""
     lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
-    found = (tuple(np.clip(values, lows, highs).tolist()) for values in _starts(effect, problem.predictor.tracks))
+    found = (tuple(np.clip(values, lows, highs).tolist()) for values in _starts(effect, problem.predictor, base.model))
     starts = [base.model.with_active(effect, values) for values in found]
     losses = [problem.loss(start) for start in starts]
     best = int(np.argmin(losses))
@@ -59,9 +61,9 @@ def best_start(problem: Problem, base: Fit, effect: Effect) -> StartingPoint:
     return stepped if stepped.loss < losses[best] else replace(stepped, model=starts[best], loss=losses[best])
 
 
-def _starts(effect: Effect, tracks: Tracks) -> Iterator[tuple[float, ...]]:
-    if effect.starts_from is not None:
-        yield from effect.starts_from(tracks.pose[:, :2])
+def _starts(effect: Effect, predictor: Predictor, model: Model) -> Iterator[tuple[float, ...]]:
+    if effect.starts_from is not None and isinstance(predictor, WheelPredictor):
+        yield from predictor.starts_of(effect, model.wheelbase_m)
         return
     if effect.starts:
         yield from effect.starts

@@ -18,7 +18,7 @@ from bns.physics.effect import Effect
 from bns.physics.grid import Grid
 from bns.physics.model import ActiveEffect, Model
 from bns.physics.motion import flow_of, wheel_motion, with_body_effects
-from bns.physics.signals import Body, Conditions, View
+from bns.physics.signals import Body, Conditions, View, Wheels
 
 RECENT_S = 0.15
 """How fast an event fades in the variables that say what has just happened: soon it does nothing any more."""
@@ -50,6 +50,7 @@ class WheelPredictor:
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
         way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[0][:, 0]
         self.way_m = self._since_previous(way)
+        self._starts: dict[tuple[str, float], tuple[tuple[float, ...], ...]] = {}
         # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
         kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
         self._wheels = lru_cache(kept)(self._turned)
@@ -85,6 +86,15 @@ class WheelPredictor:
         )
         poses.flags.writeable = sums.flags.writeable = False
         return poses, sums
+
+    def starts_of(self, effect: Effect, wheelbase_m: float) -> tuple[tuple[float, ...], ...]:
+        """What the effect's ``starts_from`` makes of these commands and poses, worked out once; its neutral values if nothing."""
+        known = (effect.name, wheelbase_m)
+        if known not in self._starts and effect.starts_from is not None:
+            grid = self.grid
+            given = Wheels(grid.step_s, grid.left_m_s, grid.right_m_s, wheelbase_m, self.conditions)
+            self._starts[known] = effect.starts_from(given) or (tuple(effect.neutral.values()),)
+        return self._starts[known]
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Back to back within each trial."""

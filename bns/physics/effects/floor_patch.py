@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Body
+from bns.physics.signals import Array, Body, Wheels
 
 _RIM = 0.1
+_PIECE_S, _FEWEST = 0.4, 50
+"""Long enough that a pose's noise is small against the way, short enough to lie at one place."""
+_SIDE, _RADII, _TRIED = 13, (0.06, 0.1, 0.15, 0.22, 0.3), 4
+"""Discs that are looked at: centres a side, radii in diagonals of the floor; and how many of them begin a fit."""
 
 
 def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float) -> Body:
@@ -20,13 +23,41 @@ def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float) -> B
     return body.scaled(1.0 - loss * inside)
 
 
-def starts_from(places: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
-    """A third of the floor's width across, at nine places of it."""
-    low, middle, high = (np.quantile(places, q, axis=0) for q in (0.2, 0.5, 0.8))
-    radius = max(0.4 * float(np.hypot(*(high - low))) / 2.0, 0.02)
-    return tuple(
-        (float(x[0]), float(y[1]), radius, 0.1) for x in (low, middle, high) for y in (low, middle, high)
-    )
+def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
+    """The discs in which the way that was seen differs most from the way that was told, per way told, from all around."""
+    middle, told, seen = _ways(wheels)
+    if len(told) < _FEWEST:
+        return ()
+    low, high = (np.quantile(middle, q, axis=0) for q in (0.03, 0.97))
+    east, north = (np.linspace(low[i], high[i], _SIDE) for i in (0, 1))
+    centres = np.stack(np.meshgrid(east, north), axis=-1).reshape(-1, 2)
+    away = np.hypot(*(middle[None] - centres[:, None]).transpose(2, 0, 1))
+    found = []
+    for radius in np.array(_RADII) * float(np.hypot(*(high - low))):
+        inside = (away < radius).astype(float)
+        way, got = inside @ told, inside @ seen
+        rest, kept = told.sum() - way, seen.sum() - got
+        with np.errstate(divide="ignore", invalid="ignore"):
+            loss = 1.0 - (got / way) / (kept / rest)
+            score = np.nan_to_num(loss**2 * way * rest / told.sum(), posinf=0.0)
+        found += [(score[i], (*centres[i].tolist(), float(radius), float(np.clip(loss[i], -0.9, 0.9)))) for i in [int(score.argmax())]]
+    return tuple(start for _, start in sorted(found, reverse=True)[:_TRIED])
+
+
+def _ways(wheels: Wheels) -> tuple[Array, Array, Array]:
+    """Pieces of about `_PIECE_S`: where they lie (n, 2), the way of the robot's middle as told and as seen (n,)."""
+    if wheels.conditions.seen is None:
+        return np.zeros((0, 2)), np.zeros(0), np.zeros(0)
+    typical = float(np.median(wheels.step_s[wheels.step_s > 0]))
+    k = max(int(round(_PIECE_S / typical)), 1)
+    driven = np.abs(wheels.left_m_s + wheels.right_m_s) / 2.0 * wheels.step_s
+    way = np.cumsum(driven, axis=1) - driven / 2.0
+    places, known = wheels.conditions.seen[..., :2], wheels.trial_s
+    told, seen = way[:, k::k] - way[:, :-k:k], np.hypot(*np.diff(places[:, ::k], axis=1).transpose(2, 0, 1))
+    lasted = known[:, k::k] - known[:, :-k:k]
+    middle = (places[:, :-k:k] + places[:, k::k]) / 2.0
+    good = np.isfinite(seen) & (told > 0.02 * np.quantile(told, 0.9)) & (lasted < 3 * _PIECE_S)
+    return middle[good], told[good], seen[good]
 
 
 EFFECT = Effect(

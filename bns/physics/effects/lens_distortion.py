@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import View
+from bns.physics.signals import View, Wheels
 
 
 def apply(view: View, per_m2: float, x_m: float, y_m: float) -> View:
@@ -20,9 +19,9 @@ def apply(view: View, per_m2: float, x_m: float, y_m: float) -> View:
     return View(np.stack([x + share * east, y + share * north, heading + turned], axis=-1))
 
 
-def starts_from(places: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     """A few percent at the edge of the floor, either way, about its middle."""
-    low, middle, high = (np.quantile(places, q, axis=0) for q in (0.02, 0.5, 0.98))
+    low, middle, high = (np.quantile(wheels.places, q, axis=0) for q in (0.02, 0.5, 0.98))
     small = 0.03 / max(float(np.hypot(*(high - low)) / 2.0) ** 2, 1e-4)
     return tuple((sign * small, float(middle[0]), float(middle[1])) for sign in (1.0, -1.0))
 

@@ -7,10 +7,9 @@ are the calibration's, or `camera-scale` and `camera-rotation`.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import View
+from bns.physics.signals import View, Wheels
 
 _NEAREST = 0.05
 
@@ -25,9 +24,9 @@ def apply(view: View, x_per_m: float, y_per_m: float) -> View:
     return View(np.stack([x / depth, y / depth, heading + np.arctan2(left, ahead)], axis=-1))
 
 
-def starts_from(places: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     """A few percent of the picture's width either way."""
-    small = 0.03 / max(float(np.ptp(places, axis=0).max()), 1e-2)
+    small = 0.03 / max(float(np.ptp(wheels.places, axis=0).max()), 1e-2)
     return ((small, 0.0), (-small, 0.0), (0.0, small), (0.0, -small))
 
 

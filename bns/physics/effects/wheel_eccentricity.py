@@ -13,6 +13,10 @@ from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
 
 _RIDGE = 1e-9
+_RANGE, _TURNS = (0.33, 5.0), 72
+"""Ways of a turn that are looked at, in wheelbases: 4 % apart, as many as some nine turns in a trial can tell apart."""
+_TRIALS, _PEAKS, _BEND = 24, 2, 3
+"""So many trials are looked at, and so many of the best for each wheel tried; slower errors are a cubic of time."""
 
 
 def apply(wheels: Wheels, left_share: float, right_share: float, turn_m: float) -> Wheels:
@@ -78,6 +82,44 @@ def _pairs(columns: Array, off: Array, known: Array, used: Array) -> Array:
     return out
 
 
+def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
+    """The ways of a turn that explain most of the heading, of `_TURNS` between a third and five times the wheelbase."""
+    if wheels.conditions.seen is None:
+        return ()
+    chosen = np.unique(np.linspace(0, len(wheels.step_s) - 1, min(len(wheels.step_s), _TRIALS)).astype(int))
+    speeds, step_s = (wheels.left_m_s[chosen], wheels.right_m_s[chosen]), wheels.step_s[chosen]
+    heading, known = wheels.conditions.seen[chosen, :, 2], wheels.trial_s[chosen]
+    used = np.isfinite(heading)
+    off = np.where(used, heading - _until((speeds[1] - speeds[0]) / wheels.wheelbase_m, step_s), 0.0)
+    bend = np.stack([known**power for power in range(_BEND + 1)], axis=2) * used[..., None]
+    turns = np.geomspace(*_RANGE, _TURNS) * wheels.wheelbase_m
+    out = []
+    for wheel, speed in enumerate(speeds):
+        score = np.array([_explained(_wave_columns(speed, step_s, turn), bend, off) for turn in turns])
+        padded = np.pad(score, 1)
+        peaks = np.flatnonzero((score >= padded[:-2]) & (score >= padded[2:]))
+        best = turns[peaks[np.argsort(-score[peaks])][:_PEAKS]].tolist()
+        out += [(share, 0.0, turn) if wheel == 0 else (0.0, share, turn) for turn in best for share in (0.03, 0.15)]
+    return tuple(out)
+
+
+def _wave_columns(speed: Array, step_s: Array, turn_m: float) -> Array:
+    angle = _angle(speed, step_s, turn_m)
+    return np.stack([_until(speed * wave, step_s) for wave in (np.cos(angle), np.sin(angle))], axis=2)
+
+
+def _explained(columns: Array, bend: Array, off: Array) -> float:
+    """Squares of the heading that columns (trials, steps, k) explain, over those of ``bend`` alone, of all trials."""
+    design = np.concatenate([columns * bend[..., :1], bend], axis=2)
+    gram, target = np.einsum("nki,nkj->nij", design, design), np.einsum("nki,nk->ni", design, off)
+    scale = np.sqrt(np.maximum(np.einsum("nii->ni", gram), 1e-30))
+    gram = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(gram.shape[1])
+    target /= scale
+    k = columns.shape[2]
+    explained = [np.einsum("ni,ni->", t, np.linalg.solve(g, t[..., None])[..., 0]) for g, t in ((gram, target), (gram[:, k:, k:], target[:, k:]))]
+    return float(explained[0] - explained[1])
+
+
 EFFECT = Effect(
     name="wheel-eccentricity",
     stage="wheel",
@@ -93,5 +135,5 @@ EFFECT = Effect(
     measurement="mark the wheel, roll it along a ruler, and look how high its axle stands",
     apply=apply,
     needs="track",
-    starts=tuple((0.06, 0.06, turn) for turn in np.geomspace(0.05, 0.35, 14).tolist()),
+    starts_from=starts_from,
 )
