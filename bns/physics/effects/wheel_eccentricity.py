@@ -50,7 +50,8 @@ def _waves(wheels: Wheels, heading: Array, angles: list[Array]) -> list[Array]:
     seen, known = np.isfinite(heading), wheels.trial_s
     last = np.where(seen, known, -np.inf).max(axis=1, keepdims=True)
     early = known < last / 2.0
-    pairs = [_pairs(columns, np.where(seen, off, 0.0), known, seen & half) for half in (~early, early)]
+    lag = _lag(wheels, angles)
+    pairs = [_pairs(columns, np.where(seen, off, 0.0), seen & half, lag) for half in (~early, early)]
     pair = np.where(early[..., None], pairs[0][:, None], pairs[1][:, None])
     return [
         pair[..., 2 * w] * np.cos(angle) + pair[..., 2 * w + 1] * np.sin(angle) for w, angle in enumerate(angles)
@@ -64,17 +65,30 @@ def _until(rate: Array, step_s: Array) -> Array:
     return out
 
 
-def _pairs(columns: Array, off: Array, known: Array, used: Array) -> Array:
-    """Cosine and sine part of each wheel's wave, (trials, 4): least squares beside a line, then of length 1 or less."""
-    lines = np.stack([np.ones_like(known), known], axis=2)
-    design = np.concatenate([columns, lines], axis=2) * used[..., None]
+def _lag(wheels: Wheels, angles: list[Array]) -> int:
+    """Steps in which a wheel usually does a third of a turn."""
+    turned = np.abs(np.diff(np.concatenate(angles), axis=1))
+    turned = turned[turned > 0]
+    usual = float(np.median(turned)) if len(turned) else np.pi
+    return int(np.clip(round(2.0 * np.pi / 3.0 / usual), 1, max(wheels.step_s.shape[1] // 8, 1)))
+
+
+def _pairs(columns: Array, off: Array, used: Array, lag: int) -> Array:
+    """Cosine and sine part of each wheel's wave, (trials, 4): least squares beside a drift, then of length 1 or less.
+
+    In differences over ``lag`` steps: a heading that wanders with the motors' scatter does not pass for a wave.
+    """
+    columns, off, used = columns[:, lag:] - columns[:, :-lag], off[:, lag:] - off[:, :-lag], used[:, lag:] & used[:, :-lag]
+    off = off * used
+    design = np.concatenate([columns, np.ones_like(off)[..., None]], axis=2) * used[..., None]
     gram = np.einsum("nki,nkj->nij", design, design)
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", gram), 1e-30))
-    gram = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(6)
+    gram = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(5)
     inverse = np.linalg.inv(gram)
     fitted = np.einsum("nij,nj->ni", inverse, np.einsum("nki,nk->ni", design, off) / scale)
     left = (off - np.einsum("nki,ni->nk", design, fitted / scale)) * used
-    spare = np.maximum(used.sum(axis=1) - 6, 1)
+    spare = np.maximum(used.sum(axis=1) / lag - 5, 1)
+    # neighbours overlap: as many differences as lags are independent
     variance = np.einsum("nii->ni", inverse)[:, :4] * ((left**2).sum(axis=1) / spare)[:, None] / scale[:, :4] ** 2
     pair = (fitted / scale)[:, :4]
     length2, unsure = (np.repeat(v[:, ::2] + v[:, 1::2], 2, axis=1) for v in (pair**2, variance))
@@ -124,8 +138,8 @@ EFFECT = Effect(
     name="wheel-eccentricity",
     stage="wheel",
     parameters=(
-        Parameter("left_share", "1", 0.0, 0.9, (0.0, 0.6), 0.0, "by which the left wheel's speed goes up and down"),
-        Parameter("right_share", "1", 0.0, 0.9, (0.0, 0.6), 0.0, "by which the right wheel's speed goes up and down"),
+        Parameter("left_share", "1", -0.9, 0.9, (-0.6, 0.6), 0.0, "by which the left wheel's speed goes up and down"),
+        Parameter("right_share", "1", -0.9, 0.9, (-0.6, 0.6), 0.0, "by which the right wheel's speed goes up and down"),
         Parameter("turn_m", "m", 5e-3, 20.0, (0.02, 0.6), 0.13, "way of one turn of a wheel", size_power=1.0, resolution=1e-4),
     ),
     equation="w' = w·(1 + a·cos(2·pi·way/U + phase)) for each wheel",
