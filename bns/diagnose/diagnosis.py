@@ -21,10 +21,12 @@ from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors, noise_json
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
+from bns.diagnose.residuals.beside_flexible import surviving
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
 from bns.diagnose.select.equivalents import equivalent_pairs
-from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, Candidate, SelectionResult, StepwiseSelection
+from bns.diagnose.select.result import Candidate, SelectionResult
+from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
 from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
 
@@ -71,6 +73,7 @@ class Diagnosis:
         return {
             "verdict": self.verdict,
             "effects": list(self.effects),
+            "implausible": selection.implausible if selection else {},
             "parameters": numbers_of(selection.fit) if selection else {},
             "ties": ties_of(selection) if selection else [],
             "explanations": [list(selection.accepted), *map(list, selection.competing_models)] if selection else [],
@@ -123,8 +126,15 @@ def diagnose(
         withdrawn, selection = selection.accepted, selection.withdrawn()
         errors = errors_before_and_after(selection, model)
     tick("what is left")
-    dependence = residual_dependence(selection.problem, selection.fit)
-    rest = unexplained(selection.problem, selection.fit, dependence)
+    dependence, rest = _left(selection)
+    imitating: tuple[str, ...] = ()
+    if rest.residual_dependence and selection.fit.model.per_trial_effect is None:
+        standing = surviving(selection.problem, selection.fit, selection.accepted, rest.residual_dependence)
+        imitating = tuple(name for name in selection.accepted if name not in standing)
+        if imitating:
+            selection = refitted(selection.only(standing), predictor, model)
+            dependence, rest = _left(selection)
+            errors = errors_before_and_after(selection, model)
     # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
     guesses = rest.residual_dependence or (tuple(dependence[:1]) if rest.outliers else ())
     formula = best_formula(selection.problem, selection.fit, guesses) if guesses else None
@@ -144,9 +154,15 @@ def diagnose(
         rest,
         formula,
         errors,
-        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn)),
+        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, imitating)),
         calibrated(predictor, model, barred),
     )
+
+
+def _left(selection: SelectionResult) -> tuple[list[ResidualDependence], Unexplained]:
+    """Residuals along every variable, and of all that is left what is too large and too certain to be luck."""
+    dependence = residual_dependence(selection.problem, selection.fit)
+    return dependence, unexplained(selection.problem, selection.fit, dependence)
 
 
 def too_little(tracks: Tracks, fewest: int) -> str:

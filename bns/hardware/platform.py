@@ -76,6 +76,9 @@ class PlatformModule(Protocol):
     RIG: Any
     """The file with the example rig, which `--emulated` uses: a path, or what `importlib.resources` gives."""
 
+    REPEATS: int
+    """How often a trial drives its final controller, unless it is told otherwise."""
+
     def open_platform(self, rig: Any, clock: Any, journal: Any, stopping: Any) -> Platform:
         """Open port and tracker; HardwareError if they cannot be used."""
 

@@ -22,6 +22,7 @@ from safetensors.numpy import save
 
 from bns.engine.snn import INPUTS, PER_NEURON, hidden_count
 from bns.errors import ModelError
+from bns.extras import extra
 from bns.robots import load_robot
 from bns.spec import robot_and_options
 
@@ -164,7 +165,8 @@ def load_static_simulator(robot: str) -> StaticSimulator:
 
 def to_torch(networks: tuple[str, ...], weights: np.ndarray) -> torch.nn.ModuleDict:
     """The networks as torch modules, float32: inputs and outputs are the normalised ones of the robot."""
-    import torch  # noqa: PLC0415  # a second to import, and a run does not need it
+    with extra("torch"):
+        import torch  # noqa: PLC0415  # a second to import, and a run does not need it
 
     def module(hidden: int) -> torch.nn.Module:
         layers = {

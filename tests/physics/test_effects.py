@@ -51,7 +51,10 @@ def test_effects_act_in_the_order_of_one_tuple_and_stage_by_stage():
     listed = [name for name in ORDER if name in EFFECTS.own]
     assert len(listed) >= 20
     assert len(set(ORDER)) == len(ORDER)
-    assert sorted(EFFECTS.own, key=lambda name: effect_named(name).place)[: len(listed)] == listed
+    model = Model(wheelbase_m=0.1)
+    for name in sorted(listed):
+        model = model.with_effect(name, **effect_named(name).neutral)
+    assert [active.effect.name for active in model.arranged().effects] == listed
     stages = [STAGES.index(effect_named(name).stage) for name in listed]
     assert stages == sorted(stages)
 

@@ -9,6 +9,8 @@ import pytest
 from bns.errors import HardwareError, ModelError, SpecError
 from bns.physics.effects import effect_named
 from bns.registry import EFFECTS, FIGURES, ROBOTS, TRACKERS, Registry
+from bns.robots.base import Robot
+from bns.tasks import TASKS
 from tests.plugins.package import announce
 
 
@@ -105,3 +107,31 @@ def test_listing_names_imports_no_part():
 def test_figures_are_called_as_they_say_not_as_their_files():
     assert FIGURES.own["paths"][0].module == "analysis.paths"
     assert all(module.replace("_", "-").endswith(name) for name, (part,) in FIGURES.own.items() for module in [part.module])
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("khepera.ring", r"task 'khepera\.ring' of the package tasks-of-mine 1\.0 .*it calls itself 'hoop'; .*ROBOT\.hoop"),
+        ("khepera.gap", r"task 'khepera\.gap' of the package tasks-of-mine 1\.0 .*it is no bns\.tasks\.Task"),
+    ],
+)
+def test_a_task_that_is_none_is_refused_by_its_package(tmp_path, monkeypatch, name, said):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "mine.py").write_text("from bns.tasks import Task\nRING, GAP = Task('hoop', 'a', 'b', None), 3\n")
+    announce(tmp_path, "tasks-of-mine", {"bns.tasks": {"khepera.ring": "mine:RING", "khepera.gap": "mine:GAP"}})
+    registry = type(TASKS)("task", "tasks", "bns.tasks", "", "", (), SpecError)
+    assert registry.load("khepera.circle").name == "circle"
+    with pytest.raises(SpecError, match=said):
+        registry.load(name)
+
+
+def test_a_robot_is_asked_for_a_few_things_at_a_time():
+    parts = [base for base in Robot.__mro__ if base.__module__ == Robot.__module__ and base is not Robot]
+    asked = {part.__name__: [name for name, one in vars(part).items() if callable(one) and name[0] != "_"] for part in parts}
+    assert len(parts) == 9
+    assert all(1 <= len(methods) <= 5 for methods in asked.values()), asked
+    declared = {name for part in (Robot, *parts) for name in part.__annotations__}
+    for name in ROBOTS.own:
+        robot = ROBOTS.load(name)
+        assert all(hasattr(robot, one) for one in (*declared, *(m for methods in asked.values() for m in methods))), name

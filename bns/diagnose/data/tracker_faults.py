@@ -37,7 +37,9 @@ def without_faults(tracks: Tracks) -> Tracks:
     found = jumps(tracks)
     if not found.any():
         return tracks
-    seen_before = np.cumsum(found) - np.repeat(np.cumsum(found)[tracks.first[:-1]], np.diff(tracks.first)) > 0
+    count = np.cumsum(found)
+    since_start: NDArray[np.int64] = count - np.repeat(count[tracks.first[:-1]], np.diff(tracks.first))
+    seen_before: NDArray[np.bool_] = np.asarray(since_start > 0)
     if seen_before.mean() > MOST_CUT:
         return replace(tracks, jumped=found)
     return tracks.at_frames([np.flatnonzero(~seen_before[a:b]) + a for a, b in pairwise(tracks.first)])

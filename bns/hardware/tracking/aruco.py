@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Camera, Frame, FrameTracker, open_camera
@@ -21,6 +21,8 @@ from bns.hardware.tracking.sight import Sight
 if TYPE_CHECKING:
     from bns.hardware.clock import EmulatedClock
     from bns.hardware.emulators.faults import Faults
+with extra("robot"):
+    import cv2
 
 SETTINGS = Settings(("camera", "calibration", "side_m", "height_m"), ("number",), ("side_m", "height_m"))
 _WORST_SHARE = 0.1

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from bns.errors import ClusterError
+from bns.extras import MissingExtraError
 from bns.registry import EXECUTORS
 from bns.sweep.grid import Sweep
 from bns.sweep.request import Placement, Request
@@ -33,11 +34,6 @@ def load_executor(name: str) -> Backend:
     """The backend called ``name``; ClusterError if there is none or its libraries are not installed."""
     try:
         backend: Backend = EXECUTORS.load(name)
-    except ModuleNotFoundError as error:
-        if (error.name or "").startswith("bns"):
-            raise
-        raise ClusterError(
-            f"--executor {name} needs the library {error.name}, which is not installed. Install it with: "
-            "pip install 'bns[cluster]'"
-        ) from error
+    except MissingExtraError as error:
+        raise ClusterError(f"--executor {name}: {error}") from error
     return backend

@@ -1,0 +1,124 @@
+"""`bns.add`: effects added to a model, fitted to measurements, with the error before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike, fspath
+from typing import Any
+
+import pandas as pd
+from matplotlib.axes import Axes
+
+from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.provenance import provenance
+from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.measurements import Log
+from bns.api.model import Given, Model
+from bns.diagnose.adding import ExtendedModel, add_effects, effect_from
+from bns.diagnose.diagnosis import numbers_of
+from bns.diagnose.predict.paired_errors import noise_json
+from bns.diagnose.report.figures import error_by_step_axes
+from bns.diagnose.report.text import extension_text
+from bns.errors import ModelError
+from bns.physics.effect import Effect
+
+Wanted = str | PathLike[str] | Effect
+
+
+@dataclass(frozen=True, repr=False)
+class AddResult(Shown):
+    """A model with effects added and all its numbers refitted."""
+
+    ready: Prepared
+    extended: ExtendedModel
+
+    @property
+    def model(self) -> Model:
+        """The new model, with 95 % intervals and where its numbers come from; `bns.Model.save` writes it."""
+        return Model(self.extended.model)
+
+    @property
+    def errors(self) -> pd.DataFrame:
+        """Position error on held-out trials (m, root mean square), all on the same windows: a row a step (as given, then each
+        effect added in turn; last the noise of the tracking), a column a horizon. NaN where there are no such windows."""
+        horizons = self.extended.errors.horizons
+        steps = {
+            name: {h: e.models[k].rms_m for h, e in horizons.items()} for k, name in enumerate(self.extended.names)
+        }
+        noise = {h: e.noise_floor_m for h, e in horizons.items()}
+        return pd.DataFrame({**steps, "tracking noise": noise}).T.rename_axis("step")
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know before using the model: numbers at a bound, effects that do nothing, an error that does not fall."""
+        return self.extended.warnings
+
+    def summary(self) -> str:
+        """The error by step, and the numbers."""
+        return extension_text(self.extended)
+
+    def to_json(self) -> dict[str, Any]:
+        """One object of plain values, the same that `bns add --json` prints."""
+        return {
+            "model": self.extended.model.name,
+            "effects": list(self.extended.names[1:]),
+            "parameters": numbers_of(self.extended.fit),
+            "error": self.extended.errors.as_json(),
+            "tracking_noise": noise_json(self.extended.errors),
+            "warnings": list(self.extended.warnings),
+            "provenance": provenance(self.ready.model, self.ready.log.sha256),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """The error at every step of the way, a line a horizon; dotted: the noise of the tracking."""
+        return drawn(ax, lambda axes: error_by_step_axes(axes, self.extended), (5.4, 3.0))
+
+    def _line(self) -> str:
+        e = self.extended.errors.horizons[self.ready.predictor.near]
+        fell = f"{1e3 * e.models[0].rms_m:.1f} mm to {1e3 * e.models[-1].rms_m:.1f} mm"
+        return f"{self.ready.model.name} + {' + '.join(self.extended.names[1:])}: {fell}, {e.horizon} ahead"
+
+
+def add(
+    log: Log,
+    effects: Wanted | Sequence[Wanted],
+    model: Given,
+    *,
+    term: str | None = None,
+    on: str = "v",
+    per_trial: bool = False,
+    progress: Progress | None = None,
+) -> AddResult:
+    """Add effects to a model one after the other, and fit all of its numbers to measurements.
+
+    Args:
+        log: a file, a table, or `bns.Measurements`.
+        effects: names of listed effects (`bns.effects`), Python files with an ``EFFECT``, `bns.Effect`, or several of these.
+        model: `bns.Model`, or the name or file of one.
+        term: makes the one name given a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w, s, east or north.
+        per_trial: an effect that may differ from trial to trial (clock-offset) has a value of its own in each.
+        progress: told what is being done.
+
+    Raises:
+        ModelError: no such effect or model, or the model has the effect already.
+        DataError: measurements that cannot be used, or of another robot.
+    """
+    wanted = [effects] if isinstance(effects, str | PathLike | Effect) else list(effects)
+    if not wanted:
+        raise ModelError("No effect is given; give at least one name of bns.effects().")
+    if term is not None and len(wanted) != 1:
+        names = ", ".join(map(_name, wanted))
+        raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
+    chosen = [_effect(each, term, on) for each in wanted]
+    ready = prepared(log, model)
+    ticks(progress)("fitting")
+    return AddResult(ready, add_effects(ready.predictor, ready.model, chosen, ready.measured, per_trial))
+
+
+def _effect(wanted: Wanted, term: str | None, on: str) -> tuple[Effect, Mapping[str, str]]:
+    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), term, on)
+
+
+def _name(wanted: Wanted) -> str:
+    return wanted.name if isinstance(wanted, Effect) else fspath(wanted)
