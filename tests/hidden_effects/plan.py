@@ -110,7 +110,8 @@ TIES: dict[str, dict[str, Parameters]] = {
 }
 
 
-QUICK = {"single": 6, "pair": 3, "none": 3, "unlisted": 3, "tie": 3, "single-hard": 2, "new": 4, "removed": 3, "triple": 2, "size": 3}
+QUICK = {"single": 6, "pair": 3, "none": 3, "unlisted": 3, "tie": 3, "single-hard": 2}
+QUICK |= {"new": 4, "removed": 3, "triple": 2, "size": 3}
 """How many worlds of each family a quick look takes, evenly spread over it."""
 
 

@@ -1,4 +1,4 @@
-"""Worlds of the longer list: each of its effects as listed and taken out of the list, three at once, other robots and trackers."""
+"""Worlds of the longer list: each effect listed and taken out of it; three at once; other robots and trackers."""
 
 from __future__ import annotations
 
@@ -38,12 +38,24 @@ TURNING = {"backlash", "caster-swing", "stribeck"}
 TRIPLES: tuple[dict[str, Parameters], ...] = (
     {"speed-gain": {"gain": 0.94}, "wheel-mismatch": {"ratio": 0.975}, "motor-lag": {"tau_s": 0.12}},
     {"wheelbase": {"factor": 1.08}, "side-slip": {"slip_s": 0.08}, "yaw-bias": {"rate_rad_s": -0.03}},
-    {"dead-zone": {"width_m_s": 0.008}, "wheelbase": {"factor": 0.94}, "marker-offset": {"forward_m": 0.02, "left_m": 0.01}},
-    {"turn-slip": {"slip_s": 0.08}, "wheel-mismatch": {"ratio": 1.03}, "floor-slope": {"x_m_s": 0.006, "y_m_s": -0.003}},
+    {
+        "dead-zone": {"width_m_s": 0.008},
+        "wheelbase": {"factor": 0.94},
+        "marker-offset": {"forward_m": 0.02, "left_m": 0.01},
+    },
+    {
+        "turn-slip": {"slip_s": 0.08},
+        "wheel-mismatch": {"ratio": 1.03},
+        "floor-slope": {"x_m_s": 0.006, "y_m_s": -0.003},
+    },
     {"warm-up": LONGER["warm-up"][1], "wheelbase": {"factor": 1.06}, "camera-rotation": {"angle_rad": -0.06}},
     {"floor-patch": LONGER["floor-patch"][1], "speed-gain": {"gain": 1.05}, "wheel-mismatch": {"ratio": 1.02}},
     {"backlash": LONGER["backlash"][0], "motor-lag": {"tau_s": 0.1}, "wheel-mismatch": {"ratio": 0.98}},
-    {"wheel-eccentricity": LONGER["wheel-eccentricity"][1], "wheelbase": {"factor": 0.95}, "speed-limit": {"max_m_s": 0.16}},
+    {
+        "wheel-eccentricity": LONGER["wheel-eccentricity"][1],
+        "wheelbase": {"factor": 0.95},
+        "speed-limit": {"max_m_s": 0.16},
+    },
 )
 
 SIZED = ("tiny", "large", "vehicle")

@@ -23,10 +23,10 @@ from tests.hidden_effects.listed import (
     WheelMismatch,
     YawBias,
 )  # fmt: skip
-from tests.hidden_effects.luck import luck
-from tests.hidden_effects.motion import mean_commands, move
 from tests.hidden_effects.listed_floor import FloorPatch
 from tests.hidden_effects.listed_motors import Backlash
+from tests.hidden_effects.luck import luck
+from tests.hidden_effects.motion import mean_commands, move
 from tests.hidden_effects.unlisted import Kicks, Swing
 from tests.hidden_effects.unlisted_motors import LateStart, LooseWheel, Overshoot, SpeedLag, Stalls, WeakSupply
 

@@ -18,12 +18,14 @@ from bns.measurements import COMMANDS, POSE
 
 
 def relative_motions(table: pd.DataFrame) -> pd.DataFrame:
-    """Two rows for each row of ``table``: duration_s, the wheels' mean speeds (or left_m, right_m: their ways), x_m, y_m, heading_rad.
+    """Two rows for each row of ``table``, which has duration_s, the wheels' mean speeds and x_m, y_m, heading_rad.
 
-    Further columns stand in both. Rows that lasted no time or lack a number are left out. DataError where a column is missing
+    left_m and right_m, the ways of the wheels, may stand for their speeds. Further columns stand in both. Rows that lasted no time or lack a number are left out. DataError where a column is missing
     or no row is left.
     """
-    ways = {c: table[way] / table[DURATION] for c, way in zip(COMMANDS, WAYS, strict=True) if {way, DURATION} <= set(table)}
+    ways = {
+        c: table[way] / table[DURATION] for c, way in zip(COMMANDS, WAYS, strict=True) if {way, DURATION} <= set(table)
+    }
     rows = table.drop(columns=[way for way in WAYS if way in table]).assign(**ways)
     wanted = [DURATION, *COMMANDS, *POSE]
     missing = [name for name in wanted if name not in rows.columns]
@@ -56,7 +58,7 @@ def read_json_lines(path: Path) -> pd.DataFrame:
 
 def _flat(row: object) -> dict[str, object]:
     if not isinstance(row, dict):
-        raise ValueError(f"it is {row!r}")
+        raise ValueError(f"it is {row!r}")  # noqa: TRY004  # of the file's text, as json's own
     out: dict[str, object] = {}
     for name, value in row.items():
         out |= {f"{name}_{i}": v for i, v in enumerate(value)} if isinstance(value, list) else {name: value}

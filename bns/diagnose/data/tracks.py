@@ -64,7 +64,7 @@ class Tracks:
 
     @cached_property
     def relative(self) -> bool:
-        """Are these single relative motions: two poses a trial, the first one exactly zero? (One where the motion was a fault.)"""
+        """Are these single relative motions: two poses a trial, the first exactly zero? (One, where the motion was a fault.)"""
         frames = np.diff(self.first)
         two = len(frames) and frames.max() == 2 and np.median(frames) == 2
         return bool(two and not self.pose[self.first[:-1][frames > 0]].any())

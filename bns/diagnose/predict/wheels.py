@@ -44,9 +44,9 @@ class WheelPredictor:
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
         self.tracks, self._dt_s = tracks, dt_s
         self.grid = _grid_of(tracks, dt_s)
-        self.conditions = _conditions(tracks, self.grid.node_s)
         self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
-        self.conditions = replace(self.conditions, seen=np.where(_between_frames(tracks, self.grid)[..., None], self._place, np.nan))
+        seen = np.where(_between_frames(tracks, self.grid)[..., None], self._place, np.nan)
+        self.conditions = replace(_conditions(tracks, self.grid.node_s), seen=seen)
         zero = np.zeros_like(self.grid.step_s)
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
         way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[0][:, 0]

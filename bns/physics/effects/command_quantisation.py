@@ -24,7 +24,9 @@ EFFECT = Effect(
     name="command-quantisation",
     stage="wheel",
     parameters=(
-        Parameter("step_m_s", "m/s", 0.0, 2.0, (0.0, 0.3), 0.0, "distance of the speeds that a wheel knows", resolution=2e-5),
+        Parameter(
+            "step_m_s", "m/s", 0.0, 2.0, (0.0, 0.3), 0.0, "distance of the speeds that a wheel knows", resolution=2e-5
+        ),
     ),
     equation="u' = step·round(u/step) for each wheel",
     residuals="Errors repeat with the command, now fast and now slow, up to half a step; equal commands err equally.",

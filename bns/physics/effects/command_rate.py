@@ -24,7 +24,16 @@ EFFECT = Effect(
     name="command-rate",
     stage="wheel",
     parameters=(
-        Parameter("period_s", "s", 0.0, 5.0, (0.0, 1.5), 0.0, "time between two commands that the robot heeds", resolution=1e-4),
+        Parameter(
+            "period_s",
+            "s",
+            0.0,
+            5.0,
+            (0.0, 1.5),
+            0.0,
+            "time between two commands that the robot heeds",
+            resolution=1e-4,
+        ),
     ),
     equation="u'(t) = u(period·floor(t/period))",
     residuals="Commands act late by anything from nothing to one period, by what is missing to the next tick of a clock.",

@@ -1,4 +1,7 @@
-"""A round patch of floor on which the robot is slower: a carpet's edge, oil, a wet spot. Its rim is a tenth of its radius wide."""
+"""A round patch of floor on which the robot is slower: a carpet's edge, oil, a wet spot.
+
+Its rim is a tenth of its radius wide.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +43,10 @@ def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
         with np.errstate(divide="ignore", invalid="ignore"):
             loss = 1.0 - (got / way) / (kept / rest)
             score = np.nan_to_num(loss**2 * way * rest / told.sum(), posinf=0.0)
-        found += [(score[i], (*centres[i].tolist(), float(radius), float(np.clip(loss[i], -0.9, 0.9)))) for i in [int(score.argmax())]]
+        found += [
+            (score[i], (*centres[i].tolist(), float(radius), float(np.clip(loss[i], -0.9, 0.9))))
+            for i in [int(score.argmax())]
+        ]
     return tuple(start for _, start in sorted(found, reverse=True)[:_TRIED])
 
 
@@ -49,7 +55,7 @@ def _ways(wheels: Wheels) -> tuple[Array, Array, Array]:
     if wheels.conditions.seen is None:
         return np.zeros((0, 2)), np.zeros(0), np.zeros(0)
     typical = float(np.median(wheels.step_s[wheels.step_s > 0]))
-    k = max(int(round(_PIECE_S / typical)), 1)
+    k = max(round(_PIECE_S / typical), 1)
     driven = np.abs(wheels.left_m_s + wheels.right_m_s) / 2.0 * wheels.step_s
     way = np.cumsum(driven, axis=1) - driven / 2.0
     places, known = wheels.conditions.seen[..., :2], wheels.trial_s

@@ -39,7 +39,9 @@ EFFECT = Effect(
     name="heating",
     stage="wheel",
     parameters=(
-        Parameter("loss_per_m", "1/m", 0.0, 2.0, (0.0, 0.3), 0.0, "share of speed lost a metre driven", size_power=-1.0),
+        Parameter(
+            "loss_per_m", "1/m", 0.0, 2.0, (0.0, 0.3), 0.0, "share of speed lost a metre driven", size_power=-1.0
+        ),
         Parameter("cool_s", "s", 1.0, 1e5, (3.0, 3000.0), 60.0, "time in which a motor cools", resolution=0.1),
     ),
     equation="dh/dt = |w| - h/cool, w' = w·(1 - k·h) for each wheel, h from trial to trial",

@@ -30,7 +30,16 @@ EFFECT = Effect(
     name="lens-distortion",
     stage="measure",
     parameters=(
-        Parameter("per_m2", "1/m^2", -2.0, 2.0, (-0.3, 0.3), 0.0, "share by which a place a metre off the centre is moved out", resolution=1e-4),
+        Parameter(
+            "per_m2",
+            "1/m^2",
+            -2.0,
+            2.0,
+            (-0.3, 0.3),
+            0.0,
+            "share by which a place a metre off the centre is moved out",
+            resolution=1e-4,
+        ),
         Parameter("x_m", "m", -1e3, 1e3, (-100.0, 100.0), 0.0, "centre of the lens, east", resolution=5e-3),
         Parameter("y_m", "m", -1e3, 1e3, (-100.0, 100.0), 0.0, "centre of the lens, north", resolution=5e-3),
     ),

@@ -26,7 +26,9 @@ EFFECT = Effect(
     stage="measure",
     parameters=(
         Parameter("forward_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker ahead of the axle's middle", size_power=1.0),
-        Parameter("left_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker to the left of the axle's middle", size_power=1.0),
+        Parameter(
+            "left_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker to the left of the axle's middle", size_power=1.0
+        ),
     ),
     equation="x' = x + f·cos(theta) - s·sin(theta), y' = y + f·sin(theta) + s·cos(theta)",
     residuals="Turns on the spot move the robot on a circle; straight commands fit.",

@@ -23,7 +23,16 @@ EFFECT = Effect(
     name="sensor-rotation",
     stage="measure",
     parameters=(
-        Parameter("angle_rad", "rad", -3.2, 3.2, (-3.15, 3.15), 0.0, "sensor's x axis against the robot's, left positive", resolution=1e-3),
+        Parameter(
+            "angle_rad",
+            "rad",
+            -3.2,
+            3.2,
+            (-3.15, 3.15),
+            0.0,
+            "sensor's x axis against the robot's, left positive",
+            resolution=1e-3,
+        ),
     ),
     equation="theta' = theta + a: the displacement in the sensor's frame is the robot's, turned by -a",
     residuals="Every displacement points away from straight ahead by one angle, the same one always, also in reverse.",
@@ -32,5 +41,7 @@ EFFECT = Effect(
     measurement="drive straight along a wall and compare the wall's direction in the sensor's picture",
     apply=apply,
     needs="motions",
-    starts=tuple((sign * a,) for a in (0.01, 0.1, math.pi / 4, math.pi / 2, 3 * math.pi / 4, math.pi) for sign in (1, -1)),
+    starts=tuple(
+        (sign * a,) for a in (0.01, 0.1, math.pi / 4, math.pi / 2, 3 * math.pi / 4, math.pi) for sign in (1, -1)
+    ),
 )

@@ -24,8 +24,12 @@ EFFECT = Effect(
     name="stribeck",
     stage="wheel",
     parameters=(
-        Parameter("width_m_s", "m/s", 0.0, 1.0, (0.0, 0.15), 0.0, "speed lost by a wheel that hardly turns", size_power=1.0),
-        Parameter("fade_m_s", "m/s", 1e-3, 5.0, (2e-3, 0.5), 0.05, "speed at which a third of that is left", size_power=1.0),
+        Parameter(
+            "width_m_s", "m/s", 0.0, 1.0, (0.0, 0.15), 0.0, "speed lost by a wheel that hardly turns", size_power=1.0
+        ),
+        Parameter(
+            "fade_m_s", "m/s", 1e-3, 5.0, (2e-3, 0.5), 0.05, "speed at which a third of that is left", size_power=1.0
+        ),
     ),
     equation="w = sign(u)·max(|u| - d·exp(-|u|/f), 0) for each wheel",
     residuals="Slow commands fall short, and the loss vanishes as speed grows: fast ones fit.",

@@ -20,12 +20,16 @@ EFFECT = Effect(
     name="turn-slip-quadratic",
     stage="body",
     parameters=(
-        Parameter("slip_s2", "s^2/rad^2", 0.0, 1.0, (0.0, 0.4), 0.0, "share of speed lost per squared rad/s of turning"),
+        Parameter(
+            "slip_s2", "s^2/rad^2", 0.0, 1.0, (0.0, 0.4), 0.0, "share of speed lost per squared rad/s of turning"
+        ),
     ),
     equation="v' = v·max(1 - k·omega^2, 0)",
     residuals="Sharp arcs are far too short, wide ones nearly right, left and right alike; headings fit.",
     lookalikes=("turn-slip", "side-slip"),
     sentence="turning sharply costs much forward speed, turning gently little",
-    beside={"turn-slip": "The two differ in how the loss grows: drive arcs of one speed at three turn rates, the highest twice the middle."},
+    beside={
+        "turn-slip": "They differ in how the loss grows: drive arcs of one speed at two turn rates, one twice the other."
+    },
     apply=apply,
 )

@@ -18,7 +18,9 @@ EFFECT = Effect(
     name="warm-up",
     stage="wheel",
     parameters=(
-        Parameter("loss", "1", -1.0, 1.0, (-0.9, 0.9), 0.0, "share of speed lost at the start of a trial (negative: gained)"),
+        Parameter(
+            "loss", "1", -1.0, 1.0, (-0.9, 0.9), 0.0, "share of speed lost at the start of a trial (negative: gained)"
+        ),
         Parameter("time_s", "s", 0.1, 600.0, (0.3, 120.0), 3.0, "time in which that fades to a third", resolution=0.01),
     ),
     equation="u' = u·(1 - k·exp(-t/T)) for each wheel, t since the trial began",

@@ -53,9 +53,7 @@ def _waves(wheels: Wheels, heading: Array, angles: list[Array]) -> list[Array]:
     lag = _lag(wheels, angles)
     pairs = [_pairs(columns, np.where(seen, off, 0.0), seen & half, lag) for half in (~early, early)]
     pair = np.where(early[..., None], pairs[0][:, None], pairs[1][:, None])
-    return [
-        pair[..., 2 * w] * np.cos(angle) + pair[..., 2 * w + 1] * np.sin(angle) for w, angle in enumerate(angles)
-    ]
+    return [pair[..., 2 * w] * np.cos(angle) + pair[..., 2 * w + 1] * np.sin(angle) for w, angle in enumerate(angles)]
 
 
 def _until(rate: Array, step_s: Array) -> Array:
@@ -78,7 +76,11 @@ def _pairs(columns: Array, off: Array, used: Array, lag: int) -> Array:
 
     In differences over ``lag`` steps: a heading that wanders with the motors' scatter does not pass for a wave.
     """
-    columns, off, used = columns[:, lag:] - columns[:, :-lag], off[:, lag:] - off[:, :-lag], used[:, lag:] & used[:, :-lag]
+    columns, off, used = (
+        columns[:, lag:] - columns[:, :-lag],
+        off[:, lag:] - off[:, :-lag],
+        used[:, lag:] & used[:, :-lag],
+    )
     off = off * used
     design = np.concatenate([columns, np.ones_like(off)[..., None]], axis=2) * used[..., None]
     gram = np.einsum("nki,nkj->nij", design, design)
@@ -130,7 +132,10 @@ def _explained(columns: Array, bend: Array, off: Array) -> float:
     gram = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(gram.shape[1])
     target /= scale
     k = columns.shape[2]
-    explained = [np.einsum("ni,ni->", t, np.linalg.solve(g, t[..., None])[..., 0]) for g, t in ((gram, target), (gram[:, k:, k:], target[:, k:]))]
+    explained = [
+        np.einsum("ni,ni->", t, np.linalg.solve(g, t[..., None])[..., 0])
+        for g, t in ((gram, target), (gram[:, k:, k:], target[:, k:]))
+    ]
     return float(explained[0] - explained[1])
 
 
@@ -140,7 +145,9 @@ EFFECT = Effect(
     parameters=(
         Parameter("left_share", "1", -0.9, 0.9, (-0.6, 0.6), 0.0, "by which the left wheel's speed goes up and down"),
         Parameter("right_share", "1", -0.9, 0.9, (-0.6, 0.6), 0.0, "by which the right wheel's speed goes up and down"),
-        Parameter("turn_m", "m", 5e-3, 20.0, (0.02, 0.6), 0.13, "way of one turn of a wheel", size_power=1.0, resolution=1e-4),
+        Parameter(
+            "turn_m", "m", 5e-3, 20.0, (0.02, 0.6), 0.13, "way of one turn of a wheel", size_power=1.0, resolution=1e-4
+        ),
     ),
     equation="w' = w·(1 + a·cos(2·pi·way/U + phase)) for each wheel",
     residuals="The heading swings to and fro with the way driven, once in every turn of a wheel, whatever the speed.",
