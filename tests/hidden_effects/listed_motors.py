@@ -15,9 +15,11 @@ class CommandQuantisation(Cause):
     """The controller knows multiples of a step."""
 
     step_m_s: float
+    share: float = 1.0
 
     def command(self, wheels: np.ndarray) -> np.ndarray:
-        return np.floor(wheels / self.step_m_s + 0.5) * self.step_m_s
+        known = np.floor(wheels / self.step_m_s + 0.5) * self.step_m_s
+        return (1 - self.share) * wheels + self.share * known
 
 
 @dataclass

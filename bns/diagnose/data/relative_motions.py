@@ -20,8 +20,8 @@ from bns.measurements import COMMANDS, POSE
 def relative_motions(table: pd.DataFrame) -> pd.DataFrame:
     """Two rows for each row of ``table``, which has duration_s, the wheels' mean speeds and x_m, y_m, heading_rad.
 
-    left_m and right_m, the ways of the wheels, may stand for their speeds. Further columns stand in both. Rows that lasted no time or lack a number are left out. DataError where a column is missing
-    or no row is left.
+    left_m and right_m, the ways of the wheels, may stand for their speeds. Further columns stand in both. Rows that lasted
+    no time or lack a number are left out. DataError where a column is missing or no row is left.
     """
     ways = {
         c: table[way] / table[DURATION] for c, way in zip(COMMANDS, WAYS, strict=True) if {way, DURATION} <= set(table)
