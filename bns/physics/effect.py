@@ -89,7 +89,7 @@ class Effect:
     needs: str = ""
     """One of `NEEDS`."""
     needs_place: bool = False
-    """Does it look at `Body.place`?"""
+    """Does what it does depend on where the robot is (`Body.place`, or the place in a `View`)?"""
     per_trial_allowed: bool = False
     """May its one number have another value in every trial? Only effects of the stage ``clock`` may."""
 

@@ -28,6 +28,8 @@ _TAIL_S = 1.0
 """What the last row says, a command or none, is in force this long: poses may be stamped early."""
 _KEPT = 500_000
 """Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
+_UNDONE = 3
+"""Rounds in which a place in the picture is traced back to the floor: each leaves a power of the distortion."""
 _MOVING = ("wheel", "body")
 
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
@@ -63,10 +65,32 @@ class WheelPredictor:
     def steps(self, model: Model) -> Steps:
         """Displacement of the tracked point since the frame before, in the frame of the robot there."""
         poses, sums = self._at(model.wheelbase_m, _chain(model, (*_MOVING, "clock")))
-        view = View(poses)
+        view, placed = View(poses), [active for active in model.at("measure") if active.effect.needs_place]
         for active in model.at("measure"):
-            view = active.effect.apply(view, **active.by_name)
-        return Steps(displacements(view.poses, self.tracks.is_first), self._drift(model, poses, sums))
+            if not active.effect.needs_place:
+                view = active.effect.apply(view, **active.by_name)
+        body = displacements(view.poses, self.tracks.is_first)
+        return Steps(self._pictured(body, placed) if placed else body, self._drift(model, poses, sums))
+
+    def _pictured(self, body: Array, placed: Sequence[ActiveEffect]) -> Array:
+        """Displacements (frames, 3) as they look where the robot was seen: the picture is undone there, and made again."""
+
+        def picture(poses: Array) -> Array:
+            view = View(poses)
+            for active in placed:
+                view = active.effect.apply(view, **active.by_name)
+            return view.poses
+
+        before = np.roll(self.tracks.pose, 1, axis=0)
+        really = before
+        for _ in range(_UNDONE):
+            really = really - (picture(really) - before)
+        cos, sin = np.cos(really[:, 2]), np.sin(really[:, 2])
+        moved = [cos * body[:, 0] - sin * body[:, 1], sin * body[:, 0] + cos * body[:, 1], body[:, 2]]
+        from_, to = picture(really), picture(really + np.stack(moved, axis=1))
+        way, cos, sin = to - from_, np.cos(from_[:, 2]), np.sin(from_[:, 2])
+        ahead, left = cos * way[:, 0] + sin * way[:, 1], cos * way[:, 1] - sin * way[:, 0]
+        return np.where(self.tracks.is_first[:, None], 0.0, np.stack([ahead, left, way[:, 2]], axis=1))
 
     def _turned(self, wheelbase_m: float, chain: Chain) -> Body:
         return replace(wheel_motion(_model_of(wheelbase_m, chain), self.grid, self.conditions), place=self._place)

@@ -50,5 +50,6 @@ EFFECT = Effect(
     measurement="calibrate the lens with a chessboard, or look at a straight edge laid along the picture's border",
     apply=apply,
     needs="track",
+    needs_place=True,
     starts_from=starts_from,
 )

@@ -62,5 +62,6 @@ EFFECT = Effect(
     measurement="track a stick of known length at the four corners of the floor",
     apply=apply,
     needs="track",
+    needs_place=True,
     starts_from=starts_from,
 )
