@@ -1,4 +1,4 @@
-"""Gears, casters, controllers, patches and pictures: each effect against what can be worked out by hand, and against a second code."""
+"""Gears, casters, controllers, patches, pictures: each effect against a calculation by hand and against a second code."""
 
 import numpy as np
 import pytest
