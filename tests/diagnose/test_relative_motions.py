@@ -12,9 +12,9 @@ from bns.cli.main import main
 from bns.diagnose.calibration import calibrated
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.load import load_measured, read_table
-from bns.diagnose.diagnosis import numbers_of
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import predictor_for_search
+from bns.diagnose.values import numbers_of
 from bns.errors import DataError
 from bns.physics.differential_drive import observe, simulate
 from bns.physics.model import Model

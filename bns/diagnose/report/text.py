@@ -9,9 +9,10 @@ import numpy as np
 from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
-from bns.diagnose.diagnosis import Diagnosis, numbers_of, ties_of
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
+from bns.diagnose.values import numbers_of, ties_of
 from bns.physics.decoys import DECOYS
 from bns.physics.effects import all_effects
 
