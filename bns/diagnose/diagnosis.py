@@ -12,6 +12,7 @@ from bns.diagnose.calibration import calibrated
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
+from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.significance import fewest_trials

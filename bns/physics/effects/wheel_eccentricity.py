@@ -8,6 +8,7 @@ fitted are how uneven each wheel is and how far it rolls in a turn. In a simulat
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
@@ -71,7 +72,7 @@ def _lag(wheels: Wheels, angles: list[Array]) -> int:
     return int(np.clip(round(2.0 * np.pi / 3.0 / usual), 1, max(wheels.step_s.shape[1] // 8, 1)))
 
 
-def _pairs(columns: Array, off: Array, used: Array, lag: int) -> Array:
+def _pairs(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> Array:
     """Cosine and sine part of each wheel's wave, (trials, 4): least squares beside a drift, then of length 1 or less.
 
     In differences over ``lag`` steps: a heading that wanders with the motors' scatter does not pass for a wave.
