@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from bns.diagnose.calibration import calibrated
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import Tracks
+from bns.diagnose.estimate.calibration import calibrated
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set

@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 from bns.cli.main import main
-from bns.diagnose.calibration import calibrated
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.load import load_measured, read_table
+from bns.diagnose.estimate.calibration import calibrated
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import predictor_for_search
 from bns.diagnose.values import numbers_of
