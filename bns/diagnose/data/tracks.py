@@ -61,6 +61,13 @@ class Tracks:
         found[self.first[:-1]] = True
         return found if self.jumped is None else found | self.jumped
 
+    @cached_property
+    def relative(self) -> bool:
+        """Are these single relative motions: two poses a trial, the first exactly zero? (One, where the motion was a fault.)"""
+        frames = np.diff(self.first)
+        two = len(frames) and frames.max() == 2 and np.median(frames) == 2
+        return bool(two and not self.pose[self.first[:-1][frames > 0]].any())
+
     def only(self, chosen: NDArray[np.int64]) -> Tracks:
         """Some of the trials, in the order of ``chosen``."""
         selected = [np.arange(self.first[i], self.first[i + 1]) for i in chosen]

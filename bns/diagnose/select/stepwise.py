@@ -6,7 +6,7 @@ or beyond what is plausible is rejected with its reason.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import cache, partial
 
@@ -44,10 +44,11 @@ class StepwiseSelection:
         model: Model,
         extra: Mapping[str, Effect] | None = None,
         tick: Callable[[str], None] = lambda _: None,
+        barred: Collection[str] = (),
     ) -> None:
         self.predictor, self.model, self.tick = predictor, model.arranged(), tick
-        self._extra = extra
-        self.catalogue = listed(self.model, extra)
+        self._extra, self._barred = extra, barred
+        self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
         self._all_believed = False
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
@@ -66,7 +67,9 @@ class StepwiseSelection:
         """The search; again with a clock for each trial where these differ, since that hides what else is wrong."""
         plain = self._select()
         clocks = fit_trial_clocks(plain.problem, plain.fit)
-        if clocks is None or not self._clocks_earned(clocks, plain.fit):
+        if clocks is None or _per_trial_effect(clocks.fit.model) in self._barred:
+            return plain
+        if not self._clocks_earned(clocks, plain.fit):
             return plain
         given = self.model
         self.model = self._bare_with_clocks(clocks.fit.model, given)
