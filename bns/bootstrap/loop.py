@@ -55,7 +55,7 @@ def run(spec: RunSpec, progress: Progress | None = None, world: World | None = N
 
     for evaluation in range(1, spec.evaluations + 1):
         # 1. A controller is picked from the population and driven in the world.
-        controller = robot.plan(evolver.pick(evaluation), weights, task)
+        controller = evolver.plan(evolver.pick(evaluation), weights)
         poses = recorder.drive_evaluated(evaluation, controller, weights)
         # 2. What it did joins the training set, and the training networks go on training.
         began = thread_time()

@@ -49,6 +49,8 @@ class Recipe(NamedTuple):
     """Iterations of the last training; it ends earlier where patterns that are only watched get worse."""
     noise_sd: tuple[float, ...]
     """Standard deviations of the substitute world, SI, a network."""
+    evolving: tuple[str, ...] = ()
+    """Options of the robot that are on while controllers evolve on the static simulator."""
 
 
 class Robot(Protocol):
@@ -63,6 +65,10 @@ class Robot(Protocol):
     input_count: int
     """Inputs that the networks have, up to five."""
     sigmoid_output: bool
+    nguyen_widrow: bool
+    """Whether untrained networks are drawn as Nguyen and Widrow did."""
+    flat_spot: float
+    """Added to the slope of a sigmoid in training."""
     recipe: Recipe | None
     """None: the static simulator learns from random controllers, and its noise is that of its residuals."""
     repeats_inputs: bool
@@ -71,7 +77,11 @@ class Robot(Protocol):
     bounds: CommandBounds
     command_columns: tuple[str, ...]
     options: tuple[str, ...]
-    """What its simulator can do beyond the source, switched on by ``ROBOT+OPTION`` as its name in a spec."""
+    """What its simulator can do beyond the source, and other readings of it, switched on by ``ROBOT+OPTION`` in a spec."""
+    switched_on: tuple[str, ...]
+    """Those of its options that are on."""
+    substitute_sd_m: float | None
+    """Standard deviation of the substitute world on every displacement, m, where it is not that of the static simulator."""
     measured_columns: tuple[str, ...]
     """Columns of its table of measurements."""
     given_columns: Mapping[str, tuple[float, float]]
@@ -120,8 +130,8 @@ class Robot(Protocol):
     def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
         """What is kept of poses, by name with its unit, (n,) each; x_m, y_m and heading_rad always."""
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
-        """The commands (m, components) that are driven when this controller is picked."""
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, luck: Luck | None = None) -> np.ndarray:
+        """The commands (m, components) that are driven when this controller is picked; luck: the draws it was scored with."""
 
     def score(
         self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None

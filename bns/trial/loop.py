@@ -86,7 +86,7 @@ class Trial:
             for number in range(1, self.spec.evaluations + 1):
                 asked = time.perf_counter()
                 weights = self._weights
-                picked = self.robot.plan(self._evolver.pick(number), weights, self.task)
+                picked = self._evolver.plan(self._evolver.pick(number), weights)
                 idle_s += time.perf_counter() - asked
                 done, count = self._evaluation(number, picked, driver, rounds)
                 driven = time.perf_counter()

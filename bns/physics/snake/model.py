@@ -7,7 +7,7 @@ import mujoco
 from bns.physics.snake.parameters import SnakeParameters
 
 YELLOW, GREEN = "yellow", "green"
-"""Names of the marker sites; green is at the end with the Arduino and the tether."""
+"""Names of the marker sites."""
 
 
 def build_model(parameters: SnakeParameters) -> mujoco.MjModel:
@@ -49,7 +49,7 @@ def _link(p: SnakeParameters, n: int) -> str:
     """Link ``n`` and, inside it, all that follow: its frame is at the joint that carries it."""
     last = int(p.links) - 1
     half, end = p.pitch_m / 2, p.pitch_m - p.radius_m
-    mass = p.body_mass_kg / p.links + (p.tail_mass_kg if n == last else 0.0)
+    mass = p.body_mass_kg / p.links + (p.tail_mass_kg if n == p.heavy_link else 0.0)
     place = f'pos="0 0 {p.radius_m}"' if n == 0 else f'pos="{p.pitch_m} 0 0"'
     axis = "0 0 1" if (n - 1) % 2 == 0 else "0 1 0"
     joint = '<freejoint name="root"/>' if n == 0 else f'<joint name="joint{n - 1}" axis="{axis}"/>'

@@ -51,6 +51,9 @@ class Khepera:
         "left_m_s": (-0.3, 0.3), "right_m_s": (-0.3, 0.3), "duration_s": (0.001, 60.0),
     }  # fmt: skip
     options: tuple[str, ...] = ()
+    switched_on: tuple[str, ...] = ()
+    nguyen_widrow, flat_spot = False, 0.0
+    substitute_sd_m = None
 
     def with_options(self, names: tuple[str, ...]) -> Khepera:
         """There are none."""
@@ -121,7 +124,7 @@ class Khepera:
         """As they are: no command of two wheels is unstable."""
         return poses
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, luck: Luck | None = None) -> np.ndarray:
         """A controller is driven as it is."""
         return controller
 
