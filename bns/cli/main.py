@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bns import __version__
+from bns.cli import calibrate as calibrating
 from bns.cli import diagnose as measuring
 from bns.cli import report as reporting
 from bns.cli.sweep_options import DEVICES, add_cluster_options, request_of, way_of
@@ -148,6 +149,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     measuring.add_commands(command)
     reporting.add_commands(command)
+    calibrating.add_commands(command)
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     planned = command(
         "validate", validate, "evolve controllers on the static simulator, drive each three times in physics"

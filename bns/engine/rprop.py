@@ -35,7 +35,7 @@ class Rprop:
 
     @classmethod
     def start(cls, weights: np.ndarray, algorithm: str, sigmoid_output: bool = False, flat_spot: float = 0.0) -> Rprop:
-        """Begin with these networks; algorithm is ``rprop+`` or ``irprop-``; ``flat_spot`` is added to the slope of every sigmoid."""
+        """Begin with these networks; algorithm is ``rprop+`` or ``irprop-``; ``flat_spot`` is added to the slopes of sigmoids."""
         weights = weights.astype(np.float32)
         return cls(
             weights,

@@ -32,7 +32,7 @@ def test_every_reading_can_be_named_and_all_together():
 
 
 def test_lateral_amplitudes_are_uniform_and_those_of_the_other_reading_are_seldom_small():
-    plain, other = (load_robot(name).random_controllers(KEY, 1, 4000).controller(0) for name in ("snake", "snake+sorted-amplitudes"))
+    plain, other = (load_robot(f"snake{name}").random_controllers(KEY, 1, 4000).controller(0) for name in ("", "+sorted-amplitudes"))
     for drawn in (plain, other):
         assert (drawn[:, 1] < drawn[:, 0]).all()
     assert np.mean(plain[:, 0] < 0.2) == pytest.approx(0.2 / (math.pi / 2), abs=0.02)
@@ -41,21 +41,24 @@ def test_lateral_amplitudes_are_uniform_and_those_of_the_other_reading_are_seldo
     np.testing.assert_array_equal(plain[:, 2:], other[:, 2:])
 
 
-def test_a_drive_is_cut_where_the_path_with_noise_ends():
+def test_a_drive_has_as_many_cycles_as_any_noisy_path_needs():
     weights, population, luck = networks(), PLAIN.initial_population(KEY, 60, 4, 100), Luck(KEY, 3)
-    noise = (normals(KEY, Purpose.ROLLOUT_NOISE, 3, NOISY_EVALUATIONS, 40) * NOISE_SD_M)[0]
-    off, lengths = load_robot("snake+cut-without-noise"), set()
+    rows = normals(KEY, Purpose.ROLLOUT_NOISE, 3, NOISY_EVALUATIONS, 40) * NOISE_SD_M
+    off, longer, never = load_robot("snake+cut-without-noise"), 0, 0
     for i in range(60):
         controller = population.controller(i)
         in_full = cycles.in_full(controller)
         moved = PLAIN.displacements(predict(weights, PLAIN.inputs(in_full), True))
-        moved[:, :4] += noise[: len(moved)]
-        used = path.judge(path.walk(moved), TASK)[2]
+        paths = [path.judge(path.walk(moved + np.pad(row[: len(moved)], ((0, 0), (0, 1)))), TASK) for row in rows]
+        done = [used for _, goals, used in paths if goals == 2]
+        used = max(done) if done else len(in_full)
         planned, without = PLAIN.plan(controller, weights, TASK, luck), off.plan(controller, weights, TASK, luck)
         np.testing.assert_array_equal(planned, in_full[:used])
         np.testing.assert_array_equal(without, PLAIN.plan(controller, weights, TASK))
-        lengths.add(len(planned) - len(without))
-    assert min(lengths) < 0 < max(lengths)
+        longer += len(planned) > len(without)
+        never += not done
+    assert longer > 0
+    assert never > 0
 
 
 def test_yellow_on_the_origin_moves_the_start_in_every_world():
@@ -122,7 +125,8 @@ def test_controllers_for_the_static_simulator_take_after_one_parent():
             share = np.mean(children.commands[1, :, 2] == parents.commands[0, :, 2])
             mine += [share] if 0 < share < 1 else []
         shares.append(np.mean(np.abs(np.array(mine) - 0.5)))
-    assert shares[0] < 0.2 < 0.25 < shares[1]
+    assert shares[0] < 0.2
+    assert shares[1] > 0.25
 
 
 def test_readings_do_not_change_each_other():

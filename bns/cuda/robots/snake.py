@@ -150,6 +150,19 @@ def scored(w, commands, length, goals, own, luck):  # type: ignore[no-untyped-de
     return 0.0, 0, used
 
 
+@cuda.jit(device=True)
+def _needed(seen, commands, length, goals, own, generation):  # type: ignore[no-untyped-def]  # compiled
+    """Cycles that are driven: as many as any of the noisy evaluations of this generation needed, as `Snake.plan`."""
+    luck, longest = cuda.local.array(_ROW, float64), 0
+    for evaluation in range(NOISY_EVALUATIONS):
+        for slot in range(_ALL):
+            _draw_cycle(luck, _DISPLACEMENTS * slot, own, generation, evaluation, slot)
+        _, goal, _, driven = _along_path(seen, commands, length, goals, own, luck, 0, _ALL)
+        if goal == goals.shape[0]:
+            longest = max(longest, driven)
+    return longest if longest > 0 else _ALL
+
+
 @cuda.jit
 def drive(  # type: ignore[no-untyped-def]  # compiled
     evaluation, settings, purpose, learning, static, noise_sd, weights, commands, lengths, order, cdf, goals,
@@ -180,11 +193,8 @@ def drive(  # type: ignore[no-untyped-def]  # compiled
     if thread > 0:
         return
 
-    noise_to_cut = cuda.local.array(_ROW, float64)
     generation = np.uint32(own["generations"] * (evaluation - 1 if learning else evaluation))
-    for slot in range(length * MOST_REPEATS):
-        _draw_cycle(noise_to_cut, _DISPLACEMENTS * slot, own, generation, 0, slot)
-    _, _, _, planned = _along_path(both[0], cycles, length, aims, own, noise_to_cut, 0, _ALL)
+    planned = _needed(both[0], cycles, length, aims, own, generation)
     total_snn, _, _, _ = _along_path(both[0], cycles, length, aims, own, noise_sd, -1, planned)
     yx, yy, gx, gy = _YX, _YY, _GX, _GY
     x, y = (yx + gx) / 2, (yy + gy) / 2

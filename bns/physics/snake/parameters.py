@@ -16,7 +16,7 @@ import yaml
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import number
 
-BASIS = ("measured", "published", "guess")
+BASIS = ("measured", "published", "fitted", "guess")
 """How a value came to be known."""
 READINGS = ("tether_at_yellow", "tipped_on_the_way_fails", "tipped_on_the_way_ends", "roles_switch_on_side")
 """Parameters that are 1 or 0: where the source can be read in two ways."""
@@ -130,4 +130,9 @@ def read_parameters(text: str) -> SnakeParameters:
 @cache
 def shipped_parameters() -> SnakeParameters:
     """The parameters that ship in the package."""
-    return read_parameters((Path(str(resources.files(__package__))) / "parameters.yaml").read_text())
+    return read_parameters(shipped_text())
+
+
+def shipped_text() -> str:
+    """The file that they stand in, each with its basis and reason."""
+    return (Path(str(resources.files(__package__))) / "parameters.yaml").read_text(encoding="utf-8")

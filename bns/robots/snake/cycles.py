@@ -20,7 +20,7 @@ _MUTATION, _PROBE = np.uint32(Purpose.MUTATION), np.uint32(Purpose.PROBE)
 def random_cycles(
     key: Key, purpose: Purpose, step: int, n: int, length: int, sorted_amplitudes: bool = False
 ) -> Population:
-    """Uniform in all that is allowed: A_lat in its range, A_vert below it; or of two draws of an amplitude the larger is lateral."""
+    """Uniform in all that is allowed: A_lat in its range, A_vert below it; or the larger of two draws is lateral, if sorted."""
     u = component_draws(key, purpose, step, (n, length, len(COLUMNS)))
     commands = np.empty(u.shape, np.float32)
     amplitudes = np.sort(u[..., :2], axis=-1)[..., ::-1] if sorted_amplitudes else np.cumprod(u[..., :2], axis=-1)

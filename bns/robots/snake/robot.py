@@ -36,7 +36,7 @@ class Snake:
     """Implements `bns.robots.base.Robot`: poses are observations (n, 9) as in `path.walk`.
 
     What the source leaves out can be switched on: ``changes`` (from one cycle to the next the markers move as `posture` says) and
-    ``rigid`` (the markers, which are on one body, cannot drift apart); and so can other readings of it (`bns.robots.snake.options`).
+    ``rigid`` (the markers, which are on one body, cannot drift apart); and other readings of it (`bns.robots.snake.options`).
     """
 
     name = "snake"
@@ -145,13 +145,24 @@ class Snake:
     def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, luck: Luck | None = None) -> np.ndarray:
         """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2).
 
-        With luck that is the first of the noisy evaluations that decide on its fitness (figure 5.18), else one without noise.
+        With luck these are as many as any of the noisy evaluations that decide on its fitness needed (figure 5.18); those that
+        did not finish do not count; where none did, all are driven.
         """
         in_full = cycles.in_full(controller)
         moved = self.displacements(predict(weights, self.inputs(in_full), self.sigmoid_output))
-        if luck is not None and "cut-without-noise" not in self._options:
-            moved[:, :4] += self._noise(luck, len(in_full))[0]
-        return in_full[: path.judge(self.poses(moved, in_full), task, self.start_m)[2]]
+        if luck is None or "cut-without-noise" in self._options:
+            return in_full[: self._needed(moved, in_full, task)[1]]
+        needed = []
+        for noise in self._noise(luck, len(in_full)):
+            noisy = moved.copy()
+            noisy[:, :4] += noise
+            needed.append(self._needed(noisy, in_full, task))
+        return in_full[: max((used for done, used in needed if done), default=len(in_full))]
+
+    def _needed(self, moved: np.ndarray, in_full: np.ndarray, task: Task) -> tuple[bool, int]:
+        """Whether a simulated path finishes the task, and after how many cycles."""
+        _, goals, used = path.judge(self.poses(moved, in_full), task, self.start_m)
+        return goals == len(task.goals_m), used
 
     def score(
         self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None
