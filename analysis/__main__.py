@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.progress import track
 
 from analysis.gallery import write_page
-from analysis.publish import forget_all_but, forget_skipped, publish_drawn, publish_skipped
-from analysis.store import NoDataError, Store
-from analysis.words import place
+from analysis.labels import source_position
+from analysis.publish import forget_all_but, forget_skipped, publish_figure, publish_skipped
+from analysis.results import NoDataError, Results
 from bns.errors import BnsError, SpecError, unknown_name
 
 
@@ -24,7 +24,7 @@ def figures() -> dict[str, ModuleType]:
     """The figure modules in this folder by NAME, in the order of the source's numbers."""
     names = sorted(file.stem for file in Path(__file__).parent.glob("*.py") if "\nNAME = " in file.read_text())
     modules = (import_module(f"analysis.{name}") for name in names)  # the others are what figures share
-    return {module.NAME: module for module in sorted(modules, key=lambda one: place(one.PAPER))}
+    return {module.NAME: module for module in sorted(modules, key=lambda one: source_position(one.PAPER))}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if wanted.run is not None:
             modules = {name: module for name, module in modules.items() if getattr(module, "OF_A_RUN", False)}
         if not wanted.page:
-            failed = not _draw_all(modules, Store(wanted.results, wanted.run), out, everything=wanted.only is None)
+            failed = not _draw_all(modules, Results(wanted.results, wanted.run), out, everything=wanted.only is None)
         print(f"page: {write_page(out, wanted.refresh)}")
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -66,7 +66,7 @@ def _chosen(only: str | None) -> dict[str, ModuleType]:
     return {only: found[only]}
 
 
-def _draw_all(modules: dict[str, ModuleType], store: Store, out: Path, *, everything: bool) -> bool:
+def _draw_all(modules: dict[str, ModuleType], store: Results, out: Path, *, everything: bool) -> bool:
     """Whether every script could be carried through: one that cannot does not cost the others their figures."""
     made, failed = set(), False
     console = Console(stderr=True)
@@ -74,7 +74,7 @@ def _draw_all(modules: dict[str, ModuleType], store: Store, out: Path, *, everyt
         try:
             forget_skipped(name, out)
             for drawn in module.draw(store):
-                place = publish_drawn(drawn, module.PAPER, store, out)
+                place = publish_figure(drawn, module.PAPER, store, out)
                 print(f"{place}  ({module.PAPER}, n = {drawn.n:,} runs)")
                 made.add(drawn.name)
         except NoDataError as reason:

@@ -13,13 +13,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
+from analysis.labels import CELL, counted, task_title
 from analysis.outcomes import criterion
 from analysis.ranking import TEN, in_words, ranking, varied
+from analysis.results import Results
 from analysis.selection import CONFIRMING, Selection, selections
-from analysis.store import Store
-from analysis.words import CELL, counted, task_title
 from bns.plotting.style import BLUE, RED, note, panels, style
 
 NAME = "best-combinations"
@@ -27,7 +27,7 @@ PAPER = "the ranking of section 4.5"
 LEVEL = 0.05
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     drawn = []
     for chosen in selections(store):
         rows = ranking(store, chosen)
@@ -36,7 +36,7 @@ def draw(store: Store) -> list[Drawn]:
     return drawn
 
 
-def confirmed(store: Store, chosen: Selection, task: str) -> pd.DataFrame:
+def confirmed(store: Results, chosen: Selection, task: str) -> pd.DataFrame:
     """Runs and successes at the last evaluation of each combination that was rerun on fresh seeds."""
     rerun = chosen.of([sweep + CONFIRMING for sweep in chosen.sweeps])
     # A seed that took part in picking the best confirms nothing.
@@ -61,7 +61,7 @@ def not_worse_than(rows: pd.DataFrame, best: pd.Series) -> np.ndarray:
 
 
 @style()
-def _draw(store: Store, chosen: Selection, task: str, rows: pd.DataFrame) -> Drawn:
+def _draw(store: Results, chosen: Selection, task: str, rows: pd.DataFrame) -> FigureResult:
     best, again = rows.head(TEN), confirmed(store, chosen, task)
     best = best.merge(again, how="left", on=list(CELL)).fillna({"confirm_runs": 0, "confirm_successes": 0})
     others = rows.iloc[1:]
@@ -81,7 +81,7 @@ def _draw(store: Store, chosen: Selection, task: str, rows: pd.DataFrame) -> Dra
         f"{', '.join(chosen.sweeps)}, the ones that picked them, so too high; confirmed: {reruns:,} runs on fresh seeds. "
         f"Bars are 95 % Wilson intervals ({INDEPENDENCE})."
     )
-    return Drawn(
+    return FigureResult(
         f"{NAME}-{chosen.robot}-{task}", f"Best combinations, {task_title(chosen.robot, task)}", figure, shows, n + reruns,
         chosen.sweeps, (*said.missing, *unconfirmed, *chosen.left_out), see=_in_words(rows, best, equal), data=best,
     )  # fmt: skip

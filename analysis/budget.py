@@ -10,10 +10,10 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import mean_interval
-from analysis.store import NoDataError, Store
-from analysis.words import each, task_order, task_title
+from analysis.labels import each, task_order, task_title
+from analysis.results import NoDataError, Results
 from bns.plotting.style import note, ordered_styles, panels, style
 
 NAME = "budget"
@@ -31,7 +31,7 @@ NEAR_CM = (10, 7)
 """Within these radii success is shown, a row each."""
 
 
-def cells(store: Store) -> pd.DataFrame:
+def cells(store: Results) -> pd.DataFrame:
     """Of each task, generations and iterations: runs, CPU seconds a run, and within each radius the share of late evaluations
     with success: its mean over runs, and the ends of Student's 95 % interval of that mean, in percent."""
     shares = ", ".join(f"100 * avg(success_{cm}cm::INT) AS share_{cm}" for cm in NEAR_CM)
@@ -51,7 +51,7 @@ def cells(store: Store) -> pd.DataFrame:
 
 
 @style()
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     rows = cells(store)
     if rows.empty:
         raise NoDataError(f"no finished run of the sweep {SWEEP!r}; run make sweep-budget")
@@ -85,7 +85,7 @@ def draw(store: Store) -> list[Drawn]:
         f"{' and '.join(map(str, NEAR_CM))} cm, mean over runs ({MEANS}). Below: CPU time of a run (median, 10 to 90 %). By "
         f"generations and training iterations after each evaluation; {runs_each} a point, n = {n:,} runs of {SWEEP}."
     )
-    return [Drawn(NAME, TITLE, figure, shows, n, (SWEEP,), said.missing, data=rows)]
+    return [FigureResult(NAME, TITLE, figure, shows, n, (SWEEP,), said.missing, data=rows)]
 
 
 def _lines(ax: Axes, rows: pd.DataFrame, looks: dict, columns: list[int], value: str, low: str, high: str) -> None:

@@ -9,41 +9,41 @@ import math
 
 import numpy as np
 
-from analysis.clouds import combinations
 from analysis.diversity_of_extremes import curves
 from analysis.importance import DRAWS, by_value
 from analysis.importance import largest_gap as widest_gap
 from analysis.intervals import FEWEST_SEEDS, band, ratios, resampled, wilson
+from analysis.labels import TITLES, valued
 from analysis.outcomes import by_seed
 from analysis.potential_success import RADIUS_CM
 from analysis.ranking import any_of, by_seed_array, extremes, ranking, varied
+from analysis.results import Results
+from analysis.scatter import combinations
 from analysis.selection import Selection
-from analysis.store import Store
 from analysis.verdicts import UNDECIDED, Checked, likely, near, within
-from analysis.words import TITLES, valued
 
 STEADY = 0.1
 """A diversity that changes by less than this share counts as steady."""
 
 
-def largest_gap(store: Store, chosen: Selection, task: str, parameter: str, points: float) -> Checked:
+def largest_gap(store: Results, chosen: Selection, task: str, parameter: str, points: float) -> Checked:
     claim = f"largest gap between {TITLES[parameter]}s {points:g} points"
     return _gap(claim, widest_gap(store, chosen, task, parameter), parameter, points)
 
 
-def gap_at_the_end(store: Store, chosen: Selection, task: str, parameter: str, points: float) -> Checked:
+def gap_at_the_end(store: Results, chosen: Selection, task: str, parameter: str, points: float) -> Checked:
     claim = f"{points:g} points between {TITLES[parameter]}s at the last evaluation"
     return _gap(claim, widest_gap(store, chosen, task, parameter, at_last=True), parameter, points)
 
 
-def saturates(store: Store, chosen: Selection, task: str, range: list[float]) -> Checked:
+def saturates(store: Results, chosen: Selection, task: str, range: list[float]) -> Checked:
     sums, counts, _ = _over_evaluations(store, chosen, task)
     low, high = (100 * end for end in _bootstrapped(sums[:, -1], counts[:, -1]))
     ours = f"{100 * sums[:, -1].sum() / counts[:, -1].sum():.0f}{_interval(low, high, '.0f')} % at the last evaluation"
     return Checked(f"success saturates at {range[0]:g} to {range[1]:g} %", ours, within(low, high, *range))
 
 
-def grows_evenly(store: Store, chosen: Selection, task: str, since: int) -> Checked:
+def grows_evenly(store: Results, chosen: Selection, task: str, since: int) -> Checked:
     claim = f"success grows linearly from evaluation {since} on"
     sums, counts, evaluations = _over_evaluations(store, chosen, task)
     marks = np.array([since, (since + evaluations[-1]) / 2, evaluations[-1]])
@@ -56,7 +56,7 @@ def grows_evenly(store: Store, chosen: Selection, task: str, since: int) -> Chec
     return Checked(claim, ours, near(low, high, 50))
 
 
-def goes_with(store: Store, chosen: Selection, task: str, parameter: str, measure: str, direction: str) -> Checked:
+def goes_with(store: Results, chosen: Selection, task: str, parameter: str, measure: str, direction: str) -> Checked:
     from scipy.stats import spearmanr  # noqa: PLC0415  # slow to load
 
     rows = combinations(store, chosen)[0].query("task == @task").dropna(subset=[measure])
@@ -69,7 +69,7 @@ def goes_with(store: Store, chosen: Selection, task: str, parameter: str, measur
     return Checked(claim, ours, likely(1 - float(found.pvalue)))
 
 
-def most_influential(store: Store, chosen: Selection, task: str, parameter: str) -> Checked:
+def most_influential(store: Results, chosen: Selection, task: str, parameter: str) -> Checked:
     names = varied(combinations(store, chosen)[0].query("task == @task"))
     gaps = {name: _gaps(store, chosen, task, name) for name in names}
     claim = f"{TITLES[parameter]} matters most"
@@ -80,7 +80,7 @@ def most_influential(store: Store, chosen: Selection, task: str, parameter: str)
     return Checked(claim, f"widest gap of all in {share:.0%} of the bootstrap samples", likely(share))
 
 
-def best_values(store: Store, chosen: Selection, task: str, parameter: str, values: list[float]) -> Checked:
+def best_values(store: Results, chosen: Selection, task: str, parameter: str, values: list[float]) -> Checked:
     claim = f"best {TITLES[parameter]}: {' and '.join(valued(parameter, value) for value in values)}"
     rates, known = _mean_rates(store, chosen, task, parameter)
     if rates is None or not set(values) <= set(known):
@@ -92,7 +92,7 @@ def best_values(store: Store, chosen: Selection, task: str, parameter: str, valu
     return Checked(claim, f"best {ours} over all evaluations; as in the source in {share:.0%} of the samples", likely(share))
 
 
-def larger_is_better(store: Store, chosen: Selection, task: str, parameter: str) -> Checked:
+def larger_is_better(store: Results, chosen: Selection, task: str, parameter: str) -> Checked:
     claim = f"a larger {TITLES[parameter]} does better"
     rates, known = _mean_rates(store, chosen, task, parameter)
     if rates is None or len(known) < 2:
@@ -104,7 +104,7 @@ def larger_is_better(store: Store, chosen: Selection, task: str, parameter: str)
     return Checked(claim, ours, likely(float((ahead > 0).mean())))
 
 
-def best_combination(store: Store, chosen: Selection, task: str, column: str, percent: float) -> Checked:
+def best_combination(store: Results, chosen: Selection, task: str, column: str, percent: float) -> Checked:
     radius = f" within {column.removeprefix('success_')[:-2]} cm" if column != "success" else ""
     rows = combinations(store, chosen)[0].query("task == @task")
     best = rows.loc[(rows[column] / rows.runs).idxmax()]
@@ -113,7 +113,7 @@ def best_combination(store: Store, chosen: Selection, task: str, column: str, pe
     return Checked(f"best combination {percent:g} %{radius}", ours, near(low, high, percent))
 
 
-def diversity_range(store: Store, chosen: Selection, task: str, range: list[float]) -> Checked:
+def diversity_range(store: Results, chosen: Selection, task: str, range: list[float]) -> Checked:
     last = curves(store, chosen, task, 0).query("evaluation == evaluation.max()")
     sums, counts = (by_seed_array(last, name)[0][:, 0] for name in ("diversity", "diversities"))
     low, high = _bootstrapped(sums, counts)
@@ -122,7 +122,7 @@ def diversity_range(store: Store, chosen: Selection, task: str, range: list[floa
     return Checked(f"good diversity {range[0]:g} to {range[1]:g}", ours, within(low, high, *range))
 
 
-def error_rises(store: Store, chosen: Selection, task: str) -> Checked:
+def error_rises(store: Results, chosen: Selection, task: str) -> Checked:
     from scipy.stats import spearmanr  # noqa: PLC0415  # slow to load
 
     rows = combinations(store, chosen)[0].query("task == @task").dropna(subset=["diversity", "fitness_error"])
@@ -135,36 +135,36 @@ def error_rises(store: Store, chosen: Selection, task: str) -> Checked:
     return Checked(claim, ours, likely(1 - float(found.pvalue)))
 
 
-def best_have_at_most(store: Store, chosen: Selection, task: str, parameter: str, value: float) -> Checked:
+def best_have_at_most(store: Results, chosen: Selection, task: str, parameter: str, value: float) -> Checked:
     cells = extremes(ranking(store, chosen), task)[0]
     return _mostly(f"most of the best have {TITLES[parameter]} {valued(parameter, value)} or less", cells[parameter] <= value)
 
 
-def worst_have_at_least(store: Store, chosen: Selection, task: str, parameter: str, value: float) -> Checked:
+def worst_have_at_least(store: Results, chosen: Selection, task: str, parameter: str, value: float) -> Checked:
     cells = extremes(ranking(store, chosen), task)[1]
     return _mostly(f"most of the worst have {TITLES[parameter]} {valued(parameter, value)} or more", cells[parameter] >= value)
 
 
-def diversity_of_best_is_steady(store: Store, chosen: Selection, task: str, since: int) -> Checked:
+def diversity_of_best_is_steady(store: Results, chosen: Selection, task: str, since: int) -> Checked:
     change, low, high = _change(store, chosen, task, which=0, since=since)
     ours = f"changes by {100 * change:+.0f}{_interval(100 * low, 100 * high, '+.0f')} % from evaluation {since} to the last"
     return Checked(f"diversity of the best steady after evaluation {since}", ours, within(low, high, -STEADY, STEADY))
 
 
-def diversity_of_best_moves(store: Store, chosen: Selection, task: str, direction: str, since: int) -> Checked:
+def diversity_of_best_moves(store: Results, chosen: Selection, task: str, direction: str, since: int) -> Checked:
     change, low, high = _change(store, chosen, task, which=0, since=since)
     ours = f"changes by {100 * change:+.0f}{_interval(100 * low, 100 * high, '+.0f')} % from evaluation {since} to the last"
     expected = {"grows": (0, math.inf), "falls": (-math.inf, 0)}[direction]
     return Checked(f"diversity of the best {direction} from evaluation {since} on", ours, within(low, high, *expected))
 
 
-def diversity_of_worst_grows(store: Store, chosen: Selection, task: str) -> Checked:
+def diversity_of_worst_grows(store: Results, chosen: Selection, task: str) -> Checked:
     change, low, high = _change(store, chosen, task, which=1, since=5)
     ours = f"changes by {100 * change:+.0f}{_interval(100 * low, 100 * high, '+.0f')} % from evaluation 5 to the last"
     return Checked("diversity of the worst grows", ours, within(low, high, 0, math.inf))
 
 
-def half_by(store: Store, chosen: Selection, task: str, evaluation: int) -> Checked:
+def half_by(store: Results, chosen: Selection, task: str, evaluation: int) -> Checked:
     cells = extremes(ranking(store, chosen), task)[0]
     rows = by_seed(store, chosen, ("evaluation",), f"task = '{task}' AND ({any_of(cells)})")
     (sums, evaluations), (counts, _) = (by_seed_array(rows, name) for name in ("successes_20cm", "runs"))
@@ -189,7 +189,7 @@ def _gap(claim: str, gap: dict[str, float], parameter: str, points: float) -> Ch
     return Checked(claim, ours, near(gap["low"], gap["high"], points))
 
 
-def _gaps(store: Store, chosen: Selection, task: str, parameter: str) -> np.ndarray | None:
+def _gaps(store: Results, chosen: Selection, task: str, parameter: str) -> np.ndarray | None:
     """Widest gap of a parameter in each bootstrap sample."""
     sums, counts, _, _ = by_value(store, chosen, task, parameter)
     if len(sums) < FEWEST_SEEDS:
@@ -198,7 +198,7 @@ def _gaps(store: Store, chosen: Selection, task: str, parameter: str) -> np.ndar
     return np.ptp(rates, axis=1).max(axis=1)
 
 
-def _mean_rates(store: Store, chosen: Selection, task: str, parameter: str) -> tuple[np.ndarray | None, list]:
+def _mean_rates(store: Results, chosen: Selection, task: str, parameter: str) -> tuple[np.ndarray | None, list]:
     """Success of each value over all evaluations in each bootstrap sample (draws, values), and the values."""
     sums, counts, values, _ = by_value(store, chosen, task, parameter)
     if len(sums) < FEWEST_SEEDS:
@@ -206,7 +206,7 @@ def _mean_rates(store: Store, chosen: Selection, task: str, parameter: str) -> t
     return np.nan_to_num(ratios(resampled(len(sums), DRAWS), sums.sum(axis=2), counts.sum(axis=2))), values
 
 
-def _over_evaluations(store: Store, chosen: Selection, task: str) -> tuple[np.ndarray, np.ndarray, list]:
+def _over_evaluations(store: Results, chosen: Selection, task: str) -> tuple[np.ndarray, np.ndarray, list]:
     """Successes and runs (seeds, evaluations) of all combinations together, and the evaluations."""
     rows = by_seed(store, chosen, ("evaluation",), f"task = '{task}'")
     (sums, evaluations), (counts, _) = (by_seed_array(rows, name) for name in ("successes", "runs"))
@@ -231,7 +231,7 @@ def _mostly(claim: str, holds: np.ndarray) -> Checked:
     return Checked(claim, f"{holds.sum()} of {len(holds)}", within(low, high, 0.5, 1.0))
 
 
-def _change(store: Store, chosen: Selection, task: str, which: int, since: int) -> tuple[float, float, float]:
+def _change(store: Results, chosen: Selection, task: str, which: int, since: int) -> tuple[float, float, float]:
     """Relative change of the mean diversity of the best (0) or worst (1) from an evaluation to the last, and its interval."""
     rows = curves(store, chosen, task, which)
     ends = rows[rows.evaluation.isin([min(since, rows.evaluation.max()), rows.evaluation.max()])]

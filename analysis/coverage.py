@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from analysis.labels import counted
+from analysis.results import Results, among
 from analysis.selection import failures, finished
-from analysis.store import Store, among
-from analysis.words import counted
 from bns.store.schema import PARAMETERS
 
 
@@ -24,7 +24,7 @@ class Coverage:
         return self.amount, *(text for text in self.missing if text != self.amount)
 
 
-def coverage(store: Store, sweeps: Sequence[str], n: int | None = None) -> Coverage:
+def coverage(store: Results, sweeps: Sequence[str], n: int | None = None) -> Coverage:
     """What there is of ``sweeps``: ``n`` runs, of those that their files ask for.
 
     By default ``n`` is all finished runs of those sweeps that have a file; runs by hand have none.
@@ -47,7 +47,7 @@ def coverage(store: Store, sweeps: Sequence[str], n: int | None = None) -> Cover
     return Coverage(amount, tuple(missing))
 
 
-def _finished_cells(store: Store, sweeps: Sequence[str]) -> int:
+def _finished_cells(store: Results, sweeps: Sequence[str]) -> int:
     return int(
         store.query(f"""SELECT count(*) AS n FROM (SELECT DISTINCT sweep, task, evaluations,
         {", ".join(name for name in PARAMETERS if name != "seed")}

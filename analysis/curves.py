@@ -9,23 +9,23 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
+from analysis.labels import TITLES, counted, task_title, valued
 from analysis.outcomes import FEWEST, by_value, criterion
+from analysis.results import Results
 from analysis.selection import Selection, selections
-from analysis.store import Store
-from analysis.words import TITLES, counted, task_title, valued
 from bns.plotting.style import lettered, note, ordered_styles, panels, style
 
 
-def success_by(store: Store, parameter: str, name: str) -> list[Drawn]:
+def success_by(store: Results, parameter: str, name: str) -> list[FigureResult]:
     """One figure a robot; NoDataError where no sweep compares values of ``parameter``."""
     return [_draw(store, chosen, parameter, name) for chosen in selections(store, parameter)]
 
 
 @style()
-def _draw(store: Store, chosen: Selection, parameter: str, name: str) -> Drawn:
-    rows, thin, least = thick_enough(by_value(store, chosen, parameter))
+def _draw(store: Results, chosen: Selection, parameter: str, name: str) -> FigureResult:
+    rows, thin, least = enough_runs(by_value(store, chosen, parameter))
     rows = rows.assign(**dict(zip(("low", "high"), wilson(rows.successes, rows.runs), strict=True)))
     tasks, n = [task for task in chosen.tasks if task in set(rows.task)], chosen.n - thin
     looks = dict(zip(sorted(rows.value.unique()), ordered_styles(rows.value.nunique()), strict=True))
@@ -44,7 +44,7 @@ def _draw(store: Store, chosen: Selection, parameter: str, name: str) -> Drawn:
         f"all other parameters pooled. n = {n:,} runs of {', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals "
         f"({INDEPENDENCE})."
     )
-    return Drawn(
+    return FigureResult(
         f"{name}-{chosen.robot}",
         f"Success by {TITLES[parameter]}",
         figure,
@@ -57,7 +57,7 @@ def _draw(store: Store, chosen: Selection, parameter: str, name: str) -> Drawn:
     )
 
 
-def thick_enough(rows: pd.DataFrame) -> tuple[pd.DataFrame, int, int]:
+def enough_runs(rows: pd.DataFrame) -> tuple[pd.DataFrame, int, int]:
     """The curves to draw, how many runs stand in the others, and the least that a curve must have.
 
     Beside a curve of many runs one of a tenth as many is left out: it jumps, and its band covers the panel.

@@ -8,13 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import BOOTSTRAP, FEWEST_SEEDS, bootstrap, ratios
+from analysis.labels import CELL, task_title
 from analysis.outcomes import by_seed
 from analysis.ranking import any_of, by_seed_array, extremes, ranking
+from analysis.results import BEGIN, NoDataError, Results, remembered
 from analysis.selection import Selection, selections
-from analysis.store import BEGIN, NoDataError, Store, remembered
-from analysis.words import CELL, task_title
 from bns.plotting.style import BLUE, GREY, lettered, note, panels, style
 
 NAME = "diversity-of-extremes"
@@ -23,7 +23,7 @@ FIRST_EVALUATION = 5
 """Before it controllers are almost random; the source draws nothing of that either."""
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     drawn, reason = [], NoDataError("")
     for chosen in selections(store):
         rows = ranking(store, chosen)
@@ -38,7 +38,7 @@ def draw(store: Store) -> list[Drawn]:
 
 
 @remembered
-def curves(store: Store, chosen: Selection, task: str, which: int) -> pd.DataFrame:
+def curves(store: Results, chosen: Selection, task: str, which: int) -> pd.DataFrame:
     """Of each of the best (0) or worst (1) combinations, seed and evaluation from the fifth on: summed diversity and how many
     runs are in it.
 
@@ -57,7 +57,7 @@ def curves(store: Store, chosen: Selection, task: str, which: int) -> pd.DataFra
 
 
 @style()
-def _draw(store: Store, chosen: Selection, task: str, ends: tuple[pd.DataFrame, pd.DataFrame]) -> Drawn:
+def _draw(store: Results, chosen: Selection, task: str, ends: tuple[pd.DataFrame, pd.DataFrame]) -> FigureResult:
     figure, axes = panels(2, 3.2)
     pooled = {}
     for number, (which, cells, ax) in enumerate(zip(("best", "worst"), ends, axes[:, 0], strict=True)):
@@ -79,7 +79,7 @@ def _draw(store: Store, chosen: Selection, task: str, ends: tuple[pd.DataFrame, 
         f"combination; thick: their mean; {bands}. n = {n:,} runs of {', '.join(chosen.sweeps)}."
     )
     data = pd.concat([frame.assign(which=which) for which, frame in pooled.items()])
-    return Drawn(
+    return FigureResult(
         f"{NAME}-{chosen.robot}-{task}",
         f"Diversity of the best and worst combinations, {task_title(chosen.robot, task)}",
         figure,

@@ -8,15 +8,15 @@ from typing import Any
 import pandas as pd
 
 from analysis import checks
-from analysis.clouds import combinations
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
+from analysis.labels import task_number, task_title
 from analysis.outcomes import fewest
+from analysis.results import NoDataError, Results
+from analysis.scatter import combinations
 from analysis.selection import Selection, selections
 from analysis.source import source
-from analysis.store import NoDataError, Store
 from analysis.verdicts import AGREES, DIFFERS, UNDECIDED, Checked
-from analysis.words import task_number, task_title
 
 NAME = "findings"
 PAPER = "sections 4.6 and 5.9"
@@ -24,14 +24,14 @@ _NOWHERE = ""
 """Where the findings of a task with too few runs stand."""
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     found = [(chosen, table) for chosen in selections(store) if not (table := checked(store, chosen)).empty]
     if not found:
         raise NoDataError("no finished run is of a robot and task of the source; run make sweep-khepera BUDGET=10m")
     return [_drawn(store, chosen, table) for chosen, table in found]
 
 
-def checked(store: Store, chosen: Selection) -> pd.DataFrame:
+def checked(store: Results, chosen: Selection) -> pd.DataFrame:
     """One row a finding and task: the source's words and ours, the verdict, where it stands; one row a task with too few runs."""
     ready = _with_enough_runs(store, chosen)
     numbers = {task_number(chosen.robot, task): task for task in chosen.tasks}
@@ -53,7 +53,7 @@ def checked(store: Store, chosen: Selection) -> pd.DataFrame:
     return pd.DataFrame(made)
 
 
-def _with_enough_runs(store: Store, chosen: Selection) -> set[str]:
+def _with_enough_runs(store: Results, chosen: Selection) -> set[str]:
     """Tasks of which at least one combination has enough runs."""
     try:
         return set(combinations(store, chosen)[0].task)
@@ -69,7 +69,7 @@ def _each_task(finding: dict[str, Any]) -> list[tuple[int, dict[str, Any]]]:
     return [(n, {name: value[n] if name in by_task else value for name, value in given.items()}) for n in numbers]
 
 
-def _check(store: Store, chosen: Selection, name: str, task: str, arguments: dict[str, Any]) -> Checked:
+def _check(store: Results, chosen: Selection, name: str, task: str, arguments: dict[str, Any]) -> Checked:
     try:
         result: Checked = getattr(checks, name)(store, chosen, task, **arguments)
     except NoDataError as reason:
@@ -78,7 +78,7 @@ def _check(store: Store, chosen: Selection, name: str, task: str, arguments: dic
     return result
 
 
-def _drawn(store: Store, chosen: Selection, table: pd.DataFrame) -> Drawn:
+def _drawn(store: Results, chosen: Selection, table: pd.DataFrame) -> FigureResult:
     said, counts = coverage(store, chosen.sweeps, chosen.n), Counter(table.verdict)
     waiting = table[table["where"] == _NOWHERE]
     see = f"{counts[AGREES]} agree, {counts[DIFFERS]} differ, {counts[UNDECIDED] - len(waiting)} are undecided"
@@ -91,7 +91,7 @@ def _drawn(store: Store, chosen: Selection, table: pd.DataFrame) -> Drawn:
         f"differ if in 5 %. The source's numbers come from 500 combinations and 30 runs each; these from n = {chosen.n:,} runs "
         f"of {', '.join(chosen.sweeps)}."
     )
-    return Drawn(
+    return FigureResult(
         f"{NAME}-{chosen.robot}", "What the source found, and these results", None, shows, chosen.n, chosen.sweeps,
         (*said.missing, *chosen.left_out), see=f"{see}.", data=table, table=table,
     )  # fmt: skip

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from analysis.clouds import Panel, cloud, combinations, described
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import mean_interval
+from analysis.labels import TITLES, task_title
+from analysis.results import Results
+from analysis.scatter import Panel, combinations, described, scatter_figure
 from analysis.selection import Selection, selections
-from analysis.store import Store
-from analysis.words import TITLES, task_title
 from bns.plotting.style import style
 
 NAME = "fitness-error-by-diversity"
@@ -20,18 +20,18 @@ LONGEST = 2.5
 """An axis ends at this many times the largest mean: intervals of a few runs would press all dots onto the other axis."""
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     return [_draw(store, chosen) for chosen in selections(store)]
 
 
 @style()
-def _draw(store: Store, chosen: Selection) -> Drawn:
+def _draw(store: Results, chosen: Selection) -> FigureResult:
     rows, thin = combinations(store, chosen)
     low, high = mean_interval(rows.fitness_error, rows.fitness_error_sd, rows.runs)
     rows = rows.assign(y=rows.fitness_error, low=np.maximum(low, 0), high=high)
     tasks = [task for task in chosen.tasks if task in set(rows.task)]
     shown = [Panel(task_title(chosen.robot, task), rows[rows.task == task]) for task in tasks]
-    figure, axes = cloud(shown, COLOUR, "mean fitness error (1/m)")
+    figure, axes = scatter_figure(shown, COLOUR, "mean fitness error (1/m)")
     for ax, panel in zip(axes, shown, strict=True):
         ax.set_ylim(0, min(ax.get_ylim()[1], LONGEST * panel.rows.y.max()) or None)
     what = (

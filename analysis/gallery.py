@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from analysis.labels import source_position
 from analysis.publish import captions
-from analysis.words import place
 from bns.plotting.style import COLUMN_IN, PAGE_IN
 from bns.store.files import publish
 
@@ -57,7 +57,7 @@ def page(found: list[dict[str, Any]], out: Path, refresh_s: int | None = None) -
 
 
 def _place(caption: dict[str, Any]) -> tuple[Any, ...]:
-    return (not caption["name"].startswith(FIRST), place(caption["paper"]), caption["name"])
+    return (not caption["name"].startswith(FIRST), source_position(caption["paper"]), caption["name"])
 
 
 def _told_apart(drawn: list[dict[str, Any]]) -> list[dict[str, Any]]:

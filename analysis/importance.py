@@ -16,11 +16,11 @@ import numpy as np
 import pandas as pd
 
 from analysis.intervals import FEWEST_SEEDS, band, ratios, resampled
+from analysis.labels import CELL
 from analysis.outcomes import successes_by_seed
 from analysis.ranking import by_seed_array
+from analysis.results import Results, remembered
 from analysis.selection import Selection
-from analysis.store import Store, remembered
-from analysis.words import CELL
 
 SPLITS = 12
 """Halvings of the seeds for the permutation importance."""
@@ -31,7 +31,7 @@ _STREAM = 5
 
 
 @remembered
-def by_value(store: Store, chosen: Selection, task: str, parameter: str) -> tuple[np.ndarray, np.ndarray, list, list]:
+def by_value(store: Results, chosen: Selection, task: str, parameter: str) -> tuple[np.ndarray, np.ndarray, list, list]:
     """Successes and runs (seeds, values, evaluations), and the values and evaluations in order."""
     rows = successes_by_seed(store, chosen, ("evaluation", parameter), f"task = '{task}'")
     runs, successes = (
@@ -43,7 +43,7 @@ def by_value(store: Store, chosen: Selection, task: str, parameter: str) -> tupl
     return sums, counts, sorted(rows[parameter].unique()), sorted(rows.evaluation.unique())
 
 
-def largest_gap(store: Store, chosen: Selection, task: str, parameter: str, *, at_last: bool = False) -> dict[str, float]:
+def largest_gap(store: Results, chosen: Selection, task: str, parameter: str, *, at_last: bool = False) -> dict[str, float]:
     """The widest gap between two values' success rates, in points, where it is, and its interval; ``at_last``: at the last
     evaluation.
 
@@ -66,7 +66,7 @@ def largest_gap(store: Store, chosen: Selection, task: str, parameter: str, *, a
 
 
 @remembered
-def at_the_end(store: Store, chosen: Selection, task: str) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
+def at_the_end(store: Results, chosen: Selection, task: str) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
     """Combinations (rows), and successes and runs of each seed at the last evaluation, both (seeds, combinations)."""
     rows = successes_by_seed(store, chosen, CELL, f"task = '{task}' AND last")
     cells = rows[list(CELL)].drop_duplicates().sort_values(list(CELL)).reset_index(drop=True)

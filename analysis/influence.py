@@ -11,14 +11,14 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.importance import at_the_end, largest_gap, permutation_importances, variance_shares
 from analysis.intervals import BOOTSTRAP, FEWEST_SEEDS, band
+from analysis.labels import CELL, TITLES, counted, task_title, valued
 from analysis.outcomes import criterion
 from analysis.ranking import varied
+from analysis.results import Results
 from analysis.selection import Selection, selections
-from analysis.store import Store
-from analysis.words import CELL, TITLES, counted, task_title, valued
 from bns.plotting.style import lettered, note, ordered_styles, panels, style
 
 NAME = "influence"
@@ -30,12 +30,12 @@ MEASURES = {
 }
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     Thread(target=import_module, args=("sklearn.inspection",)).start()  # a second to load, beside the queries
     return [_draw(store, chosen) for chosen in selections(store)]
 
 
-def influences(store: Store, chosen: Selection) -> pd.DataFrame:
+def influences(store: Results, chosen: Selection) -> pd.DataFrame:
     """One row a task and parameter; of each measure its value and the ends low and high of its interval, and the seeds."""
     made = []
     for task in chosen.tasks:
@@ -57,7 +57,7 @@ def influences(store: Store, chosen: Selection) -> pd.DataFrame:
 
 
 @style()
-def _draw(store: Store, chosen: Selection) -> Drawn:
+def _draw(store: Results, chosen: Selection) -> FigureResult:
     rows = influences(store, chosen)
     names = [name for name in CELL if name in set(rows.parameter)]
     tasks = [task for task in chosen.tasks if task in set(rows.task)]
@@ -81,7 +81,7 @@ def _draw(store: Store, chosen: Selection) -> Drawn:
         f"Permutation: how much of its R² a regression tree loses on seeds it has not seen, when the values are shuffled. "
         f"n = {n:,} runs of {', '.join(chosen.sweeps)}, {rows.seeds.max()} seeds."
     )
-    return Drawn(
+    return FigureResult(
         f"{NAME}-{chosen.robot}", "Influence of the parameters", figure, shows, n, chosen.sweeps,
         (*said.missing, *chosen.left_out), see=_in_words(rows, chosen), data=rows, table=_table(rows, chosen),
     )  # fmt: skip

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from analysis.drawn import Drawn
-from analysis.store import NoDataError, Store
-from analysis.words import counted, task_number, task_title
+from analysis.figure_result import FigureResult
+from analysis.labels import counted, task_number, task_title
+from analysis.results import NoDataError, Results
 from bns.plotting.style import BLUE, GREY, RED, lettered, note, panels, style
 
 NAME = "one-run"
@@ -23,7 +23,7 @@ SHOWN = 30
 """Evaluations that the source's run had."""
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     runs = store.query("""SELECT DISTINCT robot, task, sweep, seed, run_id, evaluations,
         generations_per_evaluation AS generations
         FROM runs SEMI JOIN probes USING (run_id, sweep) SEMI JOIN generations USING (run_id, sweep)
@@ -39,7 +39,7 @@ def draw(store: Store) -> list[Drawn]:
 
 
 @style()
-def _draw(store: Store, run) -> Drawn:
+def _draw(store: Results, run) -> FigureResult:
     shown = min(SHOWN, run.evaluations)
     where = f"run_id = '{run.run_id}' AND sweep = '{run.sweep}' AND evaluation <= {shown}"
     generations = store.query(f"SELECT * FROM generations WHERE {where} ORDER BY generation")
@@ -60,7 +60,7 @@ def _draw(store: Store, run) -> Drawn:
         f"ends of {counted(many, 'random controller')} of five commands in simulation and in the world; thick: the median. "
         f"(c) How far those ends moved from one simulator to the next, summed over the {many}."
     )
-    return Drawn(
+    return FigureResult(
         f"{NAME}-{run.robot}", "One run over time", figure, shows, 1, (run.sweep,),
         see=_in_words(probes, totals), data=probes,
     )  # fmt: skip

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from analysis.labels import CELL
+from analysis.results import Results, remembered
 from analysis.selection import Selection
-from analysis.store import Store, remembered
-from analysis.words import CELL
 from bns.store.schema import NEAR_CM
 
 NEAR = tuple(f"success_{cm}cm" for cm in NEAR_CM)
@@ -20,24 +20,24 @@ FEWEST_PLANNED = 2
 _KEPT = ("success", *NEAR, "diversity", "fitness_error", "fitness_world")
 
 
-def fewest(store: Store, chosen: Selection) -> int:
+def fewest(store: Results, chosen: Selection) -> int:
     """Runs that a combination must have to be drawn and ranked: `FEWEST`, or all that are asked for of it, where that is less."""
     planned = [store.plans[sweep].seeds for sweep in chosen.sweeps if sweep in store.plans]
     return min(FEWEST, max(FEWEST_PLANNED, *planned)) if planned else FEWEST
 
 
-def outcomes(store: Store, chosen: Selection) -> str:
+def outcomes(store: Results, chosen: Selection) -> str:
     """Name of a table with a row an evaluation: task, the four parameters, seed, root_seed, evaluation, whether it is the
     run's last, successes of the fittest controller, diversity, fitness_error, fitness_world."""
     return _kept(store, chosen, "outcomes", "true")
 
 
-def last_outcomes(store: Store, chosen: Selection) -> str:
+def last_outcomes(store: Results, chosen: Selection) -> str:
     """As `outcomes`, each run's last evaluation alone: much sooner read where a figure needs no more."""
     return _kept(store, chosen, "last_outcomes", "evaluation = evaluations")
 
 
-def _kept(store: Store, chosen: Selection, name: str, where: str) -> str:
+def _kept(store: Results, chosen: Selection, name: str, where: str) -> str:
     digest = hashlib.sha256(chosen.sql.encode()).hexdigest()[:12]
     return store.keep(
         f"{name}_{digest}",
@@ -47,26 +47,26 @@ def _kept(store: Store, chosen: Selection, name: str, where: str) -> str:
 
 
 @remembered
-def radii_cm(store: Store, chosen: Selection) -> tuple[int, ...]:
+def radii_cm(store: Results, chosen: Selection) -> tuple[int, ...]:
     """Goal radii that successes of these runs are known at; none where a task has goal regions instead of points."""
     known = store.query(f"SELECT {', '.join(f'count({name}) AS {name}' for name in NEAR)} FROM {last_outcomes(store, chosen)}")
     return tuple(cm for cm, name in zip(NEAR_CM, NEAR, strict=True) if known[name][0])
 
 
-def criterion(store: Store, chosen: Selection) -> str:
+def criterion(store: Results, chosen: Selection) -> str:
     """What ``success`` means for these runs: ``visits all goals within 7 cm``."""
     near = radii_cm(store, chosen)
     return f"visits all goals within {near[0]} cm" if near else "visits all goals"
 
 
-def by_value(store: Store, chosen: Selection, parameter: str) -> pd.DataFrame:
+def by_value(store: Results, chosen: Selection, parameter: str) -> pd.DataFrame:
     """Runs and successes of each task, value of ``parameter`` and evaluation."""
     return store.query(f"""
         SELECT task, {parameter} AS value, evaluation, count(success) AS runs, count(*) FILTER (success) AS successes
         FROM {outcomes(store, chosen)} WHERE success IS NOT NULL GROUP BY ALL ORDER BY ALL""")
 
 
-def at_the_end(store: Store, chosen: Selection) -> pd.DataFrame:
+def at_the_end(store: Results, chosen: Selection) -> pd.DataFrame:
     """Of each task and combination at its last evaluation: runs, successes, means of diversity, error and fitness."""
     counts = ", ".join(f"count(*) FILTER ({name}) AS {name}" for name in ("success", *NEAR))
     return store.query(f"""
@@ -75,12 +75,12 @@ def at_the_end(store: Store, chosen: Selection) -> pd.DataFrame:
         FROM {last_outcomes(store, chosen)} GROUP BY ALL ORDER BY ALL""")
 
 
-def successes_by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str) -> pd.DataFrame:
+def successes_by_seed(store: Results, chosen: Selection, columns: Sequence[str], where: str) -> pd.DataFrame:
     """Runs and successes of each seed and group of ``columns``: what a bootstrap over seeds draws from."""
     return _by_seed(store, chosen, columns, where, ())
 
 
-def by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str) -> pd.DataFrame:
+def by_seed(store: Results, chosen: Selection, columns: Sequence[str], where: str) -> pd.DataFrame:
     """As `successes_by_seed`, with successes within 20 cm and summed diversity."""
     more = (
         "sum(success_20cm::INT) AS successes_20cm",
@@ -90,7 +90,7 @@ def by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str)
     return _by_seed(store, chosen, columns, where, more)
 
 
-def _by_seed(store: Store, chosen: Selection, columns: Sequence[str], where: str, more: Sequence[str]) -> pd.DataFrame:
+def _by_seed(store: Results, chosen: Selection, columns: Sequence[str], where: str, more: Sequence[str]) -> pd.DataFrame:
     groups = ", ".join(("task", *columns, "root_seed", "seed"))
     sums = ", ".join(("count(success) AS runs", "count(*) FILTER (success) AS successes", *more))
     return store.query(f"SELECT {groups}, {sums} FROM {outcomes(store, chosen)} WHERE {where} GROUP BY ALL ORDER BY ALL")

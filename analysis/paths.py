@@ -5,9 +5,9 @@ from __future__ import annotations
 import pandas as pd
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
-from analysis.store import NoDataError, Store
-from analysis.words import counted, task_title
+from analysis.figure_result import FigureResult
+from analysis.labels import counted, task_title
+from analysis.results import NoDataError, Results
 from bns.plotting.style import draw_paths, frame_alike, goal_reach, note, outcome, panels, style
 from bns.robots import load_robot
 from bns.tasks import load_task
@@ -21,7 +21,7 @@ MOST_PANELS = 6
 WORLD, SNN = ["x_m", "y_m", "heading_rad"], ["snn_x_m", "snn_y_m", "snn_heading_rad"]
 
 
-def last_successes(store: Store) -> pd.DataFrame:
+def last_successes(store: Results) -> pd.DataFrame:
     """The evaluation to show of each run that has paths: its last success, or its last.
 
     A run that several sweeps have counts once, for the first of them.
@@ -36,7 +36,7 @@ def last_successes(store: Store) -> pd.DataFrame:
         GROUP BY ALL ORDER BY ALL""").sort_values("sweep", key=lambda sweep: sweep != FIRST, kind="stable")
 
 
-def poses(store: Store, shown: pd.DataFrame) -> dict[str, pd.DataFrame]:
+def poses(store: Results, shown: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Poses of the fittest controller at those evaluations, by run."""
     which = " OR ".join(
         f"(run_id = '{row.run_id}' AND sweep = '{row.sweep}' AND evaluation = {row.evaluation})"
@@ -47,7 +47,7 @@ def poses(store: Store, shown: pd.DataFrame) -> dict[str, pd.DataFrame]:
     return dict(iter(rows.groupby("run_id")))
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     runs = last_successes(store)
     if runs.empty:
         raise NoDataError(
@@ -57,7 +57,7 @@ def draw(store: Store) -> list[Drawn]:
 
 
 @style()
-def _draw_task(store: Store, robot: str, task: str, runs: pd.DataFrame) -> Drawn:
+def _draw_task(store: Results, robot: str, task: str, runs: pd.DataFrame) -> FigureResult:
     shown, sweeps = runs.head(MOST_PANELS), tuple(runs.sweep.unique())
     walked, goals_m = poses(store, shown), load_task(robot, task).goals_m
     radius_m, square = goal_reach(load_robot(robot), load_task(robot, task))
@@ -83,4 +83,4 @@ def _draw_task(store: Store, robot: str, task: str, runs: pd.DataFrame) -> Drawn
         f"goals, {100 * radius_m:g} cm from their middle to their edge, in order."
     )
     title = f"Paths of robot and simulator, {task_title(robot, task)}"
-    return Drawn(f"{NAME}-{robot}-{task}", title, figure, shows, n, sweeps, said, data=pd.concat(walked.values()))
+    return FigureResult(f"{NAME}-{robot}-{task}", title, figure, shows, n, sweeps, said, data=pd.concat(walked.values()))

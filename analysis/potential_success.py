@@ -8,13 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import BOOTSTRAP, bootstrap
+from analysis.labels import task_title
 from analysis.outcomes import by_seed, radii_cm
 from analysis.ranking import any_of, by_seed_array, extremes, ranking
+from analysis.results import NoDataError, Results
 from analysis.selection import Selection, selections
-from analysis.store import NoDataError, Store
-from analysis.words import task_title
 from bns.plotting.style import GREY, note, ordered_styles, panels, style
 
 NAME = "potential-success"
@@ -22,14 +22,14 @@ PAPER = "figure 4.16"
 RADIUS_CM = 20
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     robots = [chosen for chosen in selections(store) if RADIUS_CM in radii_cm(store, chosen)]
     if not robots:
         raise NoDataError(f"no finished run has goal points with a radius of {RADIUS_CM} cm; run make sweep-khepera")
     return [_draw(store, chosen) for chosen in robots]
 
 
-def curve(store: Store, chosen: Selection, task: str, cells: pd.DataFrame) -> pd.DataFrame:
+def curve(store: Results, chosen: Selection, task: str, cells: pd.DataFrame) -> pd.DataFrame:
     """Share of runs of these combinations that succeed within 20 cm after each evaluation, with its interval."""
     rows = by_seed(store, chosen, ("evaluation",), f"task = '{task}' AND ({any_of(cells)})")
     (sums, evaluations), (counts, _) = (by_seed_array(rows, name) for name in ("successes_20cm", "runs"))
@@ -39,7 +39,7 @@ def curve(store: Store, chosen: Selection, task: str, cells: pd.DataFrame) -> pd
 
 
 @style()
-def _draw(store: Store, chosen: Selection) -> Drawn:
+def _draw(store: Results, chosen: Selection) -> FigureResult:
     rows = ranking(store, chosen)
     tops = {task: extremes(rows, task)[0] for task in chosen.tasks if (rows.task == task).sum() > 1}
     if not tops:
@@ -56,7 +56,7 @@ def _draw(store: Store, chosen: Selection) -> Drawn:
         f"{', '.join(chosen.sweeps)}. The best are picked by success at the last evaluation, so they are seen at their luckiest."
     )
     see = " ".join(_half(task_title(chosen.robot, task), line) for task, line in lines.items())
-    return Drawn(
+    return FigureResult(
         f"{NAME}-{chosen.robot}", "Potential success of the best combinations", figure, shows, n, chosen.sweeps,
         (*said.missing, *chosen.left_out), see=see, data=pd.concat(lines.values()),
     )  # fmt: skip

@@ -9,15 +9,15 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.drawn import Drawn
-from analysis.store import Store, among
+from analysis.figure_result import FigureResult
+from analysis.results import Results, among
 from bns.plotting.style import save
 from bns.store.files import publish, remove
 
 KINDS = ("png", "svg", "csv", "json")
 
 
-def publish_drawn(drawn: Drawn, paper: str, store: Store, out: Path) -> Path:
+def publish_figure(drawn: FigureResult, paper: str, store: Results, out: Path) -> Path:
     """Write a figure, its numbers and its caption; the path of the PNG, or of the CSV of a table without a picture.
 
     Raises:
@@ -94,7 +94,7 @@ def _rows(table: pd.DataFrame | None) -> dict[str, list[Any]] | None:
     return {"columns": list(table.columns), "rows": table.astype(str).to_numpy().tolist()}
 
 
-def _origins(store: Store, sweeps: Sequence[str]) -> dict[str, Any]:
+def _origins(store: Results, sweeps: Sequence[str]) -> dict[str, Any]:
     """Spec hashes, commits and versions that the results of ``sweeps`` come from."""
     hashes = store.query(f"SELECT DISTINCT spec_hash FROM specs WHERE {among('sweep', sweeps)} ORDER BY 1")
     made = store.query(

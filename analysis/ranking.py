@@ -7,18 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.clouds import combinations
+from analysis.labels import CELL, SHORT, valued
 from analysis.outcomes import NEAR
+from analysis.results import NoDataError, Results, remembered
+from analysis.scatter import combinations
 from analysis.selection import Selection
-from analysis.store import NoDataError, Store, remembered
-from analysis.words import CELL, SHORT, valued
 from bns.sweep.confirm import RANKED_BY
 
 TEN = 10
 
 
 @remembered
-def ranking(store: Store, chosen: Selection) -> pd.DataFrame:
+def ranking(store: Results, chosen: Selection) -> pd.DataFrame:
     """Combinations with enough runs at their last evaluation, task by task from best to worst; ``rank`` counts from 1.
 
     Success by the task's own criterion decides, then at wider goal radii, then mean fitness of the fittest in the world.

@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.store import BEGIN, NoDataError, Store, among, remembered
-from analysis.words import CELL, TITLES, counted, task_order
+from analysis.labels import CELL, TITLES, counted, task_order
+from analysis.results import BEGIN, NoDataError, Results, among, remembered
 from bns.sweep.confirm import confirmed_name
 
 CONFIRMING = confirmed_name("")
@@ -48,7 +48,7 @@ class Selection:
 
 
 @remembered
-def selections(store: Store, parameter: str | None = None) -> list[Selection]:
+def selections(store: Results, parameter: str | None = None) -> list[Selection]:
     """One selection a robot, of the sweeps that compare ``parameter`` (by default any of the source's four).
 
     Raises:
@@ -64,7 +64,7 @@ def selections(store: Store, parameter: str | None = None) -> list[Selection]:
     return [_selection(store, robot, own, sweeps) for robot, own in groups.groupby("robot")]
 
 
-def comparing(store: Store, parameter: str | None = None) -> list[str]:
+def comparing(store: Results, parameter: str | None = None) -> list[str]:
     """Sweeps that compare values of ``parameter`` (of any of the four), by their plan or by their runs."""
     names = CELL if parameter is None else (parameter,)
     several = " OR ".join(f"count(DISTINCT {name}) > 1" for name in names)
@@ -77,7 +77,7 @@ def comparing(store: Store, parameter: str | None = None) -> list[str]:
     ]
 
 
-def _selection(store: Store, robot: str, groups: pd.DataFrame, sweeps: Sequence[str]) -> Selection:
+def _selection(store: Results, robot: str, groups: pd.DataFrame, sweeps: Sequence[str]) -> Selection:
     chosen = groups.drop_duplicates("task")
     setting = " OR ".join(f"({_equals(row)})" for row in chosen[["robot", "task", *SETTING]].to_dict("records"))
     left_out = tuple(
@@ -92,7 +92,7 @@ def _selection(store: Store, robot: str, groups: pd.DataFrame, sweeps: Sequence[
     return Selection(robot, tasks, own, setting, int(chosen.n.sum()), left_out)
 
 
-def _why_none(store: Store, sweeps: Sequence[str], parameter: str | None) -> str:
+def _why_none(store: Results, sweeps: Sequence[str], parameter: str | None) -> str:
     """Why none of ``sweeps``, or of all if there are none to choose from, has a run to count."""
     among_these = sweeps or store.query("SELECT DISTINCT sweep FROM runs").sweep.tolist()
     done, failed = finished(store, among_these), failures(store, among_these)
@@ -109,13 +109,13 @@ def _equals(values: dict[str, Any]) -> str:
     )
 
 
-def finished(store: Store, sweeps: Sequence[str]) -> int:
+def finished(store: Results, sweeps: Sequence[str]) -> int:
     """How many different runs of ``sweeps`` are finished."""
     rows = store.query(f"SELECT count(DISTINCT run_id) AS n FROM runs WHERE status = 'ok' AND {among('sweep', sweeps)}")
     return int(rows.n[0])
 
 
-def failures(store: Store, sweeps: Sequence[str]) -> int:
+def failures(store: Results, sweeps: Sequence[str]) -> int:
     """How many runs of ``sweeps`` broke and were not carried out again with success."""
     return int(
         store.query(f"""SELECT count(*) AS n FROM (SELECT run_id FROM runs WHERE {among("sweep", sweeps)}

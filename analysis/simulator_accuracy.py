@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import wilson
-from analysis.store import NoDataError, Store
+from analysis.results import NoDataError, Results
 from bns.errors import ModelError
 from bns.plotting.style import BLUE, GREY, RED, lettered, note, panels, style
 from bns.robots import load_robot, robot_names
@@ -27,7 +27,7 @@ SOURCE_STABILITY = {"stable": 0.94, "unstable": 0.58}
 """Shares of stable and unstable verification cycles that the source's network got right."""
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     ran = store.query("SELECT DISTINCT robot FROM runs WHERE status = 'ok' ORDER BY 1").robot
     found = [one for one in map(_shipped, sorted(set(ran) & set(robot_names()))) if "verification" in one.provenance]
     if not found:
@@ -48,7 +48,7 @@ def _shipped(robot: str) -> StaticSimulator:
 
 
 @style()
-def _draw(simulator: StaticSimulator) -> Drawn:
+def _draw(simulator: StaticSimulator) -> FigureResult:
     robot, about = load_robot(simulator.provenance["robot"]), simulator.provenance
     measured, predicted = (np.array(about["verification"][kind]) for kind in ("measured", "predicted"))
     learnable = robot.learnable(measured)
@@ -71,7 +71,7 @@ def _draw(simulator: StaticSimulator) -> Drawn:
     see = "The source predicted x well (R² 0.84 and 0.75) and y hardly at all (0.17 and 0.05)."
     columns = [f"{kind}_{net}" for kind in ("measured", "predicted") for net in simulator.networks]
     data, title = pd.DataFrame(np.hstack([measured, predicted]), columns=columns), f"Static simulator of the {robot.name}"
-    return Drawn(f"{NAME}-{robot.name}", title, figure, shows, 1, (), see=see, data=data, table=table)
+    return FigureResult(f"{NAME}-{robot.name}", title, figure, shows, 1, (), see=see, data=data, table=table)
 
 
 def _scatter(ax: Axes, measured: np.ndarray, predicted: np.ndarray) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.drawn import Drawn
-from analysis.store import NoDataError, Store
+from analysis.figure_result import FigureResult
+from analysis.results import NoDataError, Results
 from bns.plotting.style import OKABE_ITO, lettered, note, panels, style
 from bns.spec import OPTION_MARK
 
@@ -16,7 +16,7 @@ PAPER = "beyond the source"
 _AS_SOURCE = "the simulator as in the source"
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     from analysis.option_errors import driven_tables  # noqa: PLC0415  # brings the compiler, for which no other figure waits
 
     found = driven_tables(store.results)
@@ -26,7 +26,7 @@ def draw(store: Store) -> list[Drawn]:
 
 
 @style()
-def _draw(robot: str, path: Path) -> Drawn:
+def _draw(robot: str, path: Path) -> FigureResult:
     from analysis.option_errors import errors, tracks_of  # noqa: PLC0415
 
     tracks = tracks_of(path)
@@ -60,7 +60,7 @@ def _draw(robot: str, path: Path) -> Drawn:
     )
     see = "An option is worth what it takes off the first of each group."
     title = f"What options of the simulator buy, {robot}"
-    return Drawn(f"{NAME}-{robot}", title, figure, shows, len(tracks), (), see=see, data=data)
+    return FigureResult(f"{NAME}-{robot}", title, figure, shows, len(tracks), (), see=see, data=data)
 
 
 def _in_two_lines(horizon: str) -> str:

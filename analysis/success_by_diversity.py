@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.clouds import Panel, cloud, combinations, described
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
+from analysis.labels import TITLES, task_title
 from analysis.outcomes import criterion, radii_cm
+from analysis.results import Results
+from analysis.scatter import Panel, combinations, described, scatter_figure
 from analysis.selection import Selection, selections
-from analysis.store import Store
-from analysis.words import TITLES, task_title
 from bns.plotting.style import style
 
 NAME = "success-by-diversity"
@@ -20,15 +20,15 @@ HARD = 0.5
 """A task whose best combination succeeds less often is drawn at the next goal radius as well (figure 4.12d)."""
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     return [_draw(store, chosen) for chosen in selections(store)]
 
 
 @style()
-def _draw(store: Store, chosen: Selection) -> Drawn:
+def _draw(store: Results, chosen: Selection) -> FigureResult:
     rows, thin = combinations(store, chosen)
     shown = success_panels(store, chosen, rows)
-    figure, axes = cloud(shown, COLOUR, "successful runs (%)")
+    figure, axes = scatter_figure(shown, COLOUR, "successful runs (%)")
     for ax in axes:
         ax.set_ylim(-2, 102)
     what = (
@@ -41,7 +41,7 @@ def _draw(store: Store, chosen: Selection) -> Drawn:
     )  # fmt: skip
 
 
-def success_panels(store: Store, chosen: Selection, rows: pd.DataFrame) -> list[Panel]:
+def success_panels(store: Results, chosen: Selection, rows: pd.DataFrame) -> list[Panel]:
     """A panel a task, and one more at the next goal radius for tasks that are too hard to show a pattern at the first."""
     near, shown = radii_cm(store, chosen), []
     for task in (task for task in chosen.tasks if task in set(rows.task)):

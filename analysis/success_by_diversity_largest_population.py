@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from analysis.clouds import cloud, combinations, described
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import INDEPENDENCE, INTERVALS
+from analysis.labels import TITLES
 from analysis.outcomes import criterion
+from analysis.results import Results
+from analysis.scatter import combinations, described, scatter_figure
 from analysis.selection import Selection, selections
-from analysis.store import Store
 from analysis.success_by_diversity import COLOUR, in_words, success_panels
-from analysis.words import TITLES
 from bns.plotting.style import style
 
 NAME = "success-by-diversity-largest-population"
 PAPER = "figure 5.28"
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     return [_draw(store, chosen) for chosen in selections(store, "population_size")]
 
 
 @style()
-def _draw(store: Store, chosen: Selection) -> Drawn:
+def _draw(store: Results, chosen: Selection) -> FigureResult:
     found, _ = combinations(store, chosen)
     largest = found.population_size.max()
     rows = found[found.population_size == largest]
-    figure, axes = cloud(success_panels(store, chosen, rows), COLOUR, "successful runs (%)")
+    figure, axes = scatter_figure(success_panels(store, chosen, rows), COLOUR, "successful runs (%)")
     for ax in axes:
         ax.set_ylim(-2, 102)
     what = (

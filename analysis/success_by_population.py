@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from analysis.curves import success_by
-from analysis.drawn import Drawn
-from analysis.store import Store
+from analysis.figure_result import FigureResult
+from analysis.results import Results
 
 NAME = "success-by-population"
 PAPER = "figures 4.8 and 5.22"
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     return success_by(store, "population_size", NAME)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pandas as pd
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
 from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
+from analysis.labels import task_title
 from analysis.outcomes import criterion
+from analysis.results import Results
 from analysis.selection import Selection, selections
-from analysis.store import Store
-from analysis.words import task_title
 from bns.plotting.style import BLUE, RED, lettered, note, panels, style
 
 NAME = "success-so-far"
@@ -19,11 +19,11 @@ READINGS = {"success": "the fittest controller, now", "ever_success": "a control
 """Columns of evals: what the other figures show, and whether the run has "developed a controller that completes the task"."""
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     return [_draw(store, chosen) for chosen in selections(store)]
 
 
-def counted(store: Store, chosen: Selection) -> pd.DataFrame:
+def counted(store: Results, chosen: Selection) -> pd.DataFrame:
     """Runs and successes of each task, evaluation and reading, all combinations together, with Wilson intervals."""
     sums = ", ".join(f"count(*) FILTER ({name}) AS {name}" for name in READINGS)
     rows = store.query(f"""SELECT task, evaluation, count(success) AS runs, {sums}
@@ -33,7 +33,7 @@ def counted(store: Store, chosen: Selection) -> pd.DataFrame:
 
 
 @style()
-def _draw(store: Store, chosen: Selection) -> Drawn:
+def _draw(store: Results, chosen: Selection) -> FigureResult:
     rows = counted(store, chosen)
     figure, axes = panels(len(chosen.tasks), 3.2)
     looks = dict(zip(READINGS, ({"color": BLUE}, {"color": RED, "linestyle": "--"}), strict=True))
@@ -53,7 +53,7 @@ def _draw(store: Store, chosen: Selection) -> Drawn:
         f"done so after this or an earlier one; all combinations together, n = {chosen.n:,} runs of {', '.join(chosen.sweeps)}; "
         f"bands are 95 % Wilson intervals ({INDEPENDENCE})."
     )
-    return Drawn(
+    return FigureResult(
         f"{NAME}-{chosen.robot}", "Success now and so far", figure, shows, chosen.n, chosen.sweeps,
         (*said.missing, *chosen.left_out), see=_in_words(rows, chosen), data=rows,
     )  # fmt: skip

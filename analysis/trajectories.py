@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from analysis.drawn import Drawn
-from analysis.store import NoDataError, Store
-from analysis.words import task_title
+from analysis.figure_result import FigureResult
+from analysis.labels import task_title
+from analysis.results import NoDataError, Results
 from bns.plotting.style import BLUE, GREY, RED, draw_goals, frame_alike, goal_reach, note, panels, style
 from bns.robots import load_robot
 from bns.tasks import load_task
@@ -24,7 +24,7 @@ SOURCE = (
 _MARGIN_M = 0.1
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     tables = sorted((store.results / "validation").glob("*.parquet"))
     if not tables:
         raise NoDataError("no controllers were validated; run bns validate --robot snake")
@@ -46,7 +46,7 @@ def by_trial(table: pd.DataFrame, goals: int) -> pd.DataFrame:
 
 
 @style()
-def _draw(path: Path) -> Drawn:
+def _draw(path: Path) -> FigureResult:
     robot, task = path.stem.split("-", 1)
     table, aim = pd.read_parquet(path), load_task(robot, task)
     reach, square = goal_reach(load_robot(robot), aim)
@@ -74,7 +74,7 @@ def _draw(path: Path) -> Drawn:
         "dashed: its prediction without noise, solid: three drives of each in the physics world. No trial is left out."
     )
     title = f"Trajectory trials, {task_title(robot, task)}"
-    return Drawn(f"{NAME}-{robot}-{task}", title, figure, shows, len(trials), (), see=SOURCE, data=table, table=listed)
+    return FigureResult(f"{NAME}-{robot}-{task}", title, figure, shows, len(trials), (), see=SOURCE, data=table, table=listed)
 
 
 def _paths(ax: Axes, rows: pd.DataFrame) -> None:

@@ -9,10 +9,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
+from analysis.labels import counted, task_number, task_order, task_title
+from analysis.results import NoDataError, Results
 from analysis.source import trials_of
-from analysis.store import NoDataError, Store
-from analysis.words import counted, task_number, task_order, task_title
 from bns.plotting.style import BLUE, GREY, RED, note, panels, style
 
 NAME = "trials"
@@ -30,14 +30,14 @@ MARKS = {
 """What a trial is measured by: what it is called, the column of successes, how many of them in succession."""
 
 
-def draw(store: Store) -> list[Drawn]:
+def draw(store: Results) -> list[FigureResult]:
     rows = trials(store)
     if rows.empty:
         raise NoDataError(f"no finished prototype trial; run bns sweep sweeps/{SWEEPS}.yaml")
     return [_draw(store, str(robot), own) for robot, own in rows.groupby("robot")]
 
 
-def trials(store: Store) -> pd.DataFrame:
+def trials(store: Results) -> pd.DataFrame:
     """Of each prototype trial, or of the one run asked for, the evaluation of each of MARKS, and driving minutes until the first.
 
     Marks that never came are empty. Of trials with the same seed (of an older engine, say) the newest counts.
@@ -70,7 +70,7 @@ def first_in_a_row(success: np.ndarray, many: int) -> int | None:
 
 
 @style()
-def _draw(store: Store, robot: str, rows: pd.DataFrame) -> Drawn:
+def _draw(store: Results, robot: str, rows: pd.DataFrame) -> FigureResult:
     sweeps = tuple(sorted(rows.sweep.unique()))
     tasks = sorted(rows.task.unique(), key=lambda task: task_order(robot, task))
     figure, axes = panels(1, 1.9 + 0.7 * len(tasks))
@@ -84,7 +84,7 @@ def _draw(store: Store, robot: str, rows: pd.DataFrame) -> Drawn:
         f"fittest controller visits all goals. Consistent: in {IN_A_ROW} evaluations in succession (the source judged by eye). "
         f"Minutes: {_pace(robot)}. Driving: the commands of the controllers that were driven until the first success."
     )
-    return Drawn(
+    return FigureResult(
         f"{NAME}-{robot}", "Trials until success", figure, shows, len(rows), sweeps, said.missing,
         see=_in_words(robot, rows, tasks), data=rows, table=_table(robot, rows, tasks),
     )  # fmt: skip

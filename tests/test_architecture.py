@@ -94,7 +94,7 @@ def test_the_rooms_of_the_diagnosis_stand_on_floors_too():
                 found += [
                     f"{path}:{node.lineno} imports {room}"
                     for room in rooms
-                    if own != "__init__" and room != own and level[room] >= level[own]
+                    if own not in {"__init__", room} and level[room] >= level[own]
                 ]
     assert found == []
 

@@ -6,14 +6,14 @@ import pytest
 from bns.engine.philox import Key
 from bns.robots import load_robot
 from bns.robots import simulator as files
-from bns.robots.base import Recipe
+from bns.robots.base import StagedTraining
 from bns.robots.simulator import load_static_simulator
 from bns.robots.snake import path
 from bns.static_simulator import train as pre
 from bns.static_simulator import train_in_stages as refinement
 
 ROBOT, KEY = load_robot("snake"), Key(2, 3)
-SMALL = Recipe(60, 3, 2, 4, 1, 400, (0.08, 0.08, 0.08, 0.08, 0.0))
+SMALL = StagedTraining(60, 3, 2, 4, 1, 400, (0.08, 0.08, 0.08, 0.08, 0.0))
 
 
 class Meadow:
@@ -39,13 +39,13 @@ def quick(monkeypatch):
 
 def made(seed=0):
     world = Meadow()
-    return refinement.refined(ROBOT, world, SMALL, seed, lambda done, of: None), world
+    return refinement.train_in_stages(ROBOT, world, SMALL, seed, lambda done, of: None), world
 
 
 def test_stages_drive_as_many_commands_as_the_recipe_says(quick):
     told = []
     world = Meadow()
-    refinement.refined(ROBOT, world, SMALL, 0, lambda done, of: told.append((done, of)))
+    refinement.train_in_stages(ROBOT, world, SMALL, 0, lambda done, of: told.append((done, of)))
     assert len(world.driven) == 60 + 5 * 3 * 3 + 2 * 4 + 4 * 2
     assert told[-1] == (len(world.driven), len(world.driven))
     assert [done for done, _ in told] == sorted(done for done, _ in told)
@@ -60,8 +60,8 @@ def test_same_seed_same_networks_and_another_seed_others(quick):
 
 
 def some_patterns(n=200):
-    shop = refinement.Workshop(ROBOT, Meadow(), KEY, n, lambda done, of: None, 1)
-    return shop.drive(ROBOT.random_controllers(KEY, n, 1).commands[:, 0])
+    sampler = refinement.CommandSampler(ROBOT, Meadow(), KEY, n, lambda done, of: None, 1)
+    return sampler.drive(ROBOT.random_controllers(KEY, n, 1).commands[:, 0])
 
 
 def test_worst_are_those_with_the_largest_error_and_none_that_verifies():
@@ -79,7 +79,7 @@ def test_worst_are_those_with_the_largest_error_and_none_that_verifies():
 
 def test_verification_takes_no_part_in_training():
     patterns = some_patterns()
-    spoiled = refinement.Patterns(patterns.commands, patterns.moved.copy(), patterns.lot)
+    spoiled = refinement.Patterns(patterns.commands, patterns.moved.copy(), patterns.split)
     spoiled.moved[spoiled.verification, :4] = 7.0
     weights, _ = refinement.trained(ROBOT, KEY, patterns, 300)
     np.testing.assert_array_equal(refinement.trained(ROBOT, KEY, spoiled, 300)[0], weights)
@@ -141,8 +141,8 @@ def test_the_first_cycles_of_the_shipped_simulator_are_driven_again_the_same():
     from bns.worlds import build_world
 
     key, count = Key.of_run(0, 0, "snake", "precompute"), 30
-    shop = refinement.Workshop(ROBOT, build_world("physics", ROBOT), key, count, lambda done, of: None, 2)
-    patterns = shop.drive(ROBOT.random_controllers(key, ROBOT.recipe.random, 1).commands[:count, 0])
+    sampler = refinement.CommandSampler(ROBOT, build_world("physics", ROBOT), key, count, lambda done, of: None, 2)
+    patterns = sampler.drive(ROBOT.random_controllers(key, ROBOT.recipe.random, 1).commands[:count, 0])
     again = patterns.moved[patterns.verification]
     shipped = np.array(load_static_simulator("snake").provenance["verification"]["measured"])[: len(again)]
     assert len(again) >= 2

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from analysis import simulator_options
-from analysis.store import NoDataError
+from analysis.results import NoDataError
 from bns.robots import load_robot
 from bns.robots.snake import path
 from bns.static_simulator import transfer_trials as validation

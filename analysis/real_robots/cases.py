@@ -21,7 +21,7 @@ from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.horizons import HORIZONS, errors_of
 from bns.diagnose.predict.wheels import predictor_for_search
 from bns.diagnose.report.text import diagnosis_text
-from bns.diagnose.select.stepwise import Found
+from bns.diagnose.select.stepwise import SelectionResult
 from bns.errors import DataError
 from bns.physics.model import Model
 
@@ -96,19 +96,19 @@ def diagnosed(case: Case, table: pd.DataFrame, folder: Path) -> dict[str, Any]:
         "drawn": {h: v for h, v in drawn.items() if np.isfinite(v)},
         "trials": len(log.tracks),
         "findings": len(log.findings),
-        "intervals": intervals(predictor, found.found) if found.found else {},
+        "intervals": intervals(predictor, found.selection) if found.selection else {},
     }
-    differing = found.model.differing if found.model else None
-    answer["clocks_s"] = list(differing.own) if differing else []
+    per_trial_effect = found.model.per_trial_effect if found.model else None
+    answer["clocks_s"] = list(per_trial_effect.trial_values) if per_trial_effect else []
     (folder / f"{case.name}.json").write_text(json.dumps(answer, indent=1), encoding="utf-8")
     (folder / f"{case.name}.txt").write_text(diagnosis_text(found) + "\n", encoding="utf-8")
     return answer
 
 
-def intervals(predictor: Predictor, found: Found) -> dict[str, dict[str, list[float]]]:
+def intervals(predictor: Predictor, found: SelectionResult) -> dict[str, dict[str, list[float]]]:
     """95 % intervals of the held-out errors (m), before and after, at every horizon that the log has; the trial is the unit."""
     models = {"before": found.nominal.model, "after": found.fit.model}
-    steps = {name: held_out_steps(predictor, found.problem.following, model) for name, model in models.items()}
+    steps = {name: held_out_steps(predictor, found.problem.pose_filter, model) for name, model in models.items()}
     known = [h for h in HORIZONS if len(predictor.windows(h)[0])]
     return {h: {name: error_interval(predictor, s, h) for name, s in steps.items()} for h in known}
 

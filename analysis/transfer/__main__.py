@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from analysis.store import Store
+from analysis.results import Results
 from analysis.transfer.drives import described, summary, transferred
 from analysis.transfer.figure import transfer_figure
 from bns.errors import BnsError
@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     labels = compared | _labels(wanted.reference)
     try:
         robot = load_robot(wanted.robot)
-        drives = transferred(Store(wanted.results), list(labels), build_world(wanted.to, robot), robot)
+        drives = transferred(Results(wanted.results), list(labels), build_world(wanted.to, robot), robot)
         table = summary(drives)
         for name, frame in (("transfer.csv", drives), ("transfer-summary.csv", table)):
             publish(frame.to_csv(index=False).encode(), wanted.out / f".{name}.part", wanted.out / name)

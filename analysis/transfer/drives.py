@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.intervals import band, resampled, wilson
-from analysis.store import NoDataError, Store
+from analysis.results import NoDataError, Results
 from bns.engine.philox import Key, Purpose
 from bns.robots.base import Robot
 from bns.spec import RADII_CM
@@ -25,13 +25,13 @@ NEEDED_AT = "success_10cm"
 _RUN = ["sweep", "task", "seed"]
 
 
-def transferred(store: Store, sweeps: Sequence[str], world: World, robot: Robot) -> pd.DataFrame:
+def transferred(store: Results, sweeps: Sequence[str], world: World, robot: Robot) -> pd.DataFrame:
     """A row an evaluation of every run: sweep, task, seed, evaluation, fitness_simulation, fitness_world (of the new world),
     fitness_error, and `SUCCESSES` in the new world. NoDataError if a sweep has no runs with paths."""
     return pd.DataFrame([row for sweep in sweeps for row in _drives(store, sweep, world, robot)])
 
 
-def _drives(store: Store, sweep: str, world: World, robot: Robot) -> Iterator[dict[str, object]]:
+def _drives(store: Results, sweep: str, world: World, robot: Robot) -> Iterator[dict[str, object]]:
     columns = ", ".join(f"p.{name}" for name in robot.command_columns)
     found = store.query(
         f"SELECT p.run_id, e.task, e.seed, e.root_seed, p.evaluation, e.fitness_simulation, {columns} FROM paths p "

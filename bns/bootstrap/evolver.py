@@ -8,7 +8,7 @@ import numpy as np
 
 from bns.engine.evolution import Population, pick, rank, tournament_cdf
 from bns.engine.philox import Key, Purpose
-from bns.robots.base import Luck, Robot, Scores
+from bns.robots.base import RandomStream, Robot, Scores
 from bns.spec import RunSpec
 from bns.tasks import Task
 
@@ -42,7 +42,7 @@ class Evolver:
     def start(cls, robot: Robot, task: Task, key: Key, spec: RunSpec, weights: np.ndarray) -> Evolver:
         """A random population, scored on untrained networks."""
         population = robot.initial_population(key, spec.population_size, spec.min_commands, spec.max_commands)
-        return cls(robot, task, key, spec, population, robot.score(population, weights, task, Luck(key, 0)))
+        return cls(robot, task, key, spec, population, robot.score(population, weights, task, RandomStream(key, 0)))
 
     def __post_init__(self) -> None:
         self.order = rank(self.scores.fitness)
@@ -59,9 +59,9 @@ class Evolver:
         return self.population.controller(int(self.order[0]))
 
     def plan(self, controller: np.ndarray, weights: np.ndarray, generation: int | None = None) -> np.ndarray:
-        """What is driven of a controller of this generation, or of an earlier one: cut under the luck it was scored with."""
-        luck = Luck(self.key, self.generations if generation is None else generation)
-        return self.robot.plan(controller, weights, self.task, luck)
+        """What is driven of a controller of this generation, or of an earlier one: cut under the draws it was scored with."""
+        stream = RandomStream(self.key, self.generations if generation is None else generation)
+        return self.robot.plan(controller, weights, self.task, stream)
 
     def evolve(self, weights: np.ndarray) -> None:
         """Score the population on new networks, then breed and score generation after generation."""
@@ -85,8 +85,8 @@ class Evolver:
                 self.history.append(Generation(self.generations, self.fittest(), self.best_fitness, self.mean_fitness))
 
     def _score(self, weights: np.ndarray, parents: Scores | None = None) -> None:
-        luck = Luck(self.key, self.generations)
-        self.scores = self.robot.score(self.population, weights, self.task, luck, parents)
+        stream = RandomStream(self.key, self.generations)
+        self.scores = self.robot.score(self.population, weights, self.task, stream, parents)
         self.order = rank(self.scores.fitness)
         self.failures += self.scores.failures
 

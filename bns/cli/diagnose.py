@@ -169,7 +169,7 @@ def diagnose(options: argparse.Namespace) -> int:
 
     _, _, _, result = diagnosed(options)
     print(json.dumps(result.as_json()) if options.json else diagnosis_text(result))
-    if result.found is not None:
+    if result.selection is not None:
         _drawn(options, lambda folder: diagnosis_figure(result, folder / "diagnosis"))
     return 0
 
@@ -188,8 +188,8 @@ def diagnosed(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Mo
 def add(options: argparse.Namespace) -> int:
     """A mended model, as a new file."""
     from bns.diagnose.adding import add_effects, effect_from, model_yaml
-    from bns.diagnose.report.figures import ladder_figure
-    from bns.diagnose.report.text import mended_text
+    from bns.diagnose.report.figures import error_by_step_figure
+    from bns.diagnose.report.text import extension_text
     from bns.store.files import publish
 
     if options.output.suffix not in {".yaml", ".yml"}:
@@ -199,11 +199,13 @@ def add(options: argparse.Namespace) -> int:
     effects = [effect_from(name, options.term, options.on) for name in options.effects]
     measured, predictor, model = ready(options)
     with ticking("fitting"):
-        mended = add_effects(predictor, model, effects, measured, options.per_trial)
-    publish(model_yaml(mended.model).encode(), options.output.with_name(f".{options.output.name}.part"), options.output)
-    print(mended_text(mended))
+        extended = add_effects(predictor, model, effects, measured, options.per_trial)
+    publish(
+        model_yaml(extended.model).encode(), options.output.with_name(f".{options.output.name}.part"), options.output
+    )
+    print(extension_text(extended))
     print(f"written to {options.output}; the model before is as it was ({options.model})")
-    _drawn(options, lambda folder: ladder_figure(mended, folder / "ladder"))
+    _drawn(options, lambda folder: error_by_step_figure(extended, folder / "ladder"))
     return 0
 
 

@@ -16,7 +16,7 @@ from bns import __version__
 from bns.cli import calibrate as calibrating
 from bns.cli import diagnose as measuring
 from bns.cli import report as reporting
-from bns.cli.sweep_options import DEVICES, add_cluster_options, request_of, way_of
+from bns.cli.sweep_options import DEVICES, add_cluster_options, backend_name, request_of
 from bns.cli.trial_options import add_looking_options, add_trial_options
 from bns.errors import BnsError, SpecError
 from bns.spec import FIELDS, RunSpec, checked, field_type
@@ -282,11 +282,11 @@ def sweep(options: argparse.Namespace) -> int:
 
     files = [load_sweep(file) for file in options.files]
     sweeps = in_turn(files, options.results, options.confirm_top)
-    way = load_executor(way_of(options))
+    backend = load_executor(backend_name(options))
     with SweepProgress() as bar:
         request = request_of(options, bar)
         if options.dry_run:
-            place = way.place(request)
+            place = backend.placement(request)
             for one in sweeps:
                 estimate = foretell(
                     one, options.results, place.workers, options.shard, retry_failed=options.retry_failed
@@ -297,7 +297,7 @@ def sweep(options: argparse.Namespace) -> int:
             _say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files))
         failed = 0
         for one in sweeps:
-            summary = way.carry_out(one, request)
+            summary = backend.carry_out(one, request)
             print(summed_up(summary, options.results), file=sys.stderr)
             failed += summary.new_failed
             if summary.stopped_by in {"interrupt", "terminated"}:

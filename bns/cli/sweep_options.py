@@ -46,7 +46,7 @@ def add_cluster_options(
     add("--wait", action="store_true", help="stay until the jobs of SLURM are done")
 
 
-def way_of(options: argparse.Namespace) -> str:
+def backend_name(options: argparse.Namespace) -> str:
     """Name of the executor; SpecError if a GPU and other machines are asked for at once."""
     if options.device == "cpu":
         return options.executor or _ON_CPU

@@ -20,7 +20,7 @@ from bns.engine.philox import Key, Purpose
 from bns.engine.rprop import INITIAL_STEP
 from bns.engine.snn import INPUTS, predict
 from bns.robots import load_robot
-from bns.robots.base import Luck
+from bns.robots.base import RandomStream
 from bns.robots.simulator import load_static_simulator
 from bns.spec import RunSpec
 from bns.tasks import default_task, load_task
@@ -108,8 +108,8 @@ class Batch:
             controller = self._commands[half, run, best].copy_to_host()[:length]
             patterns = int(self._counts[0].copy_to_host()[run])
             learned_from = self._X[0, run].copy_to_host()[:, :patterns].copy()
-        luck = Luck(self._keys[run], spec.generations_per_evaluation * spec.evaluations)
-        fittest = self.robot.plan(controller, weights, task, luck)
+        stream = RandomStream(self._keys[run], spec.generations_per_evaluation * spec.evaluations)
+        fittest = self.robot.plan(controller, weights, task, stream)
         poses = world.drive(fittest, self._keys[run], Purpose.WORLD_FITTEST, spec.evaluations)
         outputs = predict(weights, self.robot.inputs(fittest), self.robot.sigmoid_output)
         simulated = self.robot.poses(self.robot.displacements(outputs), fittest)

@@ -1,4 +1,4 @@
-"""A model mended: effects added, all numbers refitted, and written down with their intervals and where they come from."""
+"""A model extended: effects added, all numbers refitted, and written down with their intervals and where they come from."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from bns.diagnose.data.load import Measured
 from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.parallel import one_thread_each
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
-from bns.diagnose.estimate.trial_clock_test import with_own_clocks
+from bns.diagnose.estimate.trial_clock_test import with_trial_clocks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import noise_floor
-from bns.diagnose.select.stepwise import problem_for
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.effects import all_effects, effect_in_file, effect_named
@@ -28,20 +28,20 @@ from bns.physics.model import ActiveEffect, Model
 
 
 @dataclass(frozen=True)
-class Rung:
-    """One step of the ladder: the effect that was added ("nominal" for the first), and the held-out error at each horizon (m)."""
+class ErrorStep:
+    """One step: the effect that was added ("nominal" for the first), and the held-out error at each horizon (m)."""
 
     name: str
     error: Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Mended:
-    """The refitted model, the ladder that led to it, and the error that noise alone would show, at each horizon (m)."""
+class ExtendedModel:
+    """The refitted model, the errors of the steps to it, and the error that noise alone would show, at each horizon (m)."""
 
     fit: Fit
     model: Model
-    ladder: tuple[Rung, ...]
+    error_by_step: tuple[ErrorStep, ...]
     floor: Mapping[str, float]
 
 
@@ -61,13 +61,13 @@ def add_effects(
     effects: Sequence[tuple[Effect, Mapping[str, str]]],
     measured: Measured,
     per_trial: bool = False,
-) -> Mended:
+) -> ExtendedModel:
     """Add effects one after the other, each fitted with all before it; ModelError if the model has one already.
 
     ``per_trial``: an effect that may differ from trial to trial does.
     """
-    if per_trial and not any(effect.may_differ for effect, _ in effects):
-        able = ", ".join(e.name for e in all_effects().values() if e.may_differ)
+    if per_trial and not any(effect.per_trial_allowed for effect, _ in effects):
+        able = ", ".join(e.name for e in all_effects().values() if e.per_trial_allowed)
         given = ", ".join(e.name for e, _ in effects)
         raise ModelError(f"None of {given} may differ from trial to trial; --per-trial goes with {able}.")
     for effect, _ in effects:
@@ -77,16 +77,21 @@ def add_effects(
             )
     problem = problem_for(predictor, model)
     fit = problem.fit(model)
-    ladder = [Rung("nominal", errors_at_horizons(predictor, held_out_steps(predictor, problem.following, fit.model)))]
+    error_by_step = [
+        ErrorStep("nominal", errors_at_horizons(predictor, held_out_steps(predictor, problem.pose_filter, fit.model)))
+    ]
     for effect, written in effects:
         fit = fit_with(problem, fit, effect)
-        problem = problem_for(predictor, fit.model, problem.following.noise)
+        problem = problem_for(predictor, fit.model, problem.pose_filter.noise)
         added = _written(fit.model, effect.name, written)
-        fit = problem.fit(with_own_clocks(added, effect.name) if per_trial and effect.may_differ else added)
-        steps = held_out_steps(predictor, problem.following, fit.model)
-        ladder.append(Rung(effect.name, errors_at_horizons(predictor, steps)))
-    floor = {h: noise_floor(predictor, problem.following.noise, h).get("position_m", np.nan) for h in ladder[0].error}
-    return Mended(fit, _documented(fit, model, measured, ladder), tuple(ladder), floor)
+        fit = problem.fit(with_trial_clocks(added, effect.name) if per_trial and effect.per_trial_allowed else added)
+        steps = held_out_steps(predictor, problem.pose_filter, fit.model)
+        error_by_step.append(ErrorStep(effect.name, errors_at_horizons(predictor, steps)))
+    floor = {
+        h: noise_floor(predictor, problem.pose_filter.noise, h).get("position_m", np.nan)
+        for h in error_by_step[0].error
+    }
+    return ExtendedModel(fit, _documented(fit, model, measured, error_by_step), tuple(error_by_step), floor)
 
 
 def _written(model: Model, name: str, written: Mapping[str, str]) -> Model:
@@ -95,7 +100,7 @@ def _written(model: Model, name: str, written: Mapping[str, str]) -> Model:
     )
 
 
-def _documented(fit: Fit, before: Model, measured: Measured, ladder: Sequence[Rung]) -> Model:
+def _documented(fit: Fit, before: Model, measured: Measured, error_by_step: Sequence[ErrorStep]) -> Model:
     """The fitted model with intervals, reasons and provenance."""
     reason = f"fitted to {len(measured.tracks)} trials of {measured.path.name} ({measured.digest})"
     effects = tuple(_with_interval(fit, active, reason) for active in fit.model.effects)
@@ -106,7 +111,7 @@ def _documented(fit: Fit, before: Model, measured: Measured, ladder: Sequence[Ru
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "trials": len(measured.tracks),
         "held_out_position_error_m": {
-            rung.name: {h: round(float(v), 6) for h, v in rung.error.items()} for rung in ladder
+            step.name: {h: round(float(v), 6) for h, v in step.error.items()} for step in error_by_step
         },
     }
     return replace(fit.model, effects=effects, provenance=provenance)
@@ -114,9 +119,9 @@ def _documented(fit: Fit, before: Model, measured: Measured, ladder: Sequence[Ru
 
 def _with_interval(fit: Fit, active: ActiveEffect, reason: str) -> ActiveEffect:
     intervals = {f.parameter.name: fit.interval(i) for i, f in enumerate(fit.free) if f.effect == active.effect.name}
-    if active.own:
+    if active.trial_values:
         unit = active.effect.parameters[0].unit
-        reason += f"; the mean of one value a trial, {min(active.own):+.3f} to {max(active.own):+.3f} {unit}"
+        reason += f"; the mean of one value a trial, {min(active.trial_values):+.3f} to {max(active.trial_values):+.3f} {unit}"
     return replace(active, basis="fitted", reason=reason, intervals=intervals)
 
 

@@ -10,15 +10,15 @@ from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import Unexplained
-from bns.diagnose.select.stepwise import Candidate, Found
+from bns.diagnose.select.stepwise import Candidate, SelectionResult
 from bns.physics.effects import all_effects
 
 NOTABLE = 0.01
-"""An effect that would have earned this share of the loss, but for a veto, is mentioned."""
+"""An effect that would have earned this share of the loss, but is rejected, is mentioned."""
 
 
 def notes_on(
-    found: Found,
+    selection: SelectionResult,
     tracks: Tracks,
     rest: Unexplained,
     formula: Formula | None,
@@ -26,7 +26,7 @@ def notes_on(
     longer: Sequence[tuple[str, ...]] = (),
 ) -> Iterator[str]:
     """All notes, one sentence or two each. ``longer``: explanations with one effect more that fit as well."""
-    yield from _on_effects(found, tracks)
+    yield from _on_effects(selection, tracks)
     for names in longer:
         yield f"{' with '.join(names)} would explain as much, with one effect more."
     yield from _on_rest(rest, tracks)
@@ -34,15 +34,15 @@ def notes_on(
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
         yield f"A candidate for it: {formula.on} + {formula.term} with {values}."
     if hint is not None:
-        more = int(np.ceil(len(tracks) * max((3.2 / max(hint.evidence.z, 0.5)) ** 2 - 1, 0.5)))
+        more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
         yield f"{hint.name} may be missing, but {len(tracks)} trials do not settle it; about {more} more would."
-    for c in found.steps[0].ranking:
-        if c.veto and c.evidence.gain > NOTABLE * float(found.nominal.losses.mean()):
-            yield f"{c.name} was not considered: {c.veto}."
+    for c in selection.steps[0].ranking:
+        if c.rejected_because and c.paired_comparison.elpd_diff > NOTABLE * float(selection.nominal.losses.mean()):
+            yield f"{c.name} was not considered: {c.rejected_because}."
 
 
-def _on_effects(found: Found, tracks: Tracks) -> Iterator[str]:
-    names = {*found.accepted, *(name for rival in found.rivals for name in rival)}
+def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
+    names = {*selection.accepted, *(name for competitor in selection.competing_models for name in competitor)}
     for name in sorted(names & set(all_effects())):
         if all_effects()[name].of_measuring:
             yield f"{name} is a fault of the measuring, not of the robot."
@@ -52,32 +52,32 @@ def _on_effects(found: Found, tracks: Tracks) -> Iterator[str]:
         yield "A floor-slope is a tether-pull from far away: drive on both sides of the supposed anchor to tell them apart."
     if {"command-delay", "clock-offset"} <= names:
         yield "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
-    differing = found.fit.model.differing
-    if differing is not None:
-        own = np.array(differing.own)
+    per_trial_effect = selection.fit.model.per_trial_effect
+    if per_trial_effect is not None:
+        own = np.array(per_trial_effect.trial_values)
         yield (
-            f"{differing.effect.name} has a value of its own in every trial, {own.min():+.3f} to {own.max():+.3f} s; "
+            f"{per_trial_effect.effect.name} has a value of its own in every trial, {own.min():+.3f} to {own.max():+.3f} s; "
             "trials held out are judged with the clock that other poses of the same trial ask for. "
             "A delay common to all trials cannot be told from the clocks."
         )
 
 
 def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
-    for p in rest.patterns[:4]:
+    for p in rest.residual_dependence[:4]:
         yield (
             f"Left unexplained: {p.channel} along {p.variable}, {p.share:.2%} of the loss on held-out trials "
-            f"(p {'<' if p.evidence.p_value < 1e-4 else '='} {max(p.evidence.p_value, 1e-4):.2g})."
+            f"(p {'<' if p.paired_comparison.p_value < 1e-4 else '='} {max(p.paired_comparison.p_value, 1e-4):.2g})."
         )
-    if rest.rhythm is not None:
-        r = rest.rhythm
+    if rest.autocorrelation is not None:
+        r = rest.autocorrelation
         after = f"{r.lag} frames later" if r.scale == "within" else "in the next command"
         yield (
             f"What is not foreseen in the direction {r.direction} repeats itself {after} (correlation "
             f"{r.correlation:+.2f}): something with a rhythm or a drift of its own that no logged variable shows."
         )
-    if rest.outbreaks:
-        worst = ", ".join(f"trial {o.trial} at {o.t_s:.2f} s" for o in rest.outbreaks[:3])
+    if rest.outliers:
+        worst = ", ".join(f"trial {o.trial} at {o.t_s:.2f} s" for o in rest.outliers[:3])
         yield (
-            f"{len(rest.outbreaks)} of {len(tracks)} trials have moments over {FAR:g} times as far off as most are "
+            f"{len(rest.outliers)} of {len(tracks)} trials have moments over {FAR:g} times as far off as most are "
             f"({worst}): see what happened there and then."
         )

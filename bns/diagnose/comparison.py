@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.parallel import one_thread_each
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.trial_clock_test import steps_of
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import Errors, errors_of, noise_floor
-from bns.diagnose.residuals.along_variables import Pattern, patterns
-from bns.diagnose.select.stepwise import problem_for
+from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.errors import DataError
 from bns.physics.model import Model
 
@@ -55,7 +55,7 @@ class Comparison:
     frames: int
     errors: Mapping[str, Mapping[str, float]]
     floor: Mapping[str, float]
-    patterns: tuple[Pattern, ...]
+    residual_dependence: tuple[ResidualDependence, ...]
     worst: tuple[Moment, ...]
     curves: tuple[Curve, ...]
     near: str
@@ -68,9 +68,14 @@ class Comparison:
             "trials": self.trials,
             "frames": self.frames,
             "error": {h: {**e, "noise_floor_m": self.floor[h]} for h, e in self.errors.items()},
-            "patterns": [
-                {"variable": p.variable, "velocity": p.channel, "share": p.share, "p_value": p.evidence.p_value}
-                for p in self.patterns
+            "residual_dependence": [
+                {
+                    "variable": p.variable,
+                    "velocity": p.channel,
+                    "share": p.share,
+                    "p_value": p.paired_comparison.p_value,
+                }
+                for p in self.residual_dependence
             ],
             "worst": [vars(w) for w in self.worst],
             "networks": {name: dict(score) for name, score in self.scores.items()},
@@ -82,23 +87,25 @@ def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
     """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands."""
     tracks = predictor.tracks
     if not (np.diff(tracks.first) > 1).any():
-        raise DataError("No trial has two tracked poses, and a displacement needs two: log the pose before and after commands.")
+        raise DataError(
+            "No trial has two tracked poses, and a displacement needs two: log the pose before and after commands."
+        )
     problem = problem_for(predictor, model)
     fit = _as_is(problem, model)
-    steps = steps_of(predictor, problem.following, fit.model)
+    steps = steps_of(predictor, problem.pose_filter, fit.model)
     errors = {h: errors_of(predictor, steps, h) for h in predictor.horizons}
     # scatter of the drive cannot be told from faults of the model before these are mended: only the camera's noise is sure
-    tracking = problem.following.noise * np.array([1, 1, 0, 0, 0])
-    found = patterns(problem, fit)
+    tracking = problem.pose_filter.noise * np.array([1, 1, 0, 0, 0])
+    dependence = residual_dependence(problem, fit)
     return Comparison(
         model.name,
         len(tracks),
         len(tracks.t_s),
         {h: e.summary(len(tracks)) for h, e in errors.items()},
         {h: noise_floor(predictor, tracking, h).get("position_m", float("nan")) for h in predictor.horizons},
-        tuple(found),
+        tuple(dependence),
         tuple(_worst(predictor, errors[predictor.near])),
-        tuple(_curves(predictor, errors[predictor.near], found, np.random.default_rng(seed))),
+        tuple(_curves(predictor, errors[predictor.near], dependence, np.random.default_rng(seed))),
         predictor.near,
         predictor.scores(),
     )
@@ -114,11 +121,11 @@ def _worst(predictor: Predictor, errors: Errors, most: int = 5) -> list[Moment]:
     """The worst window of each of the worst trials."""
     tracks, out = predictor.tracks, []
     order = np.argsort(-errors.position_m)
-    seen: set[int] = set()
+    listed: set[int] = set()
     for i in order:
         trial = int(errors.trial[i])
-        if trial not in seen:
-            seen.add(trial)
+        if trial not in listed:
+            listed.add(trial)
             out.append(
                 Moment(
                     tracks.names[trial],
@@ -132,10 +139,14 @@ def _worst(predictor: Predictor, errors: Errors, most: int = 5) -> list[Moment]:
     return out
 
 
-def _curves(predictor: Predictor, errors: Errors, found: list[Pattern], rng: np.random.Generator) -> list[Curve]:
+def _curves(
+    predictor: Predictor, errors: Errors, dependence: list[ResidualDependence], rng: np.random.Generator
+) -> list[Curve]:
     """Residuals along the variables that explain most, and bands from a bootstrap over trials."""
     at = predictor.at_frames(errors.start)
-    names = [name for name in dict.fromkeys(p.variable for p in found if p.variable in at) if np.ptp(at[name]) > 0][:6]
+    names = [
+        name for name in dict.fromkeys(p.variable for p in dependence if p.variable in at) if np.ptp(at[name]) > 0
+    ][:6]
     lasted = np.maximum(predictor.tracks.t_s[errors.end] - predictor.tracks.t_s[errors.start], 1e-9)
     rates = {
         "forward, mm/s": 1e3 * errors.forward_m / lasted,
@@ -145,7 +156,9 @@ def _curves(predictor: Predictor, errors: Errors, found: list[Pattern], rng: np.
     return [_binned(name, way, at[name], rate, errors.trial, rng) for name in names for way, rate in rates.items()]
 
 
-def _binned(name: str, way: str, values: Array, rate: Array, trial: NDArray[np.int64], rng: np.random.Generator) -> Curve:
+def _binned(
+    name: str, way: str, values: Array, rate: Array, trial: NDArray[np.int64], rng: np.random.Generator
+) -> Curve:
     edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
     place: NDArray[np.intp] = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     bins, trials = max(len(edges) - 1, 1), int(trial.max()) + 1

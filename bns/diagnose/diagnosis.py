@@ -18,11 +18,11 @@ from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import HORIZONS, noise_floor
-from bns.diagnose.residuals.along_variables import Pattern, patterns
+from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
-from bns.diagnose.select.equivalents import longer
-from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, Candidate, Found, Search
+from bns.diagnose.select.equivalents import equivalent_pairs
+from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, Candidate, SelectionResult, StepwiseSelection
 from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
 
@@ -37,11 +37,11 @@ NOTHING_LEFT = Unexplained((), None, ())
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A verdict and everything it rests on. ``found`` is None where there was too little to search."""
+    """A verdict and everything it rests on. ``selection`` is None where there was too little to search."""
 
     verdict: str
-    found: Found | None
-    patterns: tuple[Pattern, ...] = ()
+    selection: SelectionResult | None
+    residual_dependence: tuple[ResidualDependence, ...] = ()
     rest: Unexplained = NOTHING_LEFT
     formula: Formula | None = None
     error: Mapping[str, Mapping[str, float]] | None = None
@@ -50,41 +50,41 @@ class Diagnosis:
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the accepted effects, in the order in which they were found."""
-        return self.found.accepted if self.found else ()
+        return self.selection.accepted if self.selection else ()
 
     @property
     def model(self) -> Model | None:
         """The model refitted with all accepted effects."""
-        return self.found.fit.model if self.found else None
+        return self.selection.fit.model if self.selection else None
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""
-        found = self.found
+        selection = self.selection
         return {
             "verdict": self.verdict,
             "effects": list(self.effects),
-            "parameters": numbers_of(found.fit) if found else {},
-            "ties": ties_of(found) if found else [],
-            "explanations": [list(found.accepted), *map(list, found.rivals)] if found else [],
-            "ranking": [_ranked(c) for c in (found.steps[0].ranking if found else ())],
+            "parameters": numbers_of(selection.fit) if selection else {},
+            "ties": ties_of(selection) if selection else [],
+            "explanations": [list(selection.accepted), *map(list, selection.competing_models)] if selection else [],
+            "ranking": [_ranked(c) for c in (selection.steps[0].ranking if selection else ())],
             "error": {h: {name: _plain(v) for name, v in e.items()} for h, e in (self.error or {}).items()},
             "formula": self._formula(),
-            "patterns": [_pattern(p) for p in self.patterns],
-            "outbreaks": [vars(o) for o in self.rest.outbreaks],
+            "residual_dependence": [_pattern(p) for p in self.residual_dependence],
+            "outliers": [vars(o) for o in self.rest.outliers],
             "notes": list(self.notes),
         }
 
     def _formula(self) -> dict[str, Any] | None:
         if self.formula is None:
             return None
-        earned = self.formula.evidence
+        comparison = self.formula.paired_comparison
         return {
             "on": self.formula.on,
             "term": self.formula.term,
             "values": {k: _plain(v) for k, v in self.formula.values.items()},
-            "gain": _plain(earned.gain),
-            "gain_se": _plain(earned.se),
-            "p_value": earned.p_value,
+            "elpd_diff": _plain(comparison.elpd_diff),
+            "dse": _plain(comparison.dse),
+            "p_value": comparison.p_value,
         }
 
 
@@ -97,31 +97,33 @@ def diagnose(
     tick: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """What the model lacks on these tracks."""
-    search = Search(predictor, model, extra, tick)
+    search = StepwiseSelection(predictor, model, extra, tick)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
-    found = search.run()
+    selection = search.run()
     tick("what is left")
-    seen = patterns(found.problem, found.fit)
-    rest = unexplained(found.problem, found.fit, seen)
+    dependence = residual_dependence(selection.problem, selection.fit)
+    rest = unexplained(selection.problem, selection.fit, dependence)
     # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
-    guesses = rest.patterns or (tuple(seen[:1]) if rest.outbreaks else ())
-    formula = best_formula(found.problem, found.fit, guesses) if guesses else None
-    hint = _hint(found, len(predictor.tracks))
-    verdict = _verdict(found, rest.any, hint)
+    guesses = rest.residual_dependence or (tuple(dependence[:1]) if rest.outliers else ())
+    formula = best_formula(selection.problem, selection.fit, guesses) if guesses else None
+    hint = _hint(selection, len(predictor.tracks))
+    verdict = _verdict(selection, rest.any, hint)
     tick("longer explanations")
-    others = [effect for name, effect in listed(found.nominal.model, extra).items() if name not in found.accepted]
-    more = [] if rest.any else longer(found.problem, found.fit, found.accepted, others)
+    others = [
+        effect for name, effect in listed(selection.nominal.model, extra).items() if name not in selection.accepted
+    ]
+    pairs = [] if rest.any else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
     tick("errors on trials held out")
     return Diagnosis(
         verdict,
-        found,
-        tuple(seen[:12]),
+        selection,
+        tuple(dependence[:12]),
         rest,
         formula,
-        errors_before_and_after(found),
-        tuple(notes_on(found, predictor.tracks, rest, formula, hint, more)),
+        errors_before_and_after(selection),
+        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs)),
     )
 
 
@@ -145,40 +147,43 @@ def too_little(tracks: Tracks, fewest: int) -> str:
     return ""
 
 
-def _verdict(found: Found, unexplained: bool, hint: Candidate | None) -> str:
+def _verdict(selection: SelectionResult, unexplained: bool, hint: Candidate | None) -> str:
     if unexplained:
         return "unlisted"
-    if found.rivals:
+    if selection.competing_models:
         return "tie"
-    if found.accepted:
+    if selection.accepted:
         return "effects"
     return "insufficient-data" if hint else "none"
 
 
-def _hint(found: Found, trials: int) -> Candidate | None:
+def _hint(selection: SelectionResult, trials: int) -> Candidate | None:
     """The best candidate of a search that accepted nothing, where few trials nearly sufficed."""
-    if found.accepted or trials >= FEW_TRIALS:
+    if selection.accepted or trials >= FEW_TRIALS:
         return None
-    step, least = found.steps[0], MIN_GAIN * float(found.nominal.losses.mean())
+    step, least = selection.steps[0], MIN_GAIN * float(selection.nominal.losses.mean())
     level = _HINT * FALSE_ALARM / len(step.ranking)
     near = [
         c
         for c in step.ranking
-        if not c.veto and c.evidence.p_value < level and c.evidence.z > 2 and c.evidence.gain > max(step.bar, least)
+        if not c.rejected_because
+        and c.paired_comparison.p_value < level
+        and c.paired_comparison.z > 2
+        and c.paired_comparison.elpd_diff > max(step.decoy_threshold, least)
     ]
     return near[0] if near else None
 
 
-def errors_before_and_after(found: Found) -> dict[str, dict[str, float]]:
+def errors_before_and_after(selection: SelectionResult) -> dict[str, dict[str, float]]:
     """Held-out position error (m) at every horizon: nominal model, with the accepted effects, and what noise alone would show."""
-    predictor, following = found.problem.predictor, found.problem.following
-    before = errors_at_horizons(predictor, held_out_steps(predictor, following, found.nominal.model))
-    after = errors_at_horizons(predictor, held_out_steps(predictor, following, found.fit.model))
+    predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
+    before = errors_at_horizons(predictor, held_out_steps(predictor, pose_filter, selection.nominal.model))
+    after = errors_at_horizons(predictor, held_out_steps(predictor, pose_filter, selection.fit.model))
     return {
         h: {
             "before": before[h],
             "after": after[h],
-            "noise_floor": noise_floor(predictor, following.noise, h).get("position_m", float("nan")),
+            "noise_floor": noise_floor(predictor, pose_filter.noise, h).get("position_m", float("nan")),
         }
         for h in HORIZONS
     }
@@ -187,9 +192,9 @@ def errors_before_and_after(found: Found) -> dict[str, dict[str, float]]:
 def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
     """{effect: {name: value, se, low, high, unit, at_bound}} of a fitted model."""
     out: dict[str, dict[str, dict[str, Any]]] = {}
-    differing = fit.model.differing
-    if differing is not None:
-        out[differing.effect.name] = _spread(differing)
+    per_trial_effect = fit.model.per_trial_effect
+    if per_trial_effect is not None:
+        out[per_trial_effect.effect.name] = _spread(per_trial_effect)
     for index, number in enumerate(fit.free):
         p, (low, high) = number.parameter, fit.interval(index)
         out.setdefault(number.effect, {})[p.name] = {
@@ -203,9 +208,9 @@ def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
     return out
 
 
-def _spread(differing: ActiveEffect) -> dict[str, dict[str, Any]]:
+def _spread(per_trial_effect: ActiveEffect) -> dict[str, dict[str, Any]]:
     """The mean and the standard deviation of the trials' own values, with their intervals."""
-    p, own = differing.effect.parameters[0], np.array(differing.own)
+    p, own = per_trial_effect.effect.parameters[0], np.array(per_trial_effect.trial_values)
     scatter = float(own.std(ddof=1))
     se = scatter / np.sqrt(len(own))
     half = float(student.ppf(0.975, len(own) - 1)) * se
@@ -216,35 +221,35 @@ def _spread(differing: ActiveEffect) -> dict[str, dict[str, Any]]:
     return {p.name: {**mean, **always, "per_trial": True}, f"between_trials_{p.unit}": {**between, **always}}
 
 
-def ties_of(found: Found) -> list[list[str]]:
+def ties_of(selection: SelectionResult) -> list[list[str]]:
     """Groups of names that stand for each other: exchange one of a group for another, and the tracks are explained as well."""
     groups: list[set[str]] = []
-    for rival in found.rivals:
-        group = set(found.accepted) ^ set(rival)
+    for competitor in selection.competing_models:
+        group = set(selection.accepted) ^ set(competitor)
         touching = [g for g in groups if g & group]
         groups = [g for g in groups if g not in touching] + [group.union(*touching)]
     return [sorted(g) for g in groups]
 
 
 def _ranked(candidate: Candidate) -> dict[str, Any]:
-    earned = candidate.evidence
+    comparison = candidate.paired_comparison
     return {
         "name": candidate.name,
-        "gain": _plain(earned.gain),
-        "gain_se": _plain(earned.se),
-        "p_value": earned.p_value,
+        "elpd_diff": _plain(comparison.elpd_diff),
+        "dse": _plain(comparison.dse),
+        "p_value": comparison.p_value,
         "parameters": numbers_of(candidate.fit).get(candidate.name, {}),
-        "veto": candidate.veto,
+        "rejected_because": candidate.rejected_because,
     }
 
 
-def _pattern(p: Pattern) -> dict[str, Any]:
+def _pattern(p: ResidualDependence) -> dict[str, Any]:
     return {
         "variable": p.variable,
         "velocity": p.channel,
-        "gain": _plain(p.evidence.gain),
-        "gain_se": _plain(p.evidence.se),
-        "p_value": p.evidence.p_value,
+        "elpd_diff": _plain(p.paired_comparison.elpd_diff),
+        "dse": _plain(p.paired_comparison.dse),
+        "p_value": p.paired_comparison.p_value,
         "share": _plain(p.share),
     }
 

@@ -17,16 +17,16 @@ _GOLDEN = 0.6180339887498949
 """Multiples of it, without their whole part, never repeat: lots that need no generator."""
 
 
-def _trial_sign(body: Body, lot: int) -> Array:
+def _trial_sign(body: Body, stream: int) -> Array:
     """+1 or -1 for each trial, as if by lot, (batch, 1)."""
-    share = np.modf((np.arange(len(body.forward_m_s)) + 1) * _GOLDEN * (lot + 1))[0]
+    share = np.modf((np.arange(len(body.forward_m_s)) + 1) * _GOLDEN * (stream + 1))[0]
     signs: Array = np.where(share < 0.5, -1.0, 1.0)[:, None]
     return signs
 
 
-def _wave(body: Body, period_s: float, lot: int) -> Array:
+def _wave(body: Body, period_s: float, stream: int) -> Array:
     """A wave along the session, its phase another one for each trial."""
-    phase = np.modf((np.arange(len(body.forward_m_s)) + 1) * _GOLDEN * (lot + 2))[0][:, None]
+    phase = np.modf((np.arange(len(body.forward_m_s)) + 1) * _GOLDEN * (stream + 2))[0][:, None]
     wave: Array = np.sin(2 * np.pi * (body.session_s / period_s + phase))
     return wave
 

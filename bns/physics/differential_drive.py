@@ -127,8 +127,8 @@ def taken_at(model: Model, stamped_s: Array, trial: NDArray[np.int64] | None = N
     stamps = Stamps(stamped_s)
     for active in model.at("clock"):
         values: dict[str, Any] = dict(active.by_name)
-        if active.own and trial is not None:
-            values = dict.fromkeys(values, np.array(active.own)[trial])
+        if active.trial_values and trial is not None:
+            values = dict.fromkeys(values, np.array(active.trial_values)[trial])
         stamps = active.effect.apply(stamps, **values)
     return stamps.t_s
 

@@ -55,7 +55,7 @@ class Effect:
     """Values from which a fit may begin; empty where any few values along each number do."""
     needs_place: bool = False
     """Does it look at `Body.place`?"""
-    may_differ: bool = False
+    per_trial_allowed: bool = False
     """May its one number have another value in every trial? Only effects of the stage ``clock`` may."""
 
     @property

@@ -54,7 +54,7 @@ class ActiveEffect:
     """How an effect that is not in the catalogue is written down: term and on, or file."""
     per_trial: bool = False
     """Has every trial a value of its own? ``values`` then hold the mean, which stands for trials yet to come."""
-    own: tuple[float, ...] = ()
+    trial_values: tuple[float, ...] = ()
     """Each trial's value, in the order of the trials at hand; empty while none is known. A matter of data: never written down."""
 
     @property
@@ -95,10 +95,10 @@ class Model:
                 raise ModelError(f"model {self.name} has the effect {name!r} twice; keep one of them.")
         for active in self.effects:
             active.effect.checked(active.by_name)
-            if active.per_trial and not active.effect.may_differ:
+            if active.per_trial and not active.effect.per_trial_allowed:
                 raise ModelError(
                     f"model {self.name}: {active.effect.name} has one value for all trials; per_trial goes with "
-                    f"{_join([e.name for e in all_effects().values() if e.may_differ])} alone."
+                    f"{_join([e.name for e in all_effects().values() if e.per_trial_allowed])} alone."
                 )
 
     def at(self, stage: str) -> Iterator[ActiveEffect]:
@@ -126,15 +126,15 @@ class Model:
         return replace(self, effects=tuple(active if a.effect.name == name else a for a in self.effects))
 
     @property
-    def differing(self) -> ActiveEffect | None:
+    def per_trial_effect(self) -> ActiveEffect | None:
         """The effect that has another value in every trial; None if there is none."""
         return next((active for active in self.effects if active.per_trial), None)
 
-    def with_own(self, own: Iterable[float]) -> Model:
-        """The model with these values of its `differing` effect, one a trial; their mean stands for other trials."""
-        values = tuple(float(v) for v in own)
+    def with_trial_values(self, trial_values: Iterable[float]) -> Model:
+        """The model with these values of its `per_trial_effect` effect, one a trial; their mean stands for other trials."""
+        values = tuple(float(v) for v in trial_values)
         mean = (sum(values) / len(values),)
-        changed = tuple(replace(a, values=mean, own=values) if a.per_trial else a for a in self.effects)
+        changed = tuple(replace(a, values=mean, trial_values=values) if a.per_trial else a for a in self.effects)
         return replace(self, effects=changed)
 
     def with_values(self, values: Mapping[str, Mapping[str, float]]) -> Model:

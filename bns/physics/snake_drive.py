@@ -78,7 +78,7 @@ class SnakePhysics:
         check_ending(picture)
 
     def _friction(self, draws: np.ndarray) -> np.ndarray:
-        """Floor friction (links,) in a cycle, as a multiple of the parameter's: of the place, and of what each link finds there."""
+        """Floor friction (links,) in a cycle, as a multiple of the parameter's: the place's times each link's."""
         p = self._parameters
         links = p.link_friction_spread * draws[_SHARED:].ravel()[: int(p.links)]
         return np.clip(1.0 + p.friction_spread * draws[2, 0], 0.2, 3.0) * np.clip(1.0 + links, 0.1, 4.0)

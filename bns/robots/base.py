@@ -26,14 +26,14 @@ class Scores(NamedTuple):
     outputs: np.ndarray | None = None
 
 
-class Luck(NamedTuple):
+class RandomStream(NamedTuple):
     """Which draws a noisy evaluation takes."""
 
     key: Key
     step: int
 
 
-class Recipe(NamedTuple):
+class StagedTraining(NamedTuple):
     """How a static simulator is made where random commands alone do not do: worst patterns are driven again, with variants."""
 
     random: int
@@ -69,7 +69,7 @@ class Robot(Protocol):
     """Whether untrained networks are drawn as Nguyen and Widrow did."""
     flat_spot: float
     """Added to the slope of a sigmoid in training."""
-    recipe: Recipe | None
+    recipe: StagedTraining | None
     """None: the static simulator learns from random controllers, and its noise is that of its residuals."""
     repeats_inputs: bool
     """Whether the same inputs come up again and again, so that training gains by taking them together."""
@@ -130,13 +130,14 @@ class Robot(Protocol):
     def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
         """What is kept of poses, by name with its unit, (n,) each; x_m, y_m and heading_rad always."""
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, luck: Luck | None = None) -> np.ndarray:
-        """The commands (m, components) that are driven when this controller is picked; luck: the draws it was scored with."""
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, stream: RandomStream | None = None) -> np.ndarray:
+        """The commands (m, components) that are driven when this controller is picked; stream: the draws it was scored with."""
 
     def score(
-        self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None
+        self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
+        parents: Scores | None = None,
     ) -> Scores:
-        """Fitness of every controller on simulator networks (networks, W); luck is for robots with noise in evolution.
+        """Fitness of every controller on simulator networks (networks, W); stream is for robots with noise in evolution.
 
         parents: scores of the generation that this one was bred from, on the same networks: a robot may take over from them
         what cannot have changed. The scores are the same with them and without.

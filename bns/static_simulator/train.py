@@ -17,7 +17,7 @@ from bns.engine.rprop import Rprop
 from bns.engine.snn import INPUTS, initial_weights, predict
 from bns.robots.base import Robot
 from bns.robots.simulator import StaticSimulator
-from bns.static_simulator.train_in_stages import refined
+from bns.static_simulator.train_in_stages import train_in_stages
 from bns.worlds.base import World
 from bns.worlds.many import drive_all
 
@@ -57,7 +57,7 @@ def precompute(
 ) -> StaticSimulator:
     """Collect, train, verify. Same seed, same numbers, for any number of ``jobs`` that drive."""
     if robot.recipe is not None:
-        return refined(robot, world, robot.recipe, seed, progress, jobs)
+        return train_in_stages(robot, world, robot.recipe, seed, progress, jobs)
     key = Key.of_run(seed, 0, robot.name, "precompute")
     patterns = collect(robot, world, key, jobs)
     learn = ~patterns.verification

@@ -16,7 +16,7 @@ from bns.bootstrap.evolver import Evolver
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.rprop import Rprop
 from bns.engine.snn import initial_weights, predict
-from bns.robots.base import Recipe, Robot
+from bns.robots.base import Robot, StagedTraining
 from bns.robots.simulator import StaticSimulator
 from bns.spec import RunSpec
 from bns.tasks import load_task, task_names
@@ -40,30 +40,30 @@ class Patterns:
 
     commands: np.ndarray
     moved: np.ndarray
-    lot: np.ndarray
+    split: np.ndarray
 
     @property
     def verification(self) -> np.ndarray:
         """Held out of everything, bool (n,)."""
-        return self.lot < VERIFICATION_SHARE
+        return self.split < VERIFICATION_SHARE
 
     @property
     def watched(self) -> np.ndarray:
         """Seen by the end of training only, bool (n,)."""
-        return ~self.verification & (self.lot < VERIFICATION_SHARE + WATCHED_SHARE)
+        return ~self.verification & (self.split < VERIFICATION_SHARE + WATCHED_SHARE)
 
     @property
     def learned(self) -> np.ndarray:
         """All others, bool (n,)."""
-        return self.lot >= VERIFICATION_SHARE + WATCHED_SHARE
+        return self.split >= VERIFICATION_SHARE + WATCHED_SHARE
 
     def joined(self, other: Patterns) -> Patterns:
         """These patterns, then the others."""
-        pairs = ((self.commands, other.commands), (self.moved, other.moved), (self.lot, other.lot))
+        pairs = ((self.commands, other.commands), (self.moved, other.moved), (self.split, other.split))
         return Patterns(*(np.concatenate(pair) for pair in pairs))
 
 
-class Workshop:
+class CommandSampler:
     """Drives commands one by one and counts them, so that every drive has draws of its own."""
 
     def __init__(self, robot: Robot, world: World, key: Key, total: int, progress: Progress, jobs: int) -> None:
@@ -73,14 +73,14 @@ class Workshop:
     def drive(self, commands: np.ndarray) -> Patterns:
         """What each command does from the start."""
         before = self.driven
-        lot = uniforms(self.key, Purpose.SPLIT, self.driven, 1, len(commands))[0, :, 0]
+        split = uniforms(self.key, Purpose.SPLIT, self.driven, 1, len(commands))[0, :, 0]
         self.driven += len(commands)
         alone = [commands[i : i + 1] for i in range(len(commands))]
         seen = drive_all(
             self.world, alone, self.key, Purpose.PRECOMPUTE, before + 1, self._jobs,
             lambda done: self._progress(before + done, self._total),
         )  # fmt: skip
-        return Patterns(commands, np.array([self.robot.measured_displacements(poses)[0] for poses in seen]), lot)
+        return Patterns(commands, np.array([self.robot.measured_displacements(poses)[0] for poses in seen]), split)
 
     def again(self, commands: np.ndarray, variants: int) -> Patterns:
         """The same commands once more, and others near each."""
@@ -88,21 +88,23 @@ class Workshop:
         return self.drive(np.concatenate([commands, near]))
 
 
-def refined(robot: Robot, world: World, recipe: Recipe, seed: int, progress: Progress, jobs: int = 1) -> StaticSimulator:
+def train_in_stages(
+    robot: Robot, world: World, recipe: StagedTraining, seed: int, progress: Progress, jobs: int = 1
+) -> StaticSimulator:
     """All stages of the recipe. Same seed, same numbers, for any number of ``jobs`` that drive."""
     key, nets = Key.of_run(seed, 0, robot.name, "precompute"), len(robot.networks)
     total = recipe.random + nets * recipe.worst * (1 + recipe.variants)
     total += recipe.evolved_worst * (1 + recipe.evolved_variants) + CONTROLLERS * CYCLES
-    shop = Workshop(robot, world, key, total, progress, jobs)
-    patterns = shop.drive(robot.random_controllers(key, recipe.random, 1).commands[:, 0])
+    sampler = CommandSampler(robot, world, key, total, progress, jobs)
+    patterns = sampler.drive(robot.random_controllers(key, recipe.random, 1).commands[:, 0])
     weights, _ = trained(robot, key, patterns, recipe.iterations)
     bad = [worst(robot, weights, patterns, recipe.worst, net) for net in range(nets)]
-    patterns = patterns.joined(shop.again(np.concatenate(bad), recipe.variants))
+    patterns = patterns.joined(sampler.again(np.concatenate(bad), recipe.variants))
     weights, _ = trained(robot, key, patterns, recipe.iterations)
-    tried = shop.drive(evolved_commands(robot, key, weights))
-    every = Patterns(tried.commands, tried.moved, np.ones(len(tried.lot)))
+    tried = sampler.drive(evolved_commands(robot, key, weights))
+    every = Patterns(tried.commands, tried.moved, np.ones(len(tried.split)))
     patterns = patterns.joined(
-        shop.again(worst(robot, weights, every, recipe.evolved_worst), recipe.evolved_variants)
+        sampler.again(worst(robot, weights, every, recipe.evolved_worst), recipe.evolved_variants)
     )
     weights, iterations = trained(robot, key, patterns, recipe.iterations)
     progress(total, total)

@@ -84,26 +84,26 @@ def run_sweep(
         StoreError: another process writes this sweep (this shard), the disk is full, or the store's runs of this sweep
             come from other world files. What was finished before is kept.
     """
-    course = _Course(sweep, Path(results), budget or Budget(), on_progress, shard)
+    sweep_run = _SweepRun(sweep, Path(results), budget or Budget(), on_progress, shard)
     name = shard.name if shard else ""
-    with Interrupts(grace_s) as course.interrupts:
+    with Interrupts(grace_s) as sweep_run.interrupts:
         try:
             with Writer(
-                course.results, sweep.name, sweep_text=sweep.text, sweep_runs=sweep.total, shard=name
+                sweep_run.results, sweep.name, sweep_text=sweep.text, sweep_runs=sweep.total, shard=name
             ) as writer:
-                todo = course.plan(retry_failed, limit)
-                if todo and course.budget.allows_another():
+                todo = sweep_run.plan(retry_failed, limit)
+                if todo and sweep_run.budget.allows_another():
                     (warm_up or (partial(prepare, todo) if job is run_job else lambda: None))()
                     with executor or LokyExecutor(jobs, job) as ready:
-                        course.interrupts.arm(ready.cancel)
-                        course.carry_out(iter(todo), ready, writer)
+                        sweep_run.interrupts.arm(ready.cancel)
+                        sweep_run.carry_out(iter(todo), ready, writer)
         except KeyboardInterrupt:
-            if course.interrupts.stopped_by is None:
+            if sweep_run.interrupts.stopped_by is None:
                 raise
-    return course.summary()
+    return sweep_run.summary()
 
 
-class _Course:
+class _SweepRun:
     """One call of ``run_sweep``: counts and the loop."""
 
     def __init__(

@@ -13,7 +13,7 @@ from store.synthetic import failed, record
 from analysis.__main__ import figures, main
 from analysis.intervals import wilson
 from analysis.publish import KINDS, captions
-from analysis.store import Store
+from analysis.results import Results
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store import Writer, query
@@ -85,7 +85,7 @@ def test_figures_stand_below_the_results_unless_told(tmp_path):
     assert main(["--results", str(tmp_path), "--only", "success-by-mutation"]) == 0
     assert (tmp_path / "figures" / "success-by-mutation-khepera.svg").is_file()
     assert (
-        Store(tmp_path).query("SELECT count(*) AS n FROM runs").n[0] == 2
+        Results(tmp_path).query("SELECT count(*) AS n FROM runs").n[0] == 2
     )  # the store takes them for nothing of its own
 
 
@@ -106,7 +106,7 @@ def test_an_empty_store_says_what_to_run(tmp_path, capsys, make):
     assert main(["--results", str(tmp_path / "results")]) == 2
     assert "make sweep-khepera BUDGET=10m" in capsys.readouterr().err
     with pytest.raises(StoreError, match="no runs in"):
-        Store(tmp_path / "results")
+        Results(tmp_path / "results")
 
 
 def test_a_figure_without_data_is_skipped_with_one_line(tmp_path, capsys):
@@ -150,7 +150,7 @@ def test_a_compaction_under_way_does_not_disturb_a_figure(tmp_path):
         with Writer(tmp_path, "grid") as writer:
             for rate in (0.1, 0.5):
                 writer.append(record(RunSpec(seed=half, evaluations=3, mutation_rate=rate)))
-    store = Store(tmp_path)
+    store = Results(tmp_path)
     before = store.query("SELECT count(*) AS n FROM evals").n[0]
     store.keep("kept", "SELECT run_id, evaluation FROM evals WHERE evaluation > 1")
     assert compact(tmp_path).files_after < 4

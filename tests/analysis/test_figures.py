@@ -7,7 +7,7 @@ from store.synthetic import failed, make_store, record
 from analysis import budget, paths, success_by_diversity, success_by_mutation
 from analysis.__main__ import figures
 from analysis.intervals import wilson
-from analysis.store import NoDataError, Store
+from analysis.results import NoDataError, Results
 from bns.plotting.style import COLUMN_IN, PAGE_IN, TEXT_PT
 from bns.spec import RunSpec
 from bns.store import Writer, load
@@ -39,7 +39,7 @@ def drawn_or_nothing(module, store):
 
 
 def test_every_figure_is_drawn_from_a_real_store_legibly_and_says_how_many_runs(real_results, texts):
-    store = Store(real_results)
+    store = Results(real_results)
     drawn = [one for module in figures().values() for one in drawn_or_nothing(module, store)]
     assert {one.name: one.n for one in drawn} == {
         "best-combinations-khepera-circle": 10,
@@ -68,7 +68,7 @@ def test_every_figure_is_drawn_from_a_real_store_legibly_and_says_how_many_runs(
 
 
 def test_success_by_mutation_shows_what_pandas_counts(real_results):
-    drawn = success_by_mutation.draw(Store(real_results))[0].figure
+    drawn = success_by_mutation.draw(Results(real_results))[0].figure
     rows = load(real_results, "evals", where={"sweep": "mutation", "task": "circle"})
     shares = rows.groupby(["mutation_rate", "evaluation"]).success_7cm.mean() * 100
     for rate, label in ((0.1, "10 % (n = 5)"), (0.5, "50 % (n = 5)")):
@@ -80,7 +80,7 @@ def test_success_by_mutation_shows_what_pandas_counts(real_results):
 
 def test_the_bands_are_wilson_intervals_of_those_counts(tmp_path):
     make_store(tmp_path, 60, evaluations=3)
-    figure = success_by_mutation.draw(Store(tmp_path))[0].figure
+    figure = success_by_mutation.draw(Results(tmp_path))[0].figure
     rows = load(tmp_path, "evals").query("mutation_rate == 0.02")
     low, high = wilson(rows.groupby("evaluation").success.sum().to_numpy(int), [12] * 3)
     corners = figure.axes[0].collections[0].get_paths()[0].vertices[:, 1]
@@ -89,7 +89,7 @@ def test_the_bands_are_wilson_intervals_of_those_counts(tmp_path):
 
 
 def test_success_by_diversity_shows_what_pandas_counts(real_results):
-    figure = success_by_diversity.draw(Store(real_results))[0].figure
+    figure = success_by_diversity.draw(Results(real_results))[0].figure
     rows = load(real_results, "evals", where={"sweep": "mutation", "task": "circle", "evaluation": 6})
     means = rows.groupby("mutation_rate").agg(x=("diversity", "mean"), y=("success_7cm", "mean"))
     for rate, label in ((0.1, "10 %"), (0.5, "50 %")):
@@ -103,7 +103,7 @@ def test_success_by_diversity_shows_what_pandas_counts(real_results):
 
 
 def test_budget_shows_success_and_median_cost_of_each_cell_and_what_is_missing(real_results):
-    drawn = budget.draw(Store(real_results))[0]
+    drawn = budget.draw(Results(real_results))[0]
     runs = load(real_results, "runs", where={"sweep": "budget"})
     cost = runs.groupby(["training_iterations_per_evaluation", "generations_per_evaluation"]).cpu_s.median()
     lines = {line.get_label(): line.get_ydata() for line in drawn.figure.axes[2].get_lines()}
@@ -118,13 +118,13 @@ def test_budget_counts_the_late_evaluations_of_each_run(tmp_path):
         run.tables["evals"]["success_7cm"][:] = [True] * 7 + [True] * late + [False] * (3 - late)
         run.tables["evals"]["success_10cm"][:] = True
     written(tmp_path, "budget", runs)
-    cell = budget.cells(Store(tmp_path)).iloc[0]
+    cell = budget.cells(Results(tmp_path)).iloc[0]
     assert (cell.runs, cell.share_7, cell.share_10) == (3, pytest.approx(100 * 4 / 9), 100)
     assert cell.low_7 == 0 < cell.share_7 < cell.high_7 == 100  # Student: 44 ± 126
 
 
 def test_paths_show_the_last_fittest_controller_of_each_run(real_results):
-    figure = paths.draw(Store(real_results))[0].figure
+    figure = paths.draw(Results(real_results))[0].figure
     evals = load(real_results, "evals", where={"sweep": "prototype", "seed": 0})
     shown = evals[evals.success].evaluation.max() if evals.success.any() else 3
     rows = load(real_results, "paths", where={"run_id": evals.run_id[0], "evaluation": int(shown), "who": "fittest"})
@@ -137,7 +137,7 @@ def test_a_drive_that_ended_early_says_in_which_cycle(tmp_path):
     run = record(RunSpec(seed=0, evaluations=2, record="full"), ("evals", "paths"))
     run.tables["evals"]["fittest_commands"][:] = 90
     written(tmp_path, "prototype", [run])
-    store = Store(tmp_path)
+    store = Results(tmp_path)
     driven = len(paths.poses(store, paths.last_successes(store))[run.spec.run_id]) - 1
     assert paths.draw(store)[0].figure.axes[0].get_title().endswith(f"ended in cycle {driven} of 90")
 
@@ -149,7 +149,7 @@ def test_paths_of_a_run_by_hand_are_shown_after_the_prototypes_and_named(tmp_pat
     written(tmp_path, "prototype", [record(both, tables)])
     written(tmp_path, "by-hand", [record(spec, tables) for spec in (both, *others)])
     written(tmp_path, "without", [record(RunSpec(seed=9, evaluations=2))])
-    drawn = paths.draw(Store(tmp_path))[0]
+    drawn = paths.draw(Results(tmp_path))[0]
     titles = [ax.get_title().split(", evaluation")[0] for ax in drawn.figure.axes]
     assert titles == ["prototype,\nseed 0", *(f"by-hand,\nseed {seed}" for seed in range(1, 6))]
     assert (drawn.n, drawn.sweeps) == (8, ("prototype", "by-hand"))
@@ -161,7 +161,7 @@ def test_sweeps_with_a_grid_of_mutation_rates_are_pooled_and_the_same_run_counts
     written(tmp_path, "one", [record(spec) for spec in specs(3)])
     written(tmp_path, "two", [record(spec) for spec in specs(5)])  # the first three seeds again
     written(tmp_path, "single", [record(RunSpec(seed=9, evaluations=4, mutation_rate=0.1, population_size=50))])
-    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
     assert set(curves(drawn.figure)) == {"10 % (n = 5)", "50 % (n = 5)"}
     assert (drawn.n, drawn.sweeps) == (10, ("one", "two"))
     assert "n = 10 runs of one, two" in drawn.shows
@@ -170,7 +170,7 @@ def test_sweeps_with_a_grid_of_mutation_rates_are_pooled_and_the_same_run_counts
 def test_curves_of_a_few_runs_are_left_out_beside_thicker_ones_and_stated(tmp_path):
     few = [spec for spec in specs(2, task="complex") if spec.mutation_rate == 0.1]
     written(tmp_path, "one", [record(spec) for spec in (*specs(5), *few)])
-    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
     assert set(curves(drawn.figure)) == {"10 % (n = 5)", "50 % (n = 5)"}
     assert drawn.n == 10
     assert "2 runs in curves of fewer than 5 not drawn" in drawn.missing
@@ -179,7 +179,7 @@ def test_curves_of_a_few_runs_are_left_out_beside_thicker_ones_and_stated(tmp_pa
 def test_curves_of_a_tenth_of_the_runs_are_left_out_beside_thick_ones(tmp_path):
     few = [spec for spec in specs(6, task="complex") if spec.mutation_rate == 0.1]
     written(tmp_path, "one", [record(spec) for spec in (*specs(70), *few)])
-    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
     assert set(curves(drawn.figure)) == {"10 % (n = 70)", "50 % (n = 70)"}
     assert "6 runs in curves of fewer than 7 not drawn" in drawn.missing
 
@@ -187,7 +187,7 @@ def test_curves_of_a_tenth_of_the_runs_are_left_out_beside_thick_ones(tmp_path):
 def test_runs_of_another_length_are_left_out_and_named(tmp_path):
     written(tmp_path, "one", [record(spec) for spec in specs(3)])
     written(tmp_path, "two", [record(spec) for spec in specs(2, generations_per_evaluation=7)])
-    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
     assert drawn.n == 6
     assert any("4 runs of circle with 4 evaluations, 7 generations" in text for text in drawn.missing)
 
@@ -200,7 +200,7 @@ def test_failed_and_planned_runs_are_stated_on_the_figure(tmp_path, texts):
     written(
         tmp_path, "grid", [*(record(spec) for spec in specs(1)), failed(specs(2)[2])], sweep_text=text, sweep_runs=9
     )
-    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
     said = " ".join(text.replace("\n", " ") for text, _ in texts(drawn.figure))
     for part in ("2 of 9 runs so far", "1 of 3 combinations without a finished run", "1 failed run not shown"):
         assert part in said
@@ -210,18 +210,18 @@ def test_failed_and_planned_runs_are_stated_on_the_figure(tmp_path, texts):
 def test_one_run_of_a_planned_grid_is_drawn_with_its_wide_interval(tmp_path):
     text = "name: grid\nrobot: khepera\nfixed: {evaluations: 4, task: circle}\ngrid: {mutation_rate: [0.1, 0.5]}"
     written(tmp_path, "grid", [record(specs(1)[0])], sweep_text=text, sweep_runs=2)
-    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
     assert set(curves(drawn.figure)) == {"10 % (n = 1)"}
     heights = np.ptp(drawn.figure.axes[0].collections[0].get_paths()[0].vertices[:, 1])
     assert heights > 75  # one run says next to nothing
     with pytest.raises(NoDataError, match=r"no combination has 2 finished runs yet \(the most is 1\)"):
-        success_by_diversity.draw(Store(tmp_path))
+        success_by_diversity.draw(Results(tmp_path))
 
 
 def test_only_combinations_with_enough_runs_are_dots_and_the_others_are_counted(tmp_path):
     few = [RunSpec(seed=seed, evaluations=4, mutation_rate=0.9) for seed in range(2)]
     written(tmp_path, "grid", [record(spec) for spec in [*specs(6), *few]])
-    drawn = success_by_diversity.draw(Store(tmp_path))[0]
+    drawn = success_by_diversity.draw(Results(tmp_path))[0]
     assert set(curves(drawn.figure)) == {"10 %", "50 %"}
     assert drawn.n == 12
     assert "1 combination with fewer than 5 runs left out" in drawn.missing
@@ -233,7 +233,7 @@ def test_a_store_of_one_combination_or_of_failures_alone_says_what_would_feed_a_
     written(tmp_path / "bad", "bad", [failed(spec) for spec in specs(2)])
     for folder in ("same", "bad"):
         with pytest.raises(NoDataError, match=r"run (make sweep|bns sweep|bns validate)"):
-            module.draw(Store(tmp_path / folder))
+            module.draw(Results(tmp_path / folder))
 
 
 @pytest.mark.parametrize("module", [success_by_mutation, success_by_diversity])
@@ -241,17 +241,17 @@ def test_why_there_is_nothing_to_compare_is_said(tmp_path, module):
     one, single = RunSpec(seed=0, evaluations=4), RunSpec(seed=1, evaluations=4)
     written(tmp_path / "bad", "bad", [failed(spec) for spec in (one, single)])  # one rate, so no comparison either
     with pytest.raises(NoDataError, match=r"^2 runs failed and none finished; run make sweep-khepera"):
-        module.draw(Store(tmp_path / "bad"))
+        module.draw(Results(tmp_path / "bad"))
     written(tmp_path / "one", "one", [record(one)])
     with pytest.raises(NoDataError, match=r"^no sweep compares .* \(1 finished run\); run make"):
-        module.draw(Store(tmp_path / "one"))
+        module.draw(Results(tmp_path / "one"))
     written(tmp_path / "one", "more", [failed(single)])
     with pytest.raises(NoDataError, match=r"\(1 finished run, 1 failed\); run make"):
-        module.draw(Store(tmp_path / "one"))
+        module.draw(Results(tmp_path / "one"))
 
 
 def test_captions_say_what_the_intervals_take_for_granted(real_results, texts):
-    store = Store(real_results)
+    store = Results(real_results)
     for module in (success_by_mutation, success_by_diversity):
         drawn = module.draw(store)[0]
         assert "pointwise; runs taken as independent, though combinations share their seeds" in drawn.shows

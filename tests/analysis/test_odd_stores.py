@@ -10,9 +10,9 @@ from store.synthetic import failed, make_store, record
 from analysis import checks, findings, one_run, success_by_mutation, success_by_population, trials
 from analysis.__main__ import figures, main
 from analysis.publish import captions
+from analysis.results import NoDataError, Results
 from analysis.selection import selections
 from analysis.source import source, trials_of
-from analysis.store import NoDataError, Store
 from bns.spec import RunSpec
 from bns.store import Writer, load
 
@@ -70,7 +70,7 @@ def test_a_script_that_fails_is_told_and_costs_no_other_figure(tmp_path, monkeyp
 
 def test_a_robot_without_goal_radii_has_its_own_success_and_no_centimetres(tmp_path):
     written(tmp_path, "grid", [with_evals(spec, **NO_RADII, success=spec.seed < 2) for spec in specs(6)])
-    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
     assert drawn.data.query("evaluation == 6").successes.tolist() == [2, 2]
     assert "visits all goals, by mutation rate" in drawn.shows
     assert "cm" not in drawn.shows
@@ -79,7 +79,7 @@ def test_a_robot_without_goal_radii_has_its_own_success_and_no_centimetres(tmp_p
 def test_two_sweeps_that_compare_different_things_are_not_mixed(tmp_path):
     written(tmp_path, "rates", [record(spec) for spec in specs(5)])
     written(tmp_path, "sizes", [record(RunSpec(seed=s, evaluations=6, population_size=p)) for s in range(6) for p in (50, 99)])
-    store = Store(tmp_path)
+    store = Results(tmp_path)
     assert success_by_mutation.draw(store)[0].sweeps == ("rates",)
     assert success_by_population.draw(store)[0].sweeps == ("sizes",)
 
@@ -92,7 +92,7 @@ def test_runs_of_an_older_engine_are_left_out_and_stated(tmp_path, monkeypatch):
     written(tmp_path, "grid", [record(spec) for spec in specs(5)])
     monkeypatch.undo()
     assert len(load(tmp_path, "runs")) == 22
-    drawn = success_by_mutation.draw(Store(tmp_path))[0]
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
     assert drawn.n == 12
     assert any("10 runs of circle" in text and "another world, engine" in text for text in drawn.missing)
 
@@ -102,11 +102,11 @@ def test_a_sweep_under_way_is_drawn_from_its_journal(tmp_path):
         for spec in specs(5):
             writer.append(record(spec))
         assert list((tmp_path / "journal").glob("*.journal"))
-        assert success_by_mutation.draw(Store(tmp_path))[0].n == 10
+        assert success_by_mutation.draw(Results(tmp_path))[0].n == 10
 
 
 def test_one_run_shows_its_own_generations_and_probes(real_results):
-    drawn = one_run.draw(Store(real_results))[0]
+    drawn = one_run.draw(Results(real_results))[0]
     run = load(real_results, "runs", where={"sweep": "prototype", "seed": 0})
     rows = load(real_results, "generations", where={"run_id": run.run_id[0]})
     lines = {line.get_label(): line.get_ydata() for line in drawn.figure.axes[0].get_lines()}
@@ -125,7 +125,7 @@ def test_a_trial_says_when_it_succeeded_and_what_the_robot_would_have_cost(tmp_p
     success = np.array([False, True, False, True, True, True])
     run = with_evals(spec, success=success, success_10cm=np.ones(6, bool), driven_ms=30_000.0)
     written(tmp_path, "prototype", [run])
-    drawn = trials.draw(Store(tmp_path))[0]
+    drawn = trials.draw(Results(tmp_path))[0]
     row = drawn.data.iloc[0]
     assert (row.first_success, row.consistent, row.consistent_10cm, row.driving_min) == (2, 6, 3, 1.0)
     # The source's robot took 30 s (task 1's second trial: 12 min for 20 evaluations is 36 s) to 50 s an evaluation.
@@ -144,18 +144,18 @@ def test_every_finding_of_the_source_has_a_check_and_every_robot_its_trials():
 
 
 def test_planted_findings_are_found_and_too_few_seeds_leave_everything_undecided(study, tmp_path):
-    table = findings.draw(Store(study))[0].table.set_index(["where", "task"]).verdict
+    table = findings.draw(Results(study))[0].table.set_index(["where", "task"]).verdict
     assert table["section 4.6.1", "1, circle"] == "agrees"  # the mutation rate matters most
     assert table["figure 4.11", "1, circle"] == "agrees"  # the error rises with diversity
     make_store(tmp_path, 15, evaluations=6)  # one seed of each combination
     with pytest.raises(NoDataError, match="no combination has 5 finished runs"):
         selections_then_rank(tmp_path)
-    few = findings.draw(Store(tmp_path))[0].table
+    few = findings.draw(Results(tmp_path))[0].table
     assert set(few.verdict) == {"undecided"}
 
 
 def selections_then_rank(results):
     from analysis.ranking import ranking
 
-    store = Store(results)
+    store = Results(results)
     return ranking(store, selections(store)[0])

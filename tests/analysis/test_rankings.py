@@ -9,10 +9,10 @@ import pytest
 from figure_helpers import MUTATION, carry_out, curves, with_evals, written
 
 from analysis import best_combinations, diversity_of_extremes, potential_success
+from analysis.labels import CELL
 from analysis.ranking import extremes, in_words, ranking
+from analysis.results import NoDataError, Results
 from analysis.selection import selections
-from analysis.store import NoDataError, Store
-from analysis.words import CELL
 from bns.spec import RunSpec
 from bns.store import load
 from bns.sweep.confirm import confirmation
@@ -40,7 +40,7 @@ def test_ties_are_broken_at_wider_radii_then_by_fitness_in_the_world(tmp_path):
         0.6: {"success_20cm": True, "fitness_world": 0.0},
     }
     written(tmp_path, "grid", [run for rate, columns in planted.items() for run in rated(rate, **columns)])
-    store = Store(tmp_path)
+    store = Results(tmp_path)
     rows = ranking(store, selections(store)[0])
     assert rows.mutation_rate.tolist() == [0.3, 0.2, 0.1, 0.6, 0.5, 0.4]
     best, worst = extremes(rows, "circle")
@@ -51,7 +51,7 @@ def test_ties_are_broken_at_wider_radii_then_by_fitness_in_the_world(tmp_path):
 
 
 def test_diversity_of_the_best_is_what_pandas_computes(study):
-    store = Store(study)
+    store = Results(study)
     best, worst = extremes(ranking(store, selections(store)[0]), "circle")
     drawn = next(one for one in diversity_of_extremes.draw(store) if one.name.endswith("circle"))
     evals = load(study, "evals", where={"task": "circle"}).query("evaluation >= 5")
@@ -67,7 +67,7 @@ def test_diversity_of_the_best_is_what_pandas_computes(study):
 
 
 def test_potential_success_is_what_pandas_counts(study):
-    store = Store(study)
+    store = Results(study)
     best, _ = extremes(ranking(store, selections(store)[0]), "infinity")
     drawn = potential_success.draw(store)[0]
     own = load(study, "evals", where={"task": "infinity"}).merge(best[list(CELL)], on=list(CELL))
@@ -81,7 +81,7 @@ def test_confirmed_shares_are_of_fresh_seeds_alone_and_stand_beside_the_swept(tm
     written(tmp_path, "grid", [*rated(0.1, good=5), *rated(0.5, good=1)])
     fresh = rated(0.1, seeds=8, sweep_seed=100, good=2)
     written(tmp_path, "grid-confirm", [*rated(0.1, good=5), *fresh])  # five of them picked the winner
-    drawn = best_combinations.draw(Store(tmp_path))[0]
+    drawn = best_combinations.draw(Results(tmp_path))[0]
     first = drawn.data.iloc[0]
     assert (first.successes, first.runs, first.confirm_successes, first.confirm_runs) == (5, 5, 2, 8)
     lines = curves(drawn.figure)
@@ -95,7 +95,7 @@ def test_confirmed_shares_are_of_fresh_seeds_alone_and_stand_beside_the_swept(tm
 def test_a_confirming_sweep_is_not_pooled_with_what_it_confirms(tmp_path):
     written(tmp_path, "grid", [*rated(0.1, good=5), *rated(0.5, good=1)])
     written(tmp_path, "grid-confirm", [*rated(0.1, sweep_seed=100), *rated(0.5, sweep_seed=100)])
-    store = Store(tmp_path)
+    store = Results(tmp_path)
     assert selections(store)[0].sweeps == ("grid",)
     assert ranking(store, selections(store)[0]).runs.tolist() == [5, 5]
 
@@ -104,7 +104,7 @@ def test_who_cannot_be_told_from_the_best_is_corrected_for_many_comparisons(tmp_
     rates = [round(0.1 + 0.05 * number, 2) for number in range(8)]
     runs = [run for rate in rates[1:] for run in rated(rate, seeds=10, good=5)]
     written(tmp_path, "grid", [*rated(0.1, seeds=10, good=10), *runs])
-    drawn = best_combinations.draw(Store(tmp_path))[0]
+    drawn = best_combinations.draw(Results(tmp_path))[0]
     # Fisher's test of 10 of 10 against 5 of 10 gives 0.033: below 0.05 alone, not among seven.
     assert "7 of the 7 others cannot be told from it" in drawn.see
     assert any("bns sweep sweeps/grid.yaml --confirm-top 10" in text for text in drawn.missing)
@@ -116,6 +116,6 @@ def test_what_the_sweep_command_confirms_is_what_stands_first(real_results, tmp_
     sweep = parse_sweep(MUTATION, tmp_path / "mutation.yaml")
     again = confirmation(sweep, results, top=1)
     carry_out(results, again.text)
-    for drawn in best_combinations.draw(Store(results)):
+    for drawn in best_combinations.draw(Results(results)):
         assert drawn.data.confirm_runs.tolist() == [5, 0]
         assert drawn.n == 15

@@ -13,9 +13,9 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
-from bns.diagnose.estimate.trial_clock_test import own_clocks, steps_of
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.trial_clock_test import fit_trial_clocks, steps_of
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select.stepwise import problem_for
 from bns.errors import DataError
 from bns.physics.model import Model
 
@@ -33,7 +33,9 @@ def some(name, every, most):
 
 def test_without_data_it_says_what_to_do_and_writes_nothing(tmp_path, capsys):
     assert main(["--data", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
-    assert "Give the folder that holds diff_drive_optitrack.parquet: make real-robots DATA=dir" in capsys.readouterr().err
+    assert (
+        "Give the folder that holds diff_drive_optitrack.parquet: make real-robots DATA=dir" in capsys.readouterr().err
+    )
     assert not (tmp_path / "out").exists()
     assert main(["--data", str(tmp_path), "--only", "moon"]) == 2
     assert "unknown case 'moon'" in capsys.readouterr().err
@@ -41,8 +43,14 @@ def test_without_data_it_says_what_to_do_and_writes_nothing(tmp_path, capsys):
 
 def test_windows_begin_with_what_was_in_force_before():
     table = pd.DataFrame(
-        {"trial": ["a", "a", "b", "b"], "transient": [1, 1, 0, 0], "left_m_s": [-1.0, 0.5, 0.8, 0.8], "right_m_s": 0.1,
-         "left_cmd_m_s": 1.0, "right_cmd_m_s": 0.2}
+        {
+            "trial": ["a", "a", "b", "b"],
+            "transient": [1, 1, 0, 0],
+            "left_m_s": [-1.0, 0.5, 0.8, 0.8],
+            "right_m_s": 0.1,
+            "left_cmd_m_s": 1.0,
+            "right_cmd_m_s": 0.2,
+        }
     )
     out = with_start(table)
     assert list(out["start_left_m_s"]) == [-1.0, -1.0, 1.0, 1.0]
@@ -57,17 +65,17 @@ def test_optitrack_clocks_are_found_once_the_wheels_are_right():
     tracks = tracks_of(checked(table[table["trial"].isin(chosen)])[0]).thinned(8)
     predictor = WheelPredictor(tracks)
     plain = Model(wheelbase_m=0.2)
-    mended = plain.with_effect("wheelbase", factor=1.0).with_effect("camera-rotation", angle_rad=0.0).arranged()
-    problem = problem_for(predictor, problem_for(predictor, mended).fit(mended).model)
-    fit = problem.fit(mended)
-    clocks = own_clocks(problem, fit)
+    extended = plain.with_effect("wheelbase", factor=1.0).with_effect("camera-rotation", angle_rad=0.0).arranged()
+    problem = problem_for(predictor, problem_for(predictor, extended).fit(extended).model)
+    fit = problem.fit(extended)
+    clocks = fit_trial_clocks(problem, fit)
     assert clocks is not None
-    assert clocks.evidence.p_value < 0.01
-    assert clocks.evidence.gain > 0
+    assert clocks.paired_comparison.p_value < 0.01
+    assert clocks.paired_comparison.elpd_diff > 0
     before = errors_at_horizons(predictor, predictor.steps(plain))
-    after = errors_at_horizons(predictor, held_out_steps(predictor, problem.following, fit.model))
+    after = errors_at_horizons(predictor, held_out_steps(predictor, problem.pose_filter, fit.model))
     assert after["trial"] < 0.5 * before["trial"]
-    with_clocks = errors_at_horizons(predictor, steps_of(predictor, problem.following, clocks.fit.model))
+    with_clocks = errors_at_horizons(predictor, steps_of(predictor, problem.pose_filter, clocks.fit.model))
     assert with_clocks["1s"] < before["1s"]
 
 
@@ -84,7 +92,9 @@ def test_warthog_errors_halve_and_nothing_is_claimed_of_its_clocks(tmp_path):
 def test_variants_of_real_logs_are_refused_or_read_alike(tmp_path):
     case, table = cases()["optitrack"], some("optitrack", 4, 4)
     plain = measured(case, table, tmp_path).tracks
-    strange = table.assign(t_s=table["t_s"] * 1e9, x_m=table["x_m"] * 100, heading_rad=90 - np.degrees(table["heading_rad"]))
+    strange = table.assign(
+        t_s=table["t_s"] * 1e9, x_m=table["x_m"] * 100, heading_rad=90 - np.degrees(table["heading_rad"])
+    )
     mapping = {
         "t_s": {"from": "t_s", "unit": "ns"},
         "x_m": {"from": "x_m", "unit": "cm"},

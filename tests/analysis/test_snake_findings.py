@@ -7,9 +7,9 @@ import pytest
 from figure_helpers import with_evals, written
 
 from analysis import checks, diversity_of_extremes, findings, fitness_error_by_diversity, influence, success_so_far
-from analysis.clouds import combinations
+from analysis.results import NoDataError, Results
+from analysis.scatter import combinations
 from analysis.selection import selections
-from analysis.store import NoDataError, Store
 from bns.spec import RunSpec
 
 EVALUATIONS = 21
@@ -43,7 +43,7 @@ def made(place, seeds):
         for seed in range(seeds)
     ]
     written(place, "planted", runs, sweep_text=TEXT.replace("SEEDS", str(seeds)), sweep_runs=len(runs))
-    return Store(place)
+    return Results(place)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +96,7 @@ def test_a_finished_sweep_of_two_seeds_has_its_dots_and_its_estimates_but_no_ver
 def test_dots_of_a_sweep_that_asks_for_more_wait_for_five_runs(tmp_path):
     runs = [planted("two-regions", number, seed, rate, 50) for number, rate in enumerate(RATES) for seed in range(2)]
     written(tmp_path, "planted", runs, sweep_text=TEXT.replace("SEEDS", "30"), sweep_runs=1200)
-    store = Store(tmp_path)
+    store = Results(tmp_path)
     with pytest.raises(NoDataError, match=r"no combination has 5 finished runs yet \(the most is 2\)"):
         combinations(store, selections(store)[0])
 
@@ -111,7 +111,7 @@ def test_success_so_far_counts_each_run_from_its_first_success_on(tmp_path):
             spec = RunSpec(robot="snake", task="two-regions", seed=seed, evaluations=4, mutation_rate=rate)
             runs.append(with_evals(spec, success=now, ever_success=ever))
     written(tmp_path, "planted", runs)
-    rows = success_so_far.draw(Store(tmp_path))[0].data
+    rows = success_so_far.draw(Results(tmp_path))[0].data
     counts = {reading: own.successes.tolist() for reading, own in rows.groupby("reading")}
     assert counts == {"success": [0, 2, 2, 0], "ever_success": [0, 2, 4, 4]}
     assert set(rows.runs) == {6}

@@ -13,11 +13,11 @@ from statsmodels.stats.anova import anova_lm
 from analysis import influence
 from analysis.importance import at_the_end, chance, permutation_importances, sums_of_squares, variance_shares
 from analysis.intervals import band, bootstrap, mean_interval, ratios, resampled
+from analysis.labels import CELL
+from analysis.results import Results
 from analysis.selection import selections
-from analysis.store import Store
 from analysis.trials import first_in_a_row
 from analysis.verdicts import AGREES, DIFFERS, UNDECIDED, likely, near, within
-from analysis.words import CELL
 
 NAN = float("nan")
 
@@ -147,7 +147,7 @@ def test_verdicts_of_small_numbers_and_of_orders():
 
 
 def test_planted_influence_is_found_end_to_end(study):
-    store = Store(study)
+    store = Results(study)
     rows = influence.influences(store, selections(store)[0]).set_index(["task", "parameter"])
     for task in ("circle", "infinity"):
         for measure in ("gap", "variance", "permutation"):
@@ -162,7 +162,7 @@ def test_planted_influence_is_found_end_to_end(study):
 
 
 def test_the_rates_of_the_importances_are_those_of_the_last_evaluation(study):
-    store = Store(study)
+    store = Results(study)
     cells, sums, counts = at_the_end(store, selections(store)[0], "circle")
     rows = store.query("SELECT * FROM evals WHERE task = 'circle' AND evaluation = 10")
     means = rows.groupby(list(CELL)).success.mean()

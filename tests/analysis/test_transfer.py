@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.store import NoDataError, Store
+from analysis.results import NoDataError, Results
 from analysis.transfer.__main__ import main
 from analysis.transfer.drives import SUCCESSES, described, first_success, summary, transferred
 from analysis.transfer.figure import transfer_figure
@@ -41,7 +41,7 @@ def results(tmp_path_factory):
 
 
 def test_a_sweep_taken_to_its_own_world_gives_its_own_numbers(results):
-    store = Store(results)
+    store = Results(results)
     drives = transferred(store, ["with"], build_world("physics", ROBOT), ROBOT)
     own = store.query("SELECT * FROM evals WHERE sweep = 'with' ORDER BY seed, evaluation")
     for name in ("seed", "evaluation", "fitness_world", "fitness_error", *SUCCESSES):
@@ -49,7 +49,7 @@ def test_a_sweep_taken_to_its_own_world_gives_its_own_numbers(results):
 
 
 def test_another_world_gives_others(results):
-    store = Store(results)
+    store = Results(results)
     own, other = (transferred(store, ["with"], build_world(world, ROBOT), ROBOT) for world in ("physics", "substitute"))
     assert (own.fitness_simulation == other.fitness_simulation).all()
     assert (own.fitness_world != other.fitness_world).any()
@@ -57,7 +57,7 @@ def test_another_world_gives_others(results):
 
 def test_sweeps_without_paths_are_refused(results):
     with pytest.raises(NoDataError, match="The sweep without has no runs of khepera with paths"):
-        transferred(Store(results), ["without"], build_world("physics", ROBOT), ROBOT)
+        transferred(Results(results), ["without"], build_world("physics", ROBOT), ROBOT)
 
 
 def drives(first):

@@ -5,7 +5,7 @@ import pytest
 
 from bns.engine.evolution import Population, rank
 from bns.engine.snn import predict
-from bns.robots.base import Luck
+from bns.robots.base import RandomStream
 from tests.cuda.arrays import KEY, SIZE, Arrays
 
 ROBOTS = ["khepera", "snake"]
@@ -15,7 +15,7 @@ ROBOTS = ["khepera", "snake"]
 def test_scores_are_the_cpu_engines(robot):
     one = Arrays(robot)
     one.evolve(0)
-    scores = one.robot.score(one.start, one.weights[0], one.task, Luck(KEY, 0))
+    scores = one.robot.score(one.start, one.weights[0], one.task, RandomStream(KEY, 0))
     np.testing.assert_allclose(one.first(one.fitness), scores.fitness, rtol=1e-6)
     np.testing.assert_array_equal(one.first(one.reached), scores.goals_reached)
     np.testing.assert_array_equal(one.first(one.used), one.start.lengths if scores.used is None else scores.used)
@@ -30,7 +30,7 @@ def test_noise_is_that_of_the_generation():
     second.evolve(1)
     elite = int(second.first(second.order)[0])
     assert elite in range(3)
-    scores = second.robot.score(second.population(1), second.weights[0], second.task, Luck(KEY, 1))
+    scores = second.robot.score(second.population(1), second.weights[0], second.task, RandomStream(KEY, 1))
     np.testing.assert_allclose(second.first(second.fitness), scores.fitness, rtol=1e-6)
     assert (first.first(first.fitness)[:3] != scores.fitness).any()
 
@@ -51,7 +51,7 @@ def test_a_snake_whose_numbers_are_lost_is_worth_nothing():
     one = Arrays("snake", size=2, longest=2, generations_per_evaluation=0)
     one.weights[0, 0, -1] = np.nan
     one.evolve(1)
-    scores = one.robot.score(one.start, one.weights[0], one.task, Luck(KEY, 0))
+    scores = one.robot.score(one.start, one.weights[0], one.task, RandomStream(KEY, 0))
     assert one.first(one.fitness).tolist() == scores.fitness.tolist() == [0, 0]
     assert one.failures.tolist() == [scores.failures] == [2]
 
@@ -106,7 +106,7 @@ def test_what_is_measured_is_what_the_cpu_engine_measures(robot):
     one.X[:], one.targets[:] = draws.uniform(-1, 1, one.X.shape), draws.uniform(0, 1, one.targets.shape)
     one.targets[0, 0, 0, 1] = np.nan  # a network that does not learn from a pattern
     one.counts[0], one.failures[0], one.hits[0] = 3, 5, 6
-    scores = one.robot.score(one.start, one.weights[0], one.task, Luck(KEY, 0))
+    scores = one.robot.score(one.start, one.weights[0], one.task, RandomStream(KEY, 0))
     errors = predict(one.weights[0], one.X[0, 0, :, :3], one.robot.sigmoid_output) - one.targets[0, 0, :, :3]
     expected = {
         "diversity": one.robot.diversity(one.start, scores),

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bns.diagnose.select.indistinguishable import alike
+from bns.diagnose.select.indistinguishable import indistinguishable
 
 RNG = np.random.default_rng(0)
 FIT = SimpleNamespace(held_out=RNG.normal(10, 1, 60))
@@ -16,31 +16,31 @@ def losing(losses):
 
 
 def test_losses_that_go_either_way_are_a_tie():
-    assert alike(losing(RNG.normal(0.5, 5, 60)), FIT, WITHOUT)
+    assert indistinguishable(losing(RNG.normal(0.5, 5, 60)), FIT, WITHOUT)
 
 
 def test_a_loss_that_is_nothing_beside_what_is_earned_is_a_tie_though_all_trials_show_it():
-    assert alike(losing(np.full(60, 0.08)), FIT, WITHOUT)
+    assert indistinguishable(losing(np.full(60, 0.08)), FIT, WITHOUT)
 
 
 def test_clear_losses_are_no_tie():
-    assert not alike(losing(RNG.normal(10, 2, 60)), FIT, WITHOUT)
+    assert not indistinguishable(losing(RNG.normal(10, 2, 60)), FIT, WITHOUT)
 
 
 def test_a_few_wild_trials_do_not_hide_that_nearly_all_lose():
     losses = RNG.normal(10, 2, 60)
     losses[0] = 3000.0  # the mean is now hardly more than its standard error
     assert losses.mean() < 2 * losses.std(ddof=1) / np.sqrt(60)
-    assert not alike(losing(losses), FIT, WITHOUT)
+    assert not indistinguishable(losing(losses), FIT, WITHOUT)
 
 
 def test_a_few_trials_that_alone_are_against_it_leave_a_tie():
     losses = np.zeros(60)
     losses[:2] = 500.0
-    assert alike(losing(losses), FIT, WITHOUT)
+    assert indistinguishable(losing(losses), FIT, WITHOUT)
 
 
 def test_losses_that_are_small_in_all_are_a_tie_though_every_trial_shows_them():
     little = SimpleNamespace(held_out=FIT.held_out + 1)  # what either earns is little too
-    assert alike(losing(np.full(60, 0.04)), FIT, little)
-    assert not alike(losing(np.full(60, 0.06)), FIT, little)
+    assert indistinguishable(losing(np.full(60, 0.04)), FIT, little)
+    assert not indistinguishable(losing(np.full(60, 0.06)), FIT, little)

@@ -8,10 +8,10 @@ from bns.cli.main import main
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.noise import weights
-from bns.diagnose.estimate.trial_clock_test import every_other_block, own_clocks, with_own_clocks
-from bns.diagnose.estimate.trial_clocks import with_clocks_set, without_clocks
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.trial_clock_test import every_other_block, fit_trial_clocks, with_trial_clocks
+from bns.diagnose.estimate.trial_clocks import eliminate_clocks, with_fitted_clocks
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select.stepwise import problem_for
 from bns.errors import ModelError
 from bns.measurements import write_measurements
 from bns.physics.model import load_model, parse_model
@@ -35,11 +35,13 @@ def test_clocks_and_what_they_hide_are_found(predictor):
     found = diagnose(predictor, NOMINAL)
     answer = found.as_json()
     assert set(answer["effects"]) == {"clock-offset", "wheelbase"}
-    own = np.array(found.model.differing.own)
+    own = np.array(found.model.per_trial_effect.trial_values)
     np.testing.assert_allclose(own, LATE_S, atol=0.012)
     factor = answer["parameters"]["wheelbase"]["factor"]
     assert factor["low"] < 1.05 < factor["high"]
-    assert answer["parameters"]["clock-offset"]["between_trials_s"]["value"] == pytest.approx(LATE_S.std(ddof=1), rel=0.1)
+    assert answer["parameters"]["clock-offset"]["between_trials_s"]["value"] == pytest.approx(
+        LATE_S.std(ddof=1), rel=0.1
+    )
     assert answer["error"]["1s"]["after"] < 0.5 * answer["error"]["1s"]["before"]
     assert any("a value of its own in every trial" in note for note in answer["notes"])
 
@@ -47,36 +49,45 @@ def test_clocks_and_what_they_hide_are_found(predictor):
 def test_one_clock_for_all_is_not_called_many():
     common = WheelPredictor(tracks_of(apart(np.full(10, 0.1))))
     problem = problem_for(common, NOMINAL)
-    assert own_clocks(problem, problem.fit(NOMINAL)) is None
+    assert fit_trial_clocks(problem, problem.fit(NOMINAL)) is None
 
 
 def test_clocks_are_eliminated_as_from_the_whole_system(predictor):
     """Slow twin: shared numbers and all clocks solved for at once."""
     turned = NOMINAL.with_effect("wheelbase", factor=1.02).with_effect("clock-offset", offset_s=0.0)
-    model = with_own_clocks(turned, "clock-offset")
+    model = with_trial_clocks(turned, "clock-offset")
     problem = problem_for(predictor, NOMINAL)
     fit = problem.fit(model, rounds=0)
-    white, trial = fit.white, predictor.tracks.trial
+    whitened, trial = fit.whitened, predictor.tracks.trial
     changed = fit.model.with_values({"wheelbase": {"factor": 1.0201}})
-    column = (problem.white(changed) - white)[..., None] / 1e-4
-    slopes = without_clocks(problem, fit.model, white, column)
-    clock = (problem.white(fit.model.with_own(np.array(fit.model.differing.own) + 1e-3)) - white) / 1e-3
+    column = (problem.whitened(changed) - whitened)[..., None] / 1e-4
+    slopes = eliminate_clocks(problem, fit.model, whitened, column)
+    clock = (
+        problem.whitened(fit.model.with_trial_values(np.array(fit.model.per_trial_effect.trial_values) + 1e-3))
+        - whitened
+    ) / 1e-3
     each = clock[:, :, None] * (trial[:, None] == np.arange(len(LATE_S)))[:, None, :]
-    whole = np.concatenate([column, each], axis=2) * np.sqrt(weights(white))[:, None, None]
+    whole = np.concatenate([column, each], axis=2) * np.sqrt(weights(whitened))[:, None, None]
     curvature = np.einsum("kcp,kcq->pq", whole, whole)
     together = curvature[0, 0] - curvature[0, 1:] @ np.linalg.solve(curvature[1:, 1:], curvature[1:, 0])
-    alone = np.einsum("kcp,kcq,k->pq", slopes.jacobian, slopes.jacobian, weights(white))[0, 0]
+    alone = np.einsum("kcp,kcq,k->pq", slopes.jacobian, slopes.jacobian, weights(whitened))[0, 0]
     assert alone == pytest.approx(together, rel=1e-3)
 
 
 def test_a_clock_is_set_by_its_own_trial_alone(predictor):
     problem = problem_for(predictor, NOMINAL)
-    begun = problem.fit(with_own_clocks(NOMINAL.with_effect("clock-offset", offset_s=0.0), "clock-offset"), rounds=0).model
-    one = np.array(begun.differing.own)
+    begun = problem.fit(
+        with_trial_clocks(NOMINAL.with_effect("clock-offset", offset_s=0.0), "clock-offset"), rounds=0
+    ).model
+    one = np.array(begun.per_trial_effect.trial_values)
     one[0] += 0.05
-    again = with_clocks_set(problem, begun.with_own(one))
-    np.testing.assert_allclose(again.differing.own[1:], begun.differing.own[1:], atol=2e-3)
-    np.testing.assert_allclose(again.differing.own[0], begun.differing.own[0], atol=0.02)  # the valley is flat there
+    again = with_fitted_clocks(problem, begun.with_trial_values(one))
+    np.testing.assert_allclose(
+        again.per_trial_effect.trial_values[1:], begun.per_trial_effect.trial_values[1:], atol=2e-3
+    )
+    np.testing.assert_allclose(
+        again.per_trial_effect.trial_values[0], begun.per_trial_effect.trial_values[0], atol=0.02
+    )  # the valley is flat there
 
 
 def test_blocks_share_every_trial_evenly(predictor):
@@ -90,10 +101,10 @@ def test_added_by_command_and_compared(tmp_path, capsys):
     write_measurements(apart(LATE_S[:8]), data)
     arguments = ["--model", "khepera", "--data", str(data), "-o", str(model)]
     assert main(["add", "clock-offset", "--per-trial", *arguments]) == 0
-    mended = load_model(model)
-    assert mended.differing.effect.name == "clock-offset"
-    assert not mended.differing.own
-    assert "one value a trial" in mended.differing.reason
+    extended = load_model(model)
+    assert extended.per_trial_effect.effect.name == "clock-offset"
+    assert not extended.per_trial_effect.trial_values
+    assert "one value a trial" in extended.per_trial_effect.reason
     capsys.readouterr()
     assert main(["compare", str(data), "--model", str(model)]) == 0
     after = capsys.readouterr().out
@@ -109,7 +120,9 @@ def test_added_by_command_and_compared(tmp_path, capsys):
 def test_per_trial_is_refused_where_it_makes_no_sense(tmp_path, capsys):
     effect = "{name: wheelbase, per_trial: VALUE, values: {factor: 1.1}, basis: guess, reason: r}"
     wheelbase = f"base: differential-drive\nwheelbase_m: 0.1\neffects:\n  - {effect}\n"
-    with pytest.raises(ModelError, match=r"wheelbase has one value for all trials; per_trial goes with clock-offset alone"):
+    with pytest.raises(
+        ModelError, match=r"wheelbase has one value for all trials; per_trial goes with clock-offset alone"
+    ):
         parse_model(wheelbase.replace("VALUE", "true"), "m")
     with pytest.raises(ModelError, match="per_trial of wheelbase in model m is 'maybe'; it must be true or false"):
         parse_model(wheelbase.replace("VALUE", "maybe"), "m")

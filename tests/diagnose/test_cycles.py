@@ -121,7 +121,7 @@ def test_an_error_along_one_input_is_found_there():
         off.iloc[1, off.columns.get_indexer(["yellow_x_m", "green_x_m"])] += 0.1 * off.iloc[0].a_lat_rad
         slow.append(off)
     found = compare(predictor(pd.concat(slow)), BARE)
-    assert {p.variable for p in found.patterns[:6]} & {"a_lat_rad", "heading_rad", "change"}
+    assert {p.variable for p in found.residual_dependence[:6]} & {"a_lat_rad", "heading_rad", "change"}
     assert found.near == "cycle"
     assert len(found.worst) == 5
 
@@ -161,7 +161,17 @@ def test_what_is_left_out_is_named():
 
 def test_a_run_of_the_snake_leaves_measurements_that_networks_are_held_against(tmp_path, capsys):
     rows, nets = tmp_path / "run.csv", tmp_path / "nets.safetensors"
-    small = ["--population-size", "8", "--evaluations", "3", "--generations-per-evaluation", "1", "--max-commands", "4", *QUICK]
+    small = [
+        "--population-size",
+        "8",
+        "--evaluations",
+        "3",
+        "--generations-per-evaluation",
+        "1",
+        "--max-commands",
+        "4",
+        *QUICK,
+    ]
     run = ["run", "--robot", "snake", "--task", "two-regions", *small, "--results", str(tmp_path / "r")]
     assert main([*run, "--measurements", str(rows), "--save-snn", str(nets)]) == 0
     assert tuple(pd.read_csv(rows).columns) == COLUMNS

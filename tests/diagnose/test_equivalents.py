@@ -4,10 +4,10 @@ import pytest
 
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select.equivalents import longer
-from bns.diagnose.select.stepwise import problem_for
+from bns.diagnose.select.equivalents import equivalent_pairs
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
@@ -15,7 +15,7 @@ def longer_than(model, names):
     predictor = WheelPredictor(tracks_of(measured(model, seed=5)))
     problem = problem_for(predictor, model)
     others = [effect for name, effect in listed(NOMINAL).items() if name not in names]
-    return longer(problem, problem.fit(model), names, others)
+    return equivalent_pairs(problem, problem.fit(model), names, others)
 
 
 @pytest.mark.parametrize(

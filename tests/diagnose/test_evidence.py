@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.estimate.significance import fewest_trials, held_out_gain, sign_flip_p
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.significance import fewest_trials, paired_elpd_diff, sign_flip_p
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select.stepwise import problem_for
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
@@ -27,8 +27,8 @@ def test_trials_that_pull_together_are_no_luck():
 
 def test_gain_is_paired_by_trial():
     before = np.array([10.0, 20.0, 30.0])
-    assert held_out_gain(before, before - 1.0) == (1.0, 0.0)
-    assert held_out_gain(before, np.array([10.0, np.inf, 30.0]))[0] == -np.inf
+    assert paired_elpd_diff(before, before - 1.0) == (1.0, 0.0)
+    assert paired_elpd_diff(before, np.array([10.0, np.inf, 30.0]))[0] == -np.inf
 
 
 @pytest.mark.parametrize(
@@ -65,8 +65,8 @@ def test_what_holds_a_trial_out_is_close_to_a_fit_without_it():
     fit = problem.fit(model)
     for trial in (0, 5):
         counted = (problem.frame_trial != trial).astype(float)
-        without = Problem(predictor, problem.following, counted).fit(model)
-        truly = problem.per_trial(huber(problem.white(without.model)))[trial]
+        without = Problem(predictor, problem.pose_filter, counted).fit(model)
+        truly = problem.per_trial(huber(problem.whitened(without.model)))[trial]
         assert fit.held_out[trial] == pytest.approx(truly, rel=2e-3)
         assert fit.held_out[trial] >= fit.losses[trial] - 1e-6
 

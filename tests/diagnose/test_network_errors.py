@@ -9,7 +9,7 @@ import pytest
 from bns.cli.main import main
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.networks import NetworkPredictor
-from bns.diagnose.residuals.missing_inputs import Commands, explained
+from bns.diagnose.residuals.missing_inputs import Commands, find_missing_inputs
 from bns.diagnose.residuals.network_errors import nearness, why_wrong
 from bns.engine.philox import Key
 from bns.engine.rprop import Rprop
@@ -82,7 +82,7 @@ def asked(world, networks, trials=40):
 def test_the_planted_reason_is_named(world, kept, verdict, variable):
     why = asked(world, trained(world, kept))
     assert why.verdict == verdict
-    assert [one.variable for one in why.unseen[:1]] == ([variable] if variable else [])
+    assert [one.variable for one in why.missing_inputs[:1]] == ([variable] if variable else [])
     assert sum(why.share.values()) == pytest.approx(1.0)
     assert (why.share["thin data"] > 0.8) == (kept is not None)
 
@@ -100,7 +100,7 @@ def test_in_words_numbers_and_a_figure(tmp_path, capsys):
     assert main(["compare", *given[:3], "--json"]) == 0
     causes = json.loads(capsys.readouterr().out)["causes"]
     assert causes["verdict"] == ["inputs-cannot-know"]
-    assert causes["unseen"][0]["variable"] == "heading_rad"
+    assert causes["missing_inputs"][0]["variable"] == "heading_rad"
 
 
 def test_few_commands_among_the_patterns_are_no_verdict():
@@ -131,8 +131,8 @@ def drifting(seed, slope):
 
 
 def test_a_planted_variable_is_found_with_its_share_and_luck_is_not():
-    named, alone, share = explained(drifting(0, 4.0))
+    named, alone, share = find_missing_inputs(drifting(0, 4.0))
     assert [one.variable for one in named] == ["t"] == [alone[0].variable]
     assert share == pytest.approx(16 / 12 / (16 / 12 + 1), abs=0.08)
     for seed in range(5):
-        assert explained(drifting(seed, 0.0))[0] == []
+        assert find_missing_inputs(drifting(seed, 0.0))[0] == []

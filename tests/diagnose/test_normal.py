@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.diagnose.estimate.noise import HUBER, huber
-from bns.diagnose.estimate.normal_equations import normal, normal_by_trial, stepped
+from bns.diagnose.estimate.normal_equations import innovations_after, normal_equations, normal_equations_by_trial
 
 FIRST = np.array([0, 7, 7, 20])
 """The second trial was never tracked."""
@@ -21,12 +21,12 @@ def written_out(rows):
 
 
 def test_all_frames():
-    for found, expected in zip(normal(JACOBIAN, WHITE), written_out(slice(None)), strict=True):
+    for found, expected in zip(normal_equations(JACOBIAN, WHITE), written_out(slice(None)), strict=True):
         np.testing.assert_allclose(found, expected)
 
 
 def test_each_trial_and_none_where_nothing_was_tracked():
-    found = normal_by_trial(FIRST, JACOBIAN, WHITE)
+    found = normal_equations_by_trial(FIRST, JACOBIAN, WHITE)
     for trial, rows in ((0, slice(0, 7)), (2, slice(7, 20))):
         curvature, gradient = written_out(rows)
         np.testing.assert_allclose(found.curvatures[trial], curvature)
@@ -38,18 +38,18 @@ def test_each_trial_and_none_where_nothing_was_tracked():
 def test_the_gradient_is_that_of_the_robust_loss():
     step = 1e-6 * RNG.normal(size=4)
     steps = np.tile(step, (3, 1))
-    change = huber(stepped(FIRST, JACOBIAN, WHITE, steps)).sum() - huber(WHITE).sum()
-    assert change == pytest.approx(normal(JACOBIAN, WHITE)[1] @ step, rel=1e-3)
+    change = huber(innovations_after(FIRST, JACOBIAN, WHITE, steps)).sum() - huber(WHITE).sum()
+    assert change == pytest.approx(normal_equations(JACOBIAN, WHITE)[1] @ step, rel=1e-3)
 
 
 def test_every_trial_takes_its_own_step():
     steps = RNG.normal(size=(3, 4))
-    moved = stepped(FIRST, JACOBIAN, WHITE, steps)
+    moved = innovations_after(FIRST, JACOBIAN, WHITE, steps)
     np.testing.assert_allclose(moved[3], WHITE[3] + JACOBIAN[3] @ steps[0])
     np.testing.assert_allclose(moved[19], WHITE[19] + JACOBIAN[19] @ steps[2])
 
 
 def test_no_numbers_no_equations():
-    curvature, gradient = normal(JACOBIAN[..., :0], WHITE)
+    curvature, gradient = normal_equations(JACOBIAN[..., :0], WHITE)
     assert (curvature.shape, gradient.shape) == ((0, 0), (0,))
-    np.testing.assert_array_equal(stepped(FIRST, JACOBIAN[..., :0], WHITE, np.zeros((3, 0))), WHITE)
+    np.testing.assert_array_equal(innovations_after(FIRST, JACOBIAN[..., :0], WHITE, np.zeros((3, 0))), WHITE)

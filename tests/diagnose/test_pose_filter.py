@@ -25,11 +25,11 @@ def test_innovations_equal_a_filter_written_with_matrices():
     steps, tracks = predictor.steps(NOMINAL), predictor.tracks
     noise = np.array([2e-3, 1e-4, 4e-3, 2e-3, 1e-3])
     gain, whiten, logdet = filter_gains(steps.body, tracks.is_first, predictor.way_m, noise)
-    white = innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, gain, whiten)
+    whitened = innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, gain, whiten)
     slow, slow_logdet = reference.innovations(
         steps.body, steps.drift_m, tracks.pose, tracks.is_first, predictor.way_m, noise
     )
-    np.testing.assert_allclose((white**2).sum(axis=1), (slow**2).sum(axis=1), rtol=2e-3, atol=2e-3)
+    np.testing.assert_allclose((whitened**2).sum(axis=1), (slow**2).sum(axis=1), rtol=2e-3, atol=2e-3)
     np.testing.assert_allclose(logdet, slow_logdet, atol=1e-4)
 
 
@@ -47,10 +47,10 @@ def test_a_true_model_leaves_white_noise():
     noise = np.array([2e-3, 8e-3, 1e-5, 1e-5, 1e-4])
     gain, whiten, _ = filter_gains(steps.body, predictor.tracks.is_first, predictor.way_m, noise)
     tracks = predictor.tracks
-    white = innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, gain, whiten)[~tracks.is_first]
-    assert np.abs(white.mean(axis=0)).max() < 0.06
-    assert np.abs(white.std(axis=0) - 1).max() < 0.06
-    assert np.abs(np.corrcoef(white[1:, 0], white[:-1, 0])[0, 1]) < 0.06
+    whitened = innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, gain, whiten)[~tracks.is_first]
+    assert np.abs(whitened.mean(axis=0)).max() < 0.06
+    assert np.abs(whitened.std(axis=0) - 1).max() < 0.06
+    assert np.abs(np.corrcoef(whitened[1:, 0], whitened[:-1, 0])[0, 1]) < 0.06
 
 
 def led_by(predictor, model):
@@ -98,15 +98,15 @@ def test_a_marker_mistaken_at_the_start_does_not_lose_the_trial(followed_world):
     gain, whiten, _ = filter_gains(steps.body, tracks.is_first, predictor.way_m, NOISE)
     pose = tracks.pose.copy()
     pose[0, :2] += 0.3
-    white = innovations(steps.body, steps.drift_m, pose, tracks.is_first, gain, whiten)
-    assert np.linalg.norm(white[1:4], axis=1).min() > 20
-    assert np.linalg.norm(white[8 : tracks.first[1]], axis=1).max() < 20
+    whitened = innovations(steps.body, steps.drift_m, pose, tracks.is_first, gain, whiten)
+    assert np.linalg.norm(whitened[1:4], axis=1).min() > 20
+    assert np.linalg.norm(whitened[8 : tracks.first[1]], axis=1).max() < 20
 
 
 def test_the_clock_shifts_a_track_along_itself():
-    late = track(
-        hidden(clock_offset={"offset_s": 2 * FRAME_S}), [[0.1]], [[0.12]], [[2.0]], dense_dt_s=FRAME_S
-    ).poses[0]
+    late = track(hidden(clock_offset={"offset_s": 2 * FRAME_S}), [[0.1]], [[0.12]], [[2.0]], dense_dt_s=FRAME_S).poses[
+        0
+    ]
     true = track(NOMINAL, [[0.1]], [[0.12]], [[2.0]], dense_dt_s=FRAME_S).poses[0]
     np.testing.assert_allclose(late[2:], true[:-2], atol=1e-9)
     np.testing.assert_allclose(late[:2], true[:1].repeat(2, 0), atol=1e-12)

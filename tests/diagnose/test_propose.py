@@ -9,14 +9,23 @@ import pytest
 
 from bns.cli.main import main
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.design.competing_models import contests_of, rivals_of
-from bns.diagnose.design.discrimination import Apart, Stage, apart
+from bns.diagnose.design.competing_models import competing_models_of, model_pairs_of
+from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, discriminations
 from bns.diagnose.design.limits import arena_of, bounds_of
-from bns.diagnose.design.planned import foreseen, planned_tracks
-from bns.diagnose.design.power import Expected, Past, decided, minutes_needed, power
+from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
+from bns.diagnose.design.power import ExpectedGain, PastTrials, decision_probability, minutes_needed, power
 from bns.diagnose.design.proposal import propose
-from bns.diagnose.design.search import Pool, chosen
-from bns.diagnose.design.sequences import Arena, Bounds, Sequences, brief, drawn, extreme, uniform, varied
+from bns.diagnose.design.search import Pool, select_trials
+from bns.diagnose.design.sequences import (
+    Arena,
+    Bounds,
+    Sequences,
+    draw_sequences,
+    extreme,
+    mutate_sequences,
+    short_durations,
+    uniform,
+)
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.proposal_text import proposal_text
@@ -53,8 +62,8 @@ def path_of(plan, trial, model=NOMINAL):
 @pytest.mark.parametrize("kind", [uniform, extreme])
 def test_sequences_stay_inside_arena_and_bounds(kind):
     rng = np.random.default_rng(1)
-    plan = drawn(rng, 30, BOUNDS, ARENA, BASE_M, kind(BOUNDS))
-    for one in (plan, varied(rng, plan, BOUNDS, kind(BOUNDS))):
+    plan = draw_sequences(rng, 30, BOUNDS, ARENA, BASE_M, kind(BOUNDS))
+    for one in (plan, mutate_sequences(rng, plan, BOUNDS, kind(BOUNDS))):
         used = one.duration_s > 0
         assert (np.abs(one.left_m_s) <= 0.2).all()
         assert (one.duration_s[used] >= 0.4 - 1e-9).all()
@@ -68,18 +77,18 @@ def test_sequences_stay_inside_arena_and_bounds(kind):
 
 def test_brief_trials_last_from_a_third_to_the_whole():
     rng = np.random.default_rng(1)
-    lasts = brief(rng, BOUNDS, 200)
+    lasts = short_durations(rng, BOUNDS, 200)
     assert 4 <= lasts.min() < 5
     assert 11 < lasts.max() <= 12
-    plan = drawn(rng, 200, BOUNDS, ARENA, BASE_M, uniform(BOUNDS), lasts)
+    plan = draw_sequences(rng, 200, BOUNDS, ARENA, BASE_M, uniform(BOUNDS), lasts)
     assert np.corrcoef(plan.lasting_s, lasts)[0, 1] > 0.7
-    children = varied(rng, plan, BOUNDS, uniform(BOUNDS))
+    children = mutate_sequences(rng, plan, BOUNDS, uniform(BOUNDS))
     fewer = (children.duration_s > 0).sum(axis=1) < (plan.duration_s > 0).sum(axis=1)
     assert 0 < fewer.sum() < 100
 
 
 def test_the_same_seed_draws_the_same_sequences_and_another_seed_others():
-    a, b, c = (drawn(np.random.default_rng(s), 4, BOUNDS, ARENA, BASE_M, uniform(BOUNDS)) for s in (1, 1, 2))
+    a, b, c = (draw_sequences(np.random.default_rng(s), 4, BOUNDS, ARENA, BASE_M, uniform(BOUNDS)) for s in (1, 1, 2))
     assert np.array_equal(a.left_m_s, b.left_m_s)
     assert not np.array_equal(a.left_m_s, c.left_m_s)
 
@@ -94,8 +103,8 @@ def test_the_same_seed_draws_the_same_sequences_and_another_seed_others():
     ids=lambda m: m.effects[0].effect.name,
 )
 def test_foreseen_tracks_are_those_of_the_simulation(model):
-    plan = drawn(np.random.default_rng(3), 5, BOUNDS, ARENA, BASE_M, uniform(BOUNDS))
-    seen = foreseen(model, planned_tracks(plan, ARENA.start, 0.04, np.zeros(5))).tracks
+    plan = draw_sequences(np.random.default_rng(3), 5, BOUNDS, ARENA, BASE_M, uniform(BOUNDS))
+    seen = noise_free_predictor(model, planned_tracks(plan, ARENA.start, 0.04, np.zeros(5))).tracks
     for trial in range(5):
         last = seen.pose[seen.first[trial + 1] - 1]
         assert np.abs(last - path_of(plan, trial, model)[-1]).max() < 1e-3
@@ -103,19 +112,21 @@ def test_foreseen_tracks_are_those_of_the_simulation(model):
 
 def test_separation_is_what_a_real_refit_leaves(narrow):
     d, _ = narrow
-    a, b = rivals_of(d)[:2]
+    a, b = competing_models_of(d)[:2]
     near = replace(BOUNDS, slowest_m_s=0.06, fastest_m_s=0.14)
-    plan = drawn(np.random.default_rng(5), 12, near, ARENA, BASE_M, uniform(near))
-    stage = Stage(d.found.problem, ARENA, None, lambda p: np.zeros(len(p)), ((0, 1),))
-    found, _ = apart([a, b], plan, stage)
+    plan = draw_sequences(np.random.default_rng(5), 12, near, ARENA, BASE_M, uniform(near))
+    setup = ExperimentSetup(d.selection.problem, ARENA, None, lambda p: np.zeros(len(p)), ((0, 1),))
+    found, _ = discriminations([a, b], plan, setup)
     one = found[(0, 1)][0]
     # nothing known of the rival's numbers, all of the true ones
     free = replace(one, prior=1e-9 * np.eye(len(one.prior)), spread=np.zeros_like(one.spread))
     from bns.diagnose.estimate.fit import Problem
     from bns.diagnose.estimate.noise import filter_for
 
-    predictor = foreseen(a.fit.model, planned_tracks(plan, ARENA.start, None, np.zeros(12)))
-    problem = Problem(predictor, filter_for(predictor, predictor.steps(a.fit.model), d.found.problem.following.noise))
+    predictor = noise_free_predictor(a.fit.model, planned_tracks(plan, ARENA.start, None, np.zeros(12)))
+    problem = Problem(
+        predictor, filter_for(predictor, predictor.steps(a.fit.model), d.selection.problem.pose_filter.noise)
+    )
     left = 2 * problem.fit(b.fit.model).loss
     assert free.total() == pytest.approx(left, rel=0.1)
     assert free.each().sum() == pytest.approx(free.total(), rel=0.01)
@@ -126,9 +137,11 @@ def test_separation_is_what_a_real_refit_leaves(narrow):
 
 def test_an_explanation_is_not_driven_apart_from_itself(narrow):
     d, _ = narrow
-    a = rivals_of(d)[0]
-    plan = drawn(np.random.default_rng(5), 12, BOUNDS, ARENA, BASE_M, extreme(BOUNDS))
-    found, _ = apart([a, a], plan, Stage(d.found.problem, ARENA, None, lambda p: np.zeros(len(p)), ((0, 1),)))
+    a = competing_models_of(d)[0]
+    plan = draw_sequences(np.random.default_rng(5), 12, BOUNDS, ARENA, BASE_M, extreme(BOUNDS))
+    found, _ = discriminations(
+        [a, a], plan, ExperimentSetup(d.selection.problem, ARENA, None, lambda p: np.zeros(len(p)), ((0, 1),))
+    )
     assert found[(0, 1)][0].total() < 1e-3
     assert found[(0, 1)][0].each().max() < 1e-3
 
@@ -138,9 +151,9 @@ def test_an_experiment_decides_in_half_the_time_of_random_commands(narrow):
     assert d.verdict == "tie"
     arena = arena_of(predictor.tracks, "1.6x1.2", "0,0,90")
     proposal = propose(d, arena, bounds_of(predictor.tracks, NOMINAL, None), 4)
-    contest = next(c for c in proposal.contests if "dead-zone" in {c.first, c.second})
-    assert not contest.alike
-    assert contest.times_faster > 2
+    pair = next(c for c in proposal.model_pairs if "dead-zone" in {c.first, c.second})
+    assert not pair.indistinguishable
+    assert pair.times_faster > 2
     for trial in range(len(proposal.plan)):
         poses = path_of(proposal.plan, trial, DEAD)
         assert ARENA.holds(poses[:, 0], poses[:, 1], 0.0).all()
@@ -151,9 +164,9 @@ def test_what_is_the_same_from_outside_is_said_to_be_so():
     d, predictor = found_in(DELAYED, trials=12)
     assert d.verdict == "tie"
     proposal = propose(d, arena_of(predictor.tracks, None, None), bounds_of(predictor.tracks, NOMINAL, None), 5)
-    [contest] = [c for c in proposal.contests if {c.first, c.second} == {"command-delay", "clock-offset"}]
-    assert contest.alike
-    assert any("LED" in other for other in contest.other_measurements)
+    [pair] = [c for c in proposal.model_pairs if {c.first, c.second} == {"command-delay", "clock-offset"}]
+    assert pair.indistinguishable
+    assert any("LED" in other for other in pair.independent_measurements)
     assert "no sequence of commands tells them apart" in proposal_text(proposal)
     assert len(proposal.plan) == 0
     assert proposal.power == 0
@@ -161,30 +174,32 @@ def test_what_is_the_same_from_outside_is_said_to_be_so():
 
 def test_after_a_clear_verdict_only_the_accepted_one_is_contested():
     d, _ = found_in(hidden(turn_slip={"slip_s": 0.12}), trials=12, seed=2)
-    rivals = rivals_of(d)
-    assert rivals[0].names == ("turn-slip",)
-    assert len(rivals) > 1
-    assert contests_of(d, rivals) == tuple((0, i) for i in range(1, len(rivals)))
+    competing_models = competing_models_of(d)
+    assert competing_models[0].names == ("turn-slip",)
+    assert len(competing_models) > 1
+    assert model_pairs_of(d, competing_models) == tuple((0, i) for i in range(1, len(competing_models)))
 
 
 def test_power_grows_with_trials_and_is_small_where_nothing_separates():
     old, new, none = np.zeros(10), np.full(30, 3.0), np.zeros(30)
-    chances = [power(Expected(old, new[:n], old, new[:n])) for n in (2, 8, 30)]
+    chances = [power(ExpectedGain(old, new[:n], old, new[:n])) for n in (2, 8, 30)]
     assert chances[0] < chances[1] < chances[2]
     assert chances[2] > 0.9
-    assert power(Expected(old, none + 1e-12, old, new)) < 0.1
-    both = [Expected(old, new, old, new, chance=0.7), Expected(old, none + 1e-12, old, new, chance=0.3)]
-    assert 0.6 < decided(both) < 0.75
+    assert power(ExpectedGain(old, none + 1e-12, old, new)) < 0.1
+    both = [ExpectedGain(old, new, old, new, chance=0.7), ExpectedGain(old, none + 1e-12, old, new, chance=0.3)]
+    assert 0.6 < decision_probability(both) < 0.75
     assert minutes_needed(0.0, 10, 1.0) == np.inf
 
 
 def test_what_counts_of_a_separation_is_what_the_diagnosis_could_tell():
-    told = lambda each: float(Past().telling(np.sum(each), np.sum(np.square(each))))  # noqa: E731
+    told = lambda each: float(PastTrials().effective_discrimination(np.sum(each), np.sum(np.square(each))))  # noqa: E731
     assert told([0.01] * 50) == pytest.approx(0.5, rel=0.01)  # little a trial: their sum
-    assert told([1e6]) == pytest.approx(4, rel=0.01)  # one trial, however telling: a gain as large as its standard error
+    assert told([1e6]) == pytest.approx(
+        4, rel=0.01
+    )  # one trial, however telling: a gain as large as its standard error
     assert told([1e6] * 4) == pytest.approx(16, rel=0.01)
-    assert Past(squares=100.0).telling(np.array(10.0), np.array(10.0)) < told([1.0] * 10)
-    assert Past(scatter=3.0).telling(np.array(10.0), np.array(10.0)) < told([1.0] * 10)
+    assert PastTrials(squares=100.0).effective_discrimination(np.array(10.0), np.array(10.0)) < told([1.0] * 10)
+    assert PastTrials(scatter=3.0).effective_discrimination(np.array(10.0), np.array(10.0)) < told([1.0] * 10)
 
 
 def test_short_trials_are_chosen_where_each_tells_enough_and_long_ones_where_not():
@@ -192,14 +207,14 @@ def test_short_trials_are_chosen_where_each_tells_enough_and_long_ones_where_not
     none = np.zeros((0, 0))
     for long_tells, lasting in ((2.0, 3.0), (20.0, 9.0)):
         each = np.repeat([50.0, 50.0 * long_tells] if lasting == 3.0 else [0.1, 0.1 * long_tells], 20)
-        one = Apart(each, np.zeros((40, 0)), np.zeros((40, 0, 0)), none, none, 0)
-        first = chosen(Pool(plan, {(0, 1): (one, one)}), 12.0, {(0, 1): Past()})[:3]
+        one = Discrimination(each, np.zeros((40, 0)), np.zeros((40, 0, 0)), none, none, 0)
+        first = select_trials(Pool(plan, {(0, 1): (one, one)}), 12.0, {(0, 1): PastTrials()})[:3]
         assert plan.lasting_s[first].tolist()[0] == lasting
 
 
 def test_a_pair_without_numbers_separates_by_its_error_alone():
     none = np.zeros((0, 0))
-    one = Apart(np.array([1.0, 2.0]), np.zeros((2, 0)), np.zeros((2, 0, 0)), none, none, 0)
+    one = Discrimination(np.array([1.0, 2.0]), np.zeros((2, 0)), np.zeros((2, 0, 0)), none, none, 0)
     assert one.total() == 3.0
     assert one.each().tolist() == [1.0, 2.0]
 

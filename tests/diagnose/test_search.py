@@ -9,8 +9,8 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select.plausibility import veto_of
-from bns.diagnose.select.stepwise import Search
+from bns.diagnose.select.plausibility import implausible
+from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.decoys import DECOYS
 from bns.physics.formula import formula_effect
 from bns.physics.model import ActiveEffect
@@ -56,9 +56,9 @@ def test_what_no_list_holds_is_called_so_and_a_formula_offered():
     model = NOMINAL.with_active(rough, (-0.12,))
     answer = diagnosed(model).as_json()
     assert answer["verdict"] == "unlisted"
-    assert answer["patterns"][0]["variable"] in {"time_in_trial_s", "way_m"}
+    assert answer["residual_dependence"][0]["variable"] in {"time_in_trial_s", "way_m"}
     assert answer["formula"]["on"] == "v"
-    assert answer["formula"]["gain"] > 0
+    assert answer["formula"]["elpd_diff"] > 0
 
 
 def test_a_model_that_has_the_effect_already_lacks_nothing():
@@ -99,42 +99,44 @@ def test_a_few_late_trials_do_not_bring_a_clock_in_by_exchange(late, stays):
     table = measured(NOMINAL, seed=11)
     seen, shifted = ["x_m", "y_m", "heading_rad"], table["trial"].isin(late)
     table.loc[shifted, seen] = table[shifted].groupby("trial")[seen].shift(3).bfill()
-    search = Search(WheelPredictor(tracks_of(table)), NOMINAL)
-    problem, fit = search._settled(NOMINAL)
+    search = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL)
+    problem, fit = search._refit_with_noise(NOMINAL)
     tried = fit_with(problem, fit, search.catalogue["clock-offset"])
     assert tried.held_out.sum() < fit.held_out.sum() - 0.5
     assert search._may_stay(problem, tried, "clock-offset") is stays
 
 
-@pytest.mark.parametrize(("name", "values", "rivals"), [("turn-slip", {"slip_s": 0.0}, 0), ("camera-scale", {"factor": 1.0}, 1)])
-def test_a_rival_must_have_earned_its_place(monkeypatch, name, values, rivals):
+@pytest.mark.parametrize(
+    ("name", "values", "competing_models"), [("turn-slip", {"slip_s": 0.0}, 0), ("camera-scale", {"factor": 1.0}, 1)]
+)
+def test_a_rival_must_have_earned_its_place(monkeypatch, name, values, competing_models):
     table = measured(hidden(camera_scale={"factor": 1.05}), seed=11)
-    search = Search(WheelPredictor(tracks_of(table)), NOMINAL)
-    problem, fit = search._settled(NOMINAL.with_effect("camera-scale", factor=1.05))
+    search = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL)
+    problem, fit = search._refit_with_noise(NOMINAL.with_effect("camera-scale", factor=1.05))
     tried = problem.fit(NOMINAL.with_effect(name, **values))
-    monkeypatch.setattr("bns.diagnose.select.stepwise.alike", lambda *_: True)
+    monkeypatch.setattr("bns.diagnose.select.stepwise.indistinguishable", lambda *_: True)
     monkeypatch.setattr(search, "_exchanges", lambda *_: [("camera-scale", name, tried)])
-    assert len(search._rivals(problem, fit, ("camera-scale",))) == rivals
+    assert len(search._competing_models(problem, fit, ("camera-scale",))) == competing_models
 
 
 def test_what_asks_for_too_much_once_noise_and_numbers_have_settled_is_passed_over(monkeypatch):
-    def veto(fit, name, bounds=True):
-        return "too much" if name == "wheelbase" and not bounds else veto_of(fit, name, bounds)
+    def rejected_because(fit, name, bounds=True):
+        return "too much" if name == "wheelbase" and not bounds else implausible(fit, name, bounds)
 
-    monkeypatch.setattr("bns.diagnose.select.stepwise.veto_of", veto)
+    monkeypatch.setattr("bns.diagnose.select.stepwise.implausible", rejected_because)
     tracks = tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=12, seed=11))
-    found = Search(WheelPredictor(tracks), NOMINAL).run()
+    found = StepwiseSelection(WheelPredictor(tracks), NOMINAL).run()
     first = found.steps[0].ranking[0]
-    assert (first.name, first.veto) == ("wheelbase", "too much")
+    assert (first.name, first.rejected_because) == ("wheelbase", "too much")
     assert "wheelbase" not in found.accepted
 
 
 def test_slopes_of_a_smaller_model_lead_to_the_same_fit():
     table = measured(hidden(motor_lag={"tau_s": 0.08}, wheelbase={"factor": 1.04}), trials=8, seed=5)
-    search = Search(WheelPredictor(tracks_of(table)), NOMINAL)
-    problem, base = search._settled(NOMINAL.with_effect("wheelbase", factor=1.0))
+    search = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL)
+    problem, base = search._refit_with_noise(NOMINAL.with_effect("wheelbase", factor=1.0))
     start = base.model.with_effect("motor-lag", tau_s=0.03).arranged()
-    anew, known = problem.fit(start), problem.fit(start, known=base.slopes)
+    anew, known = problem.fit(start), problem.fit(start, nearby=base.jacobian_by_parameter)
     assert known.loss == pytest.approx(anew.loss, abs=0.02)
     errors = np.sqrt(np.diag(anew.covariance))
     assert (np.abs(known.values - anew.values) < 0.3 * errors).all()  # a loss of a hundredth is as good as settled

@@ -6,12 +6,12 @@ import pytest
 
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.estimate.significance import Evidence
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.predict.wheels import RECENT_S, WheelPredictor
-from bns.diagnose.residuals.along_variables import SHARE, Pattern, nudge, remaining
-from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, outbreaks
+from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence, probe_effect, significant_dependence
+from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, outliers
 from bns.diagnose.residuals.unexplained import unexplained
-from bns.diagnose.select.stepwise import problem_for
 from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
 
 KICK_S, KICK_RAD = 1.6, 0.15
@@ -34,7 +34,7 @@ def kicked(table, trials):
 def found_in(table):
     predictor = WheelPredictor(tracks_of(table))
     problem = problem_for(predictor, NOMINAL)
-    return outbreaks(problem, problem.fit(NOMINAL))
+    return outliers(problem, problem.fit(NOMINAL))
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -80,26 +80,26 @@ def test_a_diagnosis_says_where_to_look():
     table = kicked(measured(NOMINAL, trials=20, seed=3), [1, 8, 9, 15])
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
     assert found.verdict == "unlisted"
-    assert {o["trial"] for o in found.as_json()["outbreaks"]} == {"1", "8", "9", "15"}
+    assert {o["trial"] for o in found.as_json()["outliers"]} == {"1", "8", "9", "15"}
     assert any(note.startswith("4 of 20 trials have moments over 6 times") for note in found.notes)
 
 
-def loudest(table):
+def largest(table):
     predictor = WheelPredictor(tracks_of(table))
     problem = problem_for(predictor, NOMINAL)
-    return unexplained(problem, problem.fit(NOMINAL), ()).rhythm
+    return unexplained(problem, problem.fit(NOMINAL), ()).autocorrelation
 
 
 @pytest.mark.parametrize("jitter", [0.002, 0.02])
 def test_motors_that_vary_have_no_rhythm(jitter):
-    assert loudest(measured(NOMINAL, trials=30, seed=2, jitter=jitter)) is None
+    assert largest(measured(NOMINAL, trials=30, seed=2, jitter=jitter)) is None
 
 
 def test_a_heading_that_swings_with_a_period_has_a_rhythm():
     table = measured(NOMINAL, trials=30, seed=2)
     phase = 2 * np.pi * (table.t_s + 0.37 * table.trial) / 1.5
-    rhythm = loudest(table.assign(heading_rad=table.heading_rad + 0.02 * np.sin(phase)))
-    assert (rhythm.direction, rhythm.scale) == ("heading", "within")
+    autocorrelation = largest(table.assign(heading_rad=table.heading_rad + 0.02 * np.sin(phase)))
+    assert (autocorrelation.direction, autocorrelation.scale) == ("heading", "within")
 
 
 def variables_of(left_m_s, command_s=0.4):
@@ -139,7 +139,7 @@ def test_a_share_of_the_motion_scales_ways_and_turns_alike():
     predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=3)))
     everywhere = np.ones_like(predictor.grid.step_s)
     before = predictor.steps(NOMINAL).body
-    after = predictor.steps(NOMINAL.with_active(nudge(SHARE, everywhere, 0 * everywhere), (-0.2,))).body
+    after = predictor.steps(NOMINAL.with_active(probe_effect(SHARE, everywhere, 0 * everywhere), (-0.2,))).body
     assert after[:, 2] == pytest.approx(0.8 * before[:, 2])
     assert np.hypot(*after[:, :2].T) == pytest.approx(0.8 * np.hypot(*before[:, :2].T), abs=2e-6)
 
@@ -149,5 +149,5 @@ def test_a_share_of_the_motion_scales_ways_and_turns_alike():
     [(0.2, 1e-4, 0.01, True), (0.5, 1e-4, 0.01, False), (0.2, 0.1, 0.01, False), (0.2, 1e-4, 0.001, False)],
 )
 def test_a_pattern_must_be_earned_in_many_trials_and_large(se, chance, share, stays):
-    found = Pattern("speed_m_s", "yaw_rad_s", Evidence(1.0, se, chance), share)
-    assert remaining([found]) == ([found] if stays else [])
+    found = ResidualDependence("speed_m_s", "yaw_rad_s", PairedComparison(1.0, se, chance), share)
+    assert significant_dependence([found]) == ([found] if stays else [])

@@ -73,17 +73,27 @@ def decided(one: Open, minutes: float, seed: int, folder: Path) -> dict[str, Any
     data, commands, more = (place / f"{name}.csv" for name in ("first", "next", "more"))
     one.first.to_csv(data, index=False)
     commands.unlink(missing_ok=True)
-    told = _asked(["propose", str(data), *one.model, *one.room, "--minutes", str(minutes), "-o", str(commands), "--json"])
-    before = [told.get("verdict", told.get("fault")), *sorted("+".join(sorted(names)) for names in told.get("rivals", []))]
-    contests = told.get("contests", [])
+    told = _asked(
+        ["propose", str(data), *one.model, *one.room, "--minutes", str(minutes), "-o", str(commands), "--json"]
+    )
+    before = [
+        told.get("verdict", told.get("fault")),
+        *sorted("+".join(sorted(names)) for names in told.get("competing_models", [])),
+    ]
+    pairs = told.get("model_pairs", [])
     out: dict[str, Any] = {"world": one.name, "truth": sorted(one.truth), "before": before}
-    out["contests"] = [[c["first"], c["second"], c["alike"], c["power"], c["minutes"]] for c in contests]
+    out["contests"] = [[c["first"], c["second"], c["indistinguishable"], c["power"], c["minutes"]] for c in pairs]
     if commands.is_file():
         plan, start = plan_in(commands)
         table = carried_out(plan, start, one.hidden, one.look, seed, (one.name, "more"))
         table.to_csv(more, index=False)
-        out |= {"trials": len(plan), "after": _said(_asked(["diagnose", str(data), *one.model, "--more", str(more), "--json"]))}
-    out["right"] = is_right(one, out.get("after", before), {frozenset({c["first"], c["second"]}) for c in contests if c["alike"]})
+        out |= {
+            "trials": len(plan),
+            "after": _said(_asked(["diagnose", str(data), *one.model, "--more", str(more), "--json"])),
+        }
+    out["right"] = is_right(
+        one, out.get("after", before), {frozenset({c["first"], c["second"]}) for c in pairs if c["indistinguishable"]}
+    )
     return out
 
 

@@ -19,15 +19,15 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.design.competing_models import refitted, rivals_of
+from bns.diagnose.design.competing_models import competing_models_of, refitted
 from bns.diagnose.design.limits import arena_of, bounds_of
-from bns.diagnose.design.power import told_apart
+from bns.diagnose.design.power import distinguished
 from bns.diagnose.design.proposal import propose
-from bns.diagnose.design.sequences import Arena, Bounds, Sequences, drawn, uniform
+from bns.diagnose.design.sequences import Arena, Bounds, Sequences, draw_sequences, uniform
 from bns.diagnose.diagnosis import Diagnosis, diagnose
-from bns.diagnose.estimate.significance import held_out_gain
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.significance import paired_elpd_diff
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select.stepwise import problem_for
 from bns.physics.effects import all_effects
 from bns.physics.model import load_model
 from tests.hidden_effects.camera import Camera, Layout
@@ -89,18 +89,18 @@ def driven(case: Case, plan: Sequences, start: Sequence[float], seed: int, name:
 
 def decided(d: Diagnosis, case: Case, table: pd.DataFrame) -> bool:
     """Does the true explanation beat every rival on these measurements, by the diagnosis' own criterion?"""
-    assert d.found is not None
+    assert d.selection is not None
     model = load_model("khepera")
     predictor = WheelPredictor(tracks_of(table))
-    rivals, effects = rivals_of(d), all_effects()
+    rivals, effects = competing_models_of(d), all_effects()
     true = next(r for r in rivals if r.names == (case.truth,))
     problem = problem_for(predictor, true.fit.model)
     nothing = problem.fit(model)
     best = refitted(problem, problem.fit(true.fit.model), (case.truth,), effects)
-    worth = held_out_gain(nothing.held_out, best.held_out)[0]
+    worth = paired_elpd_diff(nothing.held_out, best.held_out)[0]
     others = [refitted(problem, problem.fit(r.fit.model), r.names, effects) for r in rivals if r.names != (case.truth,)]
-    gains = [held_out_gain(other.held_out, best.held_out) for other in others]
-    return all(bool(told_apart(np.array(gain), np.array(se), worth, len(best.held_out))) for gain, se in gains)
+    gains = [paired_elpd_diff(other.held_out, best.held_out) for other in others]
+    return all(bool(distinguished(np.array(gain), np.array(se), worth, len(best.held_out))) for gain, se in gains)
 
 
 def minutes_until_decided(d: Diagnosis, case: Case, old: pd.DataFrame, new: pd.DataFrame, plan: Sequences) -> float:
@@ -154,7 +154,7 @@ def measured_case(case: Case, seed: int) -> dict[str, object] | None:
     model = load_model("khepera")
     predictor = WheelPredictor(tracks_of(old))
     d = diagnose(predictor, model)
-    names = {rival.names for rival in rivals_of(d)}
+    names = {rival.names for rival in competing_models_of(d)}
     if d.verdict not in {"tie", "insufficient-data"} or not {(case.truth,), (case.rival,)} <= names:
         print(f"{case.truth} / {case.rival}: {d.verdict} {sorted(names)}", file=sys.stderr)
         return None
@@ -174,16 +174,20 @@ def measured_case(case: Case, seed: int) -> dict[str, object] | None:
 def random_plan(arena: Arena, bounds: Bounds, seed: int) -> Sequences:
     """Plain random trials that fill the time."""
     trials = int(np.ceil(60 * MINUTES / bounds.trial_s))
-    return drawn(luck(seed, "random"), trials, bounds, arena, ROBOT.wheelbase_m, uniform(bounds))
+    return draw_sequences(luck(seed, "random"), trials, bounds, arena, ROBOT.wheelbase_m, uniform(bounds))
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m tests.hidden_effects.proposing", description=__doc__)
     parser.add_argument("--seeds", type=int, default=3, help="worlds a pair (3)")
-    parser.add_argument("--first-seed", type=int, default=0, help="first of them (0; 0 to 2 were looked at while building)")
+    parser.add_argument(
+        "--first-seed", type=int, default=0, help="first of them (0; 0 to 2 were looked at while building)"
+    )
     parser.add_argument("--only", default="", metavar="WORD", help="pairs with this word in their names")
-    parser.add_argument("--results", type=Path, default=Path("results/propose"), help="folder of the numbers and the figure")
+    parser.add_argument(
+        "--results", type=Path, default=Path("results/propose"), help="folder of the numbers and the figure"
+    )
     options = parser.parse_args(arguments)
     options.results.mkdir(parents=True, exist_ok=True)
     found = []

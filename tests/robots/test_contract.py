@@ -10,7 +10,7 @@ from bns.engine.philox import Key
 from bns.engine.snn import initial_weights, predict
 from bns.errors import SpecError
 from bns.robots import load_robot, robot_names
-from bns.robots.base import Luck, on_floor
+from bns.robots.base import RandomStream, on_floor
 from bns.spec import FIELDS
 from bns.tasks import load_task, task_names
 
@@ -176,12 +176,12 @@ def test_a_score_does_not_depend_on_the_neighbours(goal):
 def test_what_is_taken_over_from_the_parents_is_what_would_be_computed(goal, rate):
     robot, task = goal
     weights, population = weights_of(robot), robot.initial_population(KEY, 60, 4, 12)
-    scores, cdf = robot.score(population, weights, task, Luck(KEY, 0)), tournament_cdf(60, 0.1)
+    scores, cdf = robot.score(population, weights, task, RandomStream(KEY, 0)), tournament_cdf(60, 0.1)
     for generation in range(1, 8):
         children = Population(np.zeros_like(population.commands), population.lengths.copy())
         robot.breed(KEY, population, rank(scores.fitness), cdf, rate, 4, generation, children)
-        luck = Luck(KEY, generation)
-        anew, scores = robot.score(children, weights, task, luck), robot.score(children, weights, task, luck, scores)
+        stream = RandomStream(KEY, generation)
+        anew, scores = robot.score(children, weights, task, stream), robot.score(children, weights, task, stream, scores)
         for computed, taken in zip(anew, scores, strict=True):
             np.testing.assert_array_equal(computed, taken)
         population = children

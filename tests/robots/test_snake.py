@@ -10,7 +10,7 @@ from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import initial_weights, predict
 from bns.errors import SpecError
 from bns.robots import load_robot
-from bns.robots.base import Luck, Scores
+from bns.robots.base import RandomStream, Scores
 from bns.robots.snake import cycles, path
 from bns.robots.snake.robot import NOISE_SD_M, NOISY_EVALUATIONS
 from bns.tasks import default_task, load_task, task_of
@@ -91,12 +91,12 @@ def noisy_twin(controller, weights, task, rows):
 @pytest.mark.parametrize("task", [TWO, THREE], ids=lambda task: task.name)
 def test_noisy_rollouts_are_their_twins(task):
     weights, population = networks(), ROBOT.initial_population(KEY, 40, 4, 100)
-    scores = ROBOT.score(population, weights, task, Luck(KEY, 3))
+    scores = ROBOT.score(population, weights, task, RandomStream(KEY, 3))
     rows = normals(KEY, Purpose.ROLLOUT_NOISE, 3, NOISY_EVALUATIONS, 40) * NOISE_SD_M
     twins = [noisy_twin(population.controller(i), weights, task, rows) for i in range(40)]
     np.testing.assert_allclose(scores.fitness, twins, rtol=1e-4)
     assert len(np.unique(scores.goals_reached)) > 1
-    other = ROBOT.score(population, weights, task, Luck(KEY, 4))
+    other = ROBOT.score(population, weights, task, RandomStream(KEY, 4))
     assert (other.fitness != scores.fitness).mean() > 0.9
     np.testing.assert_array_equal(other.goals_reached, scores.goals_reached)  # counted without noise
 

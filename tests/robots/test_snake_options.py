@@ -11,7 +11,7 @@ from bns.errors import SpecError
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 from bns.robots import load_robot
-from bns.robots.base import Luck
+from bns.robots.base import RandomStream
 from bns.robots.snake import cycles, path, posture
 from bns.robots.snake.gait import joint_angles
 from bns.robots.snake.robot import NOISE_SD_M, NOISY_EVALUATIONS
@@ -69,7 +69,7 @@ def test_what_was_driven_before_decides():
 def test_rollouts_are_their_twins_with_every_option(name):
     robot, weights = load_robot(name), networks()
     population = robot.initial_population(KEY, 30, 4, 100)
-    scores = robot.score(population, weights, TASK, Luck(KEY, 3))
+    scores = robot.score(population, weights, TASK, RandomStream(KEY, 3))
     rows = normals(KEY, Purpose.ROLLOUT_NOISE, 3, NOISY_EVALUATIONS, 40) * NOISE_SD_M
     for i in range(30):
         in_full = cycles.in_full(population.controller(i))

@@ -12,7 +12,7 @@ from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import INPUTS, PER_NEURON, predict
 from bns.physics.snake_drive import build as build_physics
 from bns.robots import load_robot
-from bns.robots.base import Luck
+from bns.robots.base import RandomStream
 from bns.robots.snake import cycles, path
 from bns.robots.snake.options import BEYOND, READINGS
 from bns.robots.snake.rules import NOISE_SD_M, NOISY_EVALUATIONS
@@ -42,7 +42,7 @@ def test_lateral_amplitudes_are_uniform_and_those_of_the_other_reading_are_seldo
 
 
 def test_a_drive_has_as_many_cycles_as_any_noisy_path_needs():
-    weights, population, luck = networks(), PLAIN.initial_population(KEY, 60, 4, 100), Luck(KEY, 3)
+    weights, population, stream = networks(), PLAIN.initial_population(KEY, 60, 4, 100), RandomStream(KEY, 3)
     rows = normals(KEY, Purpose.ROLLOUT_NOISE, 3, NOISY_EVALUATIONS, 40) * NOISE_SD_M
     off, longer, never = load_robot("snake+cut-without-noise"), 0, 0
     for i in range(60):
@@ -52,7 +52,7 @@ def test_a_drive_has_as_many_cycles_as_any_noisy_path_needs():
         paths = [path.judge(path.walk(moved + np.pad(row[: len(moved)], ((0, 0), (0, 1)))), TASK) for row in rows]
         done = [used for _, goals, used in paths if goals == 2]
         used = max(done) if done else len(in_full)
-        planned, without = PLAIN.plan(controller, weights, TASK, luck), off.plan(controller, weights, TASK, luck)
+        planned, without = PLAIN.plan(controller, weights, TASK, stream), off.plan(controller, weights, TASK, stream)
         np.testing.assert_array_equal(planned, in_full[:used])
         np.testing.assert_array_equal(without, PLAIN.plan(controller, weights, TASK))
         longer += len(planned) > len(without)

@@ -102,7 +102,7 @@ def test_a_shard_by_hand(sweep_file, tmp_path):
 
 def test_a_machine_is_used_whole(monkeypatch, tmp_path):
     monkeypatch.setattr("bns.sweep.cores.cpu_count", lambda: 64)
-    place = load_executor("joblib").place(Request(tmp_path))
+    place = load_executor("joblib").placement(Request(tmp_path))
     assert (place.workers, place.where.split()[0]) == (64, "64")
 
 

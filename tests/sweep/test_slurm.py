@@ -121,8 +121,8 @@ def _terminated():
 def test_scripts_ask_for_what_was_given_in_arrays_that_the_cluster_takes(slurm_commands, tmp_path):
     options = (("partition", "long"), ("account", "lab"))
     request = Request(tmp_path, jobs=4, shards=7, time_limit_s=7200.0, options=options)
-    assert slurm.place(request).workers == 28
-    assert "3 array(s), 2.0 h a turn" in slurm.place(request).where
+    assert slurm.placement(request).workers == 28
+    assert "3 array(s), 2.0 h a turn" in slurm.placement(request).where
     summary = slurm.carry_out(small(), request)
     assert (summary.stopped_by, summary.new) == ("submitted", 0)
     scripts = [path.read_text() for path in sorted(slurm_commands.glob("sbatch.*"))]

@@ -37,8 +37,8 @@ def drafted(table: pd.DataFrame) -> str:
     entries: dict[str, Any] = {}
     quaternion = next((q for words in _QUATERNION if len(q := list(_each(words, names))) == 4), None)
     for column, words in _WORDS.items():
-        taken = {entry["from"] for entry in entries.values()} | set(quaternion or ())
-        source = _source(words, {name: said for name, said in names.items() if name not in taken})
+        selected = {entry["from"] for entry in entries.values()} | set(quaternion or ())
+        source = _source(words, {name: said for name, said in names.items() if name not in selected})
         if column == "heading_rad" and quaternion is not None:  # the last
             entries[column] = {"from": quaternion, "unit": "quaternion"}
         elif source is not None and not (column in {FORWARD, TURN} and "left_m_s" in entries):

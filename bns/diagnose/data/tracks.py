@@ -62,9 +62,9 @@ class Tracks:
 
     def only(self, chosen: NDArray[np.int64]) -> Tracks:
         """Some of the trials, in the order of ``chosen``."""
-        taken = [np.arange(self.first[i], self.first[i + 1]) for i in chosen]
+        selected = [np.arange(self.first[i], self.first[i + 1]) for i in chosen]
         return replace(
-            self._at(taken),
+            self._at(selected),
             names=tuple(self.names[i] for i in chosen),
             left_m_s=self.left_m_s[chosen],
             right_m_s=self.right_m_s[chosen],
@@ -75,15 +75,18 @@ class Tracks:
     def thinned(self, every: int) -> Tracks:
         """Every so-manieth frame of each trial, its last one too; the commands stay as they are."""
         return self._at(
-            [np.unique(np.append(np.arange(a, b, every), b - 1)) if b > a else np.arange(a, b) for a, b in pairwise(self.first)]
+            [
+                np.unique(np.append(np.arange(a, b, every), b - 1)) if b > a else np.arange(a, b)
+                for a, b in pairwise(self.first)
+            ]
         )
 
-    def _at(self, taken: Sequence[NDArray[np.int64]]) -> Tracks:
+    def _at(self, selected: Sequence[NDArray[np.int64]]) -> Tracks:
         """These frames, an array a trial."""
-        frames = np.concatenate(taken)
+        frames = np.concatenate(selected)
         return replace(
             self,
-            first=np.cumsum([0, *map(len, taken)]),
+            first=np.cumsum([0, *map(len, selected)]),
             t_s=self.t_s[frames],
             pose=self.pose[frames],
             extra={name: values[frames] for name, values in self.extra.items()},

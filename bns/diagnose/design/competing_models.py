@@ -8,9 +8,10 @@ from itertools import combinations
 
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.residuals.symbolic import NAME as FORMULA
-from bns.diagnose.select.stepwise import Found, problem_for
+from bns.diagnose.select.stepwise import SelectionResult
 from bns.physics.effect import Effect
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
@@ -20,7 +21,7 @@ MOST, MOST_TIED = 3, 5
 
 
 @dataclass(frozen=True)
-class Rival:
+class CompetingModel:
     """One explanation: the names that were added to the model (none: nothing is missing), and its fit."""
 
     names: tuple[str, ...]
@@ -32,29 +33,29 @@ class Rival:
         return " + ".join(self.names) or "nothing missing"
 
 
-def rivals_of(d: Diagnosis) -> tuple[Rival, ...]:
+def competing_models_of(d: Diagnosis) -> tuple[CompetingModel, ...]:
     """The diagnosis' own explanation first, then what stands against it, best first; empty where nothing was searched.
 
     After a tie these are the explanations that fit as well. After any other verdict: the formula found, and the candidates that
     came closest, each in the place of what was accepted last, or beside nothing.
     """
-    found = d.found
-    if found is None:
+    selection = d.selection
+    if selection is None:
         return ()
-    problem, first = found.problem, Rival(found.accepted, found.fit)
+    problem, first = selection.problem, CompetingModel(selection.accepted, selection.fit)
     effects = _effects(d)
-    if d.formula is not None and not found.rivals:
-        return (first, Rival((*found.accepted, FORMULA), d.formula.fit))
-    sets: Iterable[tuple[str, ...]] = found.rivals or _nearest(found)
-    others = [Rival(names, refitted(problem, found.fit, names, effects)) for names in sets]
-    others.sort(key=lambda rival: float(rival.fit.held_out.sum()))
-    return (first, *others[: (MOST_TIED if found.rivals else MOST) - 1])
+    if d.formula is not None and not selection.competing_models:
+        return (first, CompetingModel((*selection.accepted, FORMULA), d.formula.fit))
+    sets: Iterable[tuple[str, ...]] = selection.competing_models or _nearest(selection)
+    others = [CompetingModel(names, refitted(problem, selection.fit, names, effects)) for names in sets]
+    others.sort(key=lambda competitor: float(competitor.fit.held_out.sum()))
+    return (first, *others[: (MOST_TIED if selection.competing_models else MOST) - 1])
 
 
-def contests_of(d: Diagnosis, rivals: Sequence[Rival]) -> tuple[tuple[int, int], ...]:
-    """Which rivals an experiment should hold against each other: all after a tie, else the accepted one against every other."""
-    pairs = tuple(combinations(range(len(rivals)), 2))
-    tied = d.found is not None and bool(d.found.rivals)
+def model_pairs_of(d: Diagnosis, competing_models: Sequence[CompetingModel]) -> tuple[tuple[int, int], ...]:
+    """Which models an experiment should hold against each other: all after a tie, else the accepted one against every other."""
+    pairs = tuple(combinations(range(len(competing_models)), 2))
+    tied = d.selection is not None and bool(d.selection.competing_models)
     return pairs if tied else tuple(pair for pair in pairs if pair[0] == 0)
 
 
@@ -76,23 +77,27 @@ def refitted(problem: Problem, fit: Fit, names: Sequence[str], effects: Mapping[
     return problem.fit(model)
 
 
-def without_last(found: Found) -> Model:
+def without_last(selection: SelectionResult) -> Model:
     """The accepted model without what was accepted last: what an explanation's worth is measured from."""
-    return found.fit.model.without(found.accepted[-1]) if found.accepted else found.nominal.model
+    return selection.fit.model.without(selection.accepted[-1]) if selection.accepted else selection.nominal.model
 
 
-def _nearest(found: Found, most: int = MOST - 1) -> list[tuple[str, ...]]:
+def _nearest(selection: SelectionResult, most: int = MOST - 1) -> list[tuple[str, ...]]:
     """Sets of the same size as the accepted one (or of one name), with the candidates that earned most beside those accepted."""
-    kept = found.accepted[:-1]
-    step = found.steps[len(kept)] if len(kept) < len(found.steps) else found.steps[-1]
-    close = [c.name for c in step.ranking if c.name not in found.accepted and not c.veto and c.evidence.gain > 0]
+    kept = selection.accepted[:-1]
+    step = selection.steps[len(kept)] if len(kept) < len(selection.steps) else selection.steps[-1]
+    close = [
+        c.name
+        for c in step.ranking
+        if c.name not in selection.accepted and not c.rejected_because and c.paired_comparison.elpd_diff > 0
+    ]
     return [(*kept, name) for name in close[:most]]
 
 
 def _effects(d: Diagnosis) -> dict[str, Effect]:
     """Every effect that an explanation may name: the catalogue and what was tried beside it."""
-    assert d.found is not None
-    base = {active.effect.name for active in d.found.nominal.model.effects}
-    tried = [a.effect for step in d.found.steps for c in step.ranking for a in c.fit.model.effects]
+    assert d.selection is not None
+    base = {active.effect.name for active in d.selection.nominal.model.effects}
+    tried = [a.effect for step in d.selection.steps for c in step.ranking for a in c.fit.model.effects]
     every = {**all_effects(), **{effect.name: effect for effect in tried}}
     return {name: effect for name, effect in every.items() if name not in base}

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.design.competing_models import Rival
-from bns.diagnose.design.planned import foreseen, planned_tracks
+from bns.diagnose.design.competing_models import CompetingModel
+from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
 from bns.diagnose.design.sequences import Arena, Sequences
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import filter_for, huber
@@ -32,61 +32,69 @@ Pair = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Apart:
+class Discrimination:
     """Sums of each planned trial for one pair in one direction: d'd (trials,), J'd (trials, p), J'J (trials, p, p).
 
     J = (J_B, J_A), the first ``split`` columns B's. ``prior`` (p, p): H of both; ``spread``: C.
     """
 
-    square: Array
-    pull: Array
-    give: Array
+    squared: Array
+    gradient: Array
+    information: Array
     prior: Array
     spread: Array
     split: int
 
-    def only(self, chosen: NDArray[np.int64]) -> Apart:
+    def only(self, chosen: NDArray[np.int64]) -> Discrimination:
         """Some of the trials."""
-        return replace(self, square=self.square[chosen], pull=self.pull[chosen], give=self.give[chosen])
+        return replace(
+            self, squared=self.squared[chosen], gradient=self.gradient[chosen], information=self.information[chosen]
+        )
 
-    def joined(self, other: Apart) -> Apart:
+    def joined(self, other: Discrimination) -> Discrimination:
         """These trials, then the other's."""
         return replace(
             self,
-            square=np.concatenate([self.square, other.square]),
-            pull=np.concatenate([self.pull, other.pull]),
-            give=np.concatenate([self.give, other.give]),
+            squared=np.concatenate([self.squared, other.squared]),
+            gradient=np.concatenate([self.gradient, other.gradient]),
+            information=np.concatenate([self.information, other.information]),
         )
 
-    def of(self, square: Array, pull: Array, give: Array) -> Array:
-        """The separation of sums over sets of trials, (sets,); the sums are (sets,), (sets, p), (sets, p, p)."""
+    def of(self, squared: Array, gradient: Array, information: Array) -> Array:
+        """The discrimination of sums over sets of trials, (sets,); the sums are (sets,), (sets, p), (sets, p, p)."""
         k = self.split
-        step, follow, own = self._answers(pull, give)
-        known = np.einsum("sij,sjk->sik", give[:, k:, k:], own) - np.einsum("sij,sjk->sik", give[:, k:, :k], follow)
-        gained = square - np.einsum("sp,sp->s", pull[:, :k], step) + np.einsum("ij,sji->s", self.spread, known)
+        step, follow, own = self._answers(gradient, information)
+        known = np.einsum("sij,sjk->sik", information[:, k:, k:], own) - np.einsum(
+            "sij,sjk->sik", information[:, k:, :k], follow
+        )
+        gained = squared - np.einsum("sp,sp->s", gradient[:, :k], step) + np.einsum("ij,sji->s", self.spread, known)
         return np.maximum(gained, 0.0)
 
     def total(self) -> float:
-        """The separation of all the trials together."""
-        return float(self.of(*(v.sum(axis=0)[None] for v in (self.square, self.pull, self.give)))[0])
+        """The discrimination of all the trials together."""
+        return float(self.of(*(v.sum(axis=0)[None] for v in (self.squared, self.gradient, self.information)))[0])
 
     def each(self) -> Array:
         """What each trial has of `total`, all having adjusted to all of them, (trials,)."""
         k = self.split
-        (step,), (follow,), (own,) = self._answers(self.pull.sum(axis=0)[None], self.give.sum(axis=0)[None])
-        left = self.square - 2 * self.pull[:, :k] @ step + np.einsum("tpq,p,q->t", self.give[:, :k, :k], step, step)
+        (step,), (follow,), (own,) = self._answers(self.gradient.sum(axis=0)[None], self.information.sum(axis=0)[None])
+        left = (
+            self.squared
+            - 2 * self.gradient[:, :k] @ step
+            + np.einsum("tpq,p,q->t", self.information[:, :k, :k], step, step)
+        )
         wrong = np.concatenate([-follow, np.eye(len(self.spread))])  # what B cannot follow of a change of A's numbers
         rest = np.eye(len(self.spread)) - own
-        for answer, sign, part in ((wrong, 1.0, self.give), (rest, -1.0, self.give[:, k:, k:])):
+        for answer, sign, part in ((wrong, 1.0, self.information), (rest, -1.0, self.information[:, k:, k:])):
             left = left + sign * np.einsum("ij,kj,tkl,li->t", self.spread, answer, part, answer)
         return np.maximum(left, 0.0)
 
-    def _answers(self, pull: Array, give: Array) -> tuple[Array, Array, Array]:
+    def _answers(self, gradient: Array, information: Array) -> tuple[Array, Array, Array]:
         """K_B g_B (sets, b), K_B G_BA (sets, b, a), K_A G_AA (sets, a, a)."""
         k = self.split
-        right = np.concatenate([pull[:, :k, None], give[:, :k, k:]], axis=2)
-        of_b = _solved(self.prior[:k, :k] + give[:, :k, :k], right)
-        return of_b[..., 0], of_b[..., 1:], _solved(self.prior[k:, k:] + give[:, k:, k:], give[:, k:, k:])
+        right = np.concatenate([gradient[:, :k, None], information[:, :k, k:]], axis=2)
+        of_b = _solved(self.prior[:k, :k] + information[:, :k, :k], right)
+        return of_b[..., 0], of_b[..., 1:], _solved(self.prior[k:, k:] + information[:, k:, k:], information[:, k:, k:])
 
 
 def _solved(matrix: Array, right: Array) -> Array:
@@ -99,8 +107,8 @@ def _solved(matrix: Array, right: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Stage:
-    """Where and how a plan would be carried out and seen, and which pairs of rivals it is about."""
+class ExperimentSetup:
+    """Where and how a plan would be carried out and seen, and which pairs of models it is about."""
 
     problem: Problem
     arena: Arena
@@ -109,37 +117,37 @@ class Stage:
     pairs: tuple[Pair, ...]
 
 
-def apart(
-    rivals: Sequence[Rival], plan: Sequences, stage: Stage
-) -> tuple[dict[Pair, tuple[Apart, Apart]], NDArray[np.bool_]]:
-    """Both directions of pairs of rivals over a plan's trials; and which trials stay inside the arena under all rivals."""
-    tracks = planned_tracks(plan, stage.arena.start, stage.frame_s, stage.session_s(plan))
-    noise = stage.problem.following.noise
-    seen: list[list[tuple[Array, Array]]] = []
+def discriminations(
+    competing_models: Sequence[CompetingModel], plan: Sequences, setup: ExperimentSetup
+) -> tuple[dict[Pair, tuple[Discrimination, Discrimination]], NDArray[np.bool_]]:
+    """Both directions of pairs of models over a plan's trials; and which trials stay inside the arena under all models."""
+    tracks = planned_tracks(plan, setup.arena.start, setup.frame_s, setup.session_s(plan))
+    noise = setup.problem.pose_filter.noise
+    errors: list[list[tuple[Array, Array]]] = []
     inside = np.ones(len(plan), dtype=bool)
     problems = []
-    for true in rivals:
-        predictor = foreseen(true.fit.model, tracks)
+    for true in competing_models:
+        predictor = noise_free_predictor(true.fit.model, tracks)
         steps = predictor.steps(true.fit.model)
         problem = Problem(predictor, filter_for(predictor, steps, noise))
         problems.append(problem)
-        held = stage.arena.holds(predictor.tracks.pose[:, 0], predictor.tracks.pose[:, 1], 0.0)
+        held = setup.arena.holds(predictor.tracks.pose[:, 0], predictor.tracks.pose[:, 1], 0.0)
         inside &= problem.per_trial((~held).astype(float)) == 0
-        seen.append([whitened(problem, rival.fit.model) for rival in rivals])
-    found = {
+        errors.append([whitened_errors(problem, competitor.fit.model) for competitor in competing_models])
+    result = {
         (a, b): (
-            _sums(problems[a], seen[a][b], seen[a][a], rivals[b].fit, rivals[a].fit),
-            _sums(problems[b], seen[b][a], seen[b][b], rivals[a].fit, rivals[b].fit),
+            _sums(problems[a], errors[a][b], errors[a][a], competing_models[b].fit, competing_models[a].fit),
+            _sums(problems[b], errors[b][a], errors[b][b], competing_models[a].fit, competing_models[b].fit),
         )
-        for a, b in stage.pairs
+        for a, b in setup.pairs
     }
-    return found, inside
+    return result, inside
 
 
-def whitened(problem: Problem, model: Model) -> tuple[Array, Array]:
+def whitened_errors(problem: Problem, model: Model) -> tuple[Array, Array]:
     """Whitened errors (frames, 3) and their Jacobian (frames, 3, p) of a model as it is."""
     fit = problem.fit(model, rounds=0)
-    return fit.white, fit.jacobian
+    return fit.whitened, fit.jacobian
 
 
 def curvature_of(fit: Fit) -> Array:
@@ -158,14 +166,16 @@ def curvature_of(fit: Fit) -> Array:
     return out
 
 
-def _sums(problem: Problem, other: tuple[Array, Array], true: tuple[Array, Array], of_other: Fit, of_true: Fit) -> Apart:
+def _sums(
+    problem: Problem, other: tuple[Array, Array], true: tuple[Array, Array], of_other: Fit, of_true: Fit
+) -> Discrimination:
     error = other[0] - true[0]
     jacobian = np.concatenate([other[1], true[1]], axis=2)
-    pulls = problem.normal(jacobian, error)
-    return Apart(
+    equations = problem.normal_equations(jacobian, error)
+    return Discrimination(
         problem.per_trial(2 * huber(error)),  # the diagnosis counts a large error linearly, and so must who foresees it
-        pulls.gradients,
-        pulls.curvatures,
+        equations.gradients,
+        equations.curvatures,
         block_diag(curvature_of(of_other), curvature_of(of_true)),
         of_true.covariance,
         len(of_other.free),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-WITNESS = {
+INDEPENDENT_MEASUREMENT = {
     "command-delay": "film an LED on the robot that lights when a command arrives, with the tracker's camera",
     "clock-offset": "film an event that both clocks stamp (an LED switched by the computer that logs the commands)",
     "speed-gain": "let the robot drive straight and measure the way on the floor with a tape",
@@ -23,7 +23,7 @@ WITNESS = {
 """Effect -> a measurement that sees it alone."""
 
 
-def witnesses(first: Iterable[str], second: Iterable[str]) -> list[str]:
+def independent_measurements(first: Iterable[str], second: Iterable[str]) -> list[str]:
     """Measurements that would tell two explanations apart, from the effects that only one of them names."""
     only = sorted(set(first) ^ set(second))
-    return [f"{WITNESS[name]} ({name})" for name in only if name in WITNESS]
+    return [f"{INDEPENDENT_MEASUREMENT[name]} ({name})" for name in only if name in INDEPENDENT_MEASUREMENT]

@@ -51,8 +51,8 @@ def bounds_of(tracks: Tracks, model: Model, speeds: str | None) -> Bounds:
     lasting = tracks.duration_s > 0
     if not lasting.any():
         raise DataError("No command of these measurements lasts any time; log poses before and after commands.")
-    told = np.concatenate([tracks.left_m_s[lasting], tracks.right_m_s[lasting]])
-    low, high = float(told.min()), float(told.max())
+    commanded = np.concatenate([tracks.left_m_s[lasting], tracks.right_m_s[lasting]])
+    low, high = float(commanded.min()), float(commanded.max())
     short, long = (float(v) for v in np.quantile(tracks.duration_s[lasting], [0.02, 0.98]))
     name = str(model.provenance.get("begun_from", model.name)).removesuffix("-world")
     robot = load_robot(name) if name in robot_names() else None
@@ -69,9 +69,9 @@ def bounds_of(tracks: Tracks, model: Model, speeds: str | None) -> Bounds:
 
 
 def _size(text: str) -> np.ndarray:
-    found = re.fullmatch(r"\s*([0-9.]+)\s*[xX×]\s*([0-9.]+)\s*", text)
+    match = re.fullmatch(r"\s*([0-9.]+)\s*[xX×]\s*([0-9.]+)\s*", text)
     try:
-        size = np.array([float(v) for v in found.groups()]) if found else None
+        size = np.array([float(v) for v in match.groups()]) if match else None
     except ValueError:
         size = None
     if size is None or not (size > 2 * MARGIN_M).all() or not (size < 1000).all():
@@ -85,7 +85,9 @@ def _start(text: str) -> tuple[float, float, float]:
     except ValueError:
         x = y = degrees = np.nan
     if not np.isfinite([x, y, degrees]).all():
-        raise DataError(f"--start {text!r} is no pose; write X,Y,DEGREES (metres; 0 faces east, 90 north): --start 0,0,90")
+        raise DataError(
+            f"--start {text!r} is no pose; write X,Y,DEGREES (metres; 0 faces east, 90 north): --start 0,0,90"
+        )
     return x, y, float(np.radians(degrees))
 
 

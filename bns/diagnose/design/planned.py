@@ -16,7 +16,9 @@ _PLACE_ROUNDS = 3
 """What the floor does depends on where the robot is, which depends on what the floor does: each round adds a power of it."""
 
 
-def planned_tracks(plan: Sequences, start: tuple[float, float, float], frame_s: float | None, begins_s: Array) -> Tracks:
+def planned_tracks(
+    plan: Sequences, start: tuple[float, float, float], frame_s: float | None, begins_s: Array
+) -> Tracks:
     """The frames of a plan, every pose still at the start. ``frame_s``: time between frames; None: poses at ends of commands.
 
     ``begins_s`` (trials,): time of the session at the start of each trial.
@@ -36,7 +38,7 @@ def planned_tracks(plan: Sequences, start: tuple[float, float, float], frame_s: 
     )
 
 
-def foreseen(model: Model, tracks: Tracks) -> WheelPredictor:
+def noise_free_predictor(model: Model, tracks: Tracks) -> WheelPredictor:
     """A predictor on the tracks that the model says will be seen, free of noise, each from its first pose."""
     predictor = WheelPredictor(tracks)
     placed = any(model.at("world")) or any(active.effect.needs_place for active in model.effects)

@@ -15,8 +15,8 @@ DRAWS = 2000
 
 
 @dataclass(frozen=True)
-class Expected:
-    """What a true explanation is expected to earn over another: ``old`` (trials,) seen so far, ``new`` (planned,) separations.
+class ExpectedGain:
+    """What a true explanation is expected to earn over another: ``old`` (trials,) so far, ``new`` (planned,) discriminations.
 
     ``worth_old``, ``worth_new``: likewise over the model without it, which the diagnosis' share is taken of. ``scatter``:
     variance of a trial's gain over what unit noise gives.
@@ -30,20 +30,23 @@ class Expected:
     scatter: float = 1.0
     chance: float = 0.5
 
-    def first(self, trials: int) -> Expected:
+    def first(self, trials: int) -> ExpectedGain:
         """With fewer of the planned trials."""
-        return Expected(self.old, self.new[:trials], self.worth_old, self.worth_new[:trials], self.scatter, self.chance)
+        return ExpectedGain(
+            self.old, self.new[:trials], self.worth_old, self.worth_new[:trials], self.scatter, self.chance
+        )
 
 
 @dataclass(frozen=True)
-class Past:
-    """Of the trials seen so far, for a pair of explanations: squares of their gains about the mean, and `scatter_of` these."""
+class PastTrials:
+    """Of the trials seen so far, for a pair of explanations: squares of their gains about the mean,
+    and by what factor these are overdispersed."""
 
     squares: float = 0.0
     scatter: float = 1.0
 
-    def telling(self, total: Array, squares: Array) -> Array:
-        """The separation that counts, of trials with separations s, ``total`` = sum s, ``squares`` = sum s^2.
+    def effective_discrimination(self, total: Array, squares: Array) -> Array:
+        """The discrimination that counts, of trials with discriminations s, ``total`` = sum s, ``squares`` = sum s^2.
 
         The diagnosis judges a gain by how it varies between trials: (sum s / 2)^2 over (what is expected of) its squared standard
         error, times four; without past trials, and each new one telling little, this is sum s itself. One trial that
@@ -52,15 +55,15 @@ class Past:
         return np.asarray(total**2 / np.maximum(self.squares + squares / 4 + self.scatter * total, 1e-12))
 
 
-def told_apart(gain: Array, se: Array, worth: float, trials: int) -> NDArray[np.bool_]:
-    """The diagnosis' own criterion: is a gain over a rival (a trial, with its standard error) more than a tie?"""
+def distinguished(gain: Array, se: Array, worth: float, trials: int) -> NDArray[np.bool_]:
+    """The diagnosis' own criterion: is a gain over a competing model (a trial, with its standard error) more than a tie?"""
     return np.asarray((gain >= TIE_Z * se) & matters(gain, worth, trials))
 
 
-def power(expected: Expected, seed: int = 0) -> float:
+def power(expected: ExpectedGain, seed: int = 0) -> float:
     """Chance that old and new trials together decide by the diagnosis' own criterion of a tie.
 
-    A separation s gives a trial a gain of mean s/2 and variance s (times the scatter).
+    A discrimination s gives a trial a gain of mean s/2 and variance s (times the scatter).
     """
     rng = np.random.default_rng(seed)
     new = expected.new / 2 + np.sqrt(expected.scatter * expected.new) * rng.normal(size=(DRAWS, len(expected.new)))
@@ -71,29 +74,29 @@ def power(expected: Expected, seed: int = 0) -> float:
         return 0.0
     mean, se = gains.mean(axis=1), gains.std(axis=1, ddof=1) / np.sqrt(trials)
     worth = (expected.worth_old.sum() + expected.worth_new.sum() / 2) / trials
-    return float(told_apart(mean, se, worth, trials).mean())
+    return float(distinguished(mean, se, worth, trials).mean())
 
 
-def decided(both: Sequence[Expected]) -> float:
+def decision_probability(both: Sequence[ExpectedGain]) -> float:
     """`power` whichever of two explanations is true, weighed by their chances."""
     return sum(e.chance * power(e) for e in both)
 
 
-def blocked(both: Sequence[Expected]) -> bool:
+def negligible_difference(both: Sequence[ExpectedGain]) -> bool:
     """Is the difference, however sure it may become, a smaller share of what either earns than the diagnosis counts?"""
     return all(float(e.new.sum()) < TIE_SHARE * float(e.worth_new.sum()) for e in both)
 
 
-def scatter_of(gains: Array, separations: Array) -> float:
+def overdispersion_of(gains: Array, discriminations: Array) -> float:
     """How much more the gains of trials seen so far vary than unit noise lets them, at least 1.
 
     Noise of the robot that comes and goes from trial to trial is in them, as it will be in the new ones.
     """
-    by_noise = float(separations.mean())
+    by_noise = float(discriminations.mean())
     return max(float(gains.var(ddof=1)) / by_noise, 1.0) if by_noise > 1e-9 and len(gains) > 2 else 1.0
 
 
-def minutes_needed(separation: float, minutes: float, scatter: float) -> float:
+def minutes_needed(discrimination: float, minutes: float, scatter: float) -> float:
     """Robot time (min) until nine in ten such experiments decide: the mean gain is then TIE_Z + 1.28 standard errors."""
     needed = 4 * (TIE_Z + 1.28) ** 2 * scatter
-    return minutes * needed / separation if separation > 0 else np.inf
+    return minutes * needed / discrimination if discrimination > 0 else np.inf

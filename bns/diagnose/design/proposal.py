@@ -1,4 +1,4 @@
-"""The next experiment: trials inside the arena that tell rival explanations apart in the least robot time."""
+"""The next experiment: trials inside the arena that discriminate between competing models in the least robot time."""
 
 from __future__ import annotations
 
@@ -10,11 +10,18 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.design.competing_models import Rival, contests_of, rivals_of, without_last
-from bns.diagnose.design.discrimination import Apart, Pair, Stage, apart
-from bns.diagnose.design.independent_measurement import witnesses
-from bns.diagnose.design.power import Expected, Past, blocked, decided, minutes_needed, scatter_of
-from bns.diagnose.design.search import Pool, designed, random_pool
+from bns.diagnose.design.competing_models import CompetingModel, competing_models_of, model_pairs_of, without_last
+from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, Pair, discriminations
+from bns.diagnose.design.independent_measurement import independent_measurements
+from bns.diagnose.design.power import (
+    ExpectedGain,
+    PastTrials,
+    decision_probability,
+    minutes_needed,
+    negligible_difference,
+    overdispersion_of,
+)
+from bns.diagnose.design.search import Pool, design_trials, random_pool
 from bns.diagnose.design.sequences import Arena, Bounds, Sequences
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.noise import huber
@@ -24,9 +31,9 @@ from bns.diagnose.select.stepwise import FALSE_ALARM
 from bns.errors import DataError
 from bns.physics.effects import all_effects
 
-HOPELESS_MINUTES = 24 * 60.0
+LONGEST_MINUTES = 24 * 60.0
 """Robot time beyond which a pair counts as the same for every experiment with these sensors."""
-SURE = 0.9
+TARGET_POWER = 0.9
 MOST_FASTER = 100.0
 """More times as long than this is not worth counting."""
 _DENSE = 3.0
@@ -34,11 +41,12 @@ _DENSE = 3.0
 
 
 @dataclass(frozen=True)
-class Contest:
+class ModelPair:
     """Two explanations: how likely the experiment decides between them, and after how many minutes (nine times in ten).
 
-    ``alike``: no command sequence tells them apart; ``other_measurements`` would. ``times_faster``: as many times as long
-    plain random commands would take for it. ``already``: what was measured so far decides.
+    ``indistinguishable``: no command sequence tells them apart; ``independent_measurements`` would.
+    ``times_faster``: as many times as long plain random commands would take.
+    ``already_decided``: what was measured so far decides.
     """
 
     first: str
@@ -46,9 +54,9 @@ class Contest:
     power: float
     minutes: float
     times_faster: float
-    alike: bool
-    already: bool
-    other_measurements: tuple[str, ...]
+    indistinguishable: bool
+    already_decided: bool
+    independent_measurements: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -56,8 +64,8 @@ class Proposal:
     """An experiment. ``plan`` has no trials where no commands would tell anything."""
 
     verdict: str
-    rivals: tuple[Rival, ...]
-    contests: tuple[Contest, ...]
+    competing_models: tuple[CompetingModel, ...]
+    model_pairs: tuple[ModelPair, ...]
     plan: Sequences
     arena: Arena
     bounds: Bounds
@@ -66,7 +74,7 @@ class Proposal:
     @property
     def power(self) -> float:
         """Chance that every pair is decided that commands can decide: that of the hardest one; 0 where there is none."""
-        return min((c.power for c in self.contests if not c.alike), default=0.0)
+        return min((c.power for c in self.model_pairs if not c.indistinguishable), default=0.0)
 
     def commands(self) -> pd.DataFrame:
         """The trial file: trial, left_m_s, right_m_s, duration_s, and the pose each trial starts from."""
@@ -86,10 +94,10 @@ class Proposal:
         """One object of plain values."""
         return {
             "verdict": self.verdict,
-            "rivals": [list(r.names) for r in self.rivals],
+            "competing_models": [list(r.names) for r in self.competing_models],
             "power": self.power,
             "minutes": float(self.plan.lasting_s.sum() / 60),
-            "contests": [{name: _plain(value) for name, value in vars(c).items()} for c in self.contests],
+            "model_pairs": [{name: _plain(value) for name, value in vars(c).items()} for c in self.model_pairs],
             "start": {"x_m": self.arena.start[0], "y_m": self.arena.start[1], "heading_rad": self.arena.start[2]},
             "arena": {k: v for k, v in vars(self.arena).items() if k != "start"},
             "trials": len(self.plan),
@@ -111,114 +119,143 @@ def propose(
     seed: int = 0,
     tick: Callable[[str], None] = lambda _: None,
 ) -> Proposal:
-    """The experiment of about ``minutes`` of driving that tells the diagnosis' rivals apart; DataError if there are none."""
-    tick("rivals")
-    rivals = rivals_of(d)
-    if len(rivals) < 2:
+    """The experiment of about ``minutes`` that discriminates between the diagnosis' models; DataError if there are none."""
+    tick("competing models")
+    competing_models = competing_models_of(d)
+    if len(competing_models) < 2:
         why = "; ".join(d.notes) or "no effect comes near to explaining anything"
-        raise DataError(f"There are no two explanations that an experiment could tell apart (verdict {d.verdict}): {why}")
-    assert d.found is not None
-    stage = Stage(
-        d.found.problem,
+        raise DataError(
+            f"There are no two explanations that an experiment could tell apart (verdict {d.verdict}): {why}"
+        )
+    assert d.selection is not None
+    setup = ExperimentSetup(
+        d.selection.problem,
         arena,
         _frame_s(d),
         lambda plan: np.linspace(0, 60 * minutes, len(plan), endpoint=False),
-        contests_of(d, rivals),
+        model_pairs_of(d, competing_models),
     )
     rng = np.random.default_rng(seed)
-    past = {(a, b): _past(d, rivals[a], rivals[b]) for a, b in stage.pairs}
-    best = designed(rng, rivals, stage, bounds, 60 * minutes, past, tick)
+    past = {(a, b): _past(d, competing_models[a], competing_models[b]) for a, b in setup.pairs}
+    best = design_trials(rng, competing_models, setup, bounds, 60 * minutes, past, tick)
     if not len(best.plan):
         raise DataError(
             f"No trial of {bounds.trial_s:g} s stays inside the arena from its start at x = {arena.start[0]:.2f}, y = "
             f"{arena.start[1]:.2f} m. Give a larger one (--arena 2x1.5) or another start (--start 0,0,90)."
         )
     tick("random commands, for comparison")
-    plain = random_pool(rng, rivals, stage, bounds, len(best.plan))
+    plain = random_pool(rng, competing_models, setup, bounds, len(best.plan))
     tick("power")
-    contests = _contests(d, rivals, best, plain, stage, past)
-    told = any(not c.alike for c in contests)
-    plan = best.plan if told else best.plan.only(np.array([], dtype=np.int64))
-    return Proposal(d.verdict, rivals, tuple(contests), plan, arena, bounds, minutes)
+    model_pairs = _model_pairs(d, competing_models, best, plain, setup, past)
+    decidable = any(not c.indistinguishable for c in model_pairs)
+    plan = best.plan if decidable else best.plan.only(np.array([], dtype=np.int64))
+    return Proposal(d.verdict, competing_models, tuple(model_pairs), plan, arena, bounds, minutes)
 
 
-def _contests(
-    d: Diagnosis, rivals: tuple[Rival, ...], best: Pool, plain: Pool, stage: Stage, past: Mapping[Pair, Past]
-) -> list[Contest]:
-    assert d.found is not None
-    nothing = Rival((), d.found.problem.fit(without_last(d.found)))
-    last = len(rivals)
-    more = replace(stage, pairs=(*stage.pairs, *((a, last) for a in range(last))))
-    found, random = (apart([*rivals, nothing], pool.plan, more)[0] for pool in (best, plain))
+def _model_pairs(
+    d: Diagnosis,
+    competing_models: tuple[CompetingModel, ...],
+    best: Pool,
+    plain: Pool,
+    setup: ExperimentSetup,
+    past: Mapping[Pair, PastTrials],
+) -> list[ModelPair]:
+    assert d.selection is not None
+    nothing = CompetingModel((), d.selection.problem.fit(without_last(d.selection)))
+    last = len(competing_models)
+    more = replace(setup, pairs=(*setup.pairs, *((a, last) for a in range(last))))
+    planned, random = (discriminations([*competing_models, nothing], pool.plan, more)[0] for pool in (best, plain))
     out = []
-    for a, b in stage.pairs:
-        one, other = rivals[a], rivals[b]
+    for a, b in setup.pairs:
+        one, other = competing_models[a], competing_models[b]
         scatter = past[(a, b)].scatter
         both, as_random = (
             (
-                _expected(one, other, nothing, seen[(a, b)][0], seen[(a, last)][0], scatter),
-                _expected(other, one, nothing, seen[(a, b)][1], seen[(b, last)][0], scatter),
+                _expected(one, other, nothing, each[(a, b)][0], each[(a, last)][0], scatter),
+                _expected(other, one, nothing, each[(a, b)][1], each[(b, last)][0], scatter),
             )
-            for seen in (found, random)
+            for each in (planned, random)
         )
-        minutes = _minutes(both, found[(a, b)], best.plan.lasting_s, scatter)
-        alike = minutes > HOPELESS_MINUTES or blocked(both)
+        minutes = _minutes(both, planned[(a, b)], best.plan.lasting_s, scatter)
+        indistinguishable = minutes > LONGEST_MINUTES or negligible_difference(both)
         longer = _minutes(as_random, random[(a, b)], plain.plan.lasting_s, scatter) / max(minutes, 1e-12)
         out.append(
-            Contest(
+            ModelPair(
                 one.title,
                 other.title,
-                0.0 if alike else decided(both),
-                np.inf if alike else minutes,
-                1.0 if alike else min(longer, MOST_FASTER),
-                alike,
-                decided([e.first(0) for e in both]) >= SURE,
-                tuple(witnesses(one.names, other.names)),
+                0.0 if indistinguishable else decision_probability(both),
+                np.inf if indistinguishable else minutes,
+                1.0 if indistinguishable else min(longer, MOST_FASTER),
+                indistinguishable,
+                decision_probability([e.first(0) for e in both]) >= TARGET_POWER,
+                tuple(independent_measurements(one.names, other.names)),
             )
         )
     return out
 
 
-def _expected(true: Rival, other: Rival, nothing: Rival, apart_: Apart, worth: Apart, scatter: float) -> Expected:
+def _expected(
+    true: CompetingModel,
+    other: CompetingModel,
+    nothing: CompetingModel,
+    discrimination: Discrimination,
+    worth: Discrimination,
+    scatter: float,
+) -> ExpectedGain:
     old = other.fit.held_out - true.fit.held_out
     chance = 1 / (1 + np.exp(-np.clip(old.sum() / scatter, -50, 50)))
-    return Expected(old, apart_.each(), nothing.fit.held_out - true.fit.held_out, worth.each(), scatter, float(chance))
+    return ExpectedGain(
+        old, discrimination.each(), nothing.fit.held_out - true.fit.held_out, worth.each(), scatter, float(chance)
+    )
 
 
-def _minutes(both: tuple[Expected, Expected], directions: tuple[Apart, Apart], lasting_s: Array, scatter: float) -> float:
-    """Robot time until nine in ten such experiments decide: read off the plan's first trials, else foretold from all of them.
+def _minutes(
+    both: tuple[ExpectedGain, ExpectedGain],
+    directions: tuple[Discrimination, Discrimination],
+    lasting_s: Array,
+    scatter: float,
+) -> float:
+    """Robot time until nine in ten such experiments decide: read off the plan's first trials, else predicted from all of them.
 
     Where the old trials decide already, what the new ones would take alone.
     """
-    alone = decided([e.first(0) for e in both]) >= SURE
-    if not alone and decided(both) >= SURE:
+    alone = decision_probability([e.first(0) for e in both]) >= TARGET_POWER
+    if not alone and decision_probability(both) >= TARGET_POWER:
         low, high = 0, len(lasting_s)
         while high - low > 1:
             middle = (low + high) // 2
-            low, high = (low, middle) if decided([e.first(middle) for e in both]) >= SURE else (middle, high)
+            low, high = (
+                (low, middle)
+                if decision_probability([e.first(middle) for e in both]) >= TARGET_POWER
+                else (middle, high)
+            )
         return float(lasting_s[:high].sum() / 60)
     whole = sum(e.chance * one.total() for e, one in zip(both, directions, strict=True))
-    least = fewest_trials(FALSE_ALARM / len(all_effects())) * float(lasting_s.mean() / 60) if alone and len(lasting_s) else 0.0
+    least = (
+        fewest_trials(FALSE_ALARM / len(all_effects())) * float(lasting_s.mean() / 60)
+        if alone and len(lasting_s)
+        else 0.0
+    )
     return max(minutes_needed(whole, float(lasting_s.sum() / 60), scatter), least)
 
 
-def _past(d: Diagnosis, a: Rival, b: Rival) -> Past:
+def _past(d: Diagnosis, a: CompetingModel, b: CompetingModel) -> PastTrials:
     """From the trials seen so far: how gains held out vary, and how much more so than unit noise lets them.
 
     The latter from losses as fitted: those held out vary with the numbers, too, however close two explanations are.
     """
-    assert d.found is not None
-    per_trial, held_out = d.found.problem.per_trial, b.fit.held_out - a.fit.held_out
-    difference = a.fit.white - b.fit.white
-    fitted = per_trial(huber(b.fit.white) - huber(a.fit.white))
-    scatter = scatter_of(fitted, per_trial((difference * difference).sum(axis=1)))
-    return Past(float(((held_out - held_out.mean()) ** 2).sum()), scatter)
+    assert d.selection is not None
+    per_trial, held_out = d.selection.problem.per_trial, b.fit.held_out - a.fit.held_out
+    difference = a.fit.whitened - b.fit.whitened
+    fitted = per_trial(huber(b.fit.whitened) - huber(a.fit.whitened))
+    scatter = overdispersion_of(fitted, per_trial((difference * difference).sum(axis=1)))
+    return PastTrials(float(((held_out - held_out.mean()) ** 2).sum()), scatter)
 
 
 def _frame_s(d: Diagnosis) -> float | None:
     """Time between frames of the tracks; None where poses come at the ends of commands only."""
-    assert d.found is not None
-    tracks = d.found.problem.predictor.tracks
+    assert d.selection is not None
+    tracks = d.selection.problem.predictor.tracks
     commands = (tracks.duration_s > 0).sum(axis=1)
     if float(np.median(np.diff(tracks.first) / np.maximum(commands, 1))) < _DENSE:
         return None

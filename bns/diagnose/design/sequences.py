@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array
 
 MARGIN_M = 0.05
-"""Sequences keep this far from the arena's edge: rivals disagree, and motors vary."""
+"""Sequences keep this far from the arena's edge: competing models disagree, and motors vary."""
 BRIEFEST = 1 / 3
 """Trials that are searched for may be as short as this share of ``trial_s``: where each tells enough, their number counts."""
 _TRIES = 12
@@ -99,7 +99,9 @@ def extreme(bounds: Bounds) -> Draw:
     def draw(rng: np.random.Generator, count: int) -> Array:
         low, high = bounds.slowest_m_s, bounds.fastest_m_s
         levels = np.array([low, high, high, (low + high) / 2, min(max(0.0, low), high)])
-        speeds = np.where(rng.random((count, 2)) < 0.6, rng.choice(levels, (count, 2)), rng.uniform(low, high, (count, 2)))
+        speeds = np.where(
+            rng.random((count, 2)) < 0.6, rng.choice(levels, (count, 2)), rng.uniform(low, high, (count, 2))
+        )
         straight = rng.random(count) < 0.3
         speeds[straight, 1] = speeds[straight, 0]
         lasts = np.exp(rng.uniform(np.log(bounds.shortest_s), np.log(bounds.longest_s), count))
@@ -108,7 +110,7 @@ def extreme(bounds: Bounds) -> Draw:
     return draw
 
 
-def drawn(
+def draw_sequences(
     rng: np.random.Generator,
     count: int,
     bounds: Bounds,
@@ -141,7 +143,7 @@ def drawn(
     return Sequences(stacked[..., 0], stacked[..., 1], stacked[..., 2])
 
 
-def varied(rng: np.random.Generator, parents: Sequences, bounds: Bounds, draw: Draw) -> Sequences:
+def mutate_sequences(rng: np.random.Generator, parents: Sequences, bounds: Bounds, draw: Draw) -> Sequences:
     """One child of every trial: commands exchanged, stretched, made faster or slower, two swapped, the last one left out."""
     stacked = np.stack([parents.left_m_s, parents.right_m_s, parents.duration_s], axis=2)
     count, most = stacked.shape[:2]
@@ -169,14 +171,16 @@ def varied(rng: np.random.Generator, parents: Sequences, bounds: Bounds, draw: D
     return Sequences(out[..., 0], out[..., 1], out[..., 2])
 
 
-def brief(rng: np.random.Generator, bounds: Bounds, count: int) -> Array:
+def short_durations(rng: np.random.Generator, bounds: Bounds, count: int) -> Array:
     """Lengths (s) from the briefest to ``trial_s``, as many short as long, (count,)."""
     return bounds.trial_s * np.asarray(np.exp(rng.uniform(np.log(BRIEFEST), 0.0, count)))
 
 
 def _trimmed(commands: Array, left_s: Array, bounds: Bounds) -> Array:
     """Within bounds, on the grid of times, and no longer than what is left of the trial."""
-    lasts = np.clip(commands[:, 2], bounds.shortest_s, np.minimum(bounds.longest_s, np.maximum(left_s, bounds.shortest_s)))
+    lasts = np.clip(
+        commands[:, 2], bounds.shortest_s, np.minimum(bounds.longest_s, np.maximum(left_s, bounds.shortest_s))
+    )
     lasts = np.maximum(np.round(lasts / bounds.grid_s), 1) * bounds.grid_s
     speeds = np.clip(commands[:, :2], bounds.slowest_m_s, bounds.fastest_m_s)
     return np.column_stack([speeds, lasts])
@@ -188,7 +192,9 @@ def _arc(pose: Array, commands: Array, base_m: float) -> Array:
     way = ((commands[:, 0] + commands[:, 1]) / 2 * commands[:, 2])[:, None] * share
     turn = ((commands[:, 1] - commands[:, 0]) / base_m * commands[:, 2])[:, None] * share
     chord, middle = way * np.sinc(turn / (2 * np.pi)), pose[:, 2:] + turn / 2
-    return np.stack([pose[:, :1] + chord * np.cos(middle), pose[:, 1:2] + chord * np.sin(middle), pose[:, 2:] + turn], axis=2)
+    return np.stack(
+        [pose[:, :1] + chord * np.cos(middle), pose[:, 1:2] + chord * np.sin(middle), pose[:, 2:] + turn], axis=2
+    )
 
 
 def _most(bounds: Bounds) -> int:

@@ -19,10 +19,10 @@ from bns.physics.model import Model
 FOLDS = 5
 
 
-def held_out_steps(predictor: Predictor, following: Filter, model: Model) -> Steps:
+def held_out_steps(predictor: Predictor, pose_filter: Filter, model: Model) -> Steps:
     """Steps of every trial under the model's effects, their numbers fitted to the trials of the other folds.
 
-    What belongs to one trial alone (its clock) is set as `own_clocks` says: by other poses of that trial.
+    What belongs to one trial alone (its clock) is set as `trial_clock_test` says: by other poses of that trial.
     """
     trials = len(predictor.tracks)
     if not model.effects or trials < 2:
@@ -31,8 +31,8 @@ def held_out_steps(predictor: Predictor, following: Filter, model: Model) -> Ste
     held_out = [(fold == one)[predictor.tracks.trial] for one in np.unique(fold)]
 
     def predicted(frames: NDArray[np.bool_]) -> Steps:
-        fitted = Problem(predictor, following, (~frames).astype(float)).fit(model).model
-        return steps_of(predictor, following, fitted)
+        fitted = Problem(predictor, pose_filter, (~frames).astype(float)).fit(model).model
+        return steps_of(predictor, pose_filter, fitted)
 
     body, drift = np.zeros((len(predictor.tracks.t_s), 3)), np.zeros((len(predictor.tracks.t_s), 2))
     for frames, steps in zip(held_out, each(predicted, held_out), strict=True):

@@ -16,10 +16,15 @@ from scipy.stats import t as student
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.noise import Filter, huber
-from bns.diagnose.estimate.normal_equations import Normal, normal, normal_by_trial, stepped
-from bns.diagnose.estimate.parameters import Free, increment, inside, moved_by
-from bns.diagnose.estimate.significance import Evidence, held_out_gain, sign_flip_p
-from bns.diagnose.estimate.trial_clocks import Slopes, with_clocks_begun, without_clocks
+from bns.diagnose.estimate.normal_equations import (
+    NormalEquations,
+    innovations_after,
+    normal_equations,
+    normal_equations_by_trial,
+)
+from bns.diagnose.estimate.parameters import FreeParameter, active_mask, increment, moved_by
+from bns.diagnose.estimate.significance import PairedComparison, paired_elpd_diff, sign_flip_p
+from bns.diagnose.estimate.trial_clocks import ReducedJacobian, eliminate_clocks, with_initial_clocks
 from bns.diagnose.predict.base import Predictor
 from bns.physics.model import Model
 
@@ -27,7 +32,7 @@ _ROUNDS = 25
 _SETTLED = 1e-2
 """A step that lowers the loss by less than this ends the search: numbers are then within a tenth of their standard error."""
 _TRUSTED = 0.75
-"""Slopes serve for another step if the last one earned this share of what they foretold."""
+"""The Jacobian serves for another step if the last one earned this share of the predicted decrease."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +43,12 @@ class Fit:
     """
 
     model: Model
-    free: tuple[Free, ...]
+    free: tuple[FreeParameter, ...]
     values: Array
     covariance: Array
     losses: Array
     held_out: Array
-    white: Array
+    whitened: Array
     jacobian: Array
 
     @property
@@ -52,8 +57,8 @@ class Fit:
         return float(self.losses.sum())
 
     @property
-    def slopes(self) -> dict[Free, Array]:
-        """Slopes of the innovations along every number, (frames, 3) each."""
+    def jacobian_by_parameter(self) -> dict[FreeParameter, Array]:
+        """Jacobian of the innovations, one column of (frames, 3) a fitted number."""
         return dict(zip(self.free, np.moveaxis(self.jacobian, 2, 0), strict=True))
 
     def se(self, index: int) -> float:
@@ -68,12 +73,12 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Begun:
-    """Where a fit may begin: a model, its loss, and slopes of its numbers nearby, (frames, 3) each."""
+class StartingPoint:
+    """Where a fit may begin: a model, its loss, and the Jacobian's columns nearby, (frames, 3) each."""
 
     model: Model
     loss: float
-    slopes: Mapping[Free, Array]
+    jacobian_by_parameter: Mapping[FreeParameter, Array]
 
 
 @dataclass(frozen=True)
@@ -81,25 +86,25 @@ class _Point:
     """A model, its whitened innovations (frames, 3) and its loss."""
 
     model: Model
-    white: Array
+    whitened: Array
     loss: float
 
 
 class Problem:
     """Tracks, a filter that follows them, and which numbers may be fitted."""
 
-    def __init__(self, predictor: Predictor, following: Filter, counted: Array | None = None) -> None:
+    def __init__(self, predictor: Predictor, pose_filter: Filter, counted: Array | None = None) -> None:
         """``counted`` (frames,): what each frame counts; 1 for all where it is not given."""
         self.predictor = predictor
-        self.following = following
+        self.pose_filter = pose_filter
         self._counted = None if counted is None else np.sqrt(counted)[:, None]
         tracks = predictor.tracks
         self._trial, self._trials = tracks.trial, len(tracks)
 
-    def white(self, model: Model) -> Array:
+    def whitened(self, model: Model) -> Array:
         """Whitened innovations under a model, (frames, 3)."""
-        white = self.following.white(self.predictor.tracks, self.predictor.steps(model))
-        return white if self._counted is None else white * self._counted
+        whitened = self.pose_filter.whitened(self.predictor.tracks, self.predictor.steps(model))
+        return whitened if self._counted is None else whitened * self._counted
 
     @property
     def frame_trial(self) -> NDArray[np.int64]:
@@ -112,137 +117,153 @@ class Problem:
 
     def loss(self, model: Model) -> float:
         """Robust loss of all frames."""
-        total = float(huber(self.white(model)).sum())
+        total = float(huber(self.whitened(model)).sum())
         return total if np.isfinite(total) else np.inf
 
-    def free(self, model: Model) -> tuple[Free, ...]:
+    def free(self, model: Model) -> tuple[FreeParameter, ...]:
         """The numbers of the model's effects that all trials share and these tracks can speak of."""
         columns = self.predictor.tracks.extra
         return tuple(
-            Free(active.effect.name, p)
+            FreeParameter(active.effect.name, p)
             for active in model.effects
             if not active.per_trial
             for p in active.effect.parameters
             if not (p.column and p.column not in columns) and not (p.instead_of and p.instead_of in columns)
         )
 
-    def stepped(self, model: Model, base: Fit) -> Begun:
-        """One undamped step of least squares in all numbers, with the slopes of ``base`` for those that it has too."""
+    def gauss_newton_step(self, model: Model, base: Fit) -> StartingPoint:
+        """One undamped step of least squares in all numbers, with the Jacobian of ``base`` for those that it has too."""
         free, at = self.free(model), self._point(model)
-        slopes = self._slopes(at, free, base.slopes)
-        there = self._moved(model, free, slopes, _damped_step(*normal(slopes.jacobian, at.white), 1e-9), 0.0)
-        return Begun(there, self.loss(there), dict(zip(free, np.moveaxis(slopes.jacobian, 2, 0), strict=True)))
+        reduced = self._jacobian(at, free, base.jacobian_by_parameter)
+        there = self._moved(
+            model, free, reduced, _damped_step(*normal_equations(reduced.jacobian, at.whitened), 1e-9), 0.0
+        )
+        return StartingPoint(there, self.loss(there), dict(zip(free, np.moveaxis(reduced.jacobian, 2, 0), strict=True)))
 
-    def fit(self, model: Model, rounds: int | None = None, known: Mapping[Free, Array] | None = None) -> Fit:
+    def fit(self, model: Model, rounds: int | None = None, nearby: Mapping[FreeParameter, Array] | None = None) -> Fit:
         """Levenberg-Marquardt from the values the model has, within the bounds of every number; ``rounds`` 0 keeps them.
 
-        Slopes serve for further steps while the loss falls nearly as they foretell, those ``known`` from nearby for the first.
+        The Jacobian serves for further steps while the loss falls nearly as predicted; columns ``nearby`` serve for the first.
         """
-        model = with_clocks_begun(self, model, self._trials)
+        model = with_initial_clocks(self, model, self._trials)
         free, at, damping = self.free(model), self._point(model), 1e-3
-        slopes, fresh = self._slopes(at, free, known), not known
-        for _ in range(_ROUNDS if rounds is None and (free or model.differing) else 0):
-            pull = normal(slopes.jacobian, at.white)
-            foretold = _foretold(_damped_step(*pull, damping), *pull)
-            done = foretold < _SETTLED and model.differing is None
-            found, gain = None if done else self._lower(at, free, slopes, pull, damping), 0.0
-            if found is not None:
-                gain, at, damping = at.loss - found[0].loss, *found
+        reduced, fresh = self._jacobian(at, free, nearby), not nearby
+        for _ in range(_ROUNDS if rounds is None and (free or model.per_trial_effect) else 0):
+            equations = normal_equations(reduced.jacobian, at.whitened)
+            predicted_decrease = _predicted_decrease(_damped_step(*equations, damping), *equations)
+            done = predicted_decrease < _SETTLED and model.per_trial_effect is None
+            lower, gain = None if done else self._lower(at, free, reduced, equations, damping), 0.0
+            if lower is not None:
+                gain, at, damping = at.loss - lower[0].loss, *lower
             if gain < _SETTLED and fresh:
-                fresh = found is None
+                fresh = lower is None
                 break
-            fresh = found is None or model.differing is not None or gain < _TRUSTED * foretold
+            fresh = lower is None or model.per_trial_effect is not None or gain < _TRUSTED * predicted_decrease
             if fresh:
-                slopes = self._slopes(at, free)
+                reduced = self._jacobian(at, free)
         if not fresh and rounds is None:
-            slopes = self._slopes(at, free)
-        return self._concluded(at.model, free, at.white, slopes.jacobian)
+            reduced = self._jacobian(at, free)
+        return self._concluded(at.model, free, at.whitened, reduced.jacobian)
 
     def _point(self, model: Model) -> _Point:
-        white = self.white(model)
-        return _Point(model, white, float(huber(white).sum()))
+        whitened = self.whitened(model)
+        return _Point(model, whitened, float(huber(whitened).sum()))
 
     def _lower(
-        self, at: _Point, free: Sequence[Free], slopes: Slopes, pull: tuple[Array, Array], damping: float
+        self,
+        at: _Point,
+        free: Sequence[FreeParameter],
+        reduced: ReducedJacobian,
+        equations: tuple[Array, Array],
+        damping: float,
     ) -> tuple[_Point, float] | None:
         """Where a step leads that does not raise the loss, and the damping for the next; None if there is none."""
         for _ in range(8):
-            step = _damped_step(*pull, damping)
-            there = self._point(self._moved(at.model, free, slopes, step, damping))
+            step = _damped_step(*equations, damping)
+            there = self._point(self._moved(at.model, free, reduced, step, damping))
             if np.isfinite(there.loss) and there.loss <= at.loss:
                 return there, max(damping / 10, 1e-9)
             damping *= 10
         return None
 
-    def _moved(self, model: Model, free: Sequence[Free], slopes: Slopes, step: Array, damping: float) -> Model:
-        return slopes.moved(moved_by(model, free, step), step, damping)
+    def _moved(
+        self, model: Model, free: Sequence[FreeParameter], reduced: ReducedJacobian, step: Array, damping: float
+    ) -> Model:
+        return reduced.moved(moved_by(model, free, step), step, damping)
 
-    def _concluded(self, model: Model, free: tuple[Free, ...], white: Array, jacobian: Array) -> Fit:
-        by_trial = self.normal(jacobian, white)
+    def _concluded(self, model: Model, free: tuple[FreeParameter, ...], whitened: Array, jacobian: Array) -> Fit:
+        by_trial = self.normal_equations(jacobian, whitened)
         gradients, curvatures = by_trial.gradients, by_trial.curvatures
-        inner = inside(model, free, gradients.sum(axis=0))
+        active = active_mask(model, free, gradients.sum(axis=0))
         total = curvatures.sum(axis=0)
         covariance = np.zeros_like(total)
-        keep = np.ix_(inner, inner)
-        trials, fitted = self._trials, int(inner.sum())
+        keep = np.ix_(active, active)
+        trials, fitted = self._trials, int(active.sum())
         if fitted:
             bread = np.linalg.pinv(total[keep])
-            centred = gradients[:, inner] - gradients[:, inner].mean(axis=0)
+            centred = gradients[:, active] - gradients[:, active].mean(axis=0)
             spare = trials / max(trials - fitted, 1)
             covariance[keep] = bread @ (centred.T @ centred) @ bread * spare
         steps = np.zeros((trials, len(free)))
         if fitted:
-            others = (total - curvatures)[:, inner][:, :, inner]
+            others = (total - curvatures)[:, active][:, :, active]
             # without this trial the others' gradients no longer cancel: they sum to minus this one's
-            pulls = (gradients - gradients.sum(axis=0))[:, inner]
-            steps[:, inner] = (np.linalg.pinv(others) @ pulls[..., None])[..., 0]
-        held_out = self.per_trial(huber(stepped(self.predictor.tracks.first, jacobian, white, steps)))
+            of_others = (gradients - gradients.sum(axis=0))[:, active]
+            steps[:, active] = (np.linalg.pinv(others) @ of_others[..., None])[..., 0]
+        held_out = self.per_trial(huber(innovations_after(self.predictor.tracks.first, jacobian, whitened, steps)))
         values = np.array([f.of(model) for f in free])
-        return Fit(model, free, values, covariance, self.per_trial(huber(white)), held_out, white, jacobian)
+        return Fit(model, free, values, covariance, self.per_trial(huber(whitened)), held_out, whitened, jacobian)
 
-    def normal(self, jacobian: Array, white: Array) -> Normal:
+    def normal_equations(self, jacobian: Array, whitened: Array) -> NormalEquations:
         """The normal equations of every trial."""
-        return normal_by_trial(self.predictor.tracks.first, jacobian, white)
+        return normal_equations_by_trial(self.predictor.tracks.first, jacobian, whitened)
 
-    def evidence(self, base: Fit, added: Fit) -> Evidence:
+    def paired_comparison(self, base: Fit, added: Fit) -> PairedComparison:
         """What ``added`` earns over ``base``, a model with fewer effects fitted to the same problem."""
-        gain, se = held_out_gain(base.held_out, added.held_out)
+        elpd_diff, dse = paired_elpd_diff(base.held_out, added.held_out)
         known = {(f.effect, f.parameter.name) for f in base.free}
         new = [j for j, f in enumerate(added.free) if (f.effect, f.parameter.name) not in known]
         # a number with no influence here has no column
         new = [j for j in new if np.abs(added.jacobian[..., j]).max() > 0]
-        if not new or gain <= 0:
-            return Evidence(gain, se, 1.0)
+        if not new or elpd_diff <= 0:
+            return PairedComparison(elpd_diff, dse, 1.0)
         joint = np.concatenate([base.jacobian, added.jacobian[..., new]], axis=2)
-        return Evidence(gain, se, chance(self.normal(joint, base.white), base.jacobian.shape[2]))
+        return PairedComparison(
+            elpd_diff, dse, chance(self.normal_equations(joint, base.whitened), base.jacobian.shape[2])
+        )
 
-    def _slopes(self, at: _Point, free: Sequence[Free], known: Mapping[Free, Array] | None = None) -> Slopes:
-        """By differences, but for numbers whose slopes are known; clocks of trials shift those, and all are worked out anew."""
-        known = known if known and at.model.differing is None else {}
-        out = np.zeros((*at.white.shape, len(free)))
+    def _jacobian(
+        self, at: _Point, free: Sequence[FreeParameter], nearby: Mapping[FreeParameter, Array] | None = None
+    ) -> ReducedJacobian:
+        """By differences, but for numbers whose columns are known; clocks of trials shift those, and all are worked out anew."""
+        nearby = nearby if nearby and at.model.per_trial_effect is None else {}
+        out = np.zeros((*at.whitened.shape, len(free)))
         for j, number in enumerate(free):
-            if number in known:
-                out[..., j] = known[number]
+            if number in nearby:
+                out[..., j] = nearby[number]
                 continue
             small = increment(number, number.of(at.model))
             changed = moved_by(at.model, free, small * np.eye(len(free))[j])
-            out[..., j] = (self.white(changed) - at.white) / small
-        return without_clocks(self, at.model, at.white, out)
+            out[..., j] = (self.whitened(changed) - at.whitened) / small
+        return eliminate_clocks(self, at.model, at.whitened, out)
 
 
-def chance(joint: Normal, own: int) -> float:
-    """`sign_flip_p` of an addition to a fitted model, whose own numbers are the first ``own`` of the normal equations.
+def chance(joint: NormalEquations, base_numbers: int) -> float:
+    """`sign_flip_p` of an addition to a fitted model, whose own numbers are the first ``base_numbers`` of the normal equations.
 
     What these could do as well is taken out of the others first.
     """
     scores, curvature = joint.gradients, joint.curvatures.sum(axis=0)
-    shared = np.linalg.pinv(curvature[:own, :own], hermitian=True) @ curvature[:own, own:]
-    left = curvature[own:, own:] - curvature[own:, :own] @ shared
-    return sign_flip_p(scores[:, own:] - scores[:, :own] @ shared, left)
+    shared = (
+        np.linalg.pinv(curvature[:base_numbers, :base_numbers], hermitian=True)
+        @ curvature[:base_numbers, base_numbers:]
+    )
+    left = curvature[base_numbers:, base_numbers:] - curvature[base_numbers:, :base_numbers] @ shared
+    return sign_flip_p(scores[:, base_numbers:] - scores[:, :base_numbers] @ shared, left)
 
 
-def _foretold(step: Array, curvature: Array, gradient: Array) -> float:
-    """By how much a step lowers the loss, by the slopes."""
+def _predicted_decrease(step: Array, curvature: Array, gradient: Array) -> float:
+    """By how much a step lowers the loss, by the gradient and the curvature."""
     return float(-(gradient @ step) - step @ curvature @ step / 2)
 
 

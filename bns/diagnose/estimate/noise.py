@@ -20,20 +20,20 @@ _LOW = np.array([2e-5, 1e-4, 1e-5, 1e-5, 1e-4])
 _HIGH = np.array([0.3, 0.5, 0.5, 0.5, 3.0])
 
 
-def huber(white: Array) -> Array:
+def huber(whitened: Array) -> Array:
     """Loss of every frame: half the squared length, linear beyond `HUBER`; (frames,)."""
-    length = _length(white)
+    length = _length(whitened)
     return np.where(length <= HUBER, length * length / 2, HUBER * length - HUBER * HUBER / 2)
 
 
-def weights(white: Array) -> Array:
+def weights(whitened: Array) -> Array:
     """What a frame counts in a step of least squares under `huber`; (frames,), at most 1."""
-    length = _length(white)
+    length = _length(whitened)
     return HUBER / np.maximum(length, HUBER)
 
 
-def _length(white: Array) -> Array:
-    return np.sqrt(np.asarray(np.einsum("kc,kc->k", white, white), dtype=np.float64))
+def _length(whitened: Array) -> Array:
+    return np.sqrt(np.asarray(np.einsum("kc,kc->k", whitened, whitened), dtype=np.float64))
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Filter:
     whiten: Array
     logdet: Array
 
-    def white(self, tracks: Tracks, steps: Steps) -> Array:
+    def whitened(self, tracks: Tracks, steps: Steps) -> Array:
         """Whitened innovations under other steps, (frames, 3)."""
         return innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, self.gain, self.whiten)
 
@@ -72,8 +72,8 @@ def estimate_noise(predictor: Predictor, steps: Steps, start: Array | None = Non
     def surprise(logs: Array) -> float:
         inside = np.clip(logs, low, high)
         gain, whiten, logdet = filter_gains(body, is_first, way_m, np.exp(inside))
-        white = innovations(body, drift, pose, is_first, gain, whiten)
-        total = float(logdet.sum() + huber(white).sum())
+        whitened = innovations(body, drift, pose, is_first, gain, whiten)
+        total = float(logdet.sum() + huber(whitened).sum())
         return (total if np.isfinite(total) else 1e300) + 1e3 * float(((logs - inside) ** 2).sum())
 
     first = np.log(_GUESS if start is None else start)

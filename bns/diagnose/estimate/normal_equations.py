@@ -13,35 +13,35 @@ from bns.diagnose.estimate.noise import weights
 
 
 @dataclass(frozen=True)
-class Normal:
+class NormalEquations:
     """``gradients`` (trials, p) and ``curvatures`` (trials, p, p) of the robust loss in p numbers, each trial's own."""
 
     gradients: Array
     curvatures: Array
 
 
-def normal(jacobian: Array, white: Array) -> tuple[Array, Array]:
+def normal_equations(jacobian: Array, whitened: Array) -> tuple[Array, Array]:
     """Curvature (p, p) and gradient (p,) over all frames, of a Jacobian (frames, 3, p) at the innovations (frames, 3)."""
-    flat, weighted = _flat(jacobian), _flat(jacobian * weights(white)[:, None, None])
-    return weighted.T @ flat, weighted.T @ white.ravel()
+    flat, weighted = _flat(jacobian), _flat(jacobian * weights(whitened)[:, None, None])
+    return weighted.T @ flat, weighted.T @ whitened.ravel()
 
 
-def normal_by_trial(first: NDArray[np.int64], jacobian: Array, white: Array) -> Normal:
+def normal_equations_by_trial(first: NDArray[np.int64], jacobian: Array, whitened: Array) -> NormalEquations:
     """The same for each trial; ``first`` (trials + 1): where its frames begin."""
-    weighted = jacobian * weights(white)[:, None, None]
+    weighted = jacobian * weights(whitened)[:, None, None]
     p = jacobian.shape[2]
     gradients, curvatures = np.empty((len(first) - 1, p)), np.empty((len(first) - 1, p, p))
     for trial, (a, b) in enumerate(pairwise(first)):
         part = _flat(weighted[a:b]).T
-        gradients[trial], curvatures[trial] = part @ white[a:b].ravel(), part @ _flat(jacobian[a:b])
-    return Normal(gradients, curvatures)
+        gradients[trial], curvatures[trial] = part @ whitened[a:b].ravel(), part @ _flat(jacobian[a:b])
+    return NormalEquations(gradients, curvatures)
 
 
-def stepped(first: NDArray[np.int64], jacobian: Array, white: Array, steps: Array) -> Array:
+def innovations_after(first: NDArray[np.int64], jacobian: Array, whitened: Array, steps: Array) -> Array:
     """The innovations (frames, 3) after a step of its own in each trial, ``steps`` (trials, p); to first order."""
-    moved = white.copy()
+    moved = whitened.copy()
     for step, (a, b) in zip(steps, pairwise(first), strict=True):
-        moved[a:b] += (_flat(jacobian[a:b]) @ step).reshape(-1, white.shape[1])
+        moved[a:b] += (_flat(jacobian[a:b]) @ step).reshape(-1, whitened.shape[1])
     return moved
 
 

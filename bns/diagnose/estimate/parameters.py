@@ -14,7 +14,7 @@ from bns.physics.model import Model
 
 
 @dataclass(frozen=True)
-class Free:
+class FreeParameter:
     """One number that is fitted: which effect's, and which."""
 
     effect: str
@@ -25,7 +25,7 @@ class Free:
         return model.values_of(self.effect)[self.parameter.name]
 
 
-def moved_by(model: Model, free: Sequence[Free], step: Array) -> Model:
+def moved_by(model: Model, free: Sequence[FreeParameter], step: Array) -> Model:
     """The model with its free numbers moved, held within their bounds."""
     values = {f.effect: dict(model.values_of(f.effect)) for f in free}
     for number, change in zip(free, step, strict=True):
@@ -34,14 +34,14 @@ def moved_by(model: Model, free: Sequence[Free], step: Array) -> Model:
     return model.with_values(values)
 
 
-def increment(number: Free, value: float) -> float:
+def increment(number: FreeParameter, value: float) -> float:
     """A step for differences, turned round at the upper bound."""
     p = number.parameter
     scale = 1e-3 * abs(value) if np.isinf(p.neutral) else 1e-3 * (p.plausible[1] - p.plausible[0])
     return -scale if value + scale > p.high else scale
 
 
-def inside(model: Model, free: Sequence[Free], gradient: Array) -> NDArray[np.bool_]:
+def active_mask(model: Model, free: Sequence[FreeParameter], gradient: Array) -> NDArray[np.bool_]:
     """Numbers that are not pressed against a bound by a gradient of the loss, (p,)."""
     pressed = [
         (f.of(model) <= f.parameter.low and slope > 0) or (f.of(model) >= f.parameter.high and slope < 0)

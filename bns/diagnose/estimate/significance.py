@@ -17,21 +17,24 @@ MIN_Z = 2.5
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """Mean held-out gain a trial (in units of log-likelihood), its standard error, and the chance of such a fit by luck."""
+class PairedComparison:
+    """Mean difference of held-out log-likelihood a trial, its paired standard error, and the chance of such a fit by luck.
 
-    gain: float
-    se: float
+    Named as ArviZ and loo name them; `elpd_diff` is positive where the second model is the better one.
+    """
+
+    elpd_diff: float
+    dse: float
     p_value: float
 
     @property
     def z(self) -> float:
-        """Gain in standard errors."""
-        return self.gain / self.se if self.se > 0 else 0.0
+        """The difference in standard errors."""
+        return self.elpd_diff / self.dse if self.dse > 0 else 0.0
 
 
-def held_out_gain(before: Array, after: Array) -> tuple[float, float]:
-    """Mean paired gain of held-out losses (trials,), and its standard error."""
+def paired_elpd_diff(before: Array, after: Array) -> tuple[float, float]:
+    """Mean paired difference of held-out losses (trials,), positive where ``after`` is better, and its standard error."""
     gains = before - after
     trials = len(gains)
     mean = float(gains.mean())
@@ -49,12 +52,12 @@ def sign_flip_p(scores: Array, curvature: Array) -> float:
     """
     sizes, directions = np.linalg.eigh(np.linalg.pinv(curvature, hermitian=True))
     apart = scores @ (directions * np.sqrt(np.maximum(sizes, 0.0)))  # in these the statistic is a plain sum of squares
-    seen = float((apart.sum(axis=0) ** 2).sum())
-    if not np.isfinite(seen) or seen <= 0:
+    observed = float((apart.sum(axis=0) ** 2).sum())
+    if not np.isfinite(observed) or observed <= 0:
         return 1.0
     sums = _signs(len(scores)) @ apart
     by_luck = np.einsum("fk,fk->f", sums, sums)
-    return float((1 + np.count_nonzero(by_luck >= seen * (1 - 1e-9))) / (1 + FLIPS))
+    return float((1 + np.count_nonzero(by_luck >= observed * (1 - 1e-9))) / (1 + FLIPS))
 
 
 @lru_cache

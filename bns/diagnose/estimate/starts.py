@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from bns.diagnose.estimate.fit import Begun, Fit, Problem
+from bns.diagnose.estimate.fit import Fit, Problem, StartingPoint
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
@@ -16,7 +16,7 @@ from bns.physics.model import Model
 _SHARES = (0.01, 0.05, 0.2)
 """Starts of an ordinary number: these shares of the way from neutral to either end of what is plausible."""
 NOTHING = 5e-3
-"""A gain of fewer trials' losses than this, over all trials, is not worth a fit: it would not count (`MIN_GAIN` in `search`)."""
+"""A gain of fewer trials' losses than this, over all trials, is not worth a fit: it would not count (`stepwise.MIN_GAIN`)."""
 _LIMITS = 30
 """Starts of a number that is neutral at infinity: so many, evenly spaced on a logarithmic scale."""
 
@@ -35,15 +35,15 @@ def fit_with(problem: Problem, base: Fit, effect: Effect) -> Fit:
     """
     start = best_start(problem, base, effect)
     hopeless = base.loss - start.loss < NOTHING * base.loss / len(base.losses)
-    return problem.fit(start.model, 0 if hopeless else None, start.slopes)
+    return problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter)
 
 
-def best_start(problem: Problem, base: Fit, effect: Effect) -> Begun:
+def best_start(problem: Problem, base: Fit, effect: Effect) -> StartingPoint:
     """The fitted model with the effect at the most promising of its starts, one step of least squares taken."""
     starts = [base.model.with_active(effect, values) for values in _starts(effect)]
     losses = [problem.loss(start) for start in starts]
     best = int(np.argmin(losses))
-    stepped = problem.stepped(starts[best], base)
+    stepped = problem.gauss_newton_step(starts[best], base)
     return stepped if stepped.loss < losses[best] else replace(stepped, model=starts[best], loss=losses[best])
 
 

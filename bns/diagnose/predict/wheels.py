@@ -163,16 +163,24 @@ class WheelPredictor:
         cos, sin = np.cos(turned), np.sin(turned)
         bent = np.stack([cos * bent[:, 0] - sin * bent[:, 1], sin * bent[:, 0] + cos * bent[:, 1]], axis=1)
         midway = (seen + np.roll(seen, 1, axis=0))[:, :2] / 2
-        out: Array = np.array([flow.x_m_s, flow.y_m_s]) * time_s[:, None] - flow.return_per_s * (midway * time_s[:, None] + bent)
+        out: Array = np.array([flow.x_m_s, flow.y_m_s]) * time_s[:, None] - flow.return_per_s * (
+            midway * time_s[:, None] + bent
+        )
         return out
 
 
 def _chain(model: Model, stages: Sequence[str]) -> Chain:
-    return tuple((a.effect, a.values, a.own) for a in model.effects if a.effect.stage in stages)
+    return tuple((a.effect, a.values, a.trial_values) for a in model.effects if a.effect.stage in stages)
 
 
 def _model_of(wheelbase_m: float, chain: Chain) -> Model:
-    return Model(wheelbase_m, tuple(ActiveEffect(e, values, per_trial=bool(own), own=own) for e, values, own in chain))
+    return Model(
+        wheelbase_m,
+        tuple(
+            ActiveEffect(e, values, per_trial=bool(trial_values), trial_values=trial_values)
+            for e, values, trial_values in chain
+        ),
+    )
 
 
 def predictor_for_search(tracks: Tracks) -> WheelPredictor:

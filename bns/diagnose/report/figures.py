@@ -1,4 +1,4 @@
-"""Pictures of a comparison, a diagnosis and a mended model."""
+"""Pictures of a comparison, a diagnosis and an extended model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bns.diagnose.adding import Mended
+from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison, Curve
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.report.text import ahead
@@ -66,16 +66,18 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
 @style()
 def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12) -> Path:
     """What each effect earns on trials held out, when added alone to the model; bars are 95 % intervals."""
-    assert d.found is not None
-    step = d.found.steps[0]
-    shown = [c for c in step.ranking if np.isfinite(c.evidence.gain)][:most][::-1]
+    assert d.selection is not None
+    step = d.selection.steps[0]
+    shown = [c for c in step.ranking if np.isfinite(c.paired_comparison.elpd_diff)][:most][::-1]
     figure = Figure(figsize=(PAGE_IN * 0.75, 0.24 * len(shown) + 1.2))
     axes = figure.subplots()
-    taken = {*d.effects}
+    selected = {*d.effects}
     for row, c in enumerate(shown):
-        colour = OKABE_ITO[2] if c.name in taken else GREY if c.veto else OKABE_ITO[0]
-        axes.errorbar(c.evidence.gain, row, xerr=1.96 * c.evidence.se, fmt="o", color=colour, capsize=2)
-    axes.axvline(step.bar, color=OKABE_ITO[1], linestyle="--", label="best decoy")
+        colour = OKABE_ITO[2] if c.name in selected else GREY if c.rejected_because else OKABE_ITO[0]
+        axes.errorbar(
+            c.paired_comparison.elpd_diff, row, xerr=1.96 * c.paired_comparison.dse, fmt="o", color=colour, capsize=2
+        )
+    axes.axvline(step.decoy_threshold, color=OKABE_ITO[1], linestyle="--", label="best decoy")
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     axes.set_yticks(range(len(shown)), [c.name for c in shown])
     axes.set_xscale("symlog", linthresh=1.0)
@@ -87,13 +89,13 @@ def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12) -> Path:
 
 
 @style()
-def ladder_figure(m: Mended, path: Path) -> Path:
-    """The error ladder: nominal model, each effect added in turn, noise floor; one line a horizon."""
-    names = [r.name if r.name == "nominal" else f"+ {r.name}" for r in m.ladder]
+def error_by_step_figure(m: ExtendedModel, path: Path) -> Path:
+    """The error by step: nominal model, each effect added in turn, noise floor; one line a horizon."""
+    names = [r.name if r.name == "nominal" else f"+ {r.name}" for r in m.error_by_step]
     figure = Figure(figsize=(PAGE_IN * 0.75, 3.0))
     axes = figure.subplots()
-    for colour, marker, horizon in zip(OKABE_ITO, "os^D", m.ladder[0].error, strict=False):
-        values = [1e3 * r.error[horizon] for r in m.ladder]
+    for colour, marker, horizon in zip(OKABE_ITO, "os^D", m.error_by_step[0].error, strict=False):
+        values = [1e3 * r.error[horizon] for r in m.error_by_step]
         axes.plot(range(len(values)), values, marker=marker, color=colour, label=f"{ahead(horizon)}")
         axes.plot([0, len(values) - 1], [1e3 * m.floor[horizon]] * 2, color=colour, linestyle=":", linewidth=1)
     axes.set_xticks(range(len(names)), names)

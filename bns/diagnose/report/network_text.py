@@ -36,7 +36,7 @@ def network_errors_text(why: NetworkErrors) -> str:
 
 def _lines(why: NetworkErrors) -> Iterator[str]:
     yield f"why the networks are wrong: {', '.join(why.verdict)}"
-    outside, commands = why.thin.commands, len(why.distance)
+    outside, commands = why.sparse_coverage.commands, len(why.distance)
     yield (
         f"  {outside} of {commands} commands lie outside the {why.patterns} training patterns (further than "
         f"{why.radius:.2f} from the nearest; inputs run from -1 to 1)"
@@ -48,16 +48,16 @@ def _lines(why: NetworkErrors) -> Iterator[str]:
         )
         return
     if outside:
-        t = why.thin
+        t = why.sparse_coverage
         yield f"  their squared error is {t.ratio:.1f} times that of the others (95 %: {t.low:.1f} to {t.high:.1f})"
     if "thin-data" in why.verdict:
         yield "  Thin data: more evaluations with such commands would mend it."
-    for one in why.unseen:
+    for one in why.missing_inputs:
         yield (
             f"  The inputs cannot know: among the patterns {one.share:.0%} of the squared error follows "
             f"{_VARIABLES.get(one.variable, one.variable)} (p {one.p_value:.2g})."
         )
-    if why.unseen:
+    if why.missing_inputs:
         yield "  More evaluations will not mend that; `bns diagnose` says which effect it may be."
     yield f"\n  {'cause':66}{'share of squared error':>24}"
     yield from (f"  {_CAUSES[name]:66}{share:24.1%}" for name, share in why.share.items())
@@ -93,9 +93,11 @@ def _draw_distance(ax: Axes, why: NetworkErrors) -> None:
 
 def _draw_along(ax: Axes, why: NetworkErrors) -> None:
     ax.set_title("(b) can the inputs know?")
-    names = [one.variable for one in (why.unseen or why.alone) if one.variable in why.commands.variables]
+    names = [one.variable for one in (why.missing_inputs or why.alone) if one.variable in why.commands.variables]
     if not names:
-        ax.text(0.5, 0.5, "only the place explains any" if why.share else "not asked", ha="center", transform=ax.transAxes)
+        ax.text(
+            0.5, 0.5, "only the place explains any" if why.share else "not asked", ha="center", transform=ax.transAxes
+        )
         return
     chosen = why.distance <= why.radius
     values = why.commands.variables[names[0]][chosen]

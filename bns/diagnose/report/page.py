@@ -15,14 +15,14 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from bns.diagnose.adding import Mended, add_effects
+from bns.diagnose.adding import ExtendedModel, add_effects
 from bns.diagnose.comparison import Comparison, compare
 from bns.diagnose.data.load import Measured
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report import tables
-from bns.diagnose.report.figures import comparison_figure, diagnosis_figure, ladder_figure
+from bns.diagnose.report.figures import comparison_figure, diagnosis_figure, error_by_step_figure
 from bns.diagnose.report.plain_language import certainty, headline, numbers_in_words
 from bns.diagnose.report.proposal_figure import plan_figure
 from bns.diagnose.report.proposal_text import proposal_lines
@@ -42,7 +42,7 @@ class Material:
     model: Model
     diagnosis: Diagnosis
     comparison: Comparison | None
-    mended: Mended | None
+    extended: ExtendedModel | None
     proposal: Proposal | None
     why_none: str
     paths: list[dict[str, Any]]
@@ -62,11 +62,11 @@ def gathered(
         comparison: Comparison | None = compare(predictor, model)
     except DataError:  # single poses: the verdict says so
         comparison = None
-    mended = None
-    if d.found is not None and d.effects:
-        tick("the ladder")
-        added = {a.effect.name: (a.effect, a.written) for a in d.found.fit.model.effects}
-        mended = add_effects(predictor, model, [added[name] for name in d.effects], measured)
+    extended = None
+    if d.selection is not None and d.effects:
+        tick("the error, step by step")
+        added = {a.effect.name: (a.effect, a.written) for a in d.selection.fit.model.effects}
+        extended = add_effects(predictor, model, [added[name] for name in d.effects], measured)
     tick("the next experiment")
     proposal, why = None, ""
     try:
@@ -74,7 +74,7 @@ def gathered(
     except DataError as none:
         why = str(none)
     tick("paths")
-    return Material(measured, model, d, comparison, mended, proposal, why, shown_paths(predictor, model, d))
+    return Material(measured, model, d, comparison, extended, proposal, why, shown_paths(predictor, model, d))
 
 
 def report_html(m: Material, command: Mapping[str, str]) -> str:
@@ -84,7 +84,7 @@ def report_html(m: Material, command: Mapping[str, str]) -> str:
 
 
 def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
-    d, has_found = m.diagnosis, m.diagnosis.found is not None
+    d, has_found = m.diagnosis, m.diagnosis.selection is not None
     has_after = bool(m.paths) and "after" in m.paths[0]
     values: dict[str, Any] = {
         "css": Markup(_part("report.css")),
@@ -95,16 +95,16 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "verdict": d.verdict,
         "headline": headline(d),
         "certainty": certainty(d),
-        "numbers": numbers_in_words(d.found.fit, d.effects) if d.found is not None else [],
+        "numbers": numbers_in_words(d.selection.fit, d.effects) if d.selection is not None else [],
         "formula": _formula(d),
         "improvement": tables.improvement_text(d),
-        "rivals": _rivals(m),
+        "competing_models": _competing_models(m),
         "paths": Markup(json.dumps(m.paths, separators=(",", ":")).replace("<", "\\u003c")) if m.paths else "",
         "paths_text": _paths_text(m, has_after),
         "has_after": has_after,
         "errors": tables.error_table(d, m.comparison),
-        "ladder": _drawn(partial(ladder_figure, m.mended), "the error ladder") if m.mended else None,
-        "ladder_table": tables.ladder_table(m.mended) if m.mended else None,
+        "error_by_step": _drawn(partial(error_by_step_figure, m.extended), "the error ladder") if m.extended else None,
+        "error_by_step_table": tables.error_by_step_table(m.extended) if m.extended else None,
         "comparison": _compared(m.comparison),
         "curves": tables.curves_table(m.comparison) if m.comparison else None,
         "worst": tables.worst_table(m.comparison) if m.comparison else None,
@@ -134,15 +134,16 @@ def _formula(d: Diagnosis) -> dict[str, str] | None:
     return {"on": d.formula.on, "term": d.formula.term, "numbers": values}
 
 
-def _rivals(m: Material) -> list[dict[str, str]]:
+def _competing_models(m: Material) -> list[dict[str, str]]:
     """The numbers of explanations that fit as well as the accepted one."""
     if m.diagnosis.verdict != "tie" or m.proposal is None:
         return []
-    others = m.proposal.rivals[1:]
+    others = m.proposal.competing_models[1:]
     return [
-        number | {"effect": f"{number['effect']} ({rival.title})" if len(rival.names) > 1 else number["effect"]}
-        for rival in others
-        for number in numbers_in_words(rival.fit, rival.names)
+        number
+        | {"effect": f"{number['effect']} ({competitor.title})" if len(competitor.names) > 1 else number["effect"]}
+        for competitor in others
+        for number in numbers_in_words(competitor.fit, competitor.names)
     ]
 
 

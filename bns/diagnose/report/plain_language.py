@@ -73,7 +73,9 @@ def numbers_in_words(fit: Fit, names: tuple[str, ...]) -> list[dict[str, str]]:
             "effect": effect,
             "name": name,
             "text": texts[(effect, name)],
-            **dict(zip(("value", "interval"), figures_in_words(n["value"], n["low"], n["high"], n["unit"]), strict=True)),
+            **dict(
+                zip(("value", "interval"), figures_in_words(n["value"], n["low"], n["high"], n["unit"]), strict=True)
+            ),
             "exact": f"{n['value']:.6g} {n['unit'] if n['unit'] != '1' else ''}".strip(),
         }
         for effect, values in numbers_of(fit).items()
@@ -85,8 +87,8 @@ def numbers_in_words(fit: Fit, names: tuple[str, ...]) -> list[dict[str, str]]:
 def headline(d: Diagnosis) -> str:
     """The verdict in one sentence or two."""
     said = _all_of(d.effects)
-    if d.verdict == "tie" and d.found is not None:
-        causes = [_all_of(names) for names in (d.found.accepted, *d.found.rivals)]
+    if d.verdict == "tie" and d.selection is not None:
+        causes = [_all_of(names) for names in (d.selection.accepted, *d.selection.competing_models)]
         some = [f"that {cause}" for cause in causes[:_CAUSES]] + (["something else"] if len(causes) > _CAUSES else [])
         return f"The model misses either {', or '.join(some)}. These measurements cannot say which."
     return {
@@ -104,18 +106,21 @@ def _all_of(names: tuple[str, ...]) -> str:
 
 def certainty(d: Diagnosis) -> str:
     """How sure the verdict is, in a sentence or two."""
-    found = d.found
+    found = d.selection
     if found is None:
         return d.notes[0] if d.notes else ""
     trials = len(found.problem.predictor.tracks)
     if d.verdict == "none":
         return f"No known effect earns anything on trials that it was not fitted to ({trials} trials)."
     if d.verdict == "insufficient-data":
-        return next((n for n in d.notes if "more would" in n), "") or f"{trials} trials hint at something, and do not settle it."
+        return (
+            next((n for n in d.notes if "more would" in n), "")
+            or f"{trials} trials hint at something, and do not settle it."
+        )
     if d.verdict == "unlisted":
         left = next((n for n in d.notes if n.startswith(("Left unexplained", "What is not foreseen"))), "")
         return f"Over {trials} trials predictions still go wrong in a pattern that is not luck. {left}".strip()
-    chance = next(c.evidence.p_value for s in found.steps for c in s.ranking if c.name in d.effects)
+    chance = next(c.paired_comparison.p_value for s in found.steps for c in s.ranking if c.name in d.effects)
     better = float((found.problem.fit(without_last(found)).held_out > found.fit.held_out).mean())
     luck = "less than one in ten thousand" if chance < 1e-4 else f"about {chance:.1g}"
     return (

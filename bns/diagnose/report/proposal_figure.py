@@ -1,4 +1,4 @@
-"""The first trials of a proposed experiment, as each rival foresees them."""
+"""The first trials of a proposed experiment, as each competing model predicts them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from bns.diagnose.design.planned import foreseen, planned_tracks
+from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
 from bns.diagnose.design.proposal import Proposal
 from bns.plotting.style import GREY, OKABE_ITO, lettered, panels, save, style
 
@@ -20,16 +20,16 @@ def plan_figure(p: Proposal, path: Path) -> Path:
     """One panel a trial: the arena, the start, and where each explanation says that the robot goes."""
     plan = p.plan.only(np.arange(min(_SHOWN, len(p.plan))))
     tracks = planned_tracks(plan, p.arena.start, _FRAME_S, np.zeros(len(plan)))
-    seen = [foreseen(rival.fit.model, tracks).tracks for rival in p.rivals]
+    seen = [noise_free_predictor(competitor.fit.model, tracks).tracks for competitor in p.competing_models]
     figure, axes = panels(len(plan), 2.6, wide=True)
     a = p.arena
     for trial, (axis,) in enumerate(axes):
         size = (100 * (a.x_high_m - a.x_low_m), 100 * (a.y_high_m - a.y_low_m))
         axis.add_patch(Rectangle((100 * a.x_low_m, 100 * a.y_low_m), *size, fill=False, edgecolor=GREY, linestyle=":"))
-        for number, (rival, each) in enumerate(zip(p.rivals, seen, strict=True)):
+        for number, (competitor, each) in enumerate(zip(p.competing_models, seen, strict=True)):
             pose = 100 * each.pose[each.first[trial] : each.first[trial + 1], :2]
             look = {"color": OKABE_ITO[number % len(OKABE_ITO)], "linestyle": ("-", "--", "-.", ":")[number % 4]}
-            axis.plot(*pose.T, label=rival.title, **look)
+            axis.plot(*pose.T, label=competitor.title, **look)
             axis.plot(*pose[-1], "o", color=look["color"])
         axis.plot(100 * a.start[0], 100 * a.start[1], "k^")
         axis.set(aspect="equal", xlabel="x, east (cm)", ylabel="y, north (cm)" if trial == 0 else "")

@@ -6,23 +6,25 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bns.diagnose.design.proposal import Contest, Proposal
+from bns.diagnose.design.proposal import ModelPair, Proposal
 from bns.robots.khepera import START
 
 
 def proposal_text(p: Proposal, written: str = "") -> str:
     """Who stands against whom, what the experiment would decide, and what to type next."""
-    first = f"verdict so far: {p.verdict}; explanations to tell apart: {'; '.join(r.title for r in p.rivals)}"
+    first = f"verdict so far: {p.verdict}; explanations to tell apart: {'; '.join(r.title for r in p.competing_models)}"
     return "\n".join([first, *proposal_lines(p), *_next(p, written)])
 
 
-def contest_text(c: Contest) -> str:
+def model_pair_text(c: ModelPair) -> str:
     """One sentence or two on one pair."""
     pair = f"{c.first} against {c.second}"
-    if c.alike:
-        other = "; or ".join(c.other_measurements)
-        return f"{pair}: no sequence of commands tells them apart." + (f" Another measurement does: {other}." if other else "")
-    if c.already:
+    if c.indistinguishable:
+        other = "; or ".join(c.independent_measurements)
+        return f"{pair}: no sequence of commands tells them apart." + (
+            f" Another measurement does: {other}." if other else ""
+        )
+    if c.already_decided:
         return f"{pair}: these measurements decide already; {_minutes(c.minutes)} of new ones would do so alone."
     beside = f" (plain random commands: {c.times_faster:.1f} times as long)" if c.times_faster > 1 else ""
     return f"{pair}: decided with a chance of {c.power:.0%}; nine in ten would be after {_minutes(c.minutes)}{beside}."
@@ -30,7 +32,7 @@ def contest_text(c: Contest) -> str:
 
 def proposal_lines(p: Proposal) -> list[str]:
     """A sentence a pair, then what the trials are."""
-    lines = [contest_text(c) for c in p.contests]
+    lines = [model_pair_text(c) for c in p.model_pairs]
     if not len(p.plan):
         return [*lines, "No trial is proposed: no commands would decide anything."]
     a = p.arena

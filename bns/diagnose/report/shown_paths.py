@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.cross_validation import held_out_steps
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import laid_paths
-from bns.diagnose.select.stepwise import problem_for
 from bns.physics.model import Model
 
 MOST_TRIALS, MOST_POSES = 24, 160
@@ -29,11 +29,11 @@ def shown_paths(predictor: Predictor, model: Model, d: Diagnosis) -> list[dict[s
     tracks = predictor.tracks
     before = laid_paths(tracks, predictor.steps(model))
     after = None
-    if d.found is not None and d.model is not None and d.effects:
-        after = laid_paths(tracks, held_out_steps(predictor, d.found.problem.following, d.found.fit.model))
-    elif d.formula is not None and d.found is not None:
-        following = problem_for(predictor, d.formula.fit.model).following
-        after = laid_paths(tracks, held_out_steps(predictor, following, d.formula.fit.model))
+    if d.selection is not None and d.model is not None and d.effects:
+        after = laid_paths(tracks, held_out_steps(predictor, d.selection.problem.pose_filter, d.selection.fit.model))
+    elif d.formula is not None and d.selection is not None:
+        pose_filter = problem_for(predictor, d.formula.fit.model).pose_filter
+        after = laid_paths(tracks, held_out_steps(predictor, pose_filter, d.formula.fit.model))
     off = _mean_error(predictor, before)
     strange = off > _STRANGE * np.median(off)
     better = off - (_mean_error(predictor, after) if after is not None else 0.0)

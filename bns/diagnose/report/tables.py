@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.diagnose.adding import Mended
+from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.load import Measured
 from bns.diagnose.design.proposal import Proposal
@@ -46,10 +46,13 @@ def improvement_text(d: Diagnosis) -> str:
     )
 
 
-def ladder_table(m: Mended) -> Table:
-    """Every rung at every horizon."""
-    horizons = list(m.ladder[0].error)
-    rows = [["as it was" if r.name == "nominal" else f"+ {r.name}", *(_mm(r.error[h]) for h in horizons)] for r in m.ladder]
+def error_by_step_table(m: ExtendedModel) -> Table:
+    """Every step at every horizon."""
+    horizons = list(m.error_by_step[0].error)
+    rows = [
+        ["as it was" if r.name == "nominal" else f"+ {r.name}", *(_mm(r.error[h]) for h in horizons)]
+        for r in m.error_by_step
+    ]
     rows.append(["noise floor", *(_mm(m.floor[h]) for h in horizons)])
     return _table(["model", *(f"{AHEAD[h]} (mm)" for h in horizons)], rows)
 
@@ -71,19 +74,27 @@ def worst_table(c: Comparison) -> Table:
 
 
 def ranking_table(d: Diagnosis) -> Table:
-    """Every effect alone: gain with its interval, chance, fitted numbers, veto."""
-    assert d.found is not None
+    """Every effect alone: gain with its interval, chance, fitted numbers, reason for a rejection."""
+    assert d.selection is not None
     rows = []
-    for c in d.found.steps[0].ranking:
-        e = c.evidence
+    for c in d.selection.steps[0].ranking:
+        e = c.paired_comparison
         fitted = numbers_of(c.fit).get(c.name, {})
         values = [
-            f"{name} {' '.join(part for part in _shown(n) if part)}" for name, n in fitted.items() if n["value"] is not None
+            f"{name} {' '.join(part for part in _shown(n) if part)}"
+            for name, n in fitted.items()
+            if n["value"] is not None
         ]
-        known = np.isfinite(e.gain)
-        gain = [f"{e.gain:.3g}", f"{e.gain - 1.96 * e.se:.3g} to {e.gain + 1.96 * e.se:.3g}"] if known else ["none", ""]
-        rows.append([c.name, *gain, f"{e.p_value:.2g}", "; ".join(values), c.veto])
-    return _table(["effect", "gain a trial", "95 %", "chance of luck", "fitted numbers (95 %)", "why not considered"], rows)
+        known = np.isfinite(e.elpd_diff)
+        gain = (
+            [f"{e.elpd_diff:.3g}", f"{e.elpd_diff - 1.96 * e.dse:.3g} to {e.elpd_diff + 1.96 * e.dse:.3g}"]
+            if known
+            else ["none", ""]
+        )
+        rows.append([c.name, *gain, f"{e.p_value:.2g}", "; ".join(values), c.rejected_because])
+    return _table(
+        ["effect", "gain a trial", "95 %", "chance of luck", "fitted numbers (95 %)", "why not considered"], rows
+    )
 
 
 def _shown(number: Mapping[str, Any]) -> tuple[str, str]:
@@ -100,10 +111,10 @@ def commands_table(p: Proposal) -> Table:
 
 def exact_table(d: Diagnosis) -> Table:
     """The accepted effects' numbers in SI units."""
-    assert d.found is not None
+    assert d.selection is not None
     rows = [
         [effect, name, *(f"{n[k]:.6g}" if n[k] is not None else "" for k in ("value", "se", "low", "high")), n["unit"]]
-        for effect, numbers in numbers_of(d.found.fit).items()
+        for effect, numbers in numbers_of(d.selection.fit).items()
         for name, n in numbers.items()
     ]
     return _table(["effect", "number", "value", "standard error", "95 % from", "to", "unit"], rows)
@@ -111,9 +122,11 @@ def exact_table(d: Diagnosis) -> Table:
 
 def equations_table(d: Diagnosis) -> Table:
     """What the accepted effects do, as equations, and what looks like them."""
-    assert d.found is not None
-    accepted = [a.effect for a in d.found.fit.model.effects if a.effect.name in d.effects]
-    return _table(["effect", "equation", "looks like"], [[e.name, e.equation, ", ".join(e.lookalikes)] for e in accepted])
+    assert d.selection is not None
+    accepted = [a.effect for a in d.selection.fit.model.effects if a.effect.name in d.effects]
+    return _table(
+        ["effect", "equation", "looks like"], [[e.name, e.equation, ", ".join(e.lookalikes)] for e in accepted]
+    )
 
 
 def findings_table(measured: Measured, most: int = 100) -> Table:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from bns.diagnose.adding import Mended
+from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
 from bns.diagnose.diagnosis import Diagnosis, numbers_of, ties_of
@@ -37,9 +37,9 @@ def diagnosis_text(d: Diagnosis) -> str:
 def _diagnosis(d: Diagnosis) -> Iterator[str]:
     yield f"verdict: {d.verdict}"
     yield _VERDICTS[d.verdict].format(effects=" and ".join(d.effects) or "nothing listed")
-    if d.found is not None:
+    if d.selection is not None:
         yield from _numbers(d)
-        for group in ties_of(d.found):
+        for group in ties_of(d.selection):
             yield "cannot be told apart: " + ", ".join(group)
         yield from _errors(d.error or {})
         yield from _ranking(d)
@@ -53,8 +53,8 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
 
 
 def _numbers(d: Diagnosis) -> Iterator[str]:
-    assert d.found is not None
-    for effect, numbers in numbers_of(d.found.fit).items():
+    assert d.selection is not None
+    for effect, numbers in numbers_of(d.selection.fit).items():
         for name, n in numbers.items():
             if n["low"] is not None and n["high"] is not None:
                 yield f"  {effect}: {name} = {n['value']:.5g} {n['unit']} (95 %: {n['low']:.5g} to {n['high']:.5g})"
@@ -70,13 +70,14 @@ def _errors(error: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
 
 
 def _ranking(d: Diagnosis) -> Iterator[str]:
-    assert d.found is not None
+    assert d.selection is not None
     yield "\neach effect added alone: gain on trials held out (log-likelihood a trial):"
     yield f"  {'effect':20}{'gain':>10}{'± se':>10}{'p':>10}"
-    for c in d.found.steps[0].ranking[:_SHOWN]:
-        e = c.evidence
-        yield f"  {c.name:20}{e.gain:10.3f}{e.se:10.3f}{e.p_value:10.2g}  {c.veto and 'not considered: ' + c.veto}".rstrip()
-    yield f"  (the best of {len(DECOYS)} decoys: {d.found.steps[0].bar:.3f})"
+    for c in d.selection.steps[0].ranking[:_SHOWN]:
+        rejected = f"not considered: {c.rejected_because}" if c.rejected_because else ""
+        e = c.paired_comparison
+        yield f"  {c.name:20}{e.elpd_diff:10.3f}{e.dse:10.3f}{e.p_value:10.2g}  {rejected}".rstrip()
+    yield f"  (the best of {len(DECOYS)} decoys: {d.selection.steps[0].decoy_threshold:.3f})"
 
 
 def comparison_text(c: Comparison) -> str:
@@ -97,8 +98,8 @@ def _comparison(c: Comparison) -> Iterator[str]:
     yield "  (noise: at most what tracking noise alone would show; the drive's own scatter comes on top)"
     yield "\nwhere it fails: what a free curve along each variable would explain, on trials held out:"
     yield f"  {'variable':30}{'velocity':16}{'share of loss':>14}{'p':>10}"
-    for p in c.patterns[:_SHOWN]:
-        yield f"  {p.variable:30}{p.channel:16}{p.share:14.2%}{p.evidence.p_value:10.2g}"
+    for p in c.residual_dependence[:_SHOWN]:
+        yield f"  {p.variable:30}{p.channel:16}{p.share:14.2%}{p.paired_comparison.p_value:10.2g}"
     yield from _scores(c.scores)
     yield f"\nworst trials and moments ({ahead(c.near)} ahead):"
     for w in c.worst:
@@ -125,16 +126,16 @@ def _scores(scores: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
             yield f"  {name:12} " + "  ".join(f"{kind.replace('_', ' ')} {share:.0%}" for kind, share in s.items())
 
 
-def mended_text(m: Mended) -> str:
-    """The error ladder on held-out trials, and the numbers."""
-    horizons = list(m.ladder[0].error)
+def extension_text(m: ExtendedModel) -> str:
+    """The error by step on held-out trials, and the numbers."""
+    horizons = list(m.error_by_step[0].error)
     lines = [
         "position error on trials held out, mm (root mean square):",
         f"  {'model':28}" + "".join(f"{h:>10}" for h in horizons),
     ]
-    for rung in m.ladder:
-        name = rung.name if rung.name == "nominal" else f"+ {rung.name}"
-        lines.append(f"  {name:28}" + "".join(f"{1e3 * rung.error[h]:10.2f}" for h in horizons))
+    for step in m.error_by_step:
+        name = step.name if step.name == "nominal" else f"+ {step.name}"
+        lines.append(f"  {name:28}" + "".join(f"{1e3 * step.error[h]:10.2f}" for h in horizons))
     lines.append(f"  {'noise floor':28}" + "".join(f"{1e3 * m.floor[h]:10.2f}" for h in horizons))
     for effect, numbers in numbers_of(m.fit).items():
         lines += [f"  {effect}: {name} = {n['value']:.5g} ± {n['se']:.2g} {n['unit']}" for name, n in numbers.items()]

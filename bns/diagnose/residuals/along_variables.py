@@ -15,9 +15,9 @@ import numpy as np
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem, chance
 from bns.diagnose.estimate.noise import huber
-from bns.diagnose.estimate.normal_equations import Normal, stepped
+from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_after
 from bns.diagnose.estimate.parallel import each
-from bns.diagnose.estimate.significance import MIN_Z, Evidence, held_out_gain
+from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Body
 
@@ -39,33 +39,37 @@ LEAST = 0.0015
 
 
 @dataclass(frozen=True)
-class Pattern:
+class ResidualDependence:
     """What a free curve of one variable, added to one velocity, earns on held-out trials."""
 
     variable: str
     channel: str
-    evidence: Evidence
+    paired_comparison: PairedComparison
     share: float
 
 
-def patterns(problem: Problem, fit: Fit) -> list[Pattern]:
+def residual_dependence(problem: Problem, fit: Fit) -> list[ResidualDependence]:
     """Every variable with every velocity, the best first."""
     variables = problem.predictor.variables()
     headings, usual = variables["heading_rad"], float(fit.losses.mean())
 
-    def seen(tried: tuple[str, list[Array], str]) -> Pattern:
+    def compare_clocks(tried: tuple[str, list[Array], str]) -> ResidualDependence:
         variable, basis, channel = tried
         earned = _earned(problem, fit, _columns(problem, fit, channel, basis, headings))
-        return Pattern(variable, channel, earned, earned.gain / usual)
+        return ResidualDependence(variable, channel, earned, earned.elpd_diff / usual)
 
     tried = [(v, basis, c) for v, basis in curves(variables) for c in (*CHANNELS, *(WORLD if v == "place" else ()))]
-    return sorted(each(seen, tried), key=lambda p: -p.evidence.gain)
+    return sorted(each(compare_clocks, tried), key=lambda p: -p.paired_comparison.elpd_diff)
 
 
-def remaining(found: list[Pattern]) -> list[Pattern]:
+def significant_dependence(dependence: list[ResidualDependence]) -> list[ResidualDependence]:
     """The patterns that cannot be luck, are earned in many trials and are large enough to matter."""
-    level = CHANCE / max(len(found), 1)
-    return [p for p in found if p.evidence.p_value < level and p.evidence.z > MIN_Z and p.share > LEAST]
+    level = CHANCE / max(len(dependence), 1)
+    return [
+        p
+        for p in dependence
+        if p.paired_comparison.p_value < level and p.paired_comparison.z > MIN_Z and p.share > LEAST
+    ]
 
 
 def curves(variables: Mapping[str, Array]) -> Iterator[tuple[str, list[Array]]]:
@@ -96,7 +100,7 @@ def _bumps(x: Array, y: Array, side: int) -> list[Array]:
     ]
 
 
-def nudge(channel: str, curve: Array, heading_rad: Array) -> Effect:
+def probe_effect(channel: str, curve: Array, heading_rad: Array) -> Effect:
     """An effect that adds ``size`` times a curve (trials, steps) to one velocity while the robot moves, or to all as a share."""
 
     def apply(body: Body, size: float) -> Body:
@@ -122,32 +126,34 @@ def nudge(channel: str, curve: Array, heading_rad: Array) -> Effect:
 def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array) -> Array:
     """Change of the whitened innovations a unit of each basis function, (frames, 3, k)."""
     small = 1e-3 if channel in {"yaw_rad_s", SHARE} else 1e-4
-    out = np.empty((*fit.white.shape, len(basis)))
+    out = np.empty((*fit.whitened.shape, len(basis)))
     for j, curve in enumerate(basis):
-        changed = fit.model.with_active(nudge(channel, curve, headings), (small,))
-        out[..., j] = (problem.white(changed) - fit.white) / small
+        changed = fit.model.with_active(probe_effect(channel, curve, headings), (small,))
+        out[..., j] = (problem.whitened(changed) - fit.whitened) / small
     return out
 
 
-def _earned(problem: Problem, fit: Fit, columns: Array) -> Evidence:
+def _earned(problem: Problem, fit: Fit, columns: Array) -> PairedComparison:
     joint = np.concatenate([fit.jacobian, columns], axis=2)
-    pulls = problem.normal(joint, fit.white)
-    gain, se = max((_gain(problem, fit, joint, pulls, penalty) for penalty in PENALTIES), key=lambda found: found[0])
-    return Evidence(gain, se, chance(pulls, fit.jacobian.shape[2]) if gain > 0 else 1.0)
+    equations = problem.normal_equations(joint, fit.whitened)
+    elpd_diff, dse = max(
+        (_gain(problem, fit, joint, equations, penalty) for penalty in PENALTIES), key=lambda pair: pair[0]
+    )
+    return PairedComparison(elpd_diff, dse, chance(equations, fit.jacobian.shape[2]) if elpd_diff > 0 else 1.0)
 
 
-def _gain(problem: Problem, fit: Fit, joint: Array, pulls: Normal, penalty: float) -> tuple[float, float]:
+def _gain(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, penalty: float) -> tuple[float, float]:
     """Held-out gain of a linear addition to a fitted model, each trial judged by a fit to the others.
 
     The model's own numbers move along with it. ``penalty``: how many typical trials speak for the addition being nothing.
     """
-    gradients, curvatures = pulls.gradients, pulls.curvatures
-    total, trials, own = curvatures.sum(axis=0), len(curvatures), fit.jacobian.shape[2]
+    gradients, curvatures = equations.gradients, equations.curvatures
+    total, trials, base_numbers = curvatures.sum(axis=0), len(curvatures), fit.jacobian.shape[2]
     scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
     ridge = np.full(len(total), penalty / trials)
-    ridge[:own] = 1e-9
+    ridge[:base_numbers] = 1e-9
     others = (total - curvatures) / np.outer(scale, scale) + np.diag(ridge)
     against = (gradients.sum(axis=0) - gradients) / scale
     steps = -np.linalg.solve(others, against[..., None])[..., 0] / scale
-    moved = stepped(problem.predictor.tracks.first, joint, fit.white, steps)
-    return held_out_gain(fit.held_out, problem.per_trial(huber(moved)))
+    moved = innovations_after(problem.predictor.tracks.first, joint, fit.whitened, steps)
+    return paired_elpd_diff(fit.held_out, problem.per_trial(huber(moved)))

@@ -1,7 +1,7 @@
 """What repeats itself along time, though no variable shows it: a wheel out of round, a heading that wanders.
 
 Foreseen well, frames are independent. Honest motors are a little faster or slower from one command to the next, and from
-trial to trial; that is taken out first, so that it does not look like a rhythm: inside commands each command's mean,
+trial to trial; that is taken out first, so that it does not look like an autocorrelation: inside commands each command's mean,
 between commands each trial's.
 """
 
@@ -27,7 +27,7 @@ _DIRECTIONS = ("forward", "left", "heading")
 
 
 @dataclass(frozen=True)
-class Rhythm:
+class Autocorrelation:
     """Correlation of the unforeseen with itself ``lag`` frames (``within`` commands) or commands (``between`` them) before."""
 
     direction: str
@@ -37,7 +37,7 @@ class Rhythm:
     z: float
 
     @property
-    def loud(self) -> bool:
+    def significant(self) -> bool:
         """Too large and too certain to be luck."""
         least = LEAST_BETWEEN
         if self.scale == "within":
@@ -45,7 +45,7 @@ class Rhythm:
         return abs(self.correlation) > least and abs(self.z) > LEAST_Z
 
 
-def rhythms(problem: Problem, fit: Fit) -> list[Rhythm]:
+def autocorrelations(problem: Problem, fit: Fit) -> list[Autocorrelation]:
     """Every direction and time scale, the largest in proportion to its threshold first."""
     found = []
     for index, direction in enumerate(_DIRECTIONS):
@@ -53,16 +53,16 @@ def rhythms(problem: Problem, fit: Fit) -> list[Rhythm]:
         for lag in LAGS:
             found.append(_pooled(direction, "within", lag, [_within(commands, lag) for commands in trials]))
         found.append(_pooled(direction, "between", 1, [_between(commands) for commands in trials]))
-    return sorted(found, key=lambda r: (not r.loud, -abs(r.z)))
+    return sorted(found, key=lambda r: (not r.significant, -abs(r.z)))
 
 
 def _by_command(problem: Problem, fit: Fit, direction: int) -> Iterator[list[Array]]:
     """For each trial the unforeseen of its commands, frame by frame."""
     tracks = problem.predictor.tracks
     for trial, (a, b) in enumerate(pairwise(tracks.first)):
-        white = np.clip(fit.white[a + 1 : b, direction], -_CLIP, _CLIP)
+        whitened = np.clip(fit.whitened[a + 1 : b, direction], -_CLIP, _CLIP)
         command = np.searchsorted(np.cumsum(tracks.duration_s[trial]), tracks.t_s[a + 1 : b] - 1e-9)
-        yield [white[command == c] for c in np.unique(command)]
+        yield [whitened[command == c] for c in np.unique(command)]
 
 
 def _within(commands: list[Array], lag: int) -> tuple[float, float]:
@@ -86,10 +86,10 @@ def _products(values: Array, lag: int) -> tuple[float, float]:
     return float(centred[lag:] @ centred[:-lag]) + (n - lag) * square / ((n - 1) * n), square
 
 
-def _pooled(direction: str, scale: str, lag: int, sums: list[tuple[float, float]]) -> Rhythm:
+def _pooled(direction: str, scale: str, lag: int, sums: list[tuple[float, float]]) -> Autocorrelation:
     pairs = np.array([s for s in sums if s[1] > 0])
     if len(pairs) < 4:
-        return Rhythm(direction, scale, lag, 0.0, 0.0)
+        return Autocorrelation(direction, scale, lag, 0.0, 0.0)
     r = float(pairs[:, 0].sum() / pairs[:, 1].sum())
     se = float(np.std(pairs[:, 0] - r * pairs[:, 1]) * np.sqrt(len(pairs)) / pairs[:, 1].sum())
-    return Rhythm(direction, scale, lag, r, r / se if se > 0 else 0.0)
+    return Autocorrelation(direction, scale, lag, r, r / se if se > 0 else 0.0)

@@ -26,7 +26,7 @@ _RIDGE = 1.0
 
 
 @dataclass(frozen=True)
-class Unseen:
+class MissingInput:
     """A variable, the share of the squared error (of the commands judged) that its curves explain on trials held out, and the
     chance of such a pull by luck, over all three displacements."""
 
@@ -37,27 +37,30 @@ class Unseen:
 
 @dataclass(frozen=True)
 class Commands:
-    """Errors of commands, one row each: ``trial`` (n,), ``duration_s`` (n,), ``told`` (n, 3) displacement predicted and ``error``
+    """Errors of commands, one row each: ``trial`` (n,), ``duration_s`` (n,), ``predicted`` (n, 3) displacement and ``error``
     (n, 3) measured minus predicted, both as outputs of the networks; ``variables`` name -> (n,)."""
 
     trial: NDArray[np.int64]
     duration_s: Array
-    told: Array
+    predicted: Array
     error: Array
     variables: Mapping[str, Array]
 
 
-def explained(commands: Commands) -> tuple[list[Unseen], list[Unseen], float]:
+def find_missing_inputs(commands: Commands) -> tuple[list[MissingInput], list[MissingInput], float]:
     """Variables that hold up, taken one after the other; all of them when tried alone, best first; and the share explained."""
     bases = dict(_bases(commands.variables))
     error, whole = commands.error, float((commands.error**2).sum())
-    named: list[Unseen] = []
-    alone: list[Unseen] = []
+    named: list[MissingInput] = []
+    alone: list[MissingInput] = []
     gained = 0.0
     while len(named) < MOST and whole > 0:
         tried = {name: _tried(commands, error, basis) for name, basis in bases.items()}
         ranking = sorted(
-            (Unseen(name, (float((error**2).sum()) - float((left**2).sum())) / whole, p) for name, (left, p) in tried.items()),
+            (
+                MissingInput(name, (float((error**2).sum()) - float((left**2).sum())) / whole, p)
+                for name, (left, p) in tried.items()
+            ),
             key=lambda one: -one.share,
         )
         alone = alone or ranking
@@ -72,17 +75,24 @@ def explained(commands: Commands) -> tuple[list[Unseen], list[Unseen], float]:
 
 def _bases(variables: Mapping[str, Array]) -> list[tuple[str, Array]]:
     """Basis functions (n, k) of every variable; a heading is taken round the circle."""
-    found = [(name, np.column_stack(basis)) for name, basis in curves({k: v for k, v in variables.items() if k != "heading_rad"})]
+    bases = [
+        (name, np.column_stack(basis))
+        for name, basis in curves({k: v for k, v in variables.items() if k != "heading_rad"})
+    ]
     if "heading_rad" in variables:
-        found.append(("heading_rad", np.column_stack([np.cos(variables["heading_rad"]), np.sin(variables["heading_rad"])])))
-    return found
+        bases.append(
+            ("heading_rad", np.column_stack([np.cos(variables["heading_rad"]), np.sin(variables["heading_rad"])]))
+        )
+    return bases
 
 
 def _tried(commands: Commands, error: Array, basis: Array) -> tuple[Array, float]:
     """Errors (n, 3) that curves fitted to the other trials leave, and the smallest chance of the displacements, times three."""
     left, chances = error.copy(), []
     for channel in range(error.shape[1]):
-        plain = np.column_stack([np.ones_like(commands.duration_s), commands.duration_s, commands.told[:, channel]])
+        plain = np.column_stack(
+            [np.ones_like(commands.duration_s), commands.duration_s, commands.predicted[:, channel]]
+        )
         added = np.concatenate([basis * factor[:, None] for factor in plain.T], axis=1)
         left[:, channel], chance = _beyond(plain, added, error[:, channel], commands.trial)
         chances.append(chance)

@@ -18,7 +18,7 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.cross_validation import FOLDS
 from bns.diagnose.estimate.significance import sign_flip_p
 from bns.diagnose.predict.networks import NetworkPredictor
-from bns.diagnose.residuals.missing_inputs import Commands, Unseen, explained
+from bns.diagnose.residuals.missing_inputs import Commands, MissingInput, find_missing_inputs
 from bns.errors import DataError
 from bns.physics.model import Model
 
@@ -29,7 +29,7 @@ USUAL = 0.95
 FEWEST, FEWEST_TRIALS = 30, 6
 """Of fewer commands, or from fewer trials, among the patterns nothing is said."""
 DRAWS = 1000
-LEAST_THIN = 0.1
+LEAST_SPARSE = 0.1
 """Least share of the squared error for which thin data are named."""
 MEMORY_S = 0.5
 """Time constant of the memory that is looked for: that of slow motors."""
@@ -47,7 +47,7 @@ _CHANCE = 0.01
 
 
 @dataclass(frozen=True)
-class Thin:
+class SparseCoverage:
     """Commands outside the training patterns: how many, how many times the squared error of the others they show, and the ends of
     the 95 % interval of that (bootstrap over trials)."""
 
@@ -73,18 +73,20 @@ class NetworkErrors:
     radius: float
     distance: Array
     size: Array
-    thin: Thin
+    sparse_coverage: SparseCoverage
     share: Mapping[str, float]
-    unseen: tuple[Unseen, ...]
-    alone: tuple[Unseen, ...]
+    missing_inputs: tuple[MissingInput, ...]
+    alone: tuple[MissingInput, ...]
 
     @property
     def verdict(self) -> tuple[str, ...]:
         """What holds of ``thin-data``, ``inputs-cannot-know``; ``neither``; or ``insufficient-data``."""
         if not self.share:
             return ("insufficient-data",)
-        found = ["thin-data"] * (self.share["thin data"] > LEAST_THIN) + ["inputs-cannot-know"] * bool(self.unseen)
-        return tuple(found) or ("neither",)
+        causes = ["thin-data"] * (self.share["thin data"] > LEAST_SPARSE) + ["inputs-cannot-know"] * bool(
+            self.missing_inputs
+        )
+        return tuple(causes) or ("neither",)
 
     def as_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -93,9 +95,11 @@ class NetworkErrors:
             "training_patterns": self.patterns,
             "commands": len(self.distance),
             "near_distance": self.radius,
-            "outside": {**asdict(self.thin), "matters": self.thin.matters} if self.share else {"commands": self.thin.commands},
+            "outside": {**asdict(self.sparse_coverage), "matters": self.sparse_coverage.matters}
+            if self.share
+            else {"commands": self.sparse_coverage.commands},
             "share": dict(self.share),
-            "unseen": [asdict(one) for one in self.unseen],
+            "missing_inputs": [asdict(one) for one in self.missing_inputs],
             "alone": [asdict(one) for one in self.alone],
         }
 
@@ -113,21 +117,33 @@ def why_wrong(predictor: NetworkPredictor, seed: int = 0) -> NetworkErrors:
     inputs, commands = _commands(predictor)
     distance, radius = nearness(inputs, predictor.learned_from.T.astype(np.float64))
     near, square = distance <= radius, (commands.error**2).mean(axis=1)
-    thin = _thin(square, near, commands.trial, np.random.default_rng(seed))
+    sparse_coverage = _sparse_coverage(square, near, commands.trial, np.random.default_rng(seed))
     share: dict[str, float] = {}
-    named: list[Unseen] = []
-    alone: list[Unseen] = []
+    named: list[MissingInput] = []
+    alone: list[MissingInput] = []
     if near.sum() >= FEWEST and len(np.unique(commands.trial[near])) >= FEWEST_TRIALS:
         among = _only(commands, near)
         after, gained = _beyond_inputs(inputs[near], among)
-        named, alone, unseen = explained(after)
+        named, alone, explained = find_missing_inputs(after)
         kept = 1.0 - gained
-        outside = float(max(square.sum() - len(square) * square[near].mean(), 0.0) / square.sum()) if thin.matters else 0.0
+        outside = (
+            float(max(square.sum() - len(square) * square[near].mean(), 0.0) / square.sum())
+            if sparse_coverage.matters
+            else 0.0
+        )
         among_share = 1.0 - outside
-        share = {"thin data": outside, "unlearned": among_share * gained, "unknowable": among_share * kept * unseen}
+        share = {"thin data": outside, "unlearned": among_share * gained, "unknowable": among_share * kept * explained}
         share["scatter"] = 1.0 - sum(share.values())
     return NetworkErrors(
-        commands, predictor.learned_from.shape[1], radius, distance, np.sqrt(square), thin, share, tuple(named), tuple(alone)
+        commands,
+        predictor.learned_from.shape[1],
+        radius,
+        distance,
+        np.sqrt(square),
+        sparse_coverage,
+        share,
+        tuple(named),
+        tuple(alone),
     )
 
 
@@ -139,7 +155,9 @@ def nearness(inputs: Array, patterns: Array) -> tuple[Array, float]:
     tree = cKDTree(distinct)
     neighbours = min(NEIGHBOURS, len(distinct) - 1)
     if neighbours < 1:
-        raise DataError("The networks were trained on one command alone; nothing can be said about where their data are thin.")
+        raise DataError(
+            "The networks were trained on one command alone; nothing can be said about where their data are thin."
+        )
     own = tree.query(distinct, k=neighbours + 1)[0][:, 1:].mean(axis=1)
     asked = np.reshape(tree.query(inputs, k=neighbours)[0], (len(inputs), neighbours)).mean(axis=1)
     return asked, float(np.quantile(own, USUAL))
@@ -194,22 +212,24 @@ def _only(commands: Commands, kept: NDArray[np.bool_]) -> Commands:
     return Commands(
         commands.trial[kept],
         commands.duration_s[kept],
-        commands.told[kept],
+        commands.predicted[kept],
         commands.error[kept],
         {name: values[kept] for name, values in commands.variables.items()},
     )
 
 
-def _thin(square: Array, near: NDArray[np.bool_], trial: NDArray[np.int64], rng: np.random.Generator) -> Thin:
+def _sparse_coverage(
+    square: Array, near: NDArray[np.bool_], trial: NDArray[np.int64], rng: np.random.Generator
+) -> SparseCoverage:
     outside = int((~near).sum())
     if outside == 0 or near.sum() == 0:
-        return Thin(outside, float("nan"), float("nan"), float("nan"))
+        return SparseCoverage(outside, float("nan"), float("nan"), float("nan"))
     sums = np.zeros((int(trial.max()) + 1, 4))
     np.add.at(sums, trial, np.column_stack([square * ~near, ~near, square * near, near]))
     drawn = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=DRAWS) @ sums
     whole = drawn[(drawn[:, 1] > 0) & (drawn[:, 3] > 0)]
     low, high = np.quantile((whole[:, 0] / whole[:, 1]) / (whole[:, 2] / whole[:, 3]), [0.025, 0.975])
-    return Thin(outside, float(square[~near].mean() / square[near].mean()), float(low), float(high))
+    return SparseCoverage(outside, float(square[~near].mean() / square[near].mean()), float(low), float(high))
 
 
 def _beyond_inputs(inputs: Array, commands: Commands) -> tuple[Commands, float]:
@@ -219,12 +239,12 @@ def _beyond_inputs(inputs: Array, commands: Commands) -> tuple[Commands, float]:
 
     best, told = 0.0, np.zeros_like(commands.error)
     whole = float((commands.error**2).sum())
-    for pull in (0.1, 1.0, 10.0):
+    for penalty in (0.1, 1.0, 10.0):
         guess = np.zeros_like(commands.error)
         for fold in range(FOLDS):
             held = commands.trial % FOLDS == fold
             if held.any() and not held.all():
-                learner = KernelRidge(kernel="rbf", gamma=0.5, alpha=pull).fit(inputs[~held], commands.error[~held])
+                learner = KernelRidge(kernel="rbf", gamma=0.5, alpha=penalty).fit(inputs[~held], commands.error[~held])
                 guess[held] = learner.predict(inputs[held])
         gains = (commands.error**2 - (commands.error - guess) ** 2).sum(axis=1)
         by_trial = np.bincount(commands.trial, gains)[np.unique(commands.trial)].astype(np.float64)
@@ -232,4 +252,6 @@ def _beyond_inputs(inputs: Array, commands: Commands) -> tuple[Commands, float]:
         luck = sign_flip_p(by_trial[:, None], np.array([[float(by_trial @ by_trial) or 1.0]]))
         if share > best and luck < _CHANCE:
             best, told = share, guess
-    return Commands(commands.trial, commands.duration_s, commands.told, commands.error - told, commands.variables), best
+    return Commands(
+        commands.trial, commands.duration_s, commands.predicted, commands.error - told, commands.variables
+    ), best

@@ -30,7 +30,7 @@ _NORMAL = 0.6745
 
 
 @dataclass(frozen=True)
-class Outbreak:
+class Outlier:
     """The worst window of a trial that has one which stands out: when it began, and how far off it is."""
 
     trial: str
@@ -38,20 +38,20 @@ class Outbreak:
     size: float
 
 
-def outbreaks(problem: Problem, fit: Fit) -> list[Outbreak]:
+def outliers(problem: Problem, fit: Fit) -> list[Outlier]:
     """One for every trial with a window that stands out, the worst first; none where fewer than `TRIALS` have one."""
     tracks = problem.predictor.tracks
     start = _windows(tracks.first)
     start = start[~_near(_jumped(problem, fit), start)]
     if not len(start):
         return []
-    white = np.clip(fit.white, -_CLIP, _CLIP)
-    sums = white[start[:, None] + np.arange(WIDTH)].sum(axis=1) / np.sqrt(WIDTH)
+    whitened = np.clip(fit.whitened, -_CLIP, _CLIP)
+    sums = whitened[start[:, None] + np.arange(WIDTH)].sum(axis=1) / np.sqrt(WIDTH)
     usual = np.median(np.abs(sums), axis=0) / _NORMAL
     size = np.abs(sums / np.maximum(usual, 1e-9)).max(axis=1)
     order = [i for i in np.argsort(-size) if size[i] > FAR]
     worst = {int(tracks.trial[start[i]]): i for i in reversed(order)}
-    found = [Outbreak(tracks.names[t], float(tracks.t_s[start[i]]), float(size[i])) for t, i in worst.items()]
+    found = [Outlier(tracks.names[t], float(tracks.t_s[start[i]]), float(size[i])) for t, i in worst.items()]
     return sorted(found, key=lambda o: -o.size) if len(found) >= TRIALS else []
 
 
@@ -62,8 +62,8 @@ def _windows(first: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _jumped(problem: Problem, fit: Fit) -> NDArray[np.bool_]:
     """Frames (frames,) that are farther off than any robot gets within one."""
-    possible = JUMP + WAYS * problem.predictor.way_m / problem.following.noise[0]
-    off = np.abs(fit.white)
+    possible = JUMP + WAYS * problem.predictor.way_m / problem.pose_filter.noise[0]
+    off = np.abs(fit.whitened)
     return np.asarray((off[:, :2].max(axis=1) > possible) | (off[:, 2] > TURN))
 
 

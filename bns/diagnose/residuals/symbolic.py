@@ -1,6 +1,6 @@
 """What the unlisted might be: a short formula in the known variables, or the place it is tied to.
 
-The free curves of `structure` say along which variable and in which velocity the model fails. Here orthogonal matching
+The free curves of `along_variables` say along which variable and in which velocity the model fails. Here orthogonal matching
 pursuit (scikit-learn) picks the few terms of a library that explain it; what it picks is then fitted as an effect
 like any other, and offered with its held-out gain as a term that `bns add` takes.
 """
@@ -17,8 +17,8 @@ from sklearn.linear_model import orthogonal_mp
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.parallel import each
-from bns.diagnose.estimate.significance import Evidence
-from bns.diagnose.residuals.along_variables import SHARE, Pattern
+from bns.diagnose.estimate.significance import PairedComparison
+from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.formula import formula_effect
@@ -55,7 +55,7 @@ class Formula:
     on: str
     term: str
     fit: Fit
-    evidence: Evidence
+    paired_comparison: PairedComparison
 
     @property
     def values(self) -> dict[str, float]:
@@ -63,13 +63,17 @@ class Formula:
         return self.fit.model.values_of(NAME)
 
 
-def best_formula(problem: Problem, fit: Fit, found: Sequence[Pattern]) -> Formula | None:
+def best_formula(problem: Problem, fit: Fit, dependence: Sequence[ResidualDependence]) -> Formula | None:
     """The formula that earns most along the patterns that were found; None if none earns anything."""
-    tried = each(partial(_tried, problem, fit), found[:3])
-    return max((f for of_one in tried for f in of_one if f.evidence.gain > 0), key=lambda f: f.evidence.gain, default=None)
+    tried = each(partial(_tried, problem, fit), dependence[:3])
+    return max(
+        (f for of_one in tried for f in of_one if f.paired_comparison.elpd_diff > 0),
+        key=lambda f: f.paired_comparison.elpd_diff,
+        default=None,
+    )
 
 
-def _tried(problem: Problem, fit: Fit, pattern: Pattern) -> list[Formula]:
+def _tried(problem: Problem, fit: Fit, pattern: ResidualDependence) -> list[Formula]:
     on = _ON[pattern.channel]
     terms = [f"{c} * {shape}" for c in _CARRIERS[on] for shape in _SHAPES.get(pattern.variable, ())]
     tried = [_sparse(problem, fit, on, [*_CARRIERS[on], *terms])] if terms else []
@@ -92,13 +96,15 @@ def _sparse(problem: Problem, fit: Fit, on: str, terms: Sequence[str]) -> Formul
     size = np.linalg.norm(matrix, axis=0)
     keep = size > 1e-9 * size.max()
     matrix, usable = matrix[:, keep] / size[keep], [t for t, k in zip(usable, keep, strict=True) if k]
-    target, best = -_weighted(fit, fit.white), None
+    target, best = -_weighted(fit, fit.whitened), None
     for count in range(1, min(_TERMS_AT_MOST, len(usable)) + 1):
         chosen = [usable[i] for i in np.flatnonzero(orthogonal_mp(matrix, target, n_nonzero_coefs=count))]
-        found = _fitted(problem, fit, on, " + ".join(f"k{i} * {t}" for i, t in enumerate(chosen)))
-        if found is None or (best is not None and found.evidence.gain < 1.1 * best.evidence.gain):
+        formula = _fitted(problem, fit, on, " + ".join(f"k{i} * {t}" for i, t in enumerate(chosen)))
+        if formula is None or (
+            best is not None and formula.paired_comparison.elpd_diff < 1.1 * best.paired_comparison.elpd_diff
+        ):
             break
-        best = found
+        best = formula
     return best
 
 
@@ -106,7 +112,7 @@ def _bump(problem: Problem, fit: Fit, on: str) -> Formula | None:
     """A round patch of floor: where, how wide, how strong."""
     pose = problem.predictor.tracks.pose
     (x0, x1), (y0, y1) = np.quantile(pose[:, 0], [0.05, 0.95]), np.quantile(pose[:, 1], [0.05, 0.95])
-    best, left = None, _weighted(fit, fit.white)
+    best, left = None, _weighted(fit, fit.whitened)
     for cx in np.linspace(x0, x1, 5):
         for cy in np.linspace(y0, y1, 5):
             for width in (0.1, 0.3):
@@ -124,10 +130,10 @@ def _bump(problem: Problem, fit: Fit, on: str) -> Formula | None:
         added = problem.fit(_written(model, term, on))
     except ModelError:
         return None
-    found = Formula(on, term, added, problem.evidence(fit, added))
+    formula = Formula(on, term, added, problem.paired_comparison(fit, added))
     # a patch that has run away from where the robot was is none
-    inside = x0 <= found.values["a"] <= x1 and y0 <= found.values["b"] <= y1
-    return found if inside else None
+    inside = x0 <= formula.values["a"] <= x1 and y0 <= formula.values["b"] <= y1
+    return formula if inside else None
 
 
 def _fitted(problem: Problem, fit: Fit, on: str, term: str) -> Formula | None:
@@ -137,7 +143,7 @@ def _fitted(problem: Problem, fit: Fit, on: str, term: str) -> Formula | None:
         added = problem.fit(model)
     except ModelError:
         return None
-    return Formula(on, term, added, problem.evidence(fit, added))
+    return Formula(on, term, added, problem.paired_comparison(fit, added))
 
 
 def _written(model: Model, term: str, on: str) -> Model:
@@ -147,13 +153,13 @@ def _written(model: Model, term: str, on: str) -> Model:
 
 def _column(problem: Problem, fit: Fit, effect: Effect) -> np.ndarray:
     small = 1e-4
-    changed: np.ndarray = (problem.white(fit.model.with_active(effect, (small,))) - fit.white) / small
+    changed: np.ndarray = (problem.whitened(fit.model.with_active(effect, (small,))) - fit.whitened) / small
     return changed
 
 
 def _weighted(fit: Fit, columns: np.ndarray) -> np.ndarray:
     """One long row, without what the model's own numbers could do as well."""
-    root = np.sqrt(weights(fit.white))[:, None]
+    root = np.sqrt(weights(fit.whitened))[:, None]
     flat = (columns * root).ravel()
     if not fit.jacobian.shape[2]:
         return flat

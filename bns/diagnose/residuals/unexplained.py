@@ -9,26 +9,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bns.diagnose.estimate.fit import Fit, Problem
-from bns.diagnose.residuals.along_variables import Pattern, remaining
-from bns.diagnose.residuals.autocorrelation import Rhythm, rhythms
-from bns.diagnose.residuals.outliers import Outbreak, outbreaks
+from bns.diagnose.residuals.along_variables import ResidualDependence, significant_dependence
+from bns.diagnose.residuals.autocorrelation import Autocorrelation, autocorrelations
+from bns.diagnose.residuals.outliers import Outlier, outliers
 
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Patterns and outbreaks that cannot be luck, best and worst first; the loudest rhythm, None if all are soft."""
+    """Dependences and outliers that cannot be luck, best and worst first; the largest autocorrelation if significant."""
 
-    patterns: tuple[Pattern, ...]
-    rhythm: Rhythm | None
-    outbreaks: tuple[Outbreak, ...]
+    residual_dependence: tuple[ResidualDependence, ...]
+    autocorrelation: Autocorrelation | None
+    outliers: tuple[Outlier, ...]
 
     @property
     def any(self) -> bool:
         """Something is."""
-        return bool(self.patterns or self.rhythm or self.outbreaks)
+        return bool(self.residual_dependence or self.autocorrelation or self.outliers)
 
 
-def unexplained(problem: Problem, fit: Fit, seen: Sequence[Pattern]) -> Unexplained:
+def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence]) -> Unexplained:
     """Of the patterns ``seen`` in a fitted model, and of its innovations, what is too large and too certain to be luck."""
-    loudest = rhythms(problem, fit)[0]
-    return Unexplained(tuple(remaining(list(seen))), loudest if loudest.loud else None, tuple(outbreaks(problem, fit)))
+    largest = autocorrelations(problem, fit)[0]
+    return Unexplained(
+        tuple(significant_dependence(list(seen))),
+        largest if largest.significant else None,
+        tuple(outliers(problem, fit)),
+    )

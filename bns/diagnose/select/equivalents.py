@@ -1,7 +1,7 @@
 """Longer explanations that do the same: two effects in the place of one. They are no tie, for the shorter is to be preferred,
 but whoever mends the robot should know of them: a camera's scale that is off looks like a speed gain with a wrong wheelbase.
 
-Which pairs might do it is read from the tracks' own sensitivities; those are then fitted, and judged as rivals are.
+Which pairs might do it is read from the tracks' own sensitivities; those are then fitted, and judged as competing models are.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.parallel import each
-from bns.diagnose.select.indistinguishable import alike
-from bns.diagnose.select.plausibility import veto_of
+from bns.diagnose.select.indistinguishable import indistinguishable
+from bns.diagnose.select.plausibility import implausible
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
@@ -31,9 +31,11 @@ _SMALL = 1e-3
 """Step of a number for a derivative, as a share of its plausible range."""
 
 
-def longer(problem: Problem, fit: Fit, accepted: Sequence[str], others: Sequence[Effect]) -> list[tuple[str, ...]]:
+def equivalent_pairs(
+    problem: Problem, fit: Fit, accepted: Sequence[str], others: Sequence[Effect]
+) -> list[tuple[str, ...]]:
     """Sets of one effect more than ``accepted`` that these tracks cannot tell from it; names in the order of the replaced one."""
-    found = []
+    result = []
     for name in accepted:
         pairs = _promising(problem, fit, name, others)
         if not pairs:
@@ -41,20 +43,22 @@ def longer(problem: Problem, fit: Fit, accepted: Sequence[str], others: Sequence
         model = fit.model.without(name)
         without = problem.fit(model)
         for pair, tried in zip(pairs, each(partial(_fitted, problem, model), pairs), strict=True):
-            if alike(tried, fit, without) and not any(veto_of(tried, effect.name) for effect in pair):
-                found.append(tuple(n for one in accepted for n in ((e.name for e in pair) if one == name else (one,))))
-    return found
+            if indistinguishable(tried, fit, without) and not any(implausible(tried, effect.name) for effect in pair):
+                result.append(tuple(n for one in accepted for n in ((e.name for e in pair) if one == name else (one,))))
+    return result
 
 
 def _promising(problem: Problem, fit: Fit, name: str, others: Sequence[Effect]) -> list[tuple[Effect, Effect]]:
     """Pairs whose sensitivities together span what the effect of that name does, and neither alone."""
     base = fit.model.without(name)
-    white, root = problem.white(base), np.sqrt(weights(fit.white))[:, None]
-    done = ((fit.white - white) * root).ravel()
-    own = fit.jacobian[..., [i for i, number in enumerate(fit.free) if number.effect != name]] * root[..., None]
-    given = own.reshape(len(done), -1)
+    whitened, root = problem.whitened(base), np.sqrt(weights(fit.whitened))[:, None]
+    done = ((fit.whitened - whitened) * root).ravel()
+    base_columns = (
+        fit.jacobian[..., [i for i, number in enumerate(fit.free) if number.effect != name]] * root[..., None]
+    )
+    given = base_columns.reshape(len(done), -1)
     smooth = [effect for effect in others if _smooth(effect)]
-    added = each(lambda e: np.stack(list(_columns(problem, base, white, root, e)), axis=1), smooth)
+    added = each(lambda e: np.stack(list(_columns(problem, base, whitened, root, e)), axis=1), smooth)
     columns = {effect.name: column for effect, column in zip(smooth, added, strict=True)}
     left_alone = {n: _left(done, [given, c]) for n, c in columns.items()}
     pairs = []
@@ -70,12 +74,12 @@ def _smooth(effect: Effect) -> bool:
     return not any(np.isinf(value) for value in effect.neutral.values())
 
 
-def _columns(problem: Problem, base: Model, white: Array, root: Array, effect: Effect) -> Iterator[Array]:
+def _columns(problem: Problem, base: Model, whitened: Array, root: Array, effect: Effect) -> Iterator[Array]:
     neutral = tuple(effect.neutral.values())
     for index, p in enumerate(effect.parameters):
         small = _SMALL * (p.plausible[1] - p.plausible[0])
         values = tuple(v + small * (i == index) for i, v in enumerate(neutral))
-        yield ((problem.white(base.with_active(effect, values)) - white) / small * root).ravel()
+        yield ((problem.whitened(base.with_active(effect, values)) - whitened) / small * root).ravel()
 
 
 def _left(done: Array, parts: Sequence[Array]) -> float:
@@ -83,8 +87,8 @@ def _left(done: Array, parts: Sequence[Array]) -> float:
     joint = np.concatenate(parts, axis=1)
     size = np.sqrt((joint * joint).sum(axis=0))
     joint = joint[:, size > 0] / size[size > 0]
-    curvature, pull = joint.T @ joint, joint.T @ done
-    explained = float(pull @ np.linalg.pinv(curvature, rcond=1e-10, hermitian=True) @ pull)
+    curvature, gradient = joint.T @ joint, joint.T @ done
+    explained = float(gradient @ np.linalg.pinv(curvature, rcond=1e-10, hermitian=True) @ gradient)
     return 1.0 - explained / max(float(done @ done), 1e-300)
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit
-from bns.diagnose.estimate.significance import held_out_gain
+from bns.diagnose.estimate.significance import paired_elpd_diff
 
 TIE_Z = 2.0
 """Two explanations whose held-out losses differ by fewer standard errors than this cannot be told apart ..."""
@@ -19,10 +19,10 @@ TIE_LOSS = 3.0
 """Nor those that differ by less log-likelihood than this over all trials: odds of twenty to one. A spare number costs as much."""
 
 
-def alike(tried: Fit, fit: Fit, without: Fit) -> bool:
+def indistinguishable(tried: Fit, fit: Fit, without: Fit) -> bool:
     """Whether ``tried`` cannot be told from ``fit``, an explanation that both put in the place of nothing (``without``)."""
-    worth = held_out_gain(without.held_out, fit.held_out)[0]
-    lost, se = held_out_gain(tried.held_out, fit.held_out)
+    worth = paired_elpd_diff(without.held_out, fit.held_out)[0]
+    lost, se = paired_elpd_diff(tried.held_out, fit.held_out)
     certain = lost >= TIE_Z * se or _mostly_worse(tried, fit)
     return not (certain and bool(matters(np.array(lost), worth, len(fit.held_out))))
 

@@ -7,7 +7,7 @@ import numpy as np
 from bns.diagnose.estimate.fit import Fit
 
 
-def veto_of(fit: Fit, name: str, bounds: bool = True) -> str:
+def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
     """Why an effect with these numbers cannot be believed; "" if it can. ``bounds``: do numbers at one count?"""
     for index, number in enumerate(fit.free):
         p = number.parameter

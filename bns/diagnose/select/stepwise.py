@@ -1,7 +1,7 @@
 """Which effects are missing: forwards while a step earns something on held-out trials, with a look back after each.
 
-Guards: decoys set a bar, the chance of a false alarm is shared out over the whole catalogue, a number at a bound
-or beyond what is plausible is a veto with its reason.
+Guards: decoys set a threshold, the chance of a false alarm is shared out over the whole catalogue, a number at a bound
+or beyond what is plausible is rejected with its reason.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from functools import cache, partial
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
-from bns.diagnose.estimate.noise import estimate_noise, filter_for
 from bns.diagnose.estimate.parallel import each
-from bns.diagnose.estimate.significance import MIN_Z, Evidence
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.significance import MIN_Z, PairedComparison
 from bns.diagnose.estimate.starts import best_start, fit_with, listed
-from bns.diagnose.estimate.trial_clock_test import OwnClocks, judged, own_clocks, with_one_clock
+from bns.diagnose.estimate.trial_clock_test import TrialClocks, compare_clocks, fit_trial_clocks, with_shared_clock
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.select.indistinguishable import alike
-from bns.diagnose.select.plausibility import veto_of
+from bns.diagnose.select.indistinguishable import indistinguishable
+from bns.diagnose.select.plausibility import implausible
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
 from bns.physics.model import Model
@@ -45,32 +45,32 @@ class Candidate:
 
     name: str
     fit: Fit
-    evidence: Evidence
-    veto: str = ""
+    paired_comparison: PairedComparison
+    rejected_because: str = ""
 
 
 @dataclass(frozen=True)
-class Step:
-    """One round: all candidates, best first, the bar that the decoys set, and what was taken ("" for nothing)."""
+class SelectionStep:
+    """One round: all candidates, best first, the threshold that the decoys set, and what was selected ("" for nothing)."""
 
     ranking: tuple[Candidate, ...]
-    bar: float
-    taken: str
+    decoy_threshold: float
+    selected: str
 
 
 @dataclass(frozen=True)
-class Found:
+class SelectionResult:
     """The end of a search: accepted names in order, their fit, the rounds, and explanations of the same size that fit as well."""
 
     problem: Problem
     nominal: Fit
     fit: Fit
     accepted: tuple[str, ...]
-    steps: tuple[Step, ...]
-    rivals: tuple[tuple[str, ...], ...] = ()
+    steps: tuple[SelectionStep, ...]
+    competing_models: tuple[tuple[str, ...], ...] = ()
 
 
-class Search:
+class StepwiseSelection:
     """A search for the effects that ``model`` lacks, on the tracks of a predictor."""
 
     def __init__(
@@ -86,106 +86,114 @@ class Search:
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 
-    def run(self) -> Found:
+    def run(self) -> SelectionResult:
         """The search; again with a clock for each trial where these differ, since that hides what else is wrong."""
-        plain = self._searched()
-        clocks = own_clocks(plain.problem, plain.fit)
+        plain = self._select()
+        clocks = fit_trial_clocks(plain.problem, plain.fit)
         if clocks is None or not self._clocks_earned(clocks, plain.fit):
             return plain
         given = self.model
         self.model = self._bare_with_clocks(clocks.fit.model, given)
-        added = self.catalogue.pop(_differing(self.model), None)
+        added = self.catalogue.pop(_per_trial_effect(self.model), None)
         self._exchanged = None
-        found = self._searched()
-        still = judged(found.problem, found.problem.fit(with_one_clock(found.fit.model)), found.fit)
-        if still is None or not self._clocks_earned(still, found.fit):
+        result = self._select()
+        still = compare_clocks(result.problem, result.problem.fit(with_shared_clock(result.fit.model)), result.fit)
+        if still is None or not self._clocks_earned(still, result.fit):
             return plain
-        return self._with_clocks(found, found.problem.fit(given), clocks, added)
+        return self._with_clocks(result, result.problem.fit(given), clocks, added)
 
     @staticmethod
     def _bare_with_clocks(fitted: Model, given: Model) -> Model:
         """The model as given and the trials' clocks, without what the first search added."""
-        kept = {active.effect.name for active in given.effects} | {_differing(fitted)}
+        kept = {active.effect.name for active in given.effects} | {_per_trial_effect(fitted)}
         return replace(fitted, effects=tuple(a for a in fitted.effects if a.effect.name in kept))
 
-    def _clocks_earned(self, clocks: OwnClocks, before: Fit) -> bool:
+    def _clocks_earned(self, clocks: TrialClocks, before: Fit) -> bool:
         """Few trials may earn all of it, so no number of standard errors is asked for: the clocks of most may be right."""
-        e = clocks.evidence
-        return e.p_value < CLOCKS_CHANCE and e.gain > MIN_GAIN * float(before.held_out.mean())
+        e = clocks.paired_comparison
+        return e.p_value < CLOCKS_CHANCE and e.elpd_diff > MIN_GAIN * float(before.held_out.mean())
 
-    def _with_clocks(self, found: Found, nominal: Fit, clocks: OwnClocks, added: Effect | None) -> Found:
+    def _with_clocks(
+        self, result: SelectionResult, nominal: Fit, clocks: TrialClocks, added: Effect | None
+    ) -> SelectionResult:
         """The search's end with the clocks named first, where the model given had none."""
-        name = _differing(self.model)
-        candidate = Candidate(name, clocks.fit, clocks.evidence)
-        first = replace(found.steps[0], ranking=(candidate, *found.steps[0].ranking))
+        name = _per_trial_effect(self.model)
+        candidate = Candidate(name, clocks.fit, clocks.paired_comparison)
+        first = replace(result.steps[0], ranking=(candidate, *result.steps[0].ranking))
         names = (name,) if added else ()
         return replace(
-            found,
+            result,
             nominal=nominal,
-            accepted=(*names, *found.accepted),
-            steps=(first, *found.steps[1:]),
-            rivals=tuple((*names, *r) for r in found.rivals),
+            accepted=(*names, *result.accepted),
+            steps=(first, *result.steps[1:]),
+            competing_models=tuple((*names, *r) for r in result.competing_models),
         )
 
-    def _searched(self) -> Found:
-        """Forwards and back until nothing more is earned; then rivals of the same size."""
-        problem, nominal = self._settled(self.model)
+    def _select(self) -> SelectionResult:
+        """Forwards and back until nothing more is earned; then competing models of the same size."""
+        problem, nominal = self._refit_with_noise(self.model)
         if nominal.free:
-            problem, nominal = self._settled(nominal.model, problem.following.noise)
+            problem, nominal = self._refit_with_noise(nominal.model, problem.pose_filter.noise)
         fit = nominal
         accepted: tuple[str, ...] = ()
-        steps: list[Step] = []
+        steps: list[SelectionStep] = []
         tried: set[frozenset[str]] = set()
         while len(accepted) < MOST:
-            step, problem, fit = self._round(problem, fit, accepted)
+            step, problem, fit = self._forward_step(problem, fit, accepted)
             steps.append(step)
-            if not step.taken:
+            if not step.selected:
                 break
-            accepted = (*accepted, step.taken)
-            problem, fit, accepted = self._swapped(problem, fit, accepted)
-            problem, fit, accepted = self._looked_back(problem, fit, accepted)
+            accepted = (*accepted, step.selected)
+            problem, fit, accepted = self._exchange_step(problem, fit, accepted)
+            problem, fit, accepted = self._backward_step(problem, fit, accepted)
             if frozenset(accepted) in tried:
                 break
             tried.add(frozenset(accepted))
-        rivals = self._rivals(problem, fit, accepted)
-        simplest = min(rivals, key=lambda r: len(r[1].free), default=None)
+        competing_models = self._competing_models(problem, fit, accepted)
+        simplest = min(competing_models, key=lambda r: len(r[1].free), default=None)
         if simplest is not None and len(simplest[1].free) < len(fit.free):
-            rivals = [(accepted, fit), *(r for r in rivals if r is not simplest)]
+            competing_models = [(accepted, fit), *(r for r in competing_models if r is not simplest)]
             accepted, fit = simplest
-        return Found(problem, problem.fit(self.model), fit, accepted, tuple(steps), tuple(names for names, _ in rivals))
+        return SelectionResult(
+            problem, problem.fit(self.model), fit, accepted, tuple(steps), tuple(names for names, _ in competing_models)
+        )
 
-    def _settled(self, model: Model, start: Array | None = None) -> tuple[Problem, Fit]:
+    def _refit_with_noise(self, model: Model, start: Array | None = None) -> tuple[Problem, Fit]:
         """Noise and numbers that belong together."""
         problem = problem_for(self.predictor, model, start)
         return problem, problem.fit(model)
 
-    def _round(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[Step, Problem, Fit]:
+    def _forward_step(
+        self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
+    ) -> tuple[SelectionStep, Problem, Fit]:
         """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in."""
         left = [effect for name, effect in self.catalogue.items() if name not in accepted]
         tried = each(partial(self._tried, problem, fit), [*DECOYS, *left])
-        bar = max(c.evidence.gain for c in tried[: len(DECOYS)])
-        ranking = sorted(tried[len(DECOYS) :], key=lambda c: -c.evidence.gain)
-        for place, candidate in enumerate(ranking):
-            if candidate.veto or not self._earned(candidate, fit, bar):
+        decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
+        ranking = sorted(tried[len(DECOYS) :], key=lambda c: -c.paired_comparison.elpd_diff)
+        for index, candidate in enumerate(ranking):
+            if candidate.rejected_because or not self._earned(candidate, fit, decoy_threshold):
                 continue
-            settled = self._settled(candidate.fit.model, problem.following.noise)
-            veto = veto_of(settled[1], candidate.name, bounds=False)
-            if not veto:
-                return Step(tuple(ranking), bar, candidate.name), *settled
-            ranking[place] = replace(candidate, veto=veto)
-        return Step(tuple(ranking), bar, ""), problem, fit
+            settled = self._refit_with_noise(candidate.fit.model, problem.pose_filter.noise)
+            rejected_because = implausible(settled[1], candidate.name, bounds=False)
+            if not rejected_because:
+                return SelectionStep(tuple(ranking), decoy_threshold, candidate.name), *settled
+            ranking[index] = replace(candidate, rejected_because=rejected_because)
+        return SelectionStep(tuple(ranking), decoy_threshold, ""), problem, fit
 
     def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
         self.tick(effect.name)
         added = fit_with(problem, fit, effect)
-        return Candidate(effect.name, added, problem.evidence(fit, added), veto_of(added, effect.name))
+        return Candidate(effect.name, added, problem.paired_comparison(fit, added), implausible(added, effect.name))
 
-    def _earned(self, candidate: Candidate, before: Fit, bar: float) -> bool:
-        e = candidate.evidence
+    def _earned(self, candidate: Candidate, before: Fit, decoy_threshold: float) -> bool:
+        e = candidate.paired_comparison
         least = MIN_GAIN * float(before.held_out.mean())
-        return e.p_value < self.level and e.z > MIN_Z and e.gain > max(bar, least)
+        return e.p_value < self.level and e.z > MIN_Z and e.elpd_diff > max(decoy_threshold, least)
 
-    def _swapped(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[Problem, Fit, tuple[str, ...]]:
+    def _exchange_step(
+        self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
+    ) -> tuple[Problem, Fit, tuple[str, ...]]:
         """Exchange an accepted effect for one that has earned its place too, while that makes the held-out loss smaller."""
         barred: set[str] = set()
         for _ in range(len(accepted) if len(accepted) > 1 else 0):
@@ -196,49 +204,51 @@ class Search:
                     best, new, comes = tried, tuple(other if a == name else a for a in accepted), other
             if new == accepted:
                 break
-            exchanged, settled = self._settled(best.model, problem.following.noise)
-            if any(veto_of(settled, name, bounds=False) for name in new):  # under its own noise it asks for more
+            exchanged, settled = self._refit_with_noise(best.model, problem.pose_filter.noise)
+            if any(implausible(settled, name, bounds=False) for name in new):  # under its own noise it asks for more
                 barred.add(comes)
             else:
                 problem, fit, accepted = exchanged, settled, new
         return problem, fit, accepted
 
-    def _looked_back(
+    def _backward_step(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
     ) -> tuple[Problem, Fit, tuple[str, ...]]:
         """Drop what no longer earns its place, and what can no longer be believed beside what came in."""
         newest = accepted[-1]
         for name in accepted:
-            believed = not veto_of(fit, name, bounds=False)  # at a bound it may be: what does nothing there earns nothing
+            believed = not implausible(
+                fit, name, bounds=False
+            )  # at a bound it may be: what does nothing there earns nothing
             if believed and name == newest:
                 continue
             lacking = without(problem, fit, name)
             if not believed or not self._earned_over(problem, lacking, fit, name):
                 accepted = tuple(a for a in accepted if a != name)
-                problem, fit = self._settled(lacking.model, problem.following.noise)
+                problem, fit = self._refit_with_noise(lacking.model, problem.pose_filter.noise)
         return problem, fit, accepted
 
     def _may_stay(self, problem: Problem, fit: Fit, name: str) -> bool:
         """Whether that effect of a fit would be taken as a newcomer: few trials that gain much do not bring one in."""
-        return not veto_of(fit, name) and self._earned_over(problem, without(problem, fit, name), fit, name)
+        return not implausible(fit, name) and self._earned_over(problem, without(problem, fit, name), fit, name)
 
     def _earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:
-        return self._earned(Candidate(name, fit, problem.evidence(lacking, fit)), lacking, 0.0)
+        return self._earned(Candidate(name, fit, problem.paired_comparison(lacking, fit)), lacking, 0.0)
 
     def _exchanges(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
         """Every accepted effect exchanged for every other one that might do the same."""
         if self._exchanged is not None and self._exchanged[0] is problem and self._exchanged[1] == accepted:
             return self._exchanged[2]
-        found = []
+        result = []
         for name in accepted:
             model = fit.model.without(name)
             loose = problem_for(self.predictor, model)
             lacking, reached = loose.fit(model), loose.loss(fit.model)
             others = [effect for other, effect in self.catalogue.items() if other not in accepted]
             fits = each(partial(self._in_place, problem, fit, loose, lacking, reached), others)
-            found += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
-        self._exchanged = (problem, accepted, found)
-        return found
+            result += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
+        self._exchanged = (problem, accepted, result)
+        return result
 
     def _in_place(
         self, problem: Problem, fit: Fit, loose: Problem, lacking: Fit, reached: float, effect: Effect
@@ -252,36 +262,34 @@ class Search:
         if lacking.loss - start.loss < SCREEN * (lacking.loss - reached):
             return None
         self.tick(effect.name)
-        fitted = loose.fit(start.model, known=start.slopes)
+        fitted = loose.fit(start.model, nearby=start.jacobian_by_parameter)
         if fitted.loss - reached > max(BEHIND * (lacking.loss - reached), BEHIND_LOSS):
             return None
-        return problem.fit(fitted.model, known=fit.slopes)
+        return problem.fit(fitted.model, nearby=fit.jacobian_by_parameter)
 
-    def _rivals(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[tuple[str, ...], Fit]]:
+    def _competing_models(
+        self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
+    ) -> list[tuple[tuple[str, ...], Fit]]:
         """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one.
 
         What comes in must have earned its place: where trials disagree, much that earns nothing certain is no worse for certain.
         """
-        rivals: list[tuple[tuple[str, ...], Fit]] = []
+        competing_models: list[tuple[tuple[str, ...], Fit]] = []
         lacking = cache(partial(without, problem, fit))
         for name, other, tried in self._exchanges(problem, fit, accepted):
             # at a bound it may be: a tether from ever farther away is a slope
-            may = not veto_of(tried, other, bounds=False) and self._earned_over(problem, lacking(name), tried, other)
-            if may and alike(tried, fit, lacking(name)):
-                rivals.append((tuple(other if a == name else a for a in accepted), tried))
-        return rivals
+            may = not implausible(tried, other, bounds=False) and self._earned_over(
+                problem, lacking(name), tried, other
+            )
+            if may and indistinguishable(tried, fit, lacking(name)):
+                competing_models.append((tuple(other if a == name else a for a in accepted), tried))
+        return competing_models
 
 
-def _differing(model: Model) -> str:
-    return model.differing.effect.name if model.differing else ""
+def _per_trial_effect(model: Model) -> str:
+    return model.per_trial_effect.effect.name if model.per_trial_effect else ""
 
 
 def without(problem: Problem, fit: Fit, name: str) -> Fit:
     """The fit that lacks an effect."""
-    return problem.fit(fit.model.without(name), known=fit.slopes)
-
-
-def problem_for(predictor: Predictor, model: Model, start: Array | None = None) -> Problem:
-    """The problem of fitting models like this one: its noise is estimated under it."""
-    steps = predictor.steps(model)
-    return Problem(predictor, filter_for(predictor, steps, estimate_noise(predictor, steps, start)))
+    return problem.fit(fit.model.without(name), nearby=fit.jacobian_by_parameter)

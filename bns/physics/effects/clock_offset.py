@@ -24,5 +24,5 @@ EFFECT = Effect(
     lookalikes=("command-delay", "motor-lag"),
     apply=apply,
     rank=150,
-    may_differ=True,
+    per_trial_allowed=True,
 )

@@ -16,7 +16,7 @@ from bns.engine.evolution import CommandBounds, Population, diversity, random_po
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.snn import INPUTS
 from bns.measurements import COLUMNS, trial_table
-from bns.robots.base import Luck, Scores, turned
+from bns.robots.base import RandomStream, Scores, turned
 from bns.robots.khepera.rollout import inputs, roll_out
 from bns.robots.khepera.rules import (
     GOAL_RADIUS_M,
@@ -124,7 +124,7 @@ class Khepera:
         """As they are: no command of two wheels is unstable."""
         return poses
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, luck: Luck | None = None) -> np.ndarray:
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, stream: RandomStream | None = None) -> np.ndarray:
         """A controller is driven as it is."""
         return controller
 
@@ -147,7 +147,8 @@ class Khepera:
         return diversity(population, self.bounds)
 
     def score(
-        self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None
+        self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
+        parents: Scores | None = None,
     ) -> Scores:
         """Fitness on simulator networks (algorithm 2), without noise."""
         known = None if parents is None else parents.outputs

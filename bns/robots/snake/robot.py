@@ -11,7 +11,7 @@ from bns.engine.evolution import Population, diversity
 from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import predict
 from bns.errors import SpecError
-from bns.robots.base import Luck, Recipe, Scores, turned
+from bns.robots.base import RandomStream, Scores, StagedTraining, turned
 from bns.robots.snake import cycles, path, posture, table
 from bns.robots.snake.options import BEYOND, READINGS, Options
 from bns.robots.snake.rollout import evaluate
@@ -46,7 +46,7 @@ class Snake:
     input_count = 4
     sigmoid_output = True
     repeats_inputs = True
-    recipe: Recipe | None = Recipe(400, 20, 3, 20, 4, 12_000, (*[SUBSTITUTE_SD_M] * 4, 0.0), ("crossover-80",))
+    recipe: StagedTraining | None = StagedTraining(400, 20, 3, 20, 4, 12_000, (*[SUBSTITUTE_SD_M] * 4, 0.0), ("crossover-80",))
     """Section 5.4.1; crossover there is 80/20 (section 5.4.2)."""
     radii_m: tuple[float, ...] = ()
     bounds = BOUNDS
@@ -142,18 +142,18 @@ class Snake:
         marked[[number - 1 for number in commands], path.STABLE] = 0.0
         return marked
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, luck: Luck | None = None) -> np.ndarray:
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, stream: RandomStream | None = None) -> np.ndarray:
         """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2).
 
-        With luck these are as many as any of the noisy evaluations that decide on its fitness needed (figure 5.18); those that
-        did not finish do not count; where none did, all are driven.
+        With a stream these are as many as any of the noisy evaluations that decide on its fitness needed (figure 5.18); those
+        that did not finish do not count; where none did, all are driven.
         """
         in_full = cycles.in_full(controller)
         moved = self.displacements(predict(weights, self.inputs(in_full), self.sigmoid_output))
-        if luck is None or "cut-without-noise" in self._options:
+        if stream is None or "cut-without-noise" in self._options:
             return in_full[: self._needed(moved, in_full, task)[1]]
         needed = []
-        for noise in self._noise(luck, len(in_full)):
+        for noise in self._noise(stream, len(in_full)):
             noisy = moved.copy()
             noisy[:, :4] += noise
             needed.append(self._needed(noisy, in_full, task))
@@ -165,9 +165,10 @@ class Snake:
         return goals == len(task.goals_m), used
 
     def score(
-        self, population: Population, weights: np.ndarray, task: Task, luck: Luck | None = None, parents: Scores | None = None
+        self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
+        parents: Scores | None = None,
     ) -> Scores:
-        """Mean fitness over ten noisy evaluations, all controllers under the same noise; without luck there is none."""
+        """Mean fitness over ten noisy evaluations, all controllers under the same noise; without a stream there is none."""
         commands = population.commands
         n, length, _ = commands.shape
         moves = np.ascontiguousarray(
@@ -175,7 +176,7 @@ class Snake:
         )
         fitness, reached, used = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int32)
         half = (task.region_m / 2, task.surface_m[0] / 2, task.surface_m[1] / 2)
-        noise = self._noise(luck, length * MOST_REPEATS)
+        noise = self._noise(stream, length * MOST_REPEATS)
         repeats = np.ascontiguousarray(commands[..., REPEATS])
         moved = self._population_changes(commands)
         failures = evaluate(self.start_m, moves, moved, self.rigid, repeats, noise, task.goals_m, *half, fitness, reached, used)
@@ -191,10 +192,10 @@ class Snake:
         return np.ascontiguousarray(posture.changes(commands.reshape(n * length, -1), before).T)
 
     @staticmethod
-    def _noise(luck: Luck | None, steps: int) -> np.ndarray:
-        if luck is None:
+    def _noise(stream: RandomStream | None, steps: int) -> np.ndarray:
+        if stream is None:
             return np.empty((0, steps, 4))
-        return normals(luck.key, Purpose.ROLLOUT_NOISE, luck.step, NOISY_EVALUATIONS, steps) * NOISE_SD_M
+        return normals(stream.key, Purpose.ROLLOUT_NOISE, stream.step, NOISY_EVALUATIONS, steps) * NOISE_SD_M
 
     def breed(
         self,

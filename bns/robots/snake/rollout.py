@@ -43,7 +43,8 @@ def evaluate(start, moves, changes, rigid, repeats, noise, goals, half_region, h
     """Fitness (mean over the rows of noise, if there are any), goals and cycles without noise; how many could not be computed.
 
     start (2, 2): the markers, m; moves (5, controllers * cycles): displacements m and stability; changes (5, controllers *
-    cycles) as of `posture.changes`, or (5, 0) where they are ignored; rigid: the markers cannot drift apart; repeats (controllers, cycles); noise (rows, steps, 4) m.
+    cycles) as of `posture.changes`, or (5, 0) where they are ignored; rigid: the markers cannot drift apart; repeats
+    (controllers, cycles); noise (rows, steps, 4) m.
     """
     failures, nothing = 0, np.zeros((noise.shape[1], 4))
     for i in range(repeats.shape[0]):

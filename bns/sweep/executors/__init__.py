@@ -1,6 +1,6 @@
-"""Ways to carry out a sweep. Each is a module of this folder, found by its name, with two functions.
+"""Backends that carry out a sweep. Each is a module of this folder, found by its name, with two functions.
 
-``place(request)`` says what would run where (`Placement`); ``carry_out(sweep, request)`` does it and gives a `Summary`.
+``placement(request)`` says what would run where (`Placement`); ``carry_out(sweep, request)`` does it and gives a `Summary`.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
 
 
-class Way(Protocol):
+class Backend(Protocol):
     """What every module here has."""
 
-    def place(self, request: Request) -> Placement:
+    def placement(self, request: Request) -> Placement:
         """What would run where."""
 
     def carry_out(self, sweep: Sweep, request: Request) -> Summary:
@@ -30,8 +30,8 @@ def executor_names() -> tuple[str, ...]:
     return tuple(sorted(module.name for module in pkgutil.iter_modules(__path__)))
 
 
-def load_executor(name: str) -> Way:
-    """The way called ``name``; ClusterError if there is none or its libraries are not installed."""
+def load_executor(name: str) -> Backend:
+    """The backend called ``name``; ClusterError if there is none or its libraries are not installed."""
     if name not in executor_names():
         raise ClusterError(unknown_name("executor", name, executor_names()))
     try:

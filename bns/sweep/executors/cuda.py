@@ -15,7 +15,7 @@ from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary, run_sweep
 
 
-def place(request: Request) -> Placement:
+def placement(request: Request) -> Placement:
     """Nothing can be foretold: SpecError."""
     raise SpecError("--dry-run knows the pace of cores, not of a GPU; leave --device out to count runs and disk space.")
 

@@ -16,10 +16,10 @@ from bns.sweep.runner import Summary, run_sweep
 _LOOK_S = 10.0
 
 
-def place(request: Request) -> Placement:
+def placement(request: Request) -> Placement:
     """The workers that are with the scheduler now; ClusterError if there is none."""
     if request.scheduler is None:
-        own = joblib.place(request)
+        own = joblib.placement(request)
         return Placement(own.workers, f"a Dask scheduler of its own with {own.where}")
     link = DaskLink(request.scheduler, 0, _LOOK_S)
     try:

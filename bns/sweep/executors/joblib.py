@@ -10,7 +10,7 @@ from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary, run_sweep
 
 
-def place(request: Request) -> Placement:
+def placement(request: Request) -> Placement:
     """The worker processes of this machine."""
     jobs = cores(request.jobs)
     return Placement(jobs, f"{jobs} worker processes on {platform.node()} ({cores()} cores)")

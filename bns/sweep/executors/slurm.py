@@ -32,7 +32,7 @@ _TURNS = 10_000
 _LOOK_S, _ASK_S = 5.0, 30.0
 
 
-def place(request: Request) -> Placement:
+def placement(request: Request) -> Placement:
     """The jobs that would be queued."""
     shards = request.shards or SHARDS
     processes = f"{request.jobs} worker processes" if request.jobs else "a node each, all of its cores (taken for 1)"

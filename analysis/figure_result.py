@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
-class Drawn:
+class FigureResult:
     """A figure and what its caption says: ``n`` runs stand in it, ``missing`` names what does not.
 
     ``shows`` says what is drawn and how, ``see`` what to look for; ``data`` are the numbers behind the picture, written

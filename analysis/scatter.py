@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.coverage import coverage
-from analysis.drawn import Drawn
+from analysis.figure_result import FigureResult
+from analysis.labels import SHORT, TITLES, counted, each, valued
 from analysis.outcomes import at_the_end, fewest
+from analysis.results import BEGIN, NoDataError, Results, remembered
 from analysis.selection import Selection
-from analysis.store import BEGIN, NoDataError, Store, remembered
-from analysis.words import SHORT, TITLES, counted, each, valued
 from bns.plotting.style import lettered, note, ordered_styles, panels, style
 
 CROWD = 60
@@ -30,7 +30,7 @@ class Panel:
 
 
 @remembered
-def combinations(store: Store, chosen: Selection) -> tuple[pd.DataFrame, int]:
+def combinations(store: Results, chosen: Selection) -> tuple[pd.DataFrame, int]:
     """Every combination with enough runs at its last evaluation, and how many have fewer.
 
     Raises:
@@ -46,7 +46,7 @@ def combinations(store: Store, chosen: Selection) -> tuple[pd.DataFrame, int]:
     return rows, len(found) - len(rows)
 
 
-def cloud(shown: Sequence[Panel], parameter: str, label: str) -> tuple[Figure, Sequence[Axes]]:
+def scatter_figure(shown: Sequence[Panel], parameter: str, label: str) -> tuple[Figure, Sequence[Axes]]:
     """Figure of the panels, coloured by ``parameter``, with one legend for all."""
     values = sorted(set().union(*(panel.rows[parameter] for panel in shown)))
     looks = dict(zip(values, ordered_styles(len(values)), strict=True))
@@ -96,7 +96,7 @@ def _legend(figure: Figure, axes: Sequence[Axes], parameter: str, values: Sequen
 
 @style()
 def described(
-    store: Store,
+    store: Results,
     chosen: Selection,
     figure: Figure,
     rows: pd.DataFrame,
@@ -107,7 +107,7 @@ def described(
     intervals: str,
     thin: int,
     see: str = "",
-) -> Drawn:
+) -> FigureResult:
     """The figure with its note and caption; ``what`` begins the caption."""
     said, n = coverage(store, chosen.sweeps, chosen.n), int(rows.runs.sum())
     thinned = (f"{counted(thin, 'combination')} with fewer than {fewest(store, chosen)} runs left out",) if thin else ()
@@ -121,4 +121,4 @@ def described(
         f"{', '.join(chosen.sweeps)})."
     )
     missing = (*said.missing, *thinned, *chosen.left_out)
-    return Drawn(f"{name}-{chosen.robot}", title, figure, shows, n, chosen.sweeps, missing, see=see, data=rows)
+    return FigureResult(f"{name}-{chosen.robot}", title, figure, shows, n, chosen.sweeps, missing, see=see, data=rows)

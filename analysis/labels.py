@@ -1,4 +1,4 @@
-"""The words that figures share: numbers, parameters, tasks, what a success is."""
+"""The labels that figures share: numbers, parameters, tasks, what a success is."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def task_number(robot: str, task: str) -> int | None:
     return int(words[-1]) if len(words) > 1 and words[-1].isdigit() else None
 
 
-def place(paper: str) -> tuple[float, float]:
+def source_position(paper: str) -> tuple[float, float]:
     """Where a figure stands in the source, (4, 12) for "figures 4.12 and 5.27"; last of all what the source lacks."""
     number = re.search(r"(?:figure|table)s? (\d+)\.(\d+)", paper)
     return (float(number[1]), float(number[2])) if number else (float("inf"), 0.0)

@@ -11,7 +11,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import duckdb
 import pandas as pd
 
-from analysis.words import CELL
+from analysis.labels import CELL
 from bns import store as results_store
 from bns.errors import BnsError, SpecError, StoreError
 from bns.spec import FIELDS
@@ -44,7 +44,7 @@ class Plan:
         return self.runs // max(self.cells, 1)
 
 
-class Store:
+class Results:
     """The results in one folder as they are now: all figures of one call show the same runs; with ``run``, that run alone.
 
     Raises:
@@ -111,11 +111,11 @@ def _plan(text: str, runs: float) -> Plan:
     return Plan(sweep.total, len(sweep.combos), frozenset(varied))
 
 
-def remembered(work: Callable[Concatenate[Store, P], R]) -> Callable[Concatenate[Store, P], R]:
+def remembered(work: Callable[Concatenate[Results, P], R]) -> Callable[Concatenate[Results, P], R]:
     """Let what ``work`` finds in a store be found once for all figures; its other arguments must be hashable."""
 
     @wraps(work)
-    def find(store: Store, *arguments: P.args, **named: P.kwargs) -> R:
+    def find(store: Results, *arguments: P.args, **named: P.kwargs) -> R:
         key = (work, arguments, tuple(sorted(named.items())))
         if key not in store.memory:
             store.memory[key] = work(store, *arguments, **named)
