@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 
 from bns.physics.snake.parameters import SnakeParameters
+from bns.physics.snake.servo import actuator_xml, joint_xml, servo_of
 
 YELLOW, GREEN = "yellow", "green"
 """Names of the marker sites."""
@@ -17,18 +18,15 @@ def build_model(parameters: SnakeParameters) -> mujoco.MjModel:
 
 def model_xml(p: SnakeParameters) -> str:
     """The model in MuJoCo's own language: links are capsules along x, y to the left, z up."""
-    motors = "".join(
-        f'<position joint="joint{n}" kp="{p.stiffness_n_m_rad}" '
-        f'forcerange="{-p.torque_limit_n_m} {p.torque_limit_n_m}"/>'
-        for n in range(p.joints)
-    )
+    servo = servo_of(p)
+    motors = "".join(actuator_xml(servo, f"joint{n}") for n in range(p.joints))
     return f"""
 <mujoco model="snake">
   <compiler angle="radian"/>
   <option timestep="{p.dt_s}" integrator="implicitfast" cone="elliptic" impratio="10"/>
   <visual><global offwidth="960" offheight="544"/><headlight ambient="0.4 0.4 0.4"/><quality shadowsize="0"/></visual>
   <default>
-    <joint damping="{p.damping_n_m_s_rad}" armature="{p.armature_kg_m2}" frictionloss="{p.friction_loss_n_m}"
+    <joint {joint_xml(servo)}
       range="-1.745 1.745" limited="true"/>
     <geom friction="{p.floor_friction} 0.005 0.0001" condim="3"/>
   </default>
