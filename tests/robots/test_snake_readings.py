@@ -32,7 +32,8 @@ def test_every_reading_can_be_named_and_all_together():
 
 
 def test_lateral_amplitudes_are_uniform_and_those_of_the_other_reading_are_seldom_small():
-    plain, other = (robot.random_controllers(KEY, 1, 4000).controller(0) for robot in (PLAIN, load_robot("snake+sorted-amplitudes")))
+    both = PLAIN, load_robot("snake+sorted-amplitudes")
+    plain, other = (robot.random_controllers(KEY, 1, 4000).controller(0) for robot in both)
     for drawn in (plain, other):
         assert (drawn[:, 1] < drawn[:, 0]).all()
     assert np.mean(plain[:, 0] < 0.2) == pytest.approx(0.2 / (math.pi / 2), abs=0.02)
