@@ -40,7 +40,8 @@ REACH_M = 2.0
 """Displacements from -1 to 1 m lie between outputs 0 and 1: the order of the largest that cycles make."""
 STEP_RAD = 2 * math.sin(math.pi / 12)
 """The longest of a cycle's twelve steps, a radian of its lateral amplitude."""
-JOINT_SPEED_RAD_S, SETTLE_S = 1.5, 0.05
+JOINT_SPEED_RAD_S, SETTLE_S = 2.944, 0.05
+"""As in `bns/physics/snake/parameters.yaml`."""
 
 
 @inline
