@@ -200,13 +200,14 @@ def _provenance(
 
 
 def accuracy(measured: np.ndarray, predicted: np.ndarray) -> dict[str, float]:
-    """R² of prediction, the regression of predicted on measured (slope, its R²), RMSE and bias, all in the units given."""
+    """R² of prediction, the regression of predicted on measured (slope, its R²), RMSE and bias, all in the units given; the
+    first three are 0 where all that was measured is the same."""
     spread, error = measured - measured.mean(), predicted - measured
-    slope = float((spread * predicted).sum() / (spread**2).sum())
+    varies = float((spread**2).sum())
     return {
-        "r2": float(1 - (error**2).sum() / (spread**2).sum()),
-        "regression_r2": float(np.corrcoef(measured, predicted)[0, 1] ** 2) if np.ptp(predicted) else 0.0,  # the same of all
-        "slope": slope,
+        "r2": float(1 - (error**2).sum() / varies) if varies else 0.0,
+        "regression_r2": float(np.corrcoef(measured, predicted)[0, 1] ** 2) if varies and np.ptp(predicted) else 0.0,
+        "slope": float((spread * predicted).sum() / varies) if varies else 0.0,
         "rmse": float(np.sqrt((error**2).mean())),
         "bias": float(error.mean()),
     }

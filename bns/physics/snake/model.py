@@ -9,6 +9,8 @@ from bns.physics.snake.servo import actuator_xml, joint_xml, servo_of
 
 YELLOW, GREEN = "yellow", "green"
 """Names of the marker sites."""
+_LESS_THAN_ANY = 1e-4
+"""Friction of the floor itself: of two that touch the larger friction counts, so that each link's own decides."""
 
 
 def build_model(parameters: SnakeParameters) -> mujoco.MjModel:
@@ -36,7 +38,7 @@ def model_xml(p: SnakeParameters) -> str:
   </asset>
   <worldbody>
     <light pos="0 0 4" dir="0 0 -1" diffuse="0.5 0.5 0.5"/>
-    <geom name="floor" type="plane" size="10 10 0.1" material="floor"/>
+    <geom name="floor" type="plane" size="10 10 0.1" material="floor" friction="{_LESS_THAN_ANY} 0.005 0.0001"/>
     {_link(p, 0)}
   </worldbody>
   <actuator>{motors}</actuator>
