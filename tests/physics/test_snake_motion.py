@@ -20,8 +20,8 @@ from bns.robots import load_robot
 KEY = Key(1, 2)
 SIDEWINDING = [0.6, 0.3, math.pi / 3, 1.5 * math.pi]
 ROLLING = [1.43, 1.26, 3.81, 4.58]
-FALLING = [0.84, 0.72, 4.9, 6.21]
-"""Leaves the robot on its side; one that rolls ends upright again."""
+FALLING, ROLLING_ROUND = [0.85, 0.79, 5.18, 1.41], [0.86, 0.55, 4.6, 0.39]
+"""One leaves the robot on its side, the other goes right round and ends upright."""
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +152,7 @@ def test_a_robot_on_its_side_is_not_driven_on():
 
 
 def test_a_robot_that_rolled_and_stands_again_is_driven_on_unless_read_otherwise():
-    cycles = [SIDEWINDING, ROLLING, SIDEWINDING]
+    cycles = [SIDEWINDING, ROLLING_ROUND, SIDEWINDING]
     assert stability_of(cycles) == [1, 0, 1]
     assert stability_of(cycles, tipped_on_the_way_ends=1.0) == [1, 0]
     assert stability_of(cycles, tipped_on_the_way_fails=0.0) == [1, 1, 1]
@@ -167,8 +167,8 @@ def test_a_robot_on_its_side_is_driven_on_with_exchanged_roles_where_read_so(bod
         one.data.qpos[3:7] = [math.cos(math.pi / 4), math.sin(math.pi / 4), 0, 0]  # on its side
         mujoco.mj_forward(one.model, one.data)
         one.drive_cycle([0.5, 0.0, 0.0, math.pi / 2])
-        bent = np.abs(one.data.qpos[7:]) > 0.3
-        assert bent.tolist() == [n % 2 == int(switched) for n in range(12)]
+        bent = np.abs(one.data.qpos[7:])
+        assert bent[int(switched) :: 2].mean() > 3 * bent[int(not switched) :: 2].mean()
 
 
 def test_the_heavy_end_is_yellows_unless_read_otherwise(body):
