@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from bns.bootstrap.driver import Drive
 from bns.bootstrap.evolver import Evolver
-from bns.bootstrap.trainer import Trainer
+from bns.bootstrap.neuro_simulation import NeuroSimulation
 from bns.engine.evolution import Population
 from bns.engine.philox import Key, Purpose
 from bns.engine.snn import predict
@@ -43,7 +44,7 @@ class Recorder:
 
     def __init__(self, robot: Robot, task: Task, world: World, key: Key, spec: RunSpec) -> None:
         self._robot, self._task, self._world, self._key = robot, task, world, key
-        self._once = not getattr(world, "repeatable", True)
+        self._once = not world.repeatable
         self._full, self._with_paths = spec.record == "full", spec.record in {"paths", "full"}
         self._evals, self._paths, self._generations, self._probe_rows = (_Columns() for _ in range(4))
         self.last_poses = self.last_simulated = robot.start_pose()[:0]
@@ -57,12 +58,12 @@ class Recorder:
             ]
             self._probe_before: list[np.ndarray] | None = None
 
-    def drive_evaluated(self, evaluation: int, controller: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Drive the controller picked for this evaluation; its measured poses are what the networks learn from."""
-        poses = self._drive(controller, Purpose.WORLD_EVALUATED, evaluation)
-        in_world, goals = self._robot.judge(poses, self._task)
+    def add_evaluated(self, evaluation: int, drive: Drive, weights: np.ndarray) -> None:
+        """Keep the drive of the controller picked for this evaluation, and what networks (networks, W) predict for it."""
+        controller, poses = drive.commands, drive.poses
+        in_world, goals = self._robot.evaluate_path(poses, self._task)
         simulated = self._simulated(controller, weights)
-        in_simulation, _ = self._robot.judge(simulated, self._task)
+        in_simulation, _ = self._robot.evaluate_path(simulated, self._task)
         self._evaluated = {
             "evaluated_fitness_simulation": in_simulation,
             "evaluated_fitness_world": in_world,
@@ -74,20 +75,13 @@ class Recorder:
         self._path = (controller, poses, simulated)
         if self._with_paths:
             self._add_path(evaluation, "evaluated", *self._path)
-        return poses
 
-    def record(
-        self,
-        evaluation: int,
-        trainer: Trainer,
-        evolver: Evolver,
-        weights: np.ndarray,
-        training_cpu_s: float,
-        evolution_cpu_s: float,
-    ) -> dict[str, Any]:
+    def record(self, evaluation: int, simulation: NeuroSimulation) -> dict[str, Any]:
         """Measure the fittest controller in the world and add this evaluation's row."""
+        trainer, evolver, weights = simulation.trainer, simulation.evolver, simulation.weights
+        training_cpu_s, evolution_cpu_s = simulation.take_cpu_s()
         fittest, poses, simulated = self._fittest(evaluation, evolver, weights)
-        in_world, goals = self._robot.judge(poses, self._task)
+        in_world, goals = self._robot.evaluate_path(poses, self._task)
         in_simulation = self._evaluated["evaluated_fitness_simulation"] if self._once else evolver.best_fitness
         self.last_poses, self.last_simulated = poses, simulated
         successes = self._successes("success", poses)
@@ -164,7 +158,7 @@ class Recorder:
                 evaluation=evaluation,
                 generation=generation.number,
                 best_fitness=generation.best_fitness,
-                best_fitness_world=self._robot.judge(driven, self._task)[0],
+                best_fitness_world=self._robot.evaluate_path(driven, self._task)[0],
                 mean_fitness=generation.mean_fitness,
             )
         self._add_probes(evaluation, self._probes, weights)

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 import struct
-import termios
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 
-from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler
-
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.ax12_table import BROADCAST, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel_port import ClockedPort
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
+from bns.hardware.terminal_error import TerminalError
+
+with extra("robot"):
+    from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler
 
 BAUD = 1_000_000
 ATTEMPTS = 6
@@ -30,7 +32,9 @@ _PRESENT = struct.Struct("<HHHBB")
 class Ax12Chain:
     """Driver of servos `ids` in the order of the joints. Opening checks that each is there, once, and an AX-12."""
 
-    def __init__(self, port: str, ids: Sequence[int], clock: Clock, journal: Journal, limits: ServoLimits | None = None) -> None:
+    def __init__(
+        self, port: str, ids: Sequence[int], clock: Clock, journal: HardwareLog, limits: ServoLimits | None = None
+    ) -> None:
         self.ids, self._clock, self._journal = tuple(ids), clock, journal
         self.limits = limits or ServoLimits()
         self.retries = 0
@@ -86,7 +90,7 @@ class Ax12Chain:
             except IndexError:  # the SDK reads past the end of a status packet that is too short
                 value, result, bits = 0, COMM_RX_CORRUPT, 0
                 problem = "corrupt status packet"
-            except (OSError, termios.error) as error:
+            except (OSError, TerminalError) as error:
                 self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             finally:
@@ -107,7 +111,7 @@ class Ax12Chain:
     def _lose(self, error: Exception) -> None:
         if self._port.is_open:  # else it was gone before
             self._journal.note("link-lost", port=self._port.port_name, error=str(error))
-        with suppress(OSError, termios.error):
+        with suppress(OSError, TerminalError):
             self.close()
         self._port.is_open = False
 
@@ -166,7 +170,7 @@ class Ax12Chain:
 
     def _health(self, number: int, alarms: bool = False) -> Health:
         """One exchange for all of it: the registers stand side by side."""
-        return told(self._block(number, "present_position", "present_temperature", alarms))
+        return decoded(self._block(number, "present_position", "present_temperature", alarms))
 
     def _block(self, number: int, first: str, last: str, alarms: bool = False, attempts: int = ATTEMPTS) -> bytes:
         """The registers from `first` to `last`."""
@@ -210,7 +214,7 @@ class Ax12Chain:
     def _all_off(self) -> None:
         """Take the torque off all servos at once; nobody answers that."""
         self._port.is_using = False
-        with suppress(OSError, termios.error):
+        with suppress(OSError, TerminalError):
             self._reopen()
             self._packets.write1ByteTxOnly(self._port, BROADCAST, REGISTERS["torque_enable"].address, 0)
             self._port.is_using = False
@@ -229,7 +233,7 @@ class Ax12Chain:
         return "" if still else f"servo {number} still moves"
 
 
-def told(block: bytes) -> Health:
+def decoded(block: bytes) -> Health:
     """What the registers from `present_position` to `present_temperature` say."""
     position, _speed, load, decivolts, celsius = _PRESENT.unpack(block)
     return Health(

@@ -26,6 +26,9 @@ class SnakePhysics:
     `causes` holds, after `drive`, why each driven cycle was unstable (empty: it was stable).
     """
 
+    repeatable = True
+    renderable = True
+
     def __init__(self, parameters: SnakeParameters, start_m: ArrayLike = START_M) -> None:
         self._parameters = parameters
         self._body = Body(parameters)

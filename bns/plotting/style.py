@@ -146,16 +146,22 @@ def draw_paths(
     world_poses: np.ndarray,
     snn_poses: np.ndarray,
     square: bool = False,
+    repeats: Sequence[np.ndarray] = (),
 ) -> None:
     """Robot's path (solid) and the simulator's idea of it (dashed) among the goals, in cm.
+
+    With `repeats`, paths of several drives, each is drawn thin, and the robot's path is their mean.
 
     Poses are (n, 3), x_m, y_m, heading_rad, first the start, then the end of each command (dots). A simulator that is
     far off runs out of the picture rather than shrink it. Among square goals commands are joined by straight lines.
     """
     draw_goals(ax, goals_m, radius_m, square)
     drawn = _chords if square else arcs
+    for number, poses in enumerate(repeats):
+        path, label = 100 * drawn(poses), "each drive" if number == 0 else "_each drive"
+        ax.plot(path[:, 0], path[:, 1], label=label, color=OKABE_ITO[0], linewidth=0.7, alpha=0.6)
     for poses, label, color, line in (
-        (world_poses, "robot", OKABE_ITO[0], "-"),
+        (world_poses, "robot, mean" if repeats else "robot", OKABE_ITO[0], "-"),
         (snn_poses, "simulator", OKABE_ITO[1], "--"),
     ):
         path = 100 * drawn(poses)
@@ -171,7 +177,7 @@ def draw_paths(
         linestyle="none",
         label="start",
     )
-    _frame(ax, goals_m, radius_m, drawn(world_poses))
+    _frame(ax, goals_m, radius_m, np.vstack([drawn(poses) for poses in (world_poses, *repeats)]))
 
 
 def _chords(poses: np.ndarray) -> np.ndarray:
@@ -240,15 +246,20 @@ def _tick_alike(ax: Axes) -> None:
 @style()
 def path_figure(spec: RunSpec, task: Task, robot: Robot, result: RunResult, stem: Path) -> Path:
     """Draw and save the path of a run's fittest controller at its end, a column wide; the path of the PNG."""
-    driven, simulated = floor_poses(robot, result.world_poses), floor_poses(robot, result.snn_poses)
-    reach_m, square = goal_reach(robot, task)
     figure = Figure(figsize=(COLUMN_IN, COLUMN_IN + 0.4))
     ax = figure.subplots()
+    path_axes(ax, spec, task, robot, result)
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return save(figure, stem)[0]
+
+
+def path_axes(ax: Axes, spec: RunSpec, task: Task, robot: Robot, result: RunResult) -> None:
+    """The same on axes that are there, without a legend."""
+    driven, simulated = floor_poses(robot, result.world_poses), floor_poses(robot, result.snn_poses)
+    reach_m, square = goal_reach(robot, task)
     draw_paths(ax, task.goals_m, reach_m, driven, simulated, square)
     success = bool(result.tables["evals"]["success"][-1])
     ax.set_title(f"{task.title}, seed {spec.seed}\nevaluation {spec.evaluations}: {outcome(success)}")
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return save(figure, stem)[0]
 
 
 def outcome(success: bool) -> str:

@@ -22,6 +22,9 @@ def disturbed(simulator: StaticSimulator, sd_m: float | None) -> StaticSimulator
 class SubstituteWorld:
     """Displacements of the static simulator, disturbed with the standard deviations that it names."""
 
+    repeatable = True
+    renderable = False
+
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._simulator = disturbed(load_static_simulator(robot.name), robot.substitute_sd_m)

@@ -50,7 +50,7 @@ def test_a_drive_has_as_many_cycles_as_any_noisy_path_needs():
         controller = population.controller(i)
         in_full = cycles.in_full(controller)
         moved = PLAIN.displacements(predict(weights, PLAIN.inputs(in_full), True))
-        paths = [path.judge(path.walk(moved + np.pad(row[: len(moved)], ((0, 0), (0, 1)))), TASK) for row in rows]
+        paths = [path.evaluate_path(path.walk(moved + np.pad(row[: len(moved)], ((0, 0), (0, 1)))), TASK) for row in rows]
         done = [used for _, goals, used in paths if goals == 2]
         used = max(done) if done else len(in_full)
         planned, without = PLAIN.plan(controller, weights, TASK, stream), off.plan(controller, weights, TASK, stream)

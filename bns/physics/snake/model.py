@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import mujoco
-
+from bns.extras import extra
 from bns.physics.snake.parameters import SnakeParameters
 from bns.physics.snake.servo import actuator_xml, joint_xml, servo_of
+
+with extra("snake"):
+    import mujoco
 
 YELLOW, GREEN = "yellow", "green"
 """Names of the marker sites."""
