@@ -119,8 +119,8 @@ def calibrate(
     begin = np.clip(begin, low + 1e-6, high - 1e-6)
     fit = least_squares(off, begin, bounds=(low, high), diff_step=STEP / np.abs(begin), max_nfev=recipe.looks)
     after = body(fit.x)
-    sides = [driven(robot, one, recipe.cycles, recipe.repeated, seed, jobs) for one in (parameters, after)]
-    return Calibration(recipe, parameters, after, *sides, _intervals(fit.x, fit.jac, low, high))
+    first, last = (driven(robot, one, recipe.cycles, recipe.repeated, seed, jobs) for one in (parameters, after))
+    return Calibration(recipe, parameters, after, first, last, _intervals(fit.x, fit.jac, low, high))
 
 
 def _intervals(logs: np.ndarray, jacobian: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

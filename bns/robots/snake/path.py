@@ -85,7 +85,7 @@ def evaluate_path(observations: np.ndarray, task: Task, start_m: ArrayLike = STA
     """Algorithm 3 over one path: fitness per metre (0 if not finite), goals reached, cycles until the last goal or to the end."""
     total, goal, used = 0.0, 0, len(observations)
     half_x, half_y = task.surface_m[0] / 2, task.surface_m[1] / 2
-    position = np.mean(start_m, axis=0)
+    position = np.asarray(start_m, np.float64).mean(axis=0)
     for i, position in enumerate(middles(observations)):  # the last one counts below
         if abs(position[0]) > half_x or abs(position[1]) > half_y:
             total += PENALTY_M
