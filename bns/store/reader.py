@@ -76,7 +76,7 @@ def load(
 def finished(results: Path | str, sweep: str) -> dict[str, str]:
     """Status of every run of ``sweep`` that is really there, by run id; empty where there is none.
 
-    A run that is ok counts only with all of its rows in evals.
+    A run that is ok counts only with all of its evaluations in evals, and with every table that it was written with.
     """
     return _settled(Path(results), lambda: _finished(snapshot(Path(results), sweep)))
 
@@ -86,7 +86,7 @@ def _finished(found: Snapshot) -> dict[str, str]:
         return {}
     with connect_views(found) as connection:
         rows = connection.execute("""
-            SELECT run_id, status FROM runs
+            SELECT run_id, status FROM runs ANTI JOIN store.unfinished USING (sweep, run_id)
             LEFT JOIN (SELECT run_id, count(*) AS stored FROM evals GROUP BY run_id) USING (run_id)
             WHERE status <> 'ok' OR stored = evaluations ORDER BY run_id""").fetchall()
     return dict(rows)
