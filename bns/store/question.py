@@ -9,8 +9,10 @@ import duckdb
 import pyarrow as pa
 
 from bns.errors import StoreError
+from bns.store.schema import SCHEMAS
 from bns.store.views import pattern
 
+_LEVELS = ("", "/sweep=*", "/sweep=*/task=*")
 _PARQUET_NAME = re.compile(r"""["']([^"']+\.parquet)["']""")
 _EXPLAIN = re.compile(r"\s*EXPLAIN\s+(ANALYZE\s+)?", re.IGNORECASE)
 
@@ -47,17 +49,28 @@ def damage_hint(results: Path, error: duckdb.Error) -> str:
 
 def _lock(connection: duckdb.DuckDBPyConnection, results: Path) -> None:
     # Last of all the lock itself: after it a statement can no longer undo the others.
-    folder = "'" + str(results).replace("'", "''") + "'"
+    folders = [results, *_linked(results)]
+    allowed = ", ".join(f"{_text(str(folder))}, {pattern(folder)}" for folder in folders)
     for setting in (
         "python_enable_replacements = false",
         "autoinstall_known_extensions = false",
         "autoload_known_extensions = false",
         # The views name their files as patterns, and DuckDB compares letter by letter.
-        f"allowed_directories = [{folder}, {pattern(results)}]",
+        f"allowed_directories = [{allowed}]",
         "enable_external_access = false",
         "lock_configuration = true",
     ):
         connection.execute(f"SET {setting}")
+
+
+def _linked(results: Path) -> list[Path]:
+    """Where folders of the tables really lie that are links: DuckDB goes by that."""
+    places = [place for table in SCHEMAS for below in _LEVELS for place in results.glob(f"{table}{below}")]
+    return sorted({place.resolve() for place in places if place.is_symlink()} | {results.resolve()})
+
+
+def _text(value: str) -> str:
+    return "'" + value.replace("'", "''") + "'"
 
 
 def _check(connection: duckdb.DuckDBPyConnection, sql: str) -> None:
