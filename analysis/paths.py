@@ -7,6 +7,7 @@ import pandas as pd
 from analysis.coverage import coverage
 from analysis.figure_result import FigureResult
 from analysis.labels import counted, task_title
+from analysis.repeats import mean_path, paths_of, repeats_of
 from analysis.results import NoDataError, Results
 from bns.plotting.style import draw_paths, frame_alike, goal_reach, note, outcome, panels, style
 from bns.robots import load_robot
@@ -62,15 +63,24 @@ def _draw_task(store: Results, robot: str, task: str, runs: pd.DataFrame) -> Fig
     walked, goals_m = poses(store, shown), load_task(robot, task).goals_m
     radius_m, square = goal_reach(load_robot(robot), load_task(robot, task))
     figure, axes = panels(len(shown), 3.5)
+    numbers = list(walked.values())
     for run, ax in zip(shown.itertuples(), axes[:, 0], strict=True):
         path = walked[run.run_id]
-        draw_paths(ax, goals_m, radius_m, path[WORLD].to_numpy(), path[SNN].to_numpy(), square)
+        repeats = repeats_of(store.results, str(run.sweep), str(run.run_id), int(run.evaluation))
+        drives = paths_of(repeats, WORLD)
+        world = mean_path(drives) if drives else path[WORLD].to_numpy()
+        draw_paths(ax, goals_m, radius_m, world, path[SNN].to_numpy(), square, drives)
+        if drives:
+            numbers.append(repeats.assign(run_id=run.run_id)[["run_id", "repeat", "step", *WORLD]])
         origin = f"{run.sweep},\n" if len(sweeps) > 1 else ""
         driven = len(path) - 1
         cut = f",\nended in cycle {driven} of {run.commands}" if driven < run.commands else ""
-        ax.set_title(f"{origin}seed {run.seed}, evaluation {run.evaluation}:\n{outcome(run.success)}{cut}")
+        reached = repeats.groupby("repeat").success.first().sum()
+        again = f",\nall goals in {reached} of {len(drives)} drives" if drives else ""
+        ax.set_title(f"{origin}seed {run.seed}, evaluation {run.evaluation}:\n{outcome(run.success)}{cut}{again}")
     frame_alike(axes[:, 0])
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    legends = (ax.get_legend_handles_labels() for ax in axes[:, 0])
+    figure.legend(*max(legends, key=lambda legend: len(legend[1])), loc="outside upper center", ncols=3)
     succeeded, n = int(runs.success.sum()), len(runs)
     said = coverage(store, sweeps).missing
     if n > len(shown):
@@ -82,5 +92,7 @@ def _draw_task(store: Results, robot: str, task: str, runs: pd.DataFrame) -> Fig
         f"driven, until it ended; dashed: the same commands as its simulator networks saw them; dots: ends of commands; grey: "
         f"goals, {100 * radius_m:g} cm from their middle to their edge, in order."
     )
+    if len(numbers) > len(walked):
+        shows += " Where a trial drove its final controller several times, each drive is thin and their mean is solid."
     title = f"Paths of robot and simulator, {task_title(robot, task)}"
-    return FigureResult(f"{NAME}-{robot}-{task}", title, figure, shows, n, sweeps, said, data=pd.concat(walked.values()))
+    return FigureResult(f"{NAME}-{robot}-{task}", title, figure, shows, n, sweeps, said, data=pd.concat(numbers))

@@ -1,21 +1,22 @@
-"""Bootstrapped Neuro-Simulation: the four steps of the source's figure 3.1, in lockstep.
+"""Bootstrapped Neuro-Simulation: the four steps of the source's figure 3.1.
 
-The original trains, evolves and drives at the same time. Here each evaluation is followed by a stated number of
-training iterations and generations, both in the spec, so that the same spec gives the same numbers anywhere.
+The original trains, evolves and drives at the same time. In a simulated world each evaluation is followed by one round of
+a stated number of training iterations and generations, both in the spec, so that the same spec gives the same numbers
+anywhere. A trial on a robot is the same loop with a driver that repeats such rounds while the robot drives, and notes how
+many there were.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from time import thread_time
 from typing import Any
 
 import numpy as np
 
-from bns.bootstrap.evolver import Evolver
+from bns.bootstrap.driver import Driver, WorldDriver
+from bns.bootstrap.neuro_simulation import NeuroSimulation
 from bns.bootstrap.recorder import Recorder
-from bns.bootstrap.trainer import Trainer
 from bns.engine.philox import Key
 from bns.robots import load_robot
 from bns.spec import RunSpec
@@ -42,41 +43,45 @@ class RunResult:
     learned_from: np.ndarray
 
 
-def run(spec: RunSpec, progress: Progress | None = None, world: World | None = None) -> RunResult:
-    """Carry out one run; `progress` is called with each evaluation's row. `world` replaces the one that the spec names."""
+def run(
+    spec: RunSpec, progress: Progress | None = None, world: World | None = None, driver: Driver | None = None
+) -> RunResult:
+    """Carry out one run; `progress` is called with each evaluation's row.
+
+    `world` replaces the one that the spec names; `driver` drives what is picked (without it, the world itself does).
+    """
     robot = load_robot(spec.robot)
     key = Key.of_run(spec.seed, spec.root_seed, robot.name, spec.task)  # options are compared on the same luck
     task = load_task(spec.robot, spec.task)
     world = world or build_world(spec.world, robot)
-    trainer = Trainer.start(robot, key, spec)
-    weights = trainer.evolution_weights()
-    evolver = Evolver.start(robot, task, key, spec, weights)
+    driver = driver or WorldDriver(world, key)
+    simulation = NeuroSimulation.start(robot, task, key, spec)
     recorder = Recorder(robot, task, world, key, spec)
 
     for evaluation in range(1, spec.evaluations + 1):
         # 1. A controller is picked from the population and driven in the world.
-        controller = robot.plan(evolver.pick(evaluation), weights, task)
-        poses = recorder.drive_evaluated(evaluation, controller, weights)
+        foreseen_by, controller = simulation.weights, simulation.pick(evaluation)
+        drive = driver.drive(evaluation, controller, simulation.advance)
+        recorder.add_evaluated(evaluation, drive, foreseen_by)
         # 2. What it did joins the training set, and the training networks go on training.
-        began = thread_time()
-        trainer.add(controller, poses, evaluation)
-        trainer.train()
-        trained = thread_time()
+        simulation.learn(drive.commands, drive.poses, evaluation)
         # 3. The training networks are copied over the evolution networks, and the population evolves on those.
-        weights = trainer.evolution_weights()
-        evolver.evolve(weights)
-        evolved = thread_time()
+        if not drive.rounds:  # else rounds of training and evolution went on while it drove
+            simulation.advance()
         # 4. Until the evaluations are used up. What is kept is measured apart and teaches the networks nothing.
-        row = recorder.record(evaluation, trainer, evolver, weights, trained - began, evolved - trained)
+        row = recorder.record(evaluation, simulation)
+        driver.evaluated(evaluation, drive, row)
         if progress is not None:
             progress(row)
+        if driver.finished:
+            break
     return RunResult(
         recorder.tables(),
         world.digest,
         robot.networks,
-        weights,
-        evolver.fittest(),
+        simulation.weights,
+        simulation.evolver.fittest(),
         recorder.last_poses,
         recorder.last_simulated,
-        trainer.data.training.in_use(),
+        simulation.trainer.data.training.in_use(),
     )

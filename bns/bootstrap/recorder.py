@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from bns.bootstrap.driver import Drive
 from bns.bootstrap.evolver import Evolver
-from bns.bootstrap.trainer import Trainer
+from bns.bootstrap.neuro_simulation import NeuroSimulation
 from bns.engine.evolution import Population
 from bns.engine.philox import Key, Purpose
 from bns.engine.snn import predict
@@ -57,9 +58,9 @@ class Recorder:
             ]
             self._probe_before: list[np.ndarray] | None = None
 
-    def drive_evaluated(self, evaluation: int, controller: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Drive the controller picked for this evaluation; its measured poses are what the networks learn from."""
-        poses = self._drive(controller, Purpose.WORLD_EVALUATED, evaluation)
+    def add_evaluated(self, evaluation: int, drive: Drive, weights: np.ndarray) -> None:
+        """Keep the drive of the controller picked for this evaluation, and what networks (networks, W) predict for it."""
+        controller, poses = drive.commands, drive.poses
         in_world, goals = self._robot.judge(poses, self._task)
         simulated = self._simulated(controller, weights)
         in_simulation, _ = self._robot.judge(simulated, self._task)
@@ -74,18 +75,11 @@ class Recorder:
         self._path = (controller, poses, simulated)
         if self._with_paths:
             self._add_path(evaluation, "evaluated", *self._path)
-        return poses
 
-    def record(
-        self,
-        evaluation: int,
-        trainer: Trainer,
-        evolver: Evolver,
-        weights: np.ndarray,
-        training_cpu_s: float,
-        evolution_cpu_s: float,
-    ) -> dict[str, Any]:
+    def record(self, evaluation: int, simulation: NeuroSimulation) -> dict[str, Any]:
         """Measure the fittest controller in the world and add this evaluation's row."""
+        trainer, evolver, weights = simulation.trainer, simulation.evolver, simulation.weights
+        training_cpu_s, evolution_cpu_s = simulation.take_cpu_s()
         fittest, poses, simulated = self._fittest(evaluation, evolver, weights)
         in_world, goals = self._robot.judge(poses, self._task)
         in_simulation = self._evaluated["evaluated_fitness_simulation"] if self._once else evolver.best_fitness

@@ -11,11 +11,11 @@ from bns.errors import HardwareError, SpecError
 from bns.hardware.emulators.faults import FaultPlan, load_plan
 from bns.hardware.rig import load_rig, shipped_rig
 from bns.robots import load_robot
-from bns.spec import RunSpec
+from bns.spec import RunSpec, robot_and_options
 from bns.tasks import default_task
 from bns.trial.experiment import drive_commands
 from bns.trial.replay import replayed
-from bns.trial.session import Set, carry_out
+from bns.trial.session import TrialSetup, carry_out
 
 
 def carried_out(options: argparse.Namespace, parameters: Mapping[str, Any]) -> str:
@@ -38,7 +38,7 @@ def spec_of(parameters: Mapping[str, Any]) -> RunSpec:
     return RunSpec(**{**parameters, "world": "robot", "task": parameters["task"] or default_task(robot)})
 
 
-def how_of(options: argparse.Namespace) -> Set:
+def how_of(options: argparse.Namespace) -> TrialSetup:
     """Rig, clock and operator; HardwareError for what does not go together."""
     if options.rig is None and not options.emulated:
         raise HardwareError(
@@ -50,9 +50,10 @@ def how_of(options: argparse.Namespace) -> Set:
     for name in ("faults", "speed"):
         if not options.emulated and getattr(options, name) not in {None, 1.0}:
             raise HardwareError(f"--{name} is for --emulated; a real robot has its own.")
-    rig = shipped_rig(options.robot) if options.rig is None else load_rig(options.rig, options.robot)
+    robot, _ = robot_and_options(options.robot)
+    rig = shipped_rig(robot) if options.rig is None else load_rig(options.rig, robot)
     plan = FaultPlan() if options.faults is None else load_plan(options.faults)
-    return Set(
+    return TrialSetup(
         rig,
         options.emulated,
         options.speed,
@@ -62,4 +63,5 @@ def how_of(options: argparse.Namespace) -> Set:
         options.most_rounds,
         options.until_success,
         not options.no_figures,
+        options.repeats,
     )

@@ -37,6 +37,12 @@ def add_trial_options(parser: argparse.ArgumentParser, positive: Convert) -> Non
         metavar="N",
         help="end when N driven controllers in a row have reached all goals",
     )
+    parser.add_argument(
+        "--repeats",
+        type=positive,
+        metavar="N",
+        help="drive the final controller N times, its evaluation included (default: snake 3, khepera 1)",
+    )
     parser.add_argument("--no-figures", **switch, help="draw none of the trial's figures when it is done")  # type: ignore[arg-type]
     parser.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
 

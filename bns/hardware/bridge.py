@@ -29,7 +29,7 @@ from bns.hardware.bridge_frames import (
     encoded,
 )
 from bns.hardware.clock import Clock
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.serial_link import open_port
 from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
@@ -46,7 +46,7 @@ _STARTING_S = 3.0
 class BridgeChain:
     """Driver of `count` servos behind a bridge. Opening checks the bridge's version and how many servos it has found."""
 
-    def __init__(self, port: str, count: int, clock: Clock, journal: Journal, limits: ServoLimits | None = None) -> None:
+    def __init__(self, port: str, count: int, clock: Clock, journal: HardwareLog, limits: ServoLimits | None = None) -> None:
         self._clock, self._journal, self.count = clock, journal, count
         self.limits = limits or ServoLimits()
         self._sequence, self.retries = 0, 0

@@ -13,7 +13,7 @@ from serial.tools.list_ports import comports
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.khepera import BAUD, KheperaIII, RobotLostError, check_battery
 from bns.hardware.platforms.snake import open_chain
 from bns.hardware.rig import Rig
@@ -97,7 +97,7 @@ def robot_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
 def servos_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
     """Whether all servos of a snake are there and fit; nothing moves."""
     settings = snake_settings(rig.driver)
-    chain = open_chain(rig.port, settings, clock, Journal(None, clock))
+    chain = open_chain(rig.port, settings, clock, HardwareLog(None, clock))
     try:
         found = chain.health()
         volts, hottest = min(h.voltage_v for h in found.values()), max(h.temperature_c for h in found.values())
@@ -115,7 +115,7 @@ def servos_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
 
 def khepera_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
     """Firmware, speeds and battery of a Khepera."""
-    journal = Journal(None, clock)
+    journal = HardwareLog(None, clock)
     link = SerialLink(rig.port, BAUD, clock, journal)
     try:
         robot = KheperaIII(link, clock, journal)

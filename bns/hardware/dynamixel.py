@@ -15,7 +15,7 @@ from bns.errors import HardwareError
 from bns.hardware.ax12_table import BROADCAST, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel_port import ClockedPort
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
 
@@ -30,7 +30,9 @@ _PRESENT = struct.Struct("<HHHBB")
 class Ax12Chain:
     """Driver of servos `ids` in the order of the joints. Opening checks that each is there, once, and an AX-12."""
 
-    def __init__(self, port: str, ids: Sequence[int], clock: Clock, journal: Journal, limits: ServoLimits | None = None) -> None:
+    def __init__(
+        self, port: str, ids: Sequence[int], clock: Clock, journal: HardwareLog, limits: ServoLimits | None = None
+    ) -> None:
         self.ids, self._clock, self._journal = tuple(ids), clock, journal
         self.limits = limits or ServoLimits()
         self.retries = 0
@@ -166,7 +168,7 @@ class Ax12Chain:
 
     def _health(self, number: int, alarms: bool = False) -> Health:
         """One exchange for all of it: the registers stand side by side."""
-        return told(self._block(number, "present_position", "present_temperature", alarms))
+        return decoded(self._block(number, "present_position", "present_temperature", alarms))
 
     def _block(self, number: int, first: str, last: str, alarms: bool = False, attempts: int = ATTEMPTS) -> bytes:
         """The registers from `first` to `last`."""
@@ -229,7 +231,7 @@ class Ax12Chain:
         return "" if still else f"servo {number} still moves"
 
 
-def told(block: bytes) -> Health:
+def decoded(block: bytes) -> Health:
     """What the registers from `present_position` to `present_temperature` say."""
     position, _speed, load, decivolts, celsius = _PRESENT.unpack(block)
     return Health(

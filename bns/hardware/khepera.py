@@ -13,7 +13,7 @@ from typing import Protocol
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.serial_link import NoReplyError
 from bns.hardware.stop import Stop
 
@@ -66,7 +66,7 @@ class RobotLostError(Exception):
 class KheperaIII:
     """Driver. Opening asks for the firmware and the battery and makes sure that the wheels stand still."""
 
-    def __init__(self, link: Exchange, clock: Clock, journal: Journal) -> None:
+    def __init__(self, link: Exchange, clock: Clock, journal: HardwareLog) -> None:
         self._link, self._clock, self._journal = link, clock, journal
         self.retries = 0
         self.firmware = self._identified()

@@ -75,8 +75,8 @@ class Emulation(Protocol):
 
 
 def platform_module(robot: str) -> ModuleType:
-    """The module of a robot's platform; it has `open_platform(rig, clock, journal, stopping)` and
-    `emulate(rig, folder, clock, plan, seed)`."""
+    """The module of a robot's platform; it has `open_platform(rig, clock, journal, stopping)`,
+    `emulate(rig, folder, clock, plan, seed)` and `REPEATS`, how often a trial drives its final controller."""
     names = sorted(m.name for m in pkgutil.iter_modules(platforms.__path__))
     if robot not in names:
         raise HardwareError(unknown_name("robot with a driver", robot, names))

@@ -15,7 +15,7 @@ from serial.tools.list_ports import comports
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 
 _LONGEST_LINE = 256
 _SLICE_S = 0.01
@@ -33,7 +33,7 @@ class SerialLink:
     A port that vanishes (a Bluetooth link that breaks) is opened again at the next exchange.
     """
 
-    def __init__(self, port: str, baud: int, clock: Clock, journal: Journal, timeout_s: float = 0.1) -> None:
+    def __init__(self, port: str, baud: int, clock: Clock, journal: HardwareLog, timeout_s: float = 0.1) -> None:
         self.port, self._baud, self._clock, self._journal = port, baud, clock, journal
         self._timeout_s = timeout_s
         self._took_s: deque[float] = deque(maxlen=_REMEMBERED)

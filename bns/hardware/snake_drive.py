@@ -9,7 +9,7 @@ import numpy as np
 from bns.errors import TrialPausedError
 from bns.hardware.ax12_table import RAD_PER_STEP
 from bns.hardware.clock import Clock
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.safety import OutOfSight, Watch
 from bns.hardware.servo_chain import ServoChain, StrainWatch
 from bns.hardware.snake_settings import SnakeSettings
@@ -29,7 +29,7 @@ class SnakeDrive:
     hides its markers."""
 
     def __init__(
-        self, chain: ServoChain, eye: Eye, watch: Watch, settings: SnakeSettings, clock: Clock, journal: Journal
+        self, chain: ServoChain, eye: Eye, watch: Watch, settings: SnakeSettings, clock: Clock, journal: HardwareLog
     ) -> None:
         self._chain, self._eye, self._watch, self._settings = chain, eye, watch, settings
         self._clock, self._journal = clock, journal
@@ -68,10 +68,10 @@ class SnakeDrive:
     def carry_out(self, cycle: np.ndarray) -> None:
         """One cycle: up to its first posture, then through it; ServoError, DriveEnded, TrialPausedError."""
         angles, began_s = cycle_angles(cycle[:4], len(self._angles)), self._clock.now_s()
-        told = dict(zip(PARAMETERS, cycle[:4].tolist(), strict=True))
-        self._journal.note("command", **told)
+        commanded = dict(zip(PARAMETERS, cycle[:4].tolist(), strict=True))
+        self._journal.note("command", **commanded)
         first = len(self.rows)
-        self.rows[-1] |= {"cycle": float(len(self._cycles) + 1), **told}
+        self.rows[-1] |= {"cycle": float(len(self._cycles) + 1), **commanded}
         self._strain.stalled, before = False, self._markers
         try:
             self._posture(angles[0])

@@ -146,16 +146,22 @@ def draw_paths(
     world_poses: np.ndarray,
     snn_poses: np.ndarray,
     square: bool = False,
+    repeats: Sequence[np.ndarray] = (),
 ) -> None:
     """Robot's path (solid) and the simulator's idea of it (dashed) among the goals, in cm.
+
+    With `repeats`, paths of several drives, each is drawn thin, and the robot's path is their mean.
 
     Poses are (n, 3), x_m, y_m, heading_rad, first the start, then the end of each command (dots). A simulator that is
     far off runs out of the picture rather than shrink it. Among square goals commands are joined by straight lines.
     """
     draw_goals(ax, goals_m, radius_m, square)
     drawn = _chords if square else arcs
+    for number, poses in enumerate(repeats):
+        path, label = 100 * drawn(poses), "each drive" if number == 0 else "_each drive"
+        ax.plot(path[:, 0], path[:, 1], label=label, color=OKABE_ITO[0], linewidth=0.7, alpha=0.6)
     for poses, label, color, line in (
-        (world_poses, "robot", OKABE_ITO[0], "-"),
+        (world_poses, "robot, mean" if repeats else "robot", OKABE_ITO[0], "-"),
         (snn_poses, "simulator", OKABE_ITO[1], "--"),
     ):
         path = 100 * drawn(poses)
@@ -171,7 +177,7 @@ def draw_paths(
         linestyle="none",
         label="start",
     )
-    _frame(ax, goals_m, radius_m, drawn(world_poses))
+    _frame(ax, goals_m, radius_m, np.vstack([drawn(poses) for poses in (world_poses, *repeats)]))
 
 
 def _chords(poses: np.ndarray) -> np.ndarray:

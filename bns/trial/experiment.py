@@ -13,9 +13,9 @@ from bns.hardware.safety import Stopping
 from bns.measurements import write_measurements
 from bns.robots import load_robot
 from bns.robots.base import Robot, on_floor
-from bns.trial.crew import Crew
+from bns.trial.driver import TrialDriver
 from bns.trial.folder import JOURNAL, MEASUREMENTS, forget_unless, measured, past_evaluations
-from bns.trial.session import Set, staged
+from bns.trial.session import TrialSetup, open_rig
 
 _START = ("start_x_m", "start_y_m", "start_heading_rad")
 
@@ -28,7 +28,9 @@ def read_commands(path: Path, robot: Robot) -> list[tuple[np.ndarray, np.ndarray
     try:
         table = pd.read_csv(path)
     except (OSError, ValueError) as error:
-        raise HardwareError(f"cannot read the commands {path}: {error}. It is a CSV file with {', '.join(columns)}.") from error
+        raise HardwareError(
+            f"cannot read the commands {path}: {error}. It is a CSV file with {', '.join(columns)}."
+        ) from error
     missing = [name for name in columns if name not in table.columns]
     if missing:
         raise HardwareError(
@@ -59,11 +61,13 @@ def _starts(path: Path, table: pd.DataFrame, robot: Robot) -> np.ndarray:
     starts: np.ndarray = table[list(_START)].apply(pd.to_numeric, errors="coerce").to_numpy(np.float64)
     if not np.isfinite(starts).all():
         line = int(np.argmin(np.isfinite(starts).all(axis=1))) + 2
-        raise HardwareError(f"line {line} of {path} has no number for each of {', '.join(_START)}; write them, or leave all out.")
+        raise HardwareError(
+            f"line {line} of {path} has no number for each of {', '.join(_START)}; write them, or leave all out."
+        )
     return starts
 
 
-def drive_commands(path: Path, how: Set, results: Path, seed: int) -> str:
+def drive_commands(path: Path, how: TrialSetup, results: Path, seed: int) -> str:
     """Drive every trial of a file, or those that are left of them; measurements beside the journal; the report in words."""
     robot = load_robot(how.rig.robot)
     trials = read_commands(path, robot)
@@ -77,11 +81,11 @@ def drive_commands(path: Path, how: Set, results: Path, seed: int) -> str:
                 "change the start, or surface_m in the rig."
             )
     try:
-        with Stopping() as stopping, staged(how, seed, journal, stopping) as stage:
-            crew = Crew(stage.platform, stage.operator, how.rig, trials[0][1], stage.clock, stage.journal)
+        with Stopping() as stopping, open_rig(how, seed, journal, stopping) as opened:
+            driver = TrialDriver(opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log)
             for number, (commands, start) in enumerate(trials[done:], done + 1):
-                crew.start = start
-                crew.evaluate(number, commands)
+                driver.start = start
+                driver.evaluate(number, commands)
     except HardwareError:
         forget_unless(journal, "driven")
         raise
@@ -89,7 +93,7 @@ def drive_commands(path: Path, how: Set, results: Path, seed: int) -> str:
         table = measured(journal) if journal.exists() else pd.DataFrame()
         if len(table):
             write_measurements(table, folder / MEASUREMENTS, robot.measured_columns)
-    ended = f"; {len(crew.ends)} ended early" if crew.ends else ""
+    ended = f"; {len(driver.ends)} ended early" if driver.ends else ""
     return f"{len(trials)} trials driven{ended}; {len(table)} rows of measurements in {folder / MEASUREMENTS}"
 
 
@@ -97,7 +101,9 @@ def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int
     """How many of the trials are in the journal already; HardwareError if they should not be, or are others."""
     if not journal.exists():
         if resume:
-            raise HardwareError(f"there is nothing to go on with: no journal in {journal.parent}. Begin without --resume.")
+            raise HardwareError(
+                f"there is nothing to go on with: no journal in {journal.parent}. Begin without --resume."
+            )
         return 0
     if not resume:
         raise HardwareError(
@@ -109,5 +115,7 @@ def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int
         for one, asked in zip(past, trials, strict=False)
     )
     if not same:
-        raise HardwareError(f"{journal} drove other commands than the file holds now; rename the file to begin with it afresh.")
+        raise HardwareError(
+            f"{journal} drove other commands than the file holds now; rename the file to begin with it afresh."
+        )
     return len(past)

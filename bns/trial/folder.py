@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from filelock import FileLock, Timeout
 
 from bns.errors import HardwareError
-from bns.hardware.journal import events
+from bns.hardware.hardware_log import events
 from bns.measurements import write_measurements
 from bns.robots import load_robot
 from bns.spec import RunSpec
-from bns.trial.loop import Evaluation
+from bns.trial.driver import REPEATED
+from bns.trial.evaluation import Evaluation
 
-JOURNAL, MEASUREMENTS = "journal.jsonl", "measurements.csv"
+JOURNAL, MEASUREMENTS, REPEATS = "journal.jsonl", "measurements.csv", "repeats.csv"
 
 
 class TrialFolder:
@@ -70,10 +73,27 @@ def spec_of(journal: Path) -> RunSpec:
 
 def past_evaluations(journal: Path) -> list[Evaluation]:
     """Evaluations of a journal in order. One that was driven again counts as driven last, up to the first that is missing."""
+    return _evaluations(events(journal, "driven", "marked", "evaluated", "discarded"), 1)
+
+
+def past_repeats(journal: Path, evaluation: int) -> list[Evaluation]:
+    """The further drives of an evaluation's controller in a journal, in order, the second drive first."""
+    kinds = (REPEATED + kind for kind in ("driven", "marked", "discarded"))
+    return _evaluations(
+        (
+            event | {"kind": event["kind"].removeprefix(REPEATED), "evaluation": event["repeat"]}
+            for event in events(journal, *kinds)
+            if event["evaluation"] == evaluation
+        ),
+        2,
+    )
+
+
+def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation]:
     driven: dict[int, dict] = {}
     rounds: dict[int, int] = {}
     unstable: dict[int, tuple[int, ...]] = {}
-    for event in events(journal, "driven", "marked", "evaluated", "discarded"):
+    for event in noted:
         number = event["evaluation"]
         rounds.pop(number, None)
         if event["kind"] == "driven":
@@ -86,8 +106,8 @@ def past_evaluations(journal: Path) -> list[Evaluation]:
         else:
             rounds[number] = event["rounds"]
     found: list[Evaluation] = []
-    while len(found) + 1 in driven:
-        event, number = driven[len(found) + 1], len(found) + 1
+    while (number := first + len(found)) in driven:
+        event = driven[number]
         picked, commands = (np.asarray(event[name], np.float32) for name in ("picked", "commands"))
         poses = np.asarray(event["poses"], np.float64)
         found.append(Evaluation(picked, commands, poses, rounds.get(number), unstable.get(number, ())))

@@ -18,7 +18,7 @@ _PLACED_SD = np.array([0.005, 0.005, 0.03])
 Spans = Sequence[tuple[float, float]]
 
 
-class Verdict(NamedTuple):
+class Decision(NamedTuple):
     """What becomes of an evaluation: `next`, `repeat` it, or `skip` it; and which commands (numbers from 1) were unstable."""
 
     answer: str
@@ -31,11 +31,11 @@ class Operator(Protocol):
     def place(self, start: np.ndarray, why: str) -> None:
         """See to it that the robot stands at `start` (3,); TrialPausedError if that cannot be."""
 
-    def accept(self, summary: str, spans_s: Spans) -> Verdict:
+    def accept(self, summary: str, spans_s: Spans) -> Decision:
         """What to do with the evaluation just driven; `spans_s`: when each command was under way that can be unstable."""
 
 
-class AtTheTerminal:
+class TerminalOperator:
     """Asks on the terminal. `ask` is `input` but in tests."""
 
     def __init__(self, ask: Callable[[str], str] = input) -> None:
@@ -46,22 +46,26 @@ class AtTheTerminal:
         text = f"{why}.\nPut it at x {start[0]:.2f} m, y {start[1]:.2f} m, heading {np.degrees(start[2]):.0f}°"
         self._answer(f"{text}; then Enter (p: pause the trial): ", {"": "placed"})
 
-    def accept(self, summary: str, spans_s: Spans) -> Verdict:
+    def accept(self, summary: str, spans_s: Spans) -> Decision:
         """Ask what to do."""
         words = {"": "next", "r": "repeat", "s": "skip"}
         asked = f"{summary}\nEnter: keep it; r: drive it again; s: skip it; p: pause the trial"
         if not spans_s:
-            return Verdict(self._answer(f"{asked}: ", words))
+            return Decision(self._answer(f"{asked}: ", words))
         answer = self._answer(f"{asked}; u: keep it, some cycles were unstable: ", words | {"u": "unstable"})
-        return Verdict("next", self._unstable(len(spans_s))) if answer == "unstable" else Verdict(answer)
+        return Decision("next", self._unstable(len(spans_s))) if answer == "unstable" else Decision(answer)
 
     def _unstable(self, count: int) -> tuple[int, ...]:
         while True:
-            given = self._asked(f"Which of the cycles 1 to {count} (rolled over, links touched, a servo did not follow)? ")
+            given = self._asked(
+                f"Which of the cycles 1 to {count} (rolled over, links touched, a servo did not follow)? "
+            )
             numbers = {int(word) for word in re.findall(r"\d+", given)}
             if numbers and numbers <= set(range(1, count + 1)):
                 return tuple(sorted(numbers))
-            print(f"{given!r} names no cycle, or one that is not there: write numbers from 1 to {count}", file=sys.stderr)
+            print(
+                f"{given!r} names no cycle, or one that is not there: write numbers from 1 to {count}", file=sys.stderr
+            )
 
     def _asked(self, question: str) -> str:
         try:
@@ -79,16 +83,16 @@ class AtTheTerminal:
             print(f"{given!r} is none of: Enter, {', '.join(k for k in (*words, 'p') if k)}", file=sys.stderr)
 
 
-class Nobody:
+class UnattendedOperator:
     """With `--yes`: nobody can put the robot back, so the trial pauses where it would have to be."""
 
     def place(self, start: np.ndarray, why: str) -> None:
         """Pause."""
         raise TrialPausedError(f"{why}, and with --yes nobody can put it back. Do so, then go on with --resume")
 
-    def accept(self, summary: str, spans_s: Spans) -> Verdict:
+    def accept(self, summary: str, spans_s: Spans) -> Decision:
         """Keep everything."""
-        return Verdict("next")
+        return Decision("next")
 
 
 class EmulatedHands:
@@ -102,7 +106,7 @@ class EmulatedHands:
         """Put it down."""
         self._emulation.put_down(start + _PLACED_SD * self._draw.standard_normal(3))
 
-    def accept(self, summary: str, spans_s: Spans) -> Verdict:
+    def accept(self, summary: str, spans_s: Spans) -> Decision:
         """Keep everything, and mark what was seen."""
-        seen = (number for number, span_s in enumerate(spans_s, 1) if self._emulation.unstable_between(*span_s))
-        return Verdict("next", tuple(seen))
+        observed = (number for number, span_s in enumerate(spans_s, 1) if self._emulation.unstable_between(*span_s))
+        return Decision("next", tuple(observed))

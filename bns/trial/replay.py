@@ -11,11 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from bns.bootstrap.loop import run
 from bns.console import live_view
 from bns.errors import HardwareError
+from bns.robots import load_robot
 from bns.sweep.single_run import keep_run
+from bns.trial.background import BackgroundDriver
+from bns.trial.evaluation import Evaluation
 from bns.trial.folder import past_evaluations, spec_of
-from bns.trial.loop import Evaluation, Trial
+from bns.worlds.robot import RobotWorld
 
 SWEEP = "trials-replayed"
 
@@ -37,8 +41,8 @@ def replayed(journal: Path, results: Path) -> str:
         raise HardwareError(f"{journal} holds no evaluation that was driven; there is nothing to replay.")
     spec = replace(spec_of(journal), evaluations=len(past))
     began, started = time.perf_counter(), datetime.now(UTC)
-    with live_view(spec) as show:
-        result = Trial(spec, "robot-replayed", past, most_rounds=1).run(_NoRobot(), show).run
+    with live_view(spec) as show, BackgroundDriver(load_robot(spec.robot), _NoRobot(), past, most_rounds=1) as driver:
+        result = run(spec, show, RobotWorld("robot-replayed"), driver)
     keep_run(spec, result, results, SWEEP, started, time.perf_counter() - began)
     evals = result.tables["evals"]
     return (

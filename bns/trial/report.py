@@ -1,44 +1,67 @@
-"""A trial in words: a row of the source's tables 4.2 and 5.4, and how well robot and computer kept up."""
+"""A trial as text: a row of the source's tables 4.2 and 5.4, and how well robot and computer kept up."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
 
 import numpy as np
 
+from bns.bootstrap.loop import RunResult
 from bns.spec import RADII_CM, RunSpec
-from bns.trial.crew import Crew
-from bns.trial.loop import TrialResult
 
 
-def report(spec: RunSpec, result: TrialResult, crew: Crew, wall_s: float, how: Any, folder: Path, figure: Path) -> str:
-    """Lines for the terminal."""
+@dataclass(frozen=True)
+class TrialResult:
+    """The run, and how this session of it went.
+
+    stops_s: how long each confirmed stop took; ends: why drives ended early; waited_share: of the time, that the robot
+    waited for computations; rounds: of training and evolution that went on while it drove; wall_s: how long it took;
+    repeats: success of each drive of the final controller, if it was driven more than once.
+    """
+
+    run: RunResult
+    stops_s: Sequence[float]
+    ends: Sequence[str]
+    waited_share: float
+    rounds: int
+    started: datetime
+    wall_s: float
+    repeats: list[bool] = field(default_factory=list)
+
+
+def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
+    """Lines for the terminal; `what` drove: a robot, or its emulator."""
     evals = result.run.tables["evals"]
     firsts = [f"within {cm} cm {_first(evals[f'evaluated_success_{cm}cm'])}" for cm in RADII_CM]
     if evals[f"evaluated_success_{RADII_CM[0]}cm"][0] is None:  # goals are regions
         firsts = [_first(evals["evaluated_success"])]
     driven_min = float(np.sum(evals["driven_ms"])) / 60_000.0
-    what = f"emulated, at {how.speed:g} times its speed" if how.emulated else "robot"
-    return "\n".join(
-        [
-            f"trial {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {what}",
-            f"{len(evals['evaluation'])} evaluations, {driven_min:.1f} min of driving, {wall_s:.0f} s by the clock on the wall",
-            "all goals reached: " + "; ".join(firsts),
-            f"the robot waited for computations {result.waited_share:.1%} of the time; {result.rounds} rounds of training and "
-            "evolution went on while it drove",
-            _stops(crew.stops_s),
-            *([f"drives that ended early: {len(crew.ends)}, the last because {crew.ends[-1]}"] if crew.ends else []),
-            f"measurements and journal: {folder}",
-            f"path: {figure}",
-        ]
-    )
+    early = f"drives that ended early: {len(result.ends)}, the last because {result.ends[-1]}" if result.ends else ""
+    return [
+        f"trial {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {what}",
+        f"{len(evals['evaluation'])} evaluations, {driven_min:.1f} min of driving, {result.wall_s:.0f} s by the wall clock",
+        "all goals reached: " + "; ".join(firsts),
+        f"the robot waited for computations {result.waited_share:.1%} of the time; {result.rounds} rounds of training and "
+        "evolution went on while it drove",
+        _stops(result.stops_s),
+        *([early] if early else []),
+        *_repeats(result.repeats),
+    ]
 
 
-def _stops(seconds: list[float]) -> str:
+def _repeats(successes: Sequence[bool]) -> list[str]:
+    if not successes:
+        return []
+    return [f"final controller driven {len(successes)} times: all goals reached in {sum(successes)} of them"]
+
+
+def _stops(seconds: Sequence[float]) -> str:
     if not seconds:
         return "nothing was driven in this session"
-    return f"stops: {len(seconds)} confirmed, {_ms(float(np.median(seconds)))} at the median, {_ms(max(seconds))} at most"
+    most = f"{_ms(float(np.median(seconds)))} at the median, {_ms(max(seconds))} at most"
+    return f"stops: {len(seconds)} confirmed, {most}"
 
 
 def _ms(seconds: float) -> str:
@@ -46,4 +69,6 @@ def _ms(seconds: float) -> str:
 
 
 def _first(success: np.ndarray) -> str:
-    return f"first at evaluation {int(np.argmax(success)) + 1}, {success.mean():.0%} of them" if success.any() else "never"
+    if not success.any():
+        return "never"
+    return f"first at evaluation {int(np.argmax(success)) + 1}, {success.mean():.0%} of them"

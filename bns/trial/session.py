@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
+from bns.bootstrap.loop import run
 from bns.console import live_view
 from bns.errors import BnsError, HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Emulation, Platform, platform_module
 from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
@@ -26,18 +25,21 @@ from bns.robots.base import on_floor
 from bns.spec import RunSpec
 from bns.sweep.single_run import keep_run
 from bns.tasks import load_task
-from bns.trial.crew import Crew
-from bns.trial.folder import TrialFolder, forget_unless, spec_event
-from bns.trial.loop import Trial, TrialResult
-from bns.trial.operator import AtTheTerminal, EmulatedHands, Nobody, Operator
-from bns.trial.report import report
+from bns.trial.background import BackgroundDriver
+from bns.trial.driver import TrialDriver
+from bns.trial.evaluation import Evaluation
+from bns.trial.folder import REPEATS, TrialFolder, forget_unless, spec_event
+from bns.trial.operator import EmulatedHands, Operator, TerminalOperator, UnattendedOperator
+from bns.trial.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
+from bns.trial.report import TrialResult, report
+from bns.worlds.robot import RobotWorld
 
 SWEEP, SWEEP_EMULATED = "trials", "trials-emulated"
 MOST_ROUNDS = 50
 
 
 @dataclass(frozen=True)
-class Set:
+class TrialSetup:
     """How a trial is carried out: on which rig, emulated at which speed with which faults, with somebody to ask or not."""
 
     rig: Rig
@@ -49,24 +51,26 @@ class Set:
     most_rounds: int = MOST_ROUNDS
     until_success: int | None = None
     figures: bool = True
+    repeats: int | None = None
+    """How often the final controller is driven, its evaluation included; None: as often as the robot's platform says."""
 
 
 @dataclass(frozen=True)
-class Stage:
+class OpenedRig:
     """Everything that a trial or an experiment drives with, opened and checked."""
 
     platform: Platform
     operator: Operator
     clock: Clock
-    journal: Journal
+    log: HardwareLog
 
 
 @contextmanager
-def staged(how: Set, seed: int, journal: Path | None, stopping: Stopping) -> Iterator[Stage]:
+def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stopping) -> Iterator[OpenedRig]:
     """Open clock, emulation, journal and platform; at the end, however it comes, the robot is stopped, seen to stand, let go."""
     clock: Clock = EmulatedClock(how.speed) if how.emulated else RealClock()
     with ExitStack() as stack:
-        log = stack.enter_context(Journal(journal, clock))
+        log = stack.enter_context(HardwareLog(journal, clock))
         module, rig, hands = platform_module(how.rig.robot), how.rig, None
         if how.emulated:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bns-rig-")))
@@ -76,33 +80,34 @@ def staged(how: Set, seed: int, journal: Path | None, stopping: Stopping) -> Ite
         platform: Platform = module.open_platform(rig, clock, log, stopping)
         stack.callback(platform.close)
         stack.enter_context(StopsAtTheEnd(platform.stop))
-        yield Stage(platform, hands or (Nobody() if how.yes else AtTheTerminal(stopping.ask)), clock, log)
+        yield OpenedRig(
+            platform, hands or (UnattendedOperator() if how.yes else TerminalOperator(stopping.ask)), clock, log
+        )
 
 
-def carry_out(spec: RunSpec, how: Set, results: Path) -> str:
-    """Carry out a trial, store it, draw its path; the report in words. TrialPausedError, StopNotConfirmedError, HardwareError."""
-    robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
-    how.rig.check_task(task.goals_m)
+def carry_out(spec: RunSpec, how: TrialSetup, results: Path) -> str:
+    """Carry out a trial, store it, draw its path; the report as text. TrialPausedError, StopNotConfirmedError, HardwareError."""
+    how.rig.check_task(load_task(spec.robot, spec.task).goals_m)
     folder = TrialFolder(results, spec, how.emulated)
     past = folder.open(how.resume)
     try:
-        return _driven(spec, how, results, folder, past, robot, task)
+        return _kept(spec, how, results, folder, _driven(spec, how, folder, past))
     finally:
         folder.close()
 
 
-def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: list, robot: Any, task: Any) -> str:
-    trial = Trial(spec, "robot-emulated" if how.emulated else "robot", past, how.most_rounds, how.until_success)
+def _driven(spec: RunSpec, how: TrialSetup, folder: TrialFolder, past: list[Evaluation]) -> TrialResult:
+    """The loop with the robot as its driver; measurements are written however it ends."""
+    started, robot = datetime.now(UTC), load_robot(spec.robot)
     start = on_floor(robot, robot.start_pose())[0]
-    started, wall = datetime.now(UTC), time.perf_counter()
     try:
-        with Stopping() as stopping, staged(how, spec.seed, folder.journal, stopping) as stage:
-            stage.journal.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
-            stage.journal.sync()
-            crew = Crew(stage.platform, stage.operator, how.rig, start, stage.clock, stage.journal)
-            with live_view(spec, crew.told) as show:
-                result = trial.run(crew, show)
-            stage.journal.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
+        with Stopping() as stopping, open_rig(how, spec.seed, folder.journal, stopping) as opened:
+            opened.log.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
+            opened.log.sync()
+            driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log)
+            result = _looped(spec, how, driver, past, started)
+            _repeated(spec, how, driver, folder, result)
+            opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
             forget_unless(folder.journal, "trial")
@@ -111,24 +116,50 @@ def _driven(spec: RunSpec, how: Set, results: Path, folder: TrialFolder, past: l
         folder.write_measurements()
         raise
     folder.write_measurements()
-    return _kept(spec, how, results, folder, result, robot, task, started, time.perf_counter() - wall, crew)
+    return result
+
+
+def _looped(
+    spec: RunSpec, how: TrialSetup, driver: TrialDriver, past: list[Evaluation], started: datetime
+) -> TrialResult:
+    robot = load_robot(spec.robot)
+    world = RobotWorld("robot-emulated" if how.emulated else "robot")
+    with (
+        live_view(spec, driver.live_text) as show,
+        BackgroundDriver(robot, driver, past, how.most_rounds, how.until_success) as background,
+    ):
+        result = run(spec, show, world, background)
+    wall_s = (datetime.now(UTC) - started).total_seconds()
+    return TrialResult(result, driver.stops_s, driver.ends, background.waited_share, background.rounds, started, wall_s)
+
+
+def _repeated(spec: RunSpec, how: TrialSetup, driver: TrialDriver, folder: TrialFolder, result: TrialResult) -> None:
+    """Drive the final controller as often as is asked for; all its paths go into the trial's folder."""
+    count = platform_module(how.rig.robot).REPEATS if how.repeats is None else how.repeats
+    if count == 1:
+        return
+    evaluation = final_evaluation(result.run.tables["evals"])
+    drives = drive_repeats(driver, folder.journal, evaluation, count)
+    robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
+    table = repeats_table(drives, evaluation, robot, task)
+    write_repeats(table, folder.path / REPEATS)
+    result.repeats.extend(bool(rows["success"].iloc[0]) for _, rows in table.groupby("repeat"))
+
+
+def _kept(spec: RunSpec, how: TrialSetup, results: Path, folder: TrialFolder, result: TrialResult) -> str:
+    keep_run(spec, result.run, results, SWEEP_EMULATED if how.emulated else SWEEP, result.started, result.wall_s)
+    robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
+    figure = path_figure(spec, task, robot, result.run, folder.path / "path")
+    lines = report(spec, result, f"emulated, at {how.speed:g} times its speed" if how.emulated else "robot")
+    lines += [f"measurements and journal: {folder.path}", f"path: {figure}"]
+    return "\n".join(lines + ([_figures(spec, results, folder)] if how.figures else []))
 
 
 def _figures(spec: RunSpec, results: Path, folder: TrialFolder) -> str:
-    """Figures and table rows of this trial alone, on a page in its folder; what came of it, in words."""
+    """Figures and table rows of this trial alone, on a page in its folder; what came of it, as text."""
     page = folder.path / "figures"
     try:
         complaint = draw(scripts(), results, "--run", spec.run_id, "--out", str(page.absolute()), polite=False)
     except BnsError as error:  # the package was installed without them: the trial is none the worse for it
         complaint = str(error)
     return f"figures: {page / 'index.html'}" if not complaint else f"no figures: {complaint}"
-
-
-def _kept(
-    spec: RunSpec, how: Set, results: Path, folder: TrialFolder, result: TrialResult, robot: Any, task: Any,
-    started: datetime, wall_s: float, crew: Crew,
-) -> str:  # fmt: skip
-    keep_run(spec, result.run, results, SWEEP_EMULATED if how.emulated else SWEEP, started, wall_s)
-    figure = path_figure(spec, task, robot, result.run, folder.path / "path")
-    told = report(spec, result, crew, wall_s, how, folder.path, figure)
-    return f"{told}\n{_figures(spec, results, folder)}" if how.figures else told

@@ -1,4 +1,4 @@
-"""The robot world: what a robot really did. It is driven by a trial; here its paths are handed to whoever judges them."""
+"""The robot world: what a robot really did. A trial drives it; nothing else can be asked of it."""
 
 from __future__ import annotations
 
@@ -10,23 +10,16 @@ from bns.robots.base import Robot, on_floor, turned
 
 
 class RobotWorld:
-    """Answers with the path that was driven last, in the frame of the task."""
+    """The world of a trial, in whose loop a driver of its own has the robot."""
 
     repeatable = False
 
     def __init__(self, digest: str) -> None:
         self.digest = digest
-        self._poses = np.empty((0, 3))
-
-    def answered(self, poses: np.ndarray) -> None:
-        """The robot has driven: poses (n, columns) at the end of each command, in the task's frame."""
-        self._poses = poses
 
     def drive(self, commands: np.ndarray, key: Key, purpose: Purpose, step: int) -> np.ndarray:
-        """The path of the drive just made; SpecError if it was not made with these commands."""
-        if purpose is not Purpose.WORLD_EVALUATED or len(commands) != len(self._poses):
-            raise SpecError(f"a robot has not driven these {len(commands)} commands; it drives what is picked, once.")
-        return self._poses
+        """Always SpecError: robot time is spent on controllers that are picked, once each."""
+        raise SpecError(f"a robot has not driven these {len(commands)} commands; it drives what is picked, once.")
 
 
 def in_task_frame(robot: Robot, poses: np.ndarray) -> np.ndarray:
@@ -41,4 +34,6 @@ def in_task_frame(robot: Robot, poses: np.ndarray) -> np.ndarray:
 
 def build(robot: Robot) -> RobotWorld:
     """A robot is no world to be had for nothing."""
-    raise SpecError(f"the world 'robot' is a real {robot.name}, or its emulator. Drive it with: bns trial --robot {robot.name}")
+    raise SpecError(
+        f"the world 'robot' is a real {robot.name}, or its emulator. Drive it with: bns trial --robot {robot.name}"
+    )

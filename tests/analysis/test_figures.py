@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 from store.synthetic import failed, make_store, record
 
@@ -140,6 +141,30 @@ def test_a_drive_that_ended_early_says_in_which_cycle(tmp_path):
     store = Results(tmp_path)
     driven = len(paths.poses(store, paths.last_successes(store))[run.spec.run_id]) - 1
     assert paths.draw(store)[0].figure.axes[0].get_title().endswith(f"ended in cycle {driven} of 90")
+
+
+def test_all_drives_of_a_trial_s_final_controller_are_drawn_with_their_mean(tmp_path):
+    spec = RunSpec(seed=0, evaluations=2, record="full")
+    run = record(spec, ("evals", "paths"))
+    run.tables["evals"]["success"][:] = False
+    written(tmp_path, "trials-emulated", [run])
+    folder = tmp_path / "trials" / f"khepera-circle-0-{spec.run_id}-emulated"
+    folder.mkdir(parents=True)
+    drives = [
+        {"evaluation": 2, "repeat": n, "success": n == 2, "step": step, "x_m": 0.1 * n * step, "y_m": 0.2 * step}
+        for n, steps in ((1, 3), (2, 3), (3, 2))
+        for step in range(steps)
+    ]
+    pd.DataFrame(drives).assign(heading_rad=1.5).to_csv(folder / "repeats.csv", index=False)
+    drawn = paths.draw(Results(tmp_path))[0]
+    lines = drawn.figure.axes[0].get_lines()
+    ends = [line.get_xdata()[-1] for line in lines if line.get_label().endswith("each drive")]
+    assert ends == pytest.approx([20, 40, 30])
+    x, y = curves(drawn.figure)["robot, mean"]
+    assert (x[-1], y[-1]) == (pytest.approx(20), pytest.approx(20))  # as far as all of them go
+    assert drawn.figure.axes[0].get_title().endswith("all goals in 1 of 3 drives")
+    assert drawn.data.repeat.value_counts().to_dict() == {1: 3, 2: 3, 3: 2}
+    assert "each drive is thin" in drawn.shows
 
 
 def test_paths_of_a_run_by_hand_are_shown_after_the_prototypes_and_named(tmp_path):

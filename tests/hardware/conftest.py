@@ -11,7 +11,7 @@ from bns.hardware.emulators.body import DifferentialBody
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.emulators.khepera import KheperaEmulator
 from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.journal import Journal, events
+from bns.hardware.hardware_log import HardwareLog, events
 from bns.hardware.khepera import BAUD, KheperaIII, firmware
 from bns.hardware.serial_link import SerialLink
 from bns.physics.model import load_model
@@ -38,7 +38,7 @@ def bench(tmp_path, clock, body):
         emulator = KheperaEmulator(body, clock, firmware(version, 4), Faults(tuple(faults), seed, "khepera"))
         line = PseudoTerminal(emulator, tmp_path, f"khepera{len(opened)}")
         emulator.cut_line = lambda _seconds: line.cut()
-        journal = Journal(tmp_path / f"bench{len(opened)}.jsonl", clock)
+        journal = HardwareLog(tmp_path / f"bench{len(opened)}.jsonl", clock)
         link = SerialLink(str(line.path), BAUD, clock, journal)
         opened.append((link, line, journal))
 

@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 from bns.cli.main import main
-from bns.hardware.journal import events
+from bns.hardware.hardware_log import events
 from bns.trial.folder import past_evaluations
 
 QUICK = [
@@ -43,7 +43,7 @@ KINDS = {
         {"hang-up": 2.5, "brown-out": 3.0, "lost-marker": 4.0, "stuck-marker": 4.0, "bus-fault": 1.5},
     ),
     "snake": Kind(
-        "two-regions", 1, ["--min-commands", "1", "--max-commands", "1"],
+        "two-regions", 1, ["--min-commands", "1", "--max-commands", "1", "--repeats", "1"],
         {"lost-request": 0.01, "lost-reply": 0.01, "corrupt-reply": 0.01, **SEEN},
         {"hang-up": 2.5, "lost-marker": 4.0, "stuck-marker": 4.0, "silent-servo": 1.0, "overload": 1.0, "overheat": 2.0},
         servos=12,

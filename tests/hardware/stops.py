@@ -13,7 +13,7 @@ import numpy as np
 from bns.errors import BnsError
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.faults import Fault, FaultPlan
-from bns.hardware.journal import Journal, events
+from bns.hardware.hardware_log import HardwareLog, events
 from bns.hardware.platform import platform_module
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping, Surface
@@ -70,7 +70,7 @@ def stopped(robot, cause, seed, folder, **driver):
     if cause == "stop asked for":
         clock.listeners.append(lambda now_s: stopping.request("asked for") if now_s >= at_s else None)
     try:
-        with Journal(path, clock) as journal:
+        with HardwareLog(path, clock) as journal:
             platform = module.open_platform(emulation.rig, clock, journal, stopping)
             try:
                 journal.note("driving")
@@ -128,7 +128,7 @@ def measured(robot, count, causes=None, **driver):
     return found
 
 
-def told(found):
+def report_lines(found):
     """Lines of a table."""
     everything = [stop for stops in found.values() for stop in stops]
     yield "| cause | stops | noticed after, ms | order taken, ms: median, worst | still, ms: median, worst | within 200 ms |"
@@ -147,4 +147,4 @@ def _spread(seconds):
 
 if __name__ == "__main__":
     robot, count, *wiring = sys.argv[1:]
-    print(*told(measured(robot, int(count), **({"wiring": wiring[0]} if wiring else {}))), sep="\n")
+    print(*report_lines(measured(robot, int(count), **({"wiring": wiring[0]} if wiring else {}))), sep="\n")

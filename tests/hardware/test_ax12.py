@@ -10,7 +10,7 @@ from bns.hardware.emulators.ax12 import Bus, packet
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.servo_chain import Health, ServoError, ServoLimits, StrainWatch
 
 IDS = (1, 2, 3)
@@ -26,7 +26,7 @@ def chain(tmp_path, clock):
         bus = Bus([Servo(n, clock, struck, **registers) for n in numbers], clock, struck)
         line = PseudoTerminal(bus, tmp_path, f"bus{len(opened)}")
         opened.append(line)
-        driver = Ax12Chain(str(line.path), asked, clock, Journal(None, clock))
+        driver = Ax12Chain(str(line.path), asked, clock, HardwareLog(None, clock))
         opened.append(driver)
         return driver, bus, line
 
@@ -103,7 +103,7 @@ def test_chains_that_cannot_be_used(chain, build, message):
 
 def test_no_such_port(clock):
     with pytest.raises(HardwareError, match=r"/dev/nowhere cannot be opened.*bns doctor"):
-        Ax12Chain("/dev/nowhere", IDS, clock, Journal(None, clock))
+        Ax12Chain("/dev/nowhere", IDS, clock, HardwareLog(None, clock))
 
 
 def test_arming_does_not_jerk(chain):

@@ -11,7 +11,7 @@ from bns.hardware.emulators.bridge import BridgeEmulator
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.servo_chain import ServoError, ServoLimits
 
 
@@ -25,7 +25,7 @@ def bridge(tmp_path, clock):
         emulator = BridgeEmulator([Servo(n + 1, clock, struck, **registers) for n in range(count)], clock, struck)
         line = PseudoTerminal(emulator, tmp_path, f"bridge{len(opened)}")
         opened.extend([emulator, line])
-        driver = BridgeChain(str(line.path), asked, clock, Journal(None, clock), limits)
+        driver = BridgeChain(str(line.path), asked, clock, HardwareLog(None, clock), limits)
         opened.append(driver)
         return driver, emulator
 

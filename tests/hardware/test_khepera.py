@@ -5,7 +5,7 @@ import pytest
 
 from bns.errors import HardwareError
 from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.khepera import ATTEMPTS, STILL_M_S, RobotLostError, check_battery, firmware
 from bns.hardware.serial_link import SerialLink
 
@@ -180,7 +180,7 @@ def test_what_is_no_khepera_is_named_so(tmp_path, clock, answer, monkeypatch):
     monkeypatch.setattr("bns.hardware.clock._LONGEST_ANSWER_S", 0.1)
     from bns.hardware.khepera import KheperaIII
 
-    journal = Journal(None, clock)
+    journal = HardwareLog(None, clock)
     with PseudoTerminal(Other(clock, answer), tmp_path, "other") as line:
         link = SerialLink(str(line.path), 115200, clock, journal)
         with pytest.raises(HardwareError, match=r"no Khepera III answers .*switched on, paired"):
@@ -189,7 +189,7 @@ def test_what_is_no_khepera_is_named_so(tmp_path, clock, answer, monkeypatch):
 
 
 def test_ports_that_cannot_be_used(tmp_path, clock, bench):
-    journal = Journal(None, clock)
+    journal = HardwareLog(None, clock)
     with pytest.raises(HardwareError, match=r"there is no port /dev/nowhere.*bns doctor"):
         SerialLink("/dev/nowhere", 115200, clock, journal)
     rig = bench()

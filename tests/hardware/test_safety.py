@@ -11,8 +11,7 @@ from bns.errors import StopNotConfirmedError, TrialPausedError
 from bns.hardware.safety import DriveEnded, Limits, Stopping, StopsAtTheEnd, Surface, Watch
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.sight import Sight, unwrapped
-from bns.trial.background import Rounds
-from bns.trial.operator import AtTheTerminal, Nobody
+from bns.trial.operator import TerminalOperator, UnattendedOperator
 
 LIMITS = Limits(Surface(-1, 1, -0.5, 0.5), lost_s=0.5, late_s=1.0)
 
@@ -70,7 +69,7 @@ def test_ctrl_c_ends_a_question_at_once(monkeypatch):
     monkeypatch.setattr("builtins.input", slow)
     began = time.monotonic()
     with Stopping() as stopping, pytest.raises(TrialPausedError, match="paused by the operator"):
-        AtTheTerminal(stopping.ask).accept("evaluation 1", ())
+        TerminalOperator(stopping.ask).accept("evaluation 1", ())
     assert time.monotonic() - began < 4
 
 
@@ -103,24 +102,24 @@ def test_a_confirmed_stop_lets_the_fault_through():
 
 def test_the_operator_is_asked_until_the_answer_makes_sense(capsys):
     answers = iter(["x", "r"])
-    assert AtTheTerminal(lambda _q: next(answers)).accept("evaluation 1", ()) == ("repeat", ())
+    assert TerminalOperator(lambda _q: next(answers)).accept("evaluation 1", ()) == ("repeat", ())
     assert "'x' is none of" in capsys.readouterr().err
-    assert AtTheTerminal(lambda _q: "").accept("", ()) == ("next", ())
-    assert AtTheTerminal(lambda _q: "s").accept("", ()) == ("skip", ())
+    assert TerminalOperator(lambda _q: "").accept("", ()) == ("next", ())
+    assert TerminalOperator(lambda _q: "s").accept("", ()) == ("skip", ())
     with pytest.raises(TrialPausedError, match="paused by the operator"):
-        AtTheTerminal(lambda _q: "p").place(np.zeros(3), "why")
+        TerminalOperator(lambda _q: "p").place(np.zeros(3), "why")
 
 
 def test_with_nobody_there_a_misplaced_robot_pauses_the_trial():
     with pytest.raises(TrialPausedError, match=r"stands 30 cm away, and with --yes nobody .*--resume"):
-        Nobody().place(np.zeros(3), "The robot stands 30 cm away")
-    assert Nobody().accept("", ()) == ("next", ())
+        UnattendedOperator().place(np.zeros(3), "The robot stands 30 cm away")
+    assert UnattendedOperator().accept("", ()) == ("next", ())
 
 
 def test_the_operator_names_the_cycles_that_were_unstable(capsys):
     answers = iter(["u", "none", "3, 9", "3 and 1"])
     asked = []
-    said = AtTheTerminal(lambda q: (asked.append(q), next(answers))[1]).accept("evaluation 1", [(0.0, 1.0)] * 4)
+    said = TerminalOperator(lambda q: (asked.append(q), next(answers))[1]).accept("evaluation 1", [(0.0, 1.0)] * 4)
     assert said == ("next", (1, 3))
     assert "Which of the cycles 1 to 4" in asked[1]
     assert capsys.readouterr().err.count("write numbers from 1 to 4") == 2
@@ -129,36 +128,10 @@ def test_the_operator_names_the_cycles_that_were_unstable(capsys):
 def test_where_nothing_can_be_unstable_nobody_is_asked():
     answers = iter(["u", ""])
     asked = []
-    assert AtTheTerminal(lambda q: (asked.append(q), next(answers))[1]).accept("", ()) == ("next", ())
+    assert TerminalOperator(lambda q: (asked.append(q), next(answers))[1]).accept("", ()) == ("next", ())
     assert not any("unstable" in question for question in asked)
 
 
 def test_headings_go_on_over_the_turn():
     assert unwrapped(-3.1, 3.1) == pytest.approx(2 * np.pi - 3.1)
     assert unwrapped(0.1, 12.5) == pytest.approx(0.1 + 4 * np.pi)
-
-
-def test_rounds_go_on_while_driving_and_end_whole():
-    count = [0]
-
-    def work():
-        time.sleep(0.01)
-        count[0] += 1
-
-    with Rounds(work, most=1000) as rounds:
-        done = rounds.while_driving(lambda: time.sleep(0.2))
-        assert done == count[0] > 3
-        assert rounds.while_driving(lambda: None) == 1
-    with Rounds(work, most=2) as rounds:
-        assert rounds.while_driving(lambda: time.sleep(0.2)) == 2
-
-
-def test_a_fault_in_training_waits_for_the_drive():
-    driven = []
-
-    def broken():
-        raise ValueError("training broke")
-
-    with Rounds(broken, most=3) as rounds, pytest.raises(ValueError, match="training broke"):
-        rounds.while_driving(lambda: driven.append(time.sleep(0.05)))
-    assert driven

@@ -18,7 +18,7 @@ from bns.hardware.emulators.bridge import BridgeEmulator
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.servo_chain import ServoError, ServoLimits
 
 HERE = Path(__file__).parent / "arduino"
@@ -96,7 +96,7 @@ def told(port, data, wait_s=2.0):
 
 def test_the_driver_drives_through_the_sketch(bridge, clock):
     port, servos = bridge(ccw_angle_limit=600, present_position=520)
-    driver = BridgeChain(port, 3, SlowClock(), Journal(None, SlowClock()), ServoLimits(torque=0.5))
+    driver = BridgeChain(port, 3, SlowClock(), HardwareLog(None, SlowClock()), ServoLimits(torque=0.5))
     try:
         driver.arm()
         assert [s.get("goal_position") for s in servos] == [520] * 3
@@ -115,7 +115,7 @@ def test_the_driver_drives_through_the_sketch(bridge, clock):
 
 def test_a_computer_that_falls_silent_loses_the_torque(bridge):
     port, servos = bridge()
-    driver = BridgeChain(port, 3, SlowClock(), Journal(None, SlowClock()))
+    driver = BridgeChain(port, 3, SlowClock(), HardwareLog(None, SlowClock()))
     driver.arm()
     assert until(lambda: driver.health() and all(s.get("torque_enable") for s in servos))
     driver.close()
@@ -124,7 +124,7 @@ def test_a_computer_that_falls_silent_loses_the_torque(bridge):
 
 def test_a_servo_that_is_silent_is_named(bridge, clock):
     port, _ = bridge(Fault("silent-servo", at_s=1.0, for_s=1e9, servo=2))
-    driver = BridgeChain(port, 3, SlowClock(), Journal(None, SlowClock()))
+    driver = BridgeChain(port, 3, SlowClock(), HardwareLog(None, SlowClock()))
     try:
         clock.sleep(1.0)
         with pytest.raises(ServoError, match="servo 2 does not answer the bridge"):

@@ -16,7 +16,7 @@ from bns.cli.main import main
 from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.doctor import examine
 from bns.hardware.emulators.faults import Fault, FaultPlan
-from bns.hardware.journal import Journal, events
+from bns.hardware.hardware_log import HardwareLog, events
 from bns.hardware.platforms import snake
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
@@ -45,7 +45,7 @@ def rigged(tmp_path, clock):
         rig = replace(rig, driver={**rig.driver, **driver}, limits=limits)
         emulation = snake.emulate(rig, Path(tempfile.mkdtemp(dir=tmp_path)), clock, FaultPlan(faults, 1), 0)
         opened.append(emulation)
-        journal = Journal(tmp_path / f"snake{len(opened)}.jsonl", clock)
+        journal = HardwareLog(tmp_path / f"snake{len(opened)}.jsonl", clock)
         platform = snake.open_platform(emulation.rig, clock, journal, stopping or Stopping())
         opened.extend([journal, platform])
         return SimpleNamespace(platform=platform, emulation=emulation, journal=journal)
@@ -168,11 +168,13 @@ def call(*arguments):
 
 
 def test_from_command_to_table_and_replay(tmp_path, capsys):
-    asked = [option for option in TRIAL if option != "--no-figures"]
+    assert TRIAL[-2:] == ["--repeats", "1"]
+    asked = [option for option in TRIAL[:-2] if option != "--no-figures"]  # as often as a snake is driven
     assert call(*asked, "--evaluations", 2, "--results", tmp_path) == 0
     said = capsys.readouterr().out
     assert "snake, two-regions, seed 0, emulated" in said
-    assert "stops: 2 confirmed" in said
+    assert "stops: 4 confirmed" in said
+    assert "final controller driven 3 times" in said
     [journal] = (tmp_path / "trials").glob("*/journal.jsonl")
     table = pd.read_csv(journal.parent / "measurements.csv")
     assert set(load_robot("snake").measured_columns) <= set(table)
@@ -188,6 +190,10 @@ def test_from_command_to_table_and_replay(tmp_path, capsys):
     marked = {e["evaluation"]: e["unstable"] for e in events(journal, "marked")}
     assert {n: list(e.unstable) for n, e in enumerate(past_evaluations(journal), 1) if e.unstable} == marked
     assert (journal.parent / "path.png").exists()
+    repeats = pd.read_csv(journal.parent / "repeats.csv")
+    assert repeats["repeat"].unique().tolist() == [1, 2, 3]
+    starts = repeats.loc[repeats["step"] == 0, ["x_m", "y_m", "heading_rad"]]
+    np.testing.assert_allclose(starts, [[0.3, 0.0, 0.0]] * 3, atol=1e-9)
     assert f"figures: {journal.parent / 'figures' / 'index.html'}" in said
     assert {"paths-snake-two-regions.png", "trials-snake.png"} <= {f.name for f in (journal.parent / "figures").iterdir()}
 

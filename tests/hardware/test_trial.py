@@ -20,7 +20,7 @@ from rich.console import Console
 import bns
 from bns.cli.main import main
 from bns.console import view
-from bns.hardware.journal import events
+from bns.hardware.hardware_log import events
 from bns.trial.folder import past_evaluations
 
 from . import soak
@@ -400,7 +400,7 @@ def test_the_live_view_shows_robot_and_rig(tmp_path, monkeypatch):
 
 def test_a_trial_can_end_with_success(tmp_path, monkeypatch, capsys):
     worth = iter([False, True, False, True, True, True])
-    monkeypatch.setattr("bns.bootstrap.recorder.Recorder.drive_evaluated", _succeeding(worth))
+    monkeypatch.setattr("bns.bootstrap.recorder.Recorder.add_evaluated", _succeeding(worth))
     assert call(*TRIAL, "--evaluations", 9, "--until-success", 2, "--results", tmp_path) == 0
     assert "5 evaluations" in capsys.readouterr().out
     assert evaluated(tmp_path, "trials-emulated")["evaluated_success"].tolist() == [False, True, False, True, True]
@@ -409,11 +409,10 @@ def test_a_trial_can_end_with_success(tmp_path, monkeypatch, capsys):
 def _succeeding(worth):
     from bns.bootstrap.recorder import Recorder
 
-    real = Recorder.drive_evaluated
+    real = Recorder.add_evaluated
 
-    def drive(self, *arguments):
-        poses = real(self, *arguments)
+    def add(self, *arguments):
+        real(self, *arguments)
         self._evaluated["evaluated_success"] = next(worth)
-        return poses
 
-    return drive
+    return add

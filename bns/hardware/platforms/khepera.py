@@ -11,7 +11,7 @@ from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.clock import Clock, EmulatedClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.khepera_rig import EmulatedKheperaRig
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.khepera import BAUD, KheperaIII, RobotLostError, check_battery
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
@@ -27,12 +27,22 @@ _TICK_S = 0.1
 _HEARTBEATS = 5
 """Every so many looks the robot is asked for its speed: a dead link is noticed within half a second, not at the next command."""
 
+REPEATS = 1
+"""How often a trial drives its final controller, unless it is told otherwise: the source shows one drive of it (section 4.3)."""
+
 
 class KheperaPlatform:
     """Implements `bns.hardware.platform.Platform`. Commands are (left, right, duration) in the robot module's units."""
 
     def __init__(
-        self, driver: KheperaIII, link: SerialLink, tracker: Tracker, rig: Rig, clock: Clock, journal: Journal, stopping: Stopping
+        self,
+        driver: KheperaIII,
+        link: SerialLink,
+        tracker: Tracker,
+        rig: Rig,
+        clock: Clock,
+        journal: HardwareLog,
+        stopping: Stopping,
     ) -> None:
         self._driver, self._link, self._clock, self._journal = driver, link, clock, journal
         self._eye = Eye(tracker, clock, journal, math.pi / 2)
@@ -140,7 +150,7 @@ def _row(t_s: float, left_m_s: float, right_m_s: float, pose: np.ndarray) -> dic
     return {"t_s": t_s, "left_m_s": left_m_s, "right_m_s": right_m_s, "x_m": x_m, "y_m": y_m, "heading_rad": heading_rad}
 
 
-def open_platform(rig: Rig, clock: Clock, journal: Journal, stopping: Stopping) -> KheperaPlatform:
+def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stopping) -> KheperaPlatform:
     """Open port and tracker, and make sure before anything else that the robot stands still, is charged and is seen."""
     link = SerialLink(rig.port, BAUD, clock, journal)
     try:

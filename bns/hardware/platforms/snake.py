@@ -12,7 +12,7 @@ from bns.hardware.clock import Clock, EmulatedClock
 from bns.hardware.dynamixel import Ax12Chain
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
@@ -23,12 +23,22 @@ from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import checked, open_tracker
 
+REPEATS = 3
+"""How often a trial drives its final controller, unless it is told otherwise: the source drove it three times (section 5.7)."""
+
 
 class SnakePlatform:
     """Implements `bns.hardware.platform.Platform`. Commands are cycles (n, 5), poses observations (n, 9) of the robot module."""
 
     def __init__(
-        self, chain: ServoChain, eye: Eye, rig: Rig, settings: SnakeSettings, clock: Clock, journal: Journal, stopping: Stopping
+        self,
+        chain: ServoChain,
+        eye: Eye,
+        rig: Rig,
+        settings: SnakeSettings,
+        clock: Clock,
+        journal: HardwareLog,
+        stopping: Stopping,
     ) -> None:
         self._chain, self._eye, self._settings = chain, eye, settings
         self._clock, self._journal = clock, journal
@@ -81,14 +91,14 @@ class SnakePlatform:
         return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, drive.spans_s)
 
 
-def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: Journal) -> ServoChain:
+def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: HardwareLog) -> ServoChain:
     """The servos as a rig's settings say that they are wired; HardwareError names who is missing."""
     if settings.wiring == "bridge":
         return BridgeChain(port, len(settings.ids), clock, journal, settings.limits)
     return Ax12Chain(port, settings.ids, clock, journal, settings.limits)
 
 
-def open_platform(rig: Rig, clock: Clock, journal: Journal, stopping: Stopping) -> SnakePlatform:
+def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stopping) -> SnakePlatform:
     """Open port and tracker, and make sure before anything else that the servos are limp, fit and all there."""
     settings = snake_settings(rig.driver)
     _check_tracker(rig)

@@ -6,7 +6,7 @@ import numpy as np
 
 from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.clock import Clock
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.tracking.sight import Sight, Tracker, unwrapped
 
 _FRESH_S = 0.1
@@ -16,7 +16,7 @@ _LOOKS, _BETWEEN_S = 10, 0.02
 class Eye:
     """`heading_rad` is where the robot looks first, give or take half a turn."""
 
-    def __init__(self, tracker: Tracker, clock: Clock, journal: Journal, heading_rad: float) -> None:
+    def __init__(self, tracker: Tracker, clock: Clock, journal: HardwareLog, heading_rad: float) -> None:
         self._tracker, self._clock, self._journal = tracker, clock, journal
         self._heading_rad, self._newest_s = heading_rad, -1.0
 
@@ -37,15 +37,15 @@ class Eye:
 
     def standing(self) -> Sight | None:
         """Mean of some looks, from now on, at a robot that stands; None if it is not seen often enough."""
-        seen: list[Sight] = []
+        sights: list[Sight] = []
         began_s = self._clock.now_s()
         for _ in range(5 * _LOOKS):
             sight = self.look()
             if sight is not None and sight.t_s >= began_s:  # an older one may be from before it was put there
-                seen.append(sight)
-            if len(seen) == _LOOKS:
-                points = {name: np.mean([s.points[name] for s in seen], axis=0) for name in sight.points} if sight else {}
-                return Sight(seen[-1].t_s, np.mean([s.pose for s in seen], axis=0), seen[-1].residual_m, points)
+                sights.append(sight)
+            if len(sights) == _LOOKS:
+                points = {name: np.mean([s.points[name] for s in sights], axis=0) for name in sight.points} if sight else {}
+                return Sight(sights[-1].t_s, np.mean([s.pose for s in sights], axis=0), sights[-1].residual_m, points)
             self._clock.sleep(_BETWEEN_S)
         return None
 

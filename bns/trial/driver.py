@@ -1,34 +1,48 @@
-"""Robot, operator and journal brought together: one evaluation after the other, whatever happens in between."""
+"""Robot, operator and hardware log brought together: one evaluation after the other, whatever happens in between."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from bns.errors import TrialPausedError
 from bns.hardware.clock import Clock
-from bns.hardware.journal import Journal
+from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Driven, Platform
 from bns.hardware.rig import Rig
-from bns.trial.loop import Evaluation
-from bns.trial.operator import Operator, Verdict
+from bns.trial.evaluation import Evaluation
+from bns.trial.operator import Decision, Operator
 
 _MOST_VOID = 3
 """So many drives without a single finished command, one after the other, and the trial pauses."""
 
 
-class Crew:
-    """Implements `bns.trial.loop.Driver`. `start` (3,) is where the task, or the next drive, begins."""
+REPEATED = "repeat-"
+"""Before the kinds of events of a controller that is driven once more: they are no evaluation."""
+
+
+@dataclass(frozen=True)
+class _Purpose:
+    """What a drive is for: in kinds of events, in text, and in numbers of events."""
+
+    prefix: str
+    text: str
+    numbers: Mapping[str, int]
+
+
+class TrialDriver:
+    """Implements `bns.trial.background.RobotDriver`. `start` (3,) is where the task, or the next drive, begins."""
 
     def __init__(
-        self, platform: Platform, operator: Operator, rig: Rig, start: np.ndarray, clock: Clock, journal: Journal
+        self, platform: Platform, operator: Operator, rig: Rig, start: np.ndarray, clock: Clock, log: HardwareLog
     ) -> None:
         self._platform, self._operator, self._rig, self.start = platform, operator, rig, start
-        self._clock, self._journal = clock, journal
+        self._clock, self._log = clock, log
         self._began_s = clock.now_s()
         self._first = True
         self.placing_s = 0.0
@@ -40,32 +54,42 @@ class Crew:
 
     def evaluate(self, number: int, controller: np.ndarray) -> Evaluation:
         """Drive a controller until there is an evaluation to keep."""
+        return self._kept(_Purpose("", f"evaluation {number}", {"evaluation": number}), controller)
+
+    def repeat(self, number: int, again: int, controller: np.ndarray) -> Evaluation:
+        """Drive the controller of an evaluation once more, for the `again`-th time (2, 3, ...), until it is to be kept."""
+        numbers = {"evaluation": number, "repeat": again}
+        return self._kept(
+            _Purpose(REPEATED, f"drive {again} of the controller of evaluation {number}", numbers), controller
+        )
+
+    def _kept(self, purpose: _Purpose, controller: np.ndarray) -> Evaluation:
         void = 0
         while True:
             self._ready(void)
-            driven = self._drive(number, controller)
+            driven = self._drive(purpose, controller)
             if not len(driven.commands):
                 void += 1
-                self._journal.note("discarded", evaluation=number, why=driven.ended)
+                self._note(purpose, "discarded", why=driven.ended)
                 if void == _MOST_VOID:
                     raise TrialPausedError(f"{void} drives in a row ended before a command was over: {driven.ended}")
                 continue
-            verdict = self._asked(number, controller, driven)
-            if verdict.answer == "next":
-                self.marked = len(verdict.unstable) if driven.spans_s else None
-                if verdict.unstable:
-                    self._journal.note("marked", evaluation=number, unstable=verdict.unstable)
-                    self._journal.sync()
-                return Evaluation(controller, driven.commands, driven.poses, unstable=verdict.unstable)
-            self._journal.note("discarded", evaluation=number, why=verdict.answer)
+            decision = self._asked(purpose.text, controller, driven)
+            if decision.answer == "next":
+                self.marked = len(decision.unstable) if driven.spans_s else None
+                if decision.unstable:
+                    self._note(purpose, "marked", unstable=decision.unstable)
+                    self._log.sync()
+                return Evaluation(controller, driven.commands, driven.poses, unstable=decision.unstable)
+            self._note(purpose, "discarded", why=decision.answer)
 
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         """Note it, durably."""
         fitness = {name: row[name] for name in ("evaluated_fitness_world", "evaluated_goals_reached")}
-        self._journal.note("evaluated", evaluation=number, rounds=rounds, **fitness)
-        self._journal.sync()
+        self._log.note("evaluated", evaluation=number, rounds=rounds, **fitness)
+        self._log.sync()
 
-    def told(self) -> dict[str, str]:
+    def live_text(self) -> dict[str, str]:
         """What a live view shows of robot and rig: heading -> text."""
         units = {"v": "V", "c": "°C"}
         shown = {}
@@ -78,16 +102,19 @@ class Crew:
             shown["last stop"] = f"{1000 * self.stops_s[-1]:.0f} ms"
         return shown | {"ended early": str(len(self.ends))}
 
-    def _drive(self, number: int, controller: np.ndarray) -> Driven:
+    def _note(self, purpose: _Purpose, kind: str, **what: Any) -> None:
+        self._log.note(purpose.prefix + kind, **purpose.numbers, **what)
+
+    def _drive(self, purpose: _Purpose, controller: np.ndarray) -> Driven:
         self.readings = self._platform.readings()
         session_s = self._clock.now_s() - self._began_s
         driven = self._platform.drive(controller)
         self.stops_s.append(driven.stop.seconds)
         if driven.ended:
             self.ends.append(driven.ended)
-        self._journal.note(
+        self._note(
+            purpose,
             "driven",
-            evaluation=number,
             picked=controller.tolist(),
             commands=driven.commands.tolist(),
             poses=driven.poses.tolist(),
@@ -96,15 +123,15 @@ class Crew:
             session_s=session_s,
             readings=self.readings,
         )
-        self._journal.sync()
+        self._log.sync()
         return driven
 
-    def _asked(self, number: int, controller: np.ndarray, driven: Driven) -> Verdict:
+    def _asked(self, text: str, controller: np.ndarray, driven: Driven) -> Decision:
         began = time.perf_counter()
         part = f"{len(driven.commands)} of {len(controller)} commands" + (f" ({driven.ended})" if driven.ended else "")
-        verdict = self._operator.accept(f"evaluation {number}: {part} in {driven.seconds:.0f} s", driven.spans_s)
+        decision = self._operator.accept(f"{text}: {part} in {driven.seconds:.0f} s", driven.spans_s)
         self.placing_s += time.perf_counter() - began
-        return verdict
+        return decision
 
     def _ready(self, void: int) -> None:
         """See that the robot stands near enough to its start."""
@@ -113,7 +140,7 @@ class Crew:
             why = self._misplaced(void)
             if why is None:
                 break
-            self._journal.note("placing", why=why)
+            self._log.note("placing", why=why)
             self._operator.place(self.start, why)
             void, self._first = 0, False
         else:

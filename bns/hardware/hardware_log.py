@@ -1,4 +1,6 @@
-"""Everything sent, received and seen in a trial, one JSON line each, with time stamps; a trial goes on from it, or is replayed.
+"""The hardware log: everything sent, received and observed in a trial, one JSON line each, with time stamps.
+
+A trial is resumed from it, or replayed. Its file is `journal.jsonl` in the folder of the trial.
 
 `t_s` is the trial's clock, `wall_s` the computer's (seconds since 1970). A line that a kill cut in two is dropped when the
 file is opened again; evaluations are synced to the disk before the next one begins.
@@ -17,8 +19,8 @@ from bns.errors import HardwareError
 from bns.hardware.clock import Clock
 
 
-class Journal:
-    """An open journal; events are appended. Without a path nothing is kept."""
+class HardwareLog:
+    """An open log of one trial; events are appended. Without a path nothing is kept."""
 
     def __init__(self, path: Path | None, clock: Clock) -> None:
         self._clock = clock

@@ -1,0 +1,98 @@
+"""Work that goes on in the background while a robot drives: how many rounds, what becomes of faults, what is repeated."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from bns.bootstrap.loop import run
+from bns.errors import HardwareError
+from bns.robots import load_robot
+from bns.spec import RunSpec
+from bns.trial.background import BackgroundDriver, Rounds
+from bns.trial.evaluation import Evaluation
+from bns.worlds.robot import RobotWorld
+
+SPEC = RunSpec(
+    evaluations=4,
+    population_size=12,
+    generations_per_evaluation=2,
+    training_iterations_per_evaluation=5,
+    world="robot",
+)
+
+
+class StraightRobot:
+    """Drives 10 cm ahead a command, somewhere on the floor, and keeps a list of its evaluations."""
+
+    def __init__(self):
+        self.driven, self.rounds = [], []
+
+    def evaluate(self, number, controller):
+        ahead = 0.1 * np.arange(len(controller) + 1)
+        poses = np.column_stack([0.3 + ahead, np.full(len(ahead), -0.2), np.zeros(len(ahead))])
+        self.driven.append(Evaluation(controller, controller, poses))
+        return self.driven[-1]
+
+    def evaluated(self, number, rounds, row):
+        self.rounds.append(rounds)
+
+
+def driven(past=(), most_rounds=2, until_success=None):
+    """Rows of a trial, the robot, its driver."""
+    robot = StraightRobot()
+    with BackgroundDriver(load_robot("khepera"), robot, past, most_rounds, until_success) as driver:
+        return run(SPEC, world=RobotWorld("straight"), driver=driver).tables["evals"], robot, driver
+
+
+def test_rounds_go_on_until_the_drive_is_over_or_they_are_enough():
+    third, count = threading.Event(), [0]
+
+    def work():
+        count[0] += 1
+        if count[0] == 3:
+            third.set()
+
+    rounds = Rounds(3)
+    assert rounds.while_driving(lambda: third.wait(10), work) == (True, 3)
+    held = threading.Event()
+    assert rounds.while_driving(lambda: "at once", lambda: held.wait(0.1)) == ("at once", 1)
+    assert rounds.waited_s > 0.05
+    rounds.close()
+
+
+def test_a_fault_of_the_work_is_raised_after_the_drive():
+    over = []
+
+    def fails():
+        raise ArithmeticError("no weights")
+
+    rounds = Rounds(3)
+    with pytest.raises(ArithmeticError, match="no weights"):
+        rounds.while_driving(lambda: over.append(True), fails)
+    assert over == [True]
+    rounds.close()
+
+
+def test_a_trial_repeats_its_past_with_as_many_rounds_and_goes_on_to_the_same_numbers():
+    whole, robot, driver = driven()
+    assert driver.rounds == sum(robot.rounds) == whole["generations"][-1] / 2
+    past = [
+        Evaluation(each.picked, each.commands, each.poses, rounds)
+        for each, rounds in zip(robot.driven, robot.rounds, strict=True)
+    ]
+    again, asleep, repeated = driven(past)
+    assert asleep.driven == []
+    assert repeated.waited_share == 0.0
+    for name in whole.keys() - {"training_cpu_s", "evolution_cpu_s"}:
+        np.testing.assert_array_equal(again[name], whole[name], err_msg=name)
+    _, half, _ = driven(past[:2])
+    assert len(half.driven) == 2
+    np.testing.assert_array_equal(half.driven[0].picked, robot.driven[2].picked)
+
+
+def test_a_past_that_drove_something_else_is_refused():
+    _, robot, _ = driven()
+    other = robot.driven[0]
+    with pytest.raises(HardwareError, match="evaluation 1 of the journal drove another controller than this bns picks"):
+        driven([Evaluation(other.picked + 40.0, other.commands, other.poses, 1)])
