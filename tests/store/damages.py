@@ -6,6 +6,7 @@ may differ from what was written, nothing may end in a traceback, and a sweep mu
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import sys
 import tempfile
@@ -66,13 +67,10 @@ def make(results: Path) -> None:
                     writer.append(run)
         if sweep == "t":
             compact(results)
-        try:
-            with Writer(results, sweep, sweep_text=TEXTS[sweep]) as writer:
-                for run in runs[-2:]:
-                    writer.append(run)
-                raise StopError
-        except StopError:
-            pass
+        with contextlib.suppress(StopError), Writer(results, sweep, sweep_text=TEXTS[sweep]) as writer:
+            for run in runs[-2:]:
+                writer.append(run)
+            raise StopError
 
 
 def tables(results: Path) -> dict[str, pd.DataFrame]:
@@ -82,7 +80,9 @@ def tables(results: Path) -> dict[str, pd.DataFrame]:
         for table in SCHEMAS:
             order = ", ".join(["sweep", *SORT_KEYS[table]])
             columns = ", ".join(name for name in read_columns(table) if name not in _CHANGES_BY_DAY)
-            found[table] = connection.sql(f"SELECT {columns} FROM {table} ORDER BY {order}").to_arrow_table().to_pandas()
+            found[table] = (
+                connection.sql(f"SELECT {columns} FROM {table} ORDER BY {order}").to_arrow_table().to_pandas()
+            )
         return found
 
 
@@ -113,7 +113,9 @@ def do(kind: str, path: Path, others: list[Path], random: np.random.Generator) -
     elif kind == "overwrite":
         data = bytearray(other.read_bytes())
     elif kind == "double":
-        copy = path.with_name(path.name.replace("-0.parquet", "-1.parquet").replace("--j", "--j0").replace("spec-", "spec-0"))
+        copy = path.with_name(
+            path.name.replace("-0.parquet", "-1.parquet").replace("--j", "--j0").replace("spec-", "spec-0")
+        )
         copy.with_name(copy.name[: len(path.name)] if path.suffix == ".journal" else copy.name).write_bytes(data)
     if kind == "lose":
         path.unlink()
@@ -135,11 +137,13 @@ def check(whole: Path, reference: dict[str, pd.DataFrame], work: Path, random: n
         return Outcome(kind, name, *_judged(work, reference, path, before, random))
     except BnsError as error:
         return Outcome(kind, name, "named" if path.name in str(error) else "traceback", str(error))
-    except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+    except Exception as error:
         return Outcome(kind, name, "traceback", f"{type(error).__name__}: {error}")
 
 
-def _judged(work: Path, reference: dict[str, pd.DataFrame], path: Path, before: bytes, random: np.random.Generator) -> tuple[str, str]:
+def _judged(
+    work: Path, reference: dict[str, pd.DataFrame], path: Path, before: bytes, random: np.random.Generator
+) -> tuple[str, str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         seen = tables(work)
@@ -183,8 +187,11 @@ def _redone(work: Path, reference: dict[str, pd.DataFrame], also_compact: bool) 
 
 def _is_part_of(some: pd.DataFrame, everything: pd.DataFrame) -> bool:
     """Whether each row of ``some`` is one of ``everything``, and none is there twice."""
-    rows = [list(frame.astype(object).where(frame.notna(), None).itertuples(index=False, name=None)) for frame in (some, everything)]
-    return len(set(rows[0])) == len(rows[0]) and set(rows[0]) <= set(rows[1])
+    rows, all_rows = (
+        list(frame.astype(object).where(frame.notna(), None).itertuples(index=False, name=None))
+        for frame in (some, everything)
+    )
+    return len(set(rows)) == len(rows) and set(rows) <= set(all_rows)
 
 
 def survey(count: int, seed: int) -> list[Outcome]:
@@ -210,7 +217,9 @@ def main() -> int:
         print(f"{kind:10} {verdict:10} {count}")
     for one in wrong:
         print(f"{one.verdict}: {one.kind} of {one.file}: {one.detail}")
-    print(f"{len(outcomes)} damages, {sum(one.verdict == 'silent' for one in outcomes)} silent, {len(wrong)} wrong in all")
+    print(
+        f"{len(outcomes)} damages, {sum(one.verdict == 'silent' for one in outcomes)} silent, {len(wrong)} wrong in all"
+    )
     return bool(wrong)
 
 

@@ -86,7 +86,12 @@ def test_one_bit_of_a_columns_name_makes_no_traceback(tmp_path):
     path = files(tmp_path, "evals")[0]
     data = path.read_bytes()
     path.write_bytes(data.replace(b"mutation_rate", b"\xedutation_rate", 1))
-    for read in (load, lambda folder: query(folder, "SELECT * FROM runs"), lambda folder: finished(folder, "s"), sweep_status):
+    for read in (
+        load,
+        lambda folder: query(folder, "SELECT * FROM runs"),
+        lambda folder: finished(folder, "s"),
+        sweep_status,
+    ):
         with pytest.warns(StoreWarning, match=f"{path.name} is skipped: it is damaged"):
             read(tmp_path)
     assert [moved.name for moved in compact(tmp_path).set_aside] == [path.name]
