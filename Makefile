@@ -13,7 +13,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask clean sweep-snake soak real-robots propose-benchmark closing-the-gap
+.PHONY: help setup test lint dist sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask clean sweep-snake soak real-robots propose-benchmark closing-the-gap
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -21,12 +21,12 @@ help: ## list the targets
 
 setup: $(STAMP) ## virtual environment in .venv with everything but CUDA (does nothing when it is up to date)
 
-$(STAMP): pyproject.toml constraints.txt
+$(STAMP): pyproject.toml setup.py constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "bns needs Python 3.11 or newer; this is %d.%d. Try: make PYTHON=python3.12" % sys.version_info[:2])'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -c 'import torch' 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check "$(TORCH)+cpu" 2>/dev/null \
 		|| $(BIN)/pip install --disable-pip-version-check --index-url https://download.pytorch.org/whl/cpu "$(TORCH)"
-	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,lint,bench,cluster]'
+	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[all,docs,test,lint,bench]'
 	@touch $@
 
 test: setup ## all tests
@@ -37,10 +37,13 @@ lint: setup ## style and types
 	$(BIN)/mypy
 
 clean: ## remove the virtual environment and caches (never the results)
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build *.egg-info
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build dist *.egg-info
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 SWEEP = $(BIN)/bns sweep $(if $(BUDGET),--budget "$(BUDGET)") $(if $(JOBS),--jobs "$(JOBS)") --results "$(RESULTS)"
+
+dist: setup ## wheel and sdist, into dist/
+	$(BIN)/python -m build --no-isolation
 
 sweep-khepera: setup ## the Khepera study: prototype trials, small slice, all 45,000 runs; BUDGET=10m stops in time
 	$(SWEEP) sweeps/prototype.yaml sweeps/khepera-small.yaml sweeps/khepera.yaml
@@ -52,7 +55,7 @@ sweep-budget: setup ## how much evolution and training an evaluation should get
 	$(SWEEP) sweeps/budget.yaml
 
 figures: setup ## page and figures of whatever results there are, into results/figures; ONLY=success-by-mutation for one
-	$(BIN)/python -m analysis --results "$(RESULTS)" $(if $(ONLY),--only "$(ONLY)")
+	$(BIN)/bns figures --results "$(RESULTS)" $(if $(ONLY),--only "$(ONLY)")
 
 bench: setup ## speed, as ratios against named peers measured in the same run
 	$(BIN)/python -m tests.bench --json "$(RESULTS)/bench.json"
@@ -73,7 +76,7 @@ closing-the-gap: setup ## from a run on a robot to a mended model, and how contr
 	$(BIN)/bns run --world $(GAP)/robot.yaml --task circle --seed 1000 --evaluations 30 --measurements $(OUT)/log.parquet \
 		--save-snn $(OUT)/networks.safetensors --results $(OUT)
 	$(BIN)/bns diagnose $(OUT)/log.parquet --model $(GAP)/drawing.yaml --figures $(OUT)/figures
-	$(BIN)/bns add wheel-mismatch motor-lag --model $(GAP)/drawing.yaml --data $(OUT)/log.parquet -o $(OUT)/mended.yaml --figures $(OUT)/figures
+	$(BIN)/bns add $(OUT)/log.parquet wheel-mismatch motor-lag --model $(GAP)/drawing.yaml -o $(OUT)/mended.yaml --figures $(OUT)/figures
 	$(BIN)/bns sweep $(GAP)/before.yaml $(GAP)/after.yaml $(GAP)/direct.yaml --results $(OUT)
 	$(BIN)/python -m analysis.transfer "gap-before=the drawing" "gap-after=the mended model" \
 		--reference "gap-direct=the robot itself" --to $(GAP)/robot.yaml --results $(OUT) --out $(OUT)/figures

@@ -6,9 +6,8 @@ import argparse
 import sys
 import traceback
 from collections.abc import Sequence
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 from rich.console import Console
 from rich.progress import track
@@ -17,21 +16,35 @@ from analysis.gallery import write_page
 from analysis.labels import source_position
 from analysis.publish import forget_all_but, forget_skipped, publish_figure, publish_skipped
 from analysis.results import NoDataError, Results
-from bns.errors import BnsError, SpecError, unknown_name
+from bns.errors import BnsError, SpecError
+from bns.registry import FIGURES
 
 
-def figures() -> dict[str, ModuleType]:
-    """The figure modules in this folder by NAME, in the order of the source's numbers."""
-    names = sorted(file.stem for file in Path(__file__).parent.glob("*.py") if "\nNAME = " in file.read_text())
-    modules = (import_module(f"analysis.{name}") for name in names)  # the others are what figures share
-    return {module.NAME: module for module in sorted(modules, key=lambda one: source_position(one.PAPER))}
+def figures(broken: list[str] | None = None) -> dict[str, Any]:
+    """The figures of this folder and of installed packages by NAME, in the order of the source's numbers.
+
+    SpecError if a package's figure cannot be used; with ``broken`` that is said there, and the others are given.
+    """
+    found = {}
+    for name in FIGURES.names():
+        try:
+            found[name] = FIGURES.load(name)
+        except SpecError as fault:
+            if broken is None:
+                raise
+            broken.append(str(fault))
+    return dict(sorted(found.items(), key=lambda one: source_position(one[1].PAPER)))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw what the store has data for; 0, 1 where a script failed at it, or 2 with one line on stderr."""
     wanted, failed = _parser().parse_args(arguments), False
     try:
-        modules, out = _chosen(wanted.only), wanted.out or wanted.results / "figures"
+        broken: list[str] = []
+        modules = figures(broken) if wanted.only is None else {wanted.only: FIGURES.load(wanted.only)}
+        out = wanted.out or wanted.results / "figures"
+        for fault in broken:
+            print(f"error: {fault}", file=sys.stderr)
         if wanted.run is not None:
             modules = {name: module for name, module in modules.items() if getattr(module, "OF_A_RUN", False)}
         if not wanted.page:
@@ -43,13 +56,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted; what is drawn stays. Repeat the command for the rest.", file=sys.stderr)
         return 130
-    return int(failed)
+    return int(failed or bool(broken))
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m analysis", description="Draw figures from stored results.")
     parser.add_argument("--results", type=Path, default=Path("results"), help="folder of the results (results)")
-    parser.add_argument("--only", metavar="NAME", help="one figure: " + ", ".join(figures()))
+    parser.add_argument("--only", metavar="NAME", help="one figure: " + ", ".join(FIGURES.names()))
     parser.add_argument("--run", metavar="ID", help="figures and table rows of one run alone")
     parser.add_argument("--out", type=Path, help="folder of the figures (RESULTS/figures)")
     parser.add_argument("--refresh", type=int, metavar="S", help="let the page reload itself every S seconds")
@@ -57,16 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _chosen(only: str | None) -> dict[str, ModuleType]:
-    found = figures()
-    if only is None:
-        return found
-    if only not in found:
-        raise SpecError(unknown_name("figure", only, found))
-    return {only: found[only]}
-
-
-def _draw_all(modules: dict[str, ModuleType], store: Results, out: Path, *, everything: bool) -> bool:
+def _draw_all(modules: dict[str, Any], store: Results, out: Path, *, everything: bool) -> bool:
     """Whether every script could be carried through: one that cannot does not cost the others their figures."""
     made, failed = set(), False
     console = Console(stderr=True)

@@ -16,6 +16,7 @@ from analysis.coverage import coverage
 from analysis.figure_result import FigureResult
 from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
 from analysis.labels import CELL, counted, task_title
+from analysis.multiple_tests import holm
 from analysis.outcomes import criterion
 from analysis.ranking import TEN, in_words, ranking, varied
 from analysis.results import Results
@@ -50,14 +51,13 @@ def confirmed(store: Results, chosen: Selection, task: str) -> pd.DataFrame:
 def not_worse_than(rows: pd.DataFrame, best: pd.Series) -> np.ndarray:
     """Holm-corrected p-values of Fisher's exact test of each combination's successes against those of ``best``."""
     from scipy.stats import fisher_exact  # noqa: PLC0415  # slow to load
-    from statsmodels.stats.multitest import multipletests  # noqa: PLC0415
 
     pairs = list(zip(rows.successes, rows.runs, strict=True))
     known = {
         pair: fisher_exact([[best.successes, best.runs - best.successes], [pair[0], pair[1] - pair[0]]]).pvalue
         for pair in set(pairs)
     }
-    return np.asarray(multipletests([known[pair] for pair in pairs], alpha=LEVEL, method="holm")[1])
+    return holm([known[pair] for pair in pairs])
 
 
 @style()

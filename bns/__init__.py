@@ -1,20 +1,153 @@
-"""Bootstrapped Neuro-Simulation: run it, sweep it, analyse the batch."""
+"""Bootstrapped Neuro-Simulation: run it, sweep it, hold models against measurements, analyse the batch.
+
+    import bns
+
+    run = bns.run(robot="khepera", task="infinity", seed=3)
+    found = bns.diagnose("log.csv", bns.Model("khepera"))
+
+Every name of ``__all__`` is imported when it is first used, so that ``import bns`` is quick.
+"""
 
 from __future__ import annotations
 
+import importlib
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
-__all__ = ["__version__", "load"]
-
 if TYPE_CHECKING:
-    from bns.store import load
+    from inspect import Signature
+
+    from bns.api.add import AddResult, add
+    from bns.api.compare import CompareResult, compare
+    from bns.api.diagnose import DiagnoseResult, diagnose
+    from bns.api.effects import effects
+    from bns.api.measurements import Measurements
+    from bns.api.model import Model
+    from bns.api.propose import ProposeResult, propose
+    from bns.api.report import ReportResult, report
+    from bns.api.run import RunResult, run
+    from bns.api.sweep import Sweep, SweepResult
+    from bns.api.trial import TrialResult, trial
+    from bns.errors import (
+        BnsError,
+        ClusterError,
+        DataError,
+        DeviceError,
+        HardwareError,
+        ModelError,
+        SpecError,
+        StopNotConfirmedError,
+        StoreError,
+        TrialPausedError,
+    )
+    from bns.physics.effect import Effect, Parameter
+    from bns.store.reader import load, query
+
+__version__ = "0.2.0"
+
+__all__ = [
+    "AddResult",
+    "BnsError",
+    "ClusterError",
+    "CompareResult",
+    "DataError",
+    "DeviceError",
+    "DiagnoseResult",
+    "Effect",
+    "HardwareError",
+    "Measurements",
+    "Model",
+    "ModelError",
+    "Parameter",
+    "ProposeResult",
+    "ReportResult",
+    "RunResult",
+    "SpecError",
+    "StopNotConfirmedError",
+    "StoreError",
+    "Sweep",
+    "SweepResult",
+    "TrialPausedError",
+    "TrialResult",
+    "__version__",
+    "add",
+    "compare",
+    "diagnose",
+    "effects",
+    "load",
+    "propose",
+    "query",
+    "report",
+    "run",
+    "trial",
+]
+
+_HOMES = {
+    "api.add": ("AddResult", "add"),
+    "api.compare": ("CompareResult", "compare"),
+    "api.diagnose": ("DiagnoseResult", "diagnose"),
+    "api.effects": ("effects",),
+    "api.measurements": ("Measurements",),
+    "api.model": ("Model",),
+    "api.propose": ("ProposeResult", "propose"),
+    "api.report": ("ReportResult", "report"),
+    "api.run": ("RunResult", "run"),
+    "api.sweep": ("Sweep", "SweepResult"),
+    "api.trial": ("TrialResult", "trial"),
+    "errors": (
+        *("BnsError", "ClusterError", "DataError", "DeviceError", "HardwareError", "ModelError", "SpecError"),
+        *("StopNotConfirmedError", "StoreError", "TrialPausedError"),
+    ),
+    "physics.effect": ("Effect", "Parameter"),
+    "store.reader": ("load", "query"),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+_CALLABLE_ROOMS = ("diagnose", "trial")
+"""Folders of the package that share their name with a function: the folder, called, is the function."""
+
+
+def _named(name: str) -> Any:
+    return getattr(importlib.import_module(f"bns.{_HOME[name]}"), name)
+
+
+class _CallableRoom(ModuleType):
+    """The folder ``bns/diagnose`` or ``bns/trial`` as `bns.diagnose(...)`: its modules are reached through it as through any."""
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        return _named(self.__name__.removeprefix("bns."))(*given, **named)
+
+    @property
+    def __signature__(self) -> Signature:
+        """What `help` and notebooks show."""
+        import inspect  # noqa: PLC0415  # takes as long as all else here
+
+        return inspect.signature(_named(self.__name__.removeprefix("bns.")))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return importlib.import_module, (self.__name__,)
+
+
+class _Front(ModuleType):
+    """The package: a folder that is imported under a function's name stays callable."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in _CALLABLE_ROOMS and type(value) is ModuleType:
+            value.__class__ = _CallableRoom
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Front
 
 
 def __getattr__(name: str) -> Any:
-    """`bns.load(DIR)`: the store's reader, imported when it is asked for."""
-    if name == "load":
-        from bns.store import load  # noqa: PLC0415  # keeps `import bns` quick
+    if name not in _HOME:
+        raise AttributeError(f"module 'bns' has no attribute {name!r}")
+    if name in _CALLABLE_ROOMS:
+        return importlib.import_module(f"bns.{name}")
+    value = globals()[name] = _named(name)
+    return value
 
-        return load
-    raise AttributeError(f"module 'bns' has no attribute {name!r}")
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__} - {"TYPE_CHECKING", "Any", "ModuleType", "annotations"})

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bns.errors import SpecError, unknown_name
+from bns.registry import WORLDS, Registry
 
 ENGINE_VERSION = 2
 """Raised whenever the same spec would give other numbers; part of every run's name."""
@@ -39,9 +40,10 @@ def _field(
     high: float | None = None,
     choices: tuple[str, ...] | None = None,
     or_file: tuple[str, ...] = (),
+    parts: Registry | None = None,
 ) -> Any:
-    """``or_file``: endings of file names that may stand instead of one of the choices."""
-    bounds = {"low": low, "high": high, "choices": choices, "or_file": or_file}
+    """``or_file``: endings of file names that may stand instead of one of the choices; ``parts``: so may a package's part."""
+    bounds = {"low": low, "high": high, "choices": choices, "or_file": or_file, "parts": parts}
     return dataclasses.field(default=default, metadata={"help": text, **bounds})
 
 
@@ -60,6 +62,7 @@ class RunSpec:
         "what answers a controller, or a model file (.yaml) that physics drives",
         choices=("substitute", "physics", "robot"),
         or_file=(".yaml", ".yml"),
+        parts=WORLDS,
     )
     seed: int = _field(0, "seed of this run", low=0, high=2**32 - 1)
     root_seed: int = _field(0, "seed of the whole study", low=0, high=2**32 - 1)
@@ -126,7 +129,9 @@ def checked(name: str, value: Any) -> Any:
         raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.")
     if wanted is str:
         if meta["choices"] and value not in meta["choices"] and not value.endswith(meta["or_file"] or ("\0",)):
-            raise SpecError(unknown_name(name, value, meta["choices"]))
+            valid = (*meta["choices"], *(meta["parts"].announced if meta["parts"] else ()))
+            if value not in valid:
+                raise SpecError(unknown_name(name, value, valid))
         return value
     low, high = meta["low"], meta["high"]
     if not math.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):

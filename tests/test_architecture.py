@@ -11,7 +11,7 @@ import bns
 
 PACKAGE = Path(bns.__file__).parent
 FLOORS = (
-    {"errors", "spec", "measurements", "__init__"},
+    {"errors", "examples", "extras", "registry", "shipped", "spec", "measurements", "__init__"},
     {"engine"},
     {"tasks"},
     {"robots"},
@@ -23,6 +23,7 @@ FLOORS = (
     {"sweep"},
     {"diagnose", "plotting", "console"},
     {"trial"},
+    {"api"},
     {"cli"},
     {"__main__"},
 )

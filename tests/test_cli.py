@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 
 import bns as package
-from bns.cli.main import _duration, main
+from bns.cli.main import main
+from bns.cli.option_types import duration
 from bns.errors import BnsError
 from bns.robots.simulator import load_static_simulator
 from bns.sweep.executor import SerialExecutor
@@ -109,9 +110,10 @@ def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
     assert main(["status", "--results", str(results)]) == 0
     assert re.search(r"little\s+circle\s+4\s+4\s+0\s+0", capsys.readouterr().out)
     assert (
-        main(["query", "--csv", "SELECT count(*), count(DISTINCT run_id) FROM evals", "--results", str(results)]) == 0
+        main(["query", "--csv", "SELECT count(*) AS n, count(DISTINCT run_id) AS runs FROM evals", "--results", str(results)])
+        == 0
     )
-    assert capsys.readouterr().out == "16,8\n"
+    assert capsys.readouterr().out == "n,runs\n16,8\n"
     before = package.load(results)
     assert main(["compact", "--results", str(results)]) == 0
     pd.testing.assert_frame_equal(package.load(results), before)
@@ -154,11 +156,17 @@ def test_bad_input_is_named_and_ends_with_2(arguments, message, capsys, tmp_path
     ("arguments", "message"),
     [
         (["run", "--mutation-rate", "30"], r"For 30 percent write 0\.3"),
-        (["run", "--mutation-rte", "0.3"], r"unrecognized arguments"),
+        (["run", "--mutation-rte", "0.3"], r"usage: bns run [^§]*no option --mutation-rte\. Did you mean --mutation-rate\?"),
         (["run", "--population-size", "many"], r"population_size is 'many'; it must be a whole number"),
         (["sweep", "x.yaml", "--budget", "soon"], r"'soon' is not a time; write 90s, 10m or 1h30m"),
         (["sweep", "x.yaml", "--jobs", "0"], r"whole number of 1 or more"),
-        ([], r"COMMAND"),
+        (["run", "--pop", "20"], r"there is no option --pop\. Did you mean --population-size\?"),
+        (["run", "circle"], r"usage: bns run [^§]*circle: nothing is expected there"),
+        (["swep", "x.yaml"], r"usage: bns sweep [^§]*there is no command swep\. Did you mean sweep\?"),
+        (["--jsn", "status"], r"there is no option --jsn"),
+        (["diagnose", "log.csv", "--modl", "khepera"], r"usage: bns diagnose [^§]*Did you mean --model\?"),
+        (["query", "--cvs", "SELECT 1 -- of all"], r"there is no option --cvs\. Did you mean --csv\?"),
+        (["status", "--qqqq"], r"there is no option --qqqq\.\n"),
     ],
 )
 def test_bad_options_end_with_2(arguments, message, capsys):
@@ -170,7 +178,7 @@ def test_bad_options_end_with_2(arguments, message, capsys):
 
 @pytest.mark.parametrize(("text", "seconds"), [("90", 90), ("90s", 90), ("10m", 600), ("1h30m", 5400), ("0.5h", 1800)])
 def test_times(text, seconds):
-    assert _duration(text) == seconds
+    assert duration(text) == seconds
 
 
 def test_query_says_what_duckdb_says(tmp_path, capsys):
@@ -184,7 +192,7 @@ def test_output_into_a_closed_pipe_is_no_fault(tmp_path, bns):
     import subprocess
     import sys
 
-    shell = f"{sys.executable} -m bns query --csv 'SELECT i FROM range(200000) t(i)' --results {tmp_path} | head -1"
+    shell = f"{sys.executable} -m bns query --csv --no-header 'SELECT i FROM range(200000) t(i)' --results {tmp_path} | head -1"
     done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=60, check=False)
     assert done.stdout == "0\n"
     assert done.stderr == ""

@@ -71,4 +71,4 @@ def test_the_page_adds_what_its_robot_hides_and_the_two_differ_in_nothing_else()
     )
     assert {**robot, "effects": None} == {**drawing, "effects": None}
     (add,) = (shlex.split(command) for command in COMMANDS if command.startswith("bns add"))
-    assert add[2 : add.index("--model")] == [effect["name"] for effect in robot["effects"]]
+    assert add[3 : add.index("--model")] == [effect["name"] for effect in robot["effects"]]

@@ -99,11 +99,11 @@ def test_training_ends_where_watched_patterns_were_best_and_has_learned():
 
 def test_near_commands_are_allowed_ones_within_a_mutation():
     commands = ROBOT.random_controllers(KEY, 50, 1).commands[:, 0]
-    near = ROBOT.near(commands, KEY, 1)
+    near = ROBOT.perturb(commands, KEY, 1)
     assert (near[:, 1] < near[:, 0]).all()
     turned = np.abs(np.mod(near[:, 2:4] - commands[:, 2:4] + np.pi, 2 * np.pi) - np.pi)
     assert 0.05 < turned.mean() < 0.2
-    assert not np.array_equal(near, ROBOT.near(commands, KEY, 2))
+    assert not np.array_equal(near, ROBOT.perturb(commands, KEY, 2))
 
 
 def test_accuracy_of_known_numbers():

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from store.synthetic import record
 
-import bns as package
 from bns.cli import watch as watching
 from bns.cli.watch import trace, watch
 from bns.errors import BnsError
@@ -80,14 +79,14 @@ def test_a_run_in_the_journal_and_a_fold_leave_a_trace(tmp_path):
     assert trace(tmp_path) == trace(tmp_path)
 
 
-def test_without_a_checkout_the_message_says_what_to_do(tmp_path, monkeypatch):
-    monkeypatch.setattr(package, "__file__", str(tmp_path / "bns" / "__init__.py"))
-    with pytest.raises(BnsError, match="come with a checkout, not with an installed package"):
+def test_without_the_scripts_the_message_says_what_to_do(tmp_path, monkeypatch):
+    monkeypatch.setattr("bns.shipped.PACKAGE", tmp_path / "bns")
+    with pytest.raises(BnsError, match=r"did not come with this package.*pip install --force-reinstall bns"):
         watch(tmp_path)
 
 
 def test_ctrl_c_ends_the_command_quietly(tmp_path):
-    command = [sys.executable, "-m", "bns", "watch", str(tmp_path / "none"), "--every", "1s"]
+    command = [sys.executable, "-m", "bns", "watch", "--results", str(tmp_path / "none"), "--every", "1s"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         first = process.stderr.readline()
         process.send_signal(signal.SIGINT)

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from bns.engine.philox import Key, Purpose
-from bns.errors import SpecError
+from bns.errors import ModelError, SpecError
 from bns.robots import load_robot
 from bns.robots.simulator import load_static_simulator
 from bns.spec import FIELDS
 from bns.worlds import build_world
+from bns.worlds.logged import LoggedWorld
 from bns.worlds.robot import RobotWorld, in_task_frame
 
 SIMULATED = [name for name in FIELDS["world"].metadata["choices"] if name != "robot"]
@@ -95,7 +96,7 @@ def test_what_a_robot_did_is_judged_as_if_it_had_begun_at_the_start():
 def test_a_snake_that_was_laid_down_elsewhere_is_judged_from_the_start_too():
     robot = load_robot("snake")
     did = robot.poses(np.array([[0.1, 0.02, 0.08, 0.0, 1.0], [-0.2, 0.1, 0.0, 0.1, 0.0]]))
-    elsewhere = robot.moved(np.vstack([robot.start_pose(), did]), 0.7, np.array([0.2, -0.1]))
+    elsewhere = robot.transform(np.vstack([robot.start_pose(), did]), 0.7, np.array([0.2, -0.1]))
     assert abs(elsewhere[1:, :8] - did[:, :8]).min() > 1e-3
     np.testing.assert_allclose(in_task_frame(robot, elsewhere), did, atol=1e-12)
 
@@ -103,3 +104,28 @@ def test_a_snake_that_was_laid_down_elsewhere_is_judged_from_the_start_too():
 def test_a_robot_drives_nothing_for_the_sake_of_a_measurement():
     with pytest.raises(SpecError, match="it drives what is picked, once"):
         RobotWorld("r").drive(np.zeros((3, 3)), KEY, Purpose.WORLD_FITTEST, 1)
+class Filmed:
+    """A world that can be rendered."""
+
+    digest, repeatable, renderable = "w-filmed", False, True
+
+    def __init__(self):
+        self.pictures = []
+
+    def render(self, commands, picture):
+        self.pictures.append((len(commands), picture.name))
+
+    def check_picture(self, picture):
+        raise ModelError(f"no {picture.suffix}")
+
+
+def test_a_logged_world_is_repeatable_and_renderable_as_the_world_behind_it(tmp_path):
+    robot, filmed = load_robot("khepera"), Filmed()
+    logged = LoggedWorld(filmed, robot)
+    assert (logged.repeatable, logged.renderable) == (False, True)
+    logged.render(np.zeros((3, 3)), tmp_path / "a.png")
+    assert filmed.pictures == [(3, "a.png")]
+    with pytest.raises(ModelError, match=r"no \.gif"):
+        logged.check_picture(tmp_path / "a.gif")
+    assert not build_world("physics", robot).renderable
+    assert build_world("physics", load_robot("snake")).renderable

@@ -49,7 +49,7 @@ def _drives(store: Results, sweep: str, world: World, robot: Robot) -> Iterator[
         commands = rows[list(robot.command_columns)].to_numpy(np.float32)
         key = Key.of_run(int(seed), int(root_seed), robot.name, name)
         poses = world.drive(commands, key, Purpose.WORLD_FITTEST, int(evaluation))
-        fitness, _ = robot.judge(poses, task)
+        fitness, _ = robot.evaluate_path(poses, task)
         yield {
             "sweep": sweep,
             "task": name,

@@ -44,7 +44,7 @@ class Recorder:
 
     def __init__(self, robot: Robot, task: Task, world: World, key: Key, spec: RunSpec) -> None:
         self._robot, self._task, self._world, self._key = robot, task, world, key
-        self._once = not getattr(world, "repeatable", True)
+        self._once = not world.repeatable
         self._full, self._with_paths = spec.record == "full", spec.record in {"paths", "full"}
         self._evals, self._paths, self._generations, self._probe_rows = (_Columns() for _ in range(4))
         self.last_poses = self.last_simulated = robot.start_pose()[:0]
@@ -61,9 +61,9 @@ class Recorder:
     def add_evaluated(self, evaluation: int, drive: Drive, weights: np.ndarray) -> None:
         """Keep the drive of the controller picked for this evaluation, and what networks (networks, W) predict for it."""
         controller, poses = drive.commands, drive.poses
-        in_world, goals = self._robot.judge(poses, self._task)
+        in_world, goals = self._robot.evaluate_path(poses, self._task)
         simulated = self._simulated(controller, weights)
-        in_simulation, _ = self._robot.judge(simulated, self._task)
+        in_simulation, _ = self._robot.evaluate_path(simulated, self._task)
         self._evaluated = {
             "evaluated_fitness_simulation": in_simulation,
             "evaluated_fitness_world": in_world,
@@ -81,7 +81,7 @@ class Recorder:
         trainer, evolver, weights = simulation.trainer, simulation.evolver, simulation.weights
         training_cpu_s, evolution_cpu_s = simulation.take_cpu_s()
         fittest, poses, simulated = self._fittest(evaluation, evolver, weights)
-        in_world, goals = self._robot.judge(poses, self._task)
+        in_world, goals = self._robot.evaluate_path(poses, self._task)
         in_simulation = self._evaluated["evaluated_fitness_simulation"] if self._once else evolver.best_fitness
         self.last_poses, self.last_simulated = poses, simulated
         successes = self._successes("success", poses)
@@ -158,7 +158,7 @@ class Recorder:
                 evaluation=evaluation,
                 generation=generation.number,
                 best_fitness=generation.best_fitness,
-                best_fitness_world=self._robot.judge(driven, self._task)[0],
+                best_fitness_world=self._robot.evaluate_path(driven, self._task)[0],
                 mean_fitness=generation.mean_fitness,
             )
         self._add_probes(evaluation, self._probes, weights)

@@ -8,9 +8,8 @@ import tempfile
 from contextlib import ExitStack
 from pathlib import Path
 
-import cv2
-
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.looking import from_folder, views, watch
@@ -18,6 +17,9 @@ from bns.hardware.platform import platform_module
 from bns.hardware.rig import Rig, load_rig, shipped_rig
 from bns.hardware.tracking.calibration import Board, calibrate
 from bns.hardware.tracking.camera import StreamCamera
+
+with extra("robot"):
+    import cv2
 
 _PRINT_PX_PER_M = 300 / 0.0254
 

@@ -7,22 +7,20 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
-import yaml
-
-from bns.errors import DataError, ModelError
+from bns.cli.parser import Parser, data_first
+from bns.errors import DataError
 
 if TYPE_CHECKING:
-    from bns.diagnose.data.load import Measured
-    from bns.diagnose.diagnosis import Diagnosis
-    from bns.diagnose.predict.base import Predictor
-    from bns.diagnose.predict.wheels import WheelPredictor
-    from bns.physics.model import Model
+    from bns.api.common.prepared import Prepared
+    from bns.api.common.shown import Progress
+    from bns.api.diagnose import DiagnoseResult
+    from bns.api.measurements import Measurements
+    from bns.api.model import Given
 
-Adder = Callable[[str, Callable[[argparse.Namespace], int], str], argparse.ArgumentParser]
+Adder = Callable[[str, Callable[[argparse.Namespace], int], str], Parser]
 
 
 def add_commands(command: Adder) -> None:
@@ -40,6 +38,8 @@ def add_commands(command: Adder) -> None:
         "diagnose", diagnose, "which physical effect a model lacks, how sure that is, and what else it could be"
     )
     more = command("add", add, "add effects to a model, fit it to measurements, and show the error before and after")
+    more.rewrite = data_first
+    more.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
     more.add_argument(
         "effects", nargs="+", metavar="EFFECT", help="names of effects, Python files, or one name with --term"
     )
@@ -53,7 +53,7 @@ def add_commands(command: Adder) -> None:
         help="every trial has a value of its own (clock-offset: clocks set anew each time)",
     )
     more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the mended model")
-    more.add_argument("--data", type=Path, required=True, metavar="FILE", help="measurements (.csv or .parquet)")
+    more.add_argument("--json", action="store_true", help="one JSON object on stdout")
     for one in (held, found):
         one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
         one.add_argument("--json", action="store_true", help="one JSON object on stdout")
@@ -99,6 +99,8 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
 
 def import_(options: argparse.Namespace) -> int:
     """A log as a table of measurements; the mapping is kept beside it."""
+    import yaml
+
     from bns.diagnose.data.apply_mapping import applied
     from bns.diagnose.data.checks import checked
     from bns.diagnose.data.guess_mapping import drafted
@@ -129,150 +131,101 @@ def import_(options: argparse.Namespace) -> int:
 
 def compare(options: argparse.Namespace) -> int:
     """Errors of a model as it is; of a run's networks also why they are wrong."""
-    from bns.diagnose.comparison import compare as hold
-    from bns.diagnose.predict.networks import NetworkPredictor
+    from bns.api.compare import compare as held_against
     from bns.diagnose.report.figures import comparison_figure
-    from bns.diagnose.report.network_text import network_errors_figure, network_errors_text
-    from bns.diagnose.report.text import comparison_text
-    from bns.diagnose.residuals.network_errors import why_wrong
+    from bns.diagnose.report.network_text import network_errors_figure
 
-    networks = _networks(options)
-    held: tuple[Measured, Predictor, Model]
-    held = ready(options, slim=False) if networks is None else _ready_with_networks(options, *networks)
-    measured, predictor, model = held
-    with ticking("comparing"):
-        result = hold(predictor, model)
-        kept = isinstance(predictor, NetworkPredictor) and predictor.learned_from.size > 0
-        why = why_wrong(cast("NetworkPredictor", predictor)) if kept else None
-    if isinstance(predictor, NetworkPredictor) and not kept:
+    model, log = model_of(options), log_of(options)
+    with ticking("comparing") as tick:
+        seen = held_against(log, model, progress=tick)
+    if seen.of_networks and seen.causes is None:
         print(
             "bns: these networks come without their training patterns, so why they are wrong is not said",
             file=sys.stderr,
         )
-    if options.json:
-        causes = {} if why is None else {"causes": why.as_json()}
-        print(json.dumps({**result.as_json(), **causes, "findings": [vars(f) for f in measured.findings]}))
-    else:
-        print(comparison_text(result))
-        if why is not None:
-            print(f"\n{network_errors_text(why)}")
-    _drawn(options, lambda folder: comparison_figure(result, folder / "comparison"))
-    if why is not None:
-        _drawn(options, lambda folder: network_errors_figure(why, folder / "network-errors"))
+    print(json.dumps(seen.to_json()) if options.json else seen.summary())
+    _drawn(options, lambda folder: comparison_figure(seen.comparison, folder / "comparison"))
+    causes = seen.causes
+    if causes is not None:
+        _drawn(options, lambda folder: network_errors_figure(causes, folder / "network-errors"))
     return 0
 
 
 def diagnose(options: argparse.Namespace) -> int:
     """The verdict on what a model lacks."""
     from bns.diagnose.report.figures import diagnosis_figure
-    from bns.diagnose.report.text import diagnosis_text
 
-    _, _, _, result = diagnosed(options)
-    print(json.dumps(result.as_json()) if options.json else diagnosis_text(result))
-    if result.selection is not None:
-        _drawn(options, lambda folder: diagnosis_figure(result, folder / "diagnosis"))
+    found = diagnosed(options)
+    print(json.dumps(found.to_json()) if options.json else found.summary())
+    if found.diagnosis.selection is not None:
+        _drawn(options, lambda folder: diagnosis_figure(found.diagnosis, folder / "diagnosis"))
     return 0
 
 
-def diagnosed(options: argparse.Namespace) -> tuple[Measured, WheelPredictor, Model, Diagnosis]:
-    """Data, predictor and model of the options, and the diagnosis of what the model lacks."""
-    from bns.diagnose.diagnosis import diagnose as find
-    from bns.physics.effects import effect_in_file
+def diagnosed(options: argparse.Namespace) -> DiagnoseResult:
+    """The diagnosis of what the options' model lacks on their data."""
+    from bns.api.diagnose import diagnose as find
 
-    own = {effect.name: effect for effect in map(effect_in_file, map(Path, options.also))}
-    measured, predictor, model = ready(options)
+    model, log = model_of(options), log_of(options)
     with ticking("diagnosing") as tick:
-        return measured, predictor, model, find(predictor, model, extra=own, tick=tick)
+        found = find(log, model, also=options.also, progress=tick)
+    _say_thinned(found.ready)
+    return found
 
 
 def add(options: argparse.Namespace) -> int:
-    """A mended model, as a new file."""
-    from bns.diagnose.adding import add_effects, effect_from, model_yaml
+    """An extended model, as a new file."""
+    from bns.api.add import add as fitted
+    from bns.api.model import checked_target
     from bns.diagnose.report.figures import error_by_step_figure
-    from bns.diagnose.report.text import extension_text
-    from bns.store.files import publish
 
-    if options.output.suffix not in {".yaml", ".yml"}:
-        raise ModelError(f"The mended model cannot be written to {options.output}; let the name end in .yaml.")
-    if options.term is not None and len(options.effects) != 1:
-        raise ModelError(f"A formula needs one name, not {', '.join(options.effects)}: bns add NAME --term … --on …")
-    effects = [effect_from(name, options.term, options.on) for name in options.effects]
-    measured, predictor, model = ready(options)
-    with ticking("fitting"):
-        extended = add_effects(predictor, model, effects, measured, options.per_trial)
-    publish(
-        model_yaml(extended.model).encode(), options.output.with_name(f".{options.output.name}.part"), options.output
-    )
-    print(extension_text(extended))
-    print(f"written to {options.output}; the model before is as it was ({options.model})")
-    _drawn(options, lambda folder: error_by_step_figure(extended, folder / "ladder"))
+    checked_target(options.output)
+    model, log = model_of(options), log_of(options)
+    with ticking("fitting") as tick:
+        result = fitted(
+            log,
+            options.effects,
+            model,
+            term=options.term,
+            on=options.on,
+            per_trial=options.per_trial,
+            progress=tick,
+        )
+    _say_thinned(result.ready)
+    result.model.save(options.output)
+    print(json.dumps(result.to_json()) if options.json else result.summary())
+    if not options.json:
+        print(f"written to {options.output}; the model before is as it was ({options.model})")
+    _drawn(options, lambda folder: error_by_step_figure(result.extended, folder / "ladder"))
     return 0
 
 
-def ready(options: argparse.Namespace, *, slim: bool = True) -> tuple[Measured, WheelPredictor, Model]:
-    """Data, predictor and model of the options; what is odd about the data goes to stderr.
-
-    ``slim``: of very many poses only some are taken, as fits need.
-    """
-    from bns.diagnose.data.cycles import CycleTracks
-    from bns.diagnose.predict.check_robot import check_named_robot, check_same_robot
-    from bns.diagnose.predict.wheels import WheelPredictor, predictor_for_search
-
-    if _networks(options) is not None:
-        raise ModelError(f"{options.model} holds networks, which have no effects: they can be compared, not diagnosed.")
-    model = _model(options)
-    measured = _measured(options)
-    check_named_robot(measured.robot, model)
-    if isinstance(measured.tracks, CycleTracks):
-        raise DataError(
-            f"{options.data} holds cycles and markers, and the model {options.model} drives wheels; "
-            "compare them with networks: --model snake, or a file (.safetensors) of bns run --robot snake --save-snn FILE."
-        )
-    predictor = predictor_for_search(measured.tracks) if slim else WheelPredictor(measured.tracks)
-    used, there = len(predictor.tracks.t_s), len(measured.tracks.t_s)
-    if used < there:
-        print(f"{used} of {there} poses are used, evenly chosen; all commands are", file=sys.stderr)
-        measured = replace(measured, tracks=predictor.tracks)
-    check_same_robot(predictor, model)
-    return measured, predictor, model
-
-
-def _ready_with_networks(options: argparse.Namespace, file: Path, robot: str) -> tuple[Measured, Predictor, Model]:
-    """Data and networks that predict them; the model has no effects of its own."""
-    from bns.diagnose.predict.saved_networks import network_predictor
-    from bns.physics.model import Model
-
-    measured = _measured(options)
-    return measured, network_predictor(file, measured.tracks, robot), Model(wheelbase_m=1.0, name=options.model)
-
-
-def _networks(options: argparse.Namespace) -> tuple[Path, str] | None:
-    from bns.diagnose.predict.saved_networks import networks_file
-    from bns.physics.model import model_names
-
-    return networks_file(options.model, model_names())
-
-
-def _measured(options: argparse.Namespace) -> Measured:
-    from bns.diagnose.data.load import load_measured
+def log_of(options: argparse.Namespace) -> Measurements:
+    """The measurements of the options; what is odd about them goes to stderr."""
+    from bns.api.measurements import Measurements
     from bns.diagnose.report.text import findings_text
 
-    measured = load_measured(options.data, options.robot, options.more)
-    if measured.findings:
-        most = len(measured.findings) if getattr(options, "findings", False) else 5
-        print(findings_text(measured.findings, most), file=sys.stderr)
-    return measured
+    log = Measurements(options.data, *options.more, robot=options.robot)
+    findings = log.measured.findings
+    if findings:
+        most = len(findings) if getattr(options, "findings", False) else 5
+        print(findings_text(findings, most), file=sys.stderr)
+    return log
 
 
-def _model(options: argparse.Namespace) -> Model:
-    from bns.physics.model import Model, load_model
+def model_of(options: argparse.Namespace) -> Given:
+    """The model of the options; the name as it is where it means networks."""
+    from bns.api.common.prepared import are_networks
+    from bns.api.model import Model
 
-    if options.model == "differential-drive":
-        if options.wheelbase is None:
-            raise ModelError("The model differential-drive needs its wheelbase: --wheelbase METRES.")
-        return Model(wheelbase_m=options.wheelbase, name="differential-drive")
-    model = load_model(options.model)
-    return model if options.wheelbase is None else replace(model, wheelbase_m=options.wheelbase)
+    if are_networks(options.model):
+        return str(options.model)
+    return Model(options.model, **({} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}))
+
+
+def _say_thinned(ready: Prepared) -> None:
+    if ready.thinned:
+        print(ready.thinned, file=sys.stderr)
 
 
 def _drawn(options: argparse.Namespace, draw: Callable[[Path], Path]) -> None:
@@ -282,14 +235,14 @@ def _drawn(options: argparse.Namespace, draw: Callable[[Path], Path]) -> None:
 
 
 @contextmanager
-def ticking(text: str) -> Iterator[Callable[[str], None]]:
+def ticking(text: str) -> Iterator[Progress]:
     """A line on stderr that says what is being looked at; nothing where stderr is no terminal."""
     from rich.console import Console
     from rich.status import Status
 
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield lambda _: None
+        yield lambda _share, _what: None
         return
     with Status(text, console=console) as line:
-        yield lambda what: line.update(f"{text}: {what}")
+        yield lambda _share, what: line.update(f"{text}: {what}")

@@ -10,8 +10,8 @@ from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import Unexplained
+from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.stepwise import Candidate, SelectionResult
-from bns.physics.effects import all_effects
 
 NOTABLE = 0.01
 """An effect that would have earned this share of the loss, but is rejected, is mentioned."""
@@ -43,15 +43,14 @@ def notes_on(
 
 def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
     names = {*selection.accepted, *(name for competitor in selection.competing_models for name in competitor)}
-    for name in sorted(names & set(all_effects())):
-        if all_effects()[name].of_measuring:
+    known = known_effects(selection)
+    for name in sorted(names):
+        if known[name].of_measuring:
             yield f"{name} is a fault of the measuring, not of the robot."
-    if "battery-sag" in names and not tracks.start_known and "battery_v" not in tracks.extra:
-        yield "No session_s or battery_v was logged: the session's time is taken as the trials one right after the other."
-    if {"tether-pull", "floor-slope"} <= names:
-        yield "A floor-slope is a tether-pull from far away: drive on both sides of the supposed anchor to tell them apart."
-    if {"command-delay", "clock-offset"} <= names:
-        yield "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
+    chain = sorted((known[name] for name in names), key=lambda effect: (effect.place, effect.name))
+    logged = {*tracks.extra, *(("session_s",) if tracks.start_known else ())}
+    yield from (effect.caveat for effect in chain if effect.caveat and not logged.intersection(effect.explained_by))
+    yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
     per_trial_effect = selection.fit.model.per_trial_effect
     if per_trial_effect is not None:
         own = np.array(per_trial_effect.trial_values)

@@ -41,7 +41,8 @@ def cache_folder() -> Path:
             continue
         if os.access(place.parent, os.W_OK):
             return place
-    return Path(tempfile.gettempdir()) / f"bns-{os.getuid()}" / name
+    user = f"bns-{os.getuid()}" if hasattr(os, "getuid") else "bns"  # on Windows each user has a folder for these
+    return Path(tempfile.gettempdir()) / user / name
 
 
 def _configure() -> None:

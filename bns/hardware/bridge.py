@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import termios
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 
-import serial
-
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.ax12_table import CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
 from bns.hardware.bridge_frames import (
     ANSWER,
@@ -33,6 +31,10 @@ from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.serial_link import open_port
 from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
+from bns.hardware.terminal_error import TerminalError
+
+with extra("robot"):
+    import serial
 
 BAUD = 115200
 ATTEMPTS = 6
@@ -146,7 +148,7 @@ class BridgeChain:
             self._sequence = (self._sequence + 1) % 256
             try:
                 answer = self._once(Frame(kind, self._sequence, payload), timeout_s)
-            except (OSError, termios.error, HardwareError) as error:
+            except (OSError, TerminalError, HardwareError) as error:
                 self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             if answer is not None and answer.kind == kind | ANSWER and len(answer.payload) == size:
@@ -157,7 +159,7 @@ class BridgeChain:
     def _lose(self, error: Exception) -> None:
         if self._serial is not None:  # else it was gone before
             self._journal.note("link-lost", port=self._port, error=str(error))
-        with suppress(OSError, termios.error):
+        with suppress(OSError, TerminalError):
             self.close()
         self._serial = None
 

@@ -9,9 +9,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from serial.tools.list_ports import comports
-
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.khepera import BAUD, KheperaIII, RobotLostError, check_battery
@@ -22,6 +21,9 @@ from bns.hardware.servo_chain import ServoError
 from bns.hardware.snake_settings import snake_settings
 from bns.hardware.tracking.calibration import WORST_RMS_PX, load_calibration
 from bns.hardware.tracking.kinds import open_tracker
+
+with extra("robot"):
+    from serial.tools.list_ports import comports
 
 _SLOW_LATENCY_MS = 1
 _STRAIGHT_RAD = 0.17

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 import struct
-import termios
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 
-from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler
-
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.ax12_table import BROADCAST, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel_port import ClockedPort
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
+from bns.hardware.terminal_error import TerminalError
+
+with extra("robot"):
+    from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler
 
 BAUD = 1_000_000
 ATTEMPTS = 6
@@ -88,7 +90,7 @@ class Ax12Chain:
             except IndexError:  # the SDK reads past the end of a status packet that is too short
                 value, result, bits = 0, COMM_RX_CORRUPT, 0
                 problem = "corrupt status packet"
-            except (OSError, termios.error) as error:
+            except (OSError, TerminalError) as error:
                 self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             finally:
@@ -109,7 +111,7 @@ class Ax12Chain:
     def _lose(self, error: Exception) -> None:
         if self._port.is_open:  # else it was gone before
             self._journal.note("link-lost", port=self._port.port_name, error=str(error))
-        with suppress(OSError, termios.error):
+        with suppress(OSError, TerminalError):
             self.close()
         self._port.is_open = False
 
@@ -212,7 +214,7 @@ class Ax12Chain:
     def _all_off(self) -> None:
         """Take the torque off all servos at once; nobody answers that."""
         self._port.is_using = False
-        with suppress(OSError, termios.error):
+        with suppress(OSError, TerminalError):
             self._reopen()
             self._packets.write1ByteTxOnly(self._port, BROADCAST, REGISTERS["torque_enable"].address, 0)
             self._port.is_using = False

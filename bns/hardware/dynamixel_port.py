@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from dynamixel_sdk import PortHandler
-
+from bns.extras import extra
 from bns.hardware.clock import Clock
+
+with extra("robot"):
+    from dynamixel_sdk import PortHandler
 
 _SLICE_S = 0.002
 

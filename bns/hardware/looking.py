@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.rig import Rig
 from bns.hardware.tracking.calibration import Board, Calibration, calibrate, corners, load_calibration
 from bns.hardware.tracking.camera import FrameTracker, StreamCamera, annotated
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.sight import Sight
+
+with extra("robot"):
+    import cv2
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".bmp"}
 _MOVED_PX = 25.0

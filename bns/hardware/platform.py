@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
 
-from bns.errors import HardwareError, unknown_name
-from bns.hardware import platforms
 from bns.hardware.stop import Stop
+from bns.registry import PLATFORMS
 
 
 @dataclass(frozen=True)
@@ -74,10 +70,23 @@ class Emulation(Protocol):
         """Take it away."""
 
 
-def platform_module(robot: str) -> ModuleType:
-    """The module of a robot's platform; it has `open_platform(rig, clock, journal, stopping)`,
-    `emulate(rig, folder, clock, plan, seed)` and `REPEATS`, how often a trial drives its final controller."""
-    names = sorted(m.name for m in pkgutil.iter_modules(platforms.__path__))
-    if robot not in names:
-        raise HardwareError(unknown_name("robot with a driver", robot, names))
-    return import_module(f"bns.hardware.platforms.{robot}")
+class PlatformModule(Protocol):
+    """What the module of a robot's driver has, ours or an installed package's."""
+
+    RIG: Any
+    """The file with the example rig, which `--emulated` uses: a path, or what `importlib.resources` gives."""
+
+    REPEATS: int
+    """How often a trial drives its final controller, unless it is told otherwise."""
+
+    def open_platform(self, rig: Any, clock: Any, journal: Any, stopping: Any) -> Platform:
+        """Open port and tracker; HardwareError if they cannot be used."""
+
+    def emulate(self, rig: Any, folder: Any, clock: Any, plan: Any, seed: int) -> Emulation:
+        """An emulated robot under an emulated tracker, their ports in `folder`."""
+
+
+def platform_module(robot: str) -> PlatformModule:
+    """The driver of a robot, found by the robot's name; HardwareError lists the robots that have one."""
+    module: PlatformModule = PLATFORMS.load(robot)
+    return module

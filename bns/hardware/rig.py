@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import yaml
 
 from bns.errors import HardwareError, unknown_name
 from bns.hardware.safety import Limits, Surface
+from bns.registry import PLATFORMS, TRACKERS
 
 _KEYS = ("robot", "port", "surface_m", "tracker", "lost_s", "late_s", "placed_within_m", "placed_within_rad", "driver")
 _NEEDED = ("robot", "port", "surface_m", "tracker")
@@ -51,11 +51,7 @@ def surface_text(surface: Surface) -> str:
 
 def shipped_rig(robot: str) -> Rig:
     """The example rig of a robot, which `--emulated` uses."""
-    place = resources.files("bns.hardware") / "rigs"
-    names = sorted(f.name.removesuffix(".yaml") for f in place.iterdir() if f.name.endswith(".yaml"))
-    if robot not in names:
-        raise HardwareError(unknown_name("robot with a rig", robot, names))
-    return parse_rig((place / f"{robot}.yaml").read_text(encoding="utf-8"), f"the shipped rig of {robot}")
+    return parse_rig(PLATFORMS.load(robot).RIG.read_text(encoding="utf-8"), f"the shipped rig of {robot}")
 
 
 def load_rig(path: Path, robot: str) -> Rig:
@@ -90,7 +86,7 @@ def parse_rig(text: str, where: str) -> Rig:
 def _rig(content: Mapping[str, Any], where: str) -> Rig:
     tracker = content["tracker"]
     if not isinstance(tracker, dict) or "kind" not in tracker:
-        raise HardwareError(f"{where}: tracker is {tracker!r}; it needs a kind (wii, aruco or colour) and its settings.")
+        raise HardwareError(f"{where}: tracker is {tracker!r}; it needs a kind ({', '.join(TRACKERS.names())}) and its settings.")
     numbers = {name: _positive(where, name, content[name]) for name in ("lost_s", "late_s") if name in content}
     limits = Limits(_surface(where, content["surface_m"]), **numbers)
     near_m = _positive(where, "placed_within_m", content.get("placed_within_m", 0.1))

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import errno
 import os
-import termios
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-import serial
-from serial.tools.list_ports import comports
-
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.terminal_error import TerminalError
+
+with extra("robot"):
+    import serial
+    from serial.tools.list_ports import comports
 
 _LONGEST_LINE = 256
 _SLICE_S = 0.01
@@ -55,7 +57,7 @@ class SerialLink:
             in_vain = self._clock.in_vain(timeout_s)
             self._serial.write(request)
             line = self._line(in_vain)
-        except (serial.SerialException, OSError, termios.error, HardwareError) as error:
+        except (serial.SerialException, OSError, TerminalError, HardwareError) as error:
             self._lose(error)
             self._wait_out(began_s + timeout_s)
             raise NoReplyError(f"the port {self.port} is gone ({error})") from error
@@ -71,7 +73,7 @@ class SerialLink:
 
     def forget(self) -> None:
         """Drop answers that came too late."""
-        with suppress(serial.SerialException, OSError, termios.error):  # then there are none
+        with suppress(serial.SerialException, OSError, TerminalError):  # then there are none
             if self._serial is not None:
                 self._serial.reset_input_buffer()
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from bns.physics.effect import Effect, Parameter
+from bns.physics.order import DECOYS as BETWEEN
 from bns.physics.signals import Array, Body
 
 _GOLDEN = 0.6180339887498949
@@ -66,7 +67,7 @@ def _decoy(number: int, apply: Callable[[Body, float], Body]) -> Effect:
         residuals="none",
         lookalikes=(),
         apply=apply,
-        rank=115,
+        after=BETWEEN,
     )
 
 

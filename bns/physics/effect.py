@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bns.errors import ModelError, unknown_name
+from bns.physics.order import ORDER, OTHERS, place
 
 STAGES = ("wheel", "body", "world", "clock", "measure")
 """In the order in which they act; `bns.physics.signals` says what each one passes on."""
@@ -34,7 +35,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """One file of `bns.physics.effects`.
+    """One file of `bns.physics.effects`, or one object that a package announces in the group ``bns.effects``.
 
     ``apply(signal, **values)`` returns the stage's signal (`Wheels`, `Body`, `Flow`, `Stamps`, `View`) with the effect
     added; its keywords are the parameters' names. ``residuals`` says how measurements depart from a model
@@ -48,15 +49,39 @@ class Effect:
     residuals: str
     lookalikes: tuple[str, ...]
     apply: Callable[..., Any] = field(repr=False)
-    rank: float = 50.0
-    """Place in the chain where effects are put together by the machine: lower ranks act first."""
-
+    sentence: str = ""
+    """What happens, in everyday words, to stand after "the model misses that"; may be empty, as may all that follow."""
+    measurement: str = ""
+    """What else could be measured that sees this effect alone."""
+    beside: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Another effect -> how to tell the two apart, where a verdict names both."""
+    explained_by: tuple[str, ...] = ()
+    """Columns of measurements of which one should be logged where a verdict names the effect..."""
+    caveat: str = ""
+    """...and what to beware of where none was."""
+    after: str = OTHERS
+    """Its place in the chain, unless `bns.physics.order.ORDER` lists it: right after this entry of that tuple."""
     starts: tuple[tuple[float, ...], ...] = ()
     """Values from which a fit may begin; empty where any few values along each number do."""
     needs_place: bool = False
     """Does it look at `Body.place`?"""
     per_trial_allowed: bool = False
     """May its one number have another value in every trial? Only effects of the stage ``clock`` may."""
+
+    def __post_init__(self) -> None:
+        for kind, given, valid in (("stage of an effect", self.stage, STAGES), ("place of an effect", self.after, ORDER)):
+            if given not in valid:
+                raise ModelError(f"effect {self.name}: {unknown_name(kind, given, valid)}")
+
+    @property
+    def in_words(self) -> str:
+        """Its sentence; its name where nobody wrote one."""
+        return self.sentence or f"the effect “{self.name}”"
+
+    @property
+    def place(self) -> float:
+        """Where it acts, among all effects: lower places first."""
+        return place(self.name, self.after)
 
     @property
     def of_measuring(self) -> bool:

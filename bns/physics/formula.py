@@ -11,6 +11,7 @@ import numpy as np
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, Parameter
+from bns.physics.order import FORMULAS
 from bns.physics.signals import Array, Body
 
 ON: Mapping[str, str] = {"v": "forward_m_s", "s": "sideways_m_s", "w": "yaw_rad_s", "east": "east", "north": "north"}
@@ -81,7 +82,7 @@ def formula_effect(name: str, term: str, on: str) -> Effect:
         residuals="as the formula says",
         lookalikes=(),
         apply=partial(_apply, name, code, on),
-        rank=116,
+        after=FORMULAS,
         needs_place=bool(names & _PLACE) or on in {"east", "north"},
     )
 

@@ -17,7 +17,7 @@ import yaml
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, number
-from bns.physics.effects import all_effects, effect_in_file, effect_named
+from bns.physics.effects import all_effects, chain_key, effect_in_file, effect_named, effect_names
 from bns.physics.formula import formula_effect
 
 BASES = ("differential-drive",)
@@ -113,7 +113,7 @@ class Model:
         return effect_named(name).neutral
 
     def with_active(self, effect: Effect, values: tuple[float, ...]) -> Model:
-        """The model with an effect object at these values, listed or not; in its place by rank."""
+        """The model with an effect object at these values, listed or not; in its place in the chain."""
         others = tuple(a for a in self.effects if a.effect.name != effect.name)
         return replace(self, effects=(*others, ActiveEffect(effect, values))).arranged()
 
@@ -148,8 +148,8 @@ class Model:
         return replace(self, effects=changed)
 
     def arranged(self) -> Model:
-        """The model with its effects in the order in which they act, by their ranks."""
-        return replace(self, effects=tuple(sorted(self.effects, key=lambda a: a.effect.rank)))
+        """The model with its effects in the order in which they act; those of packages that share a place, by name."""
+        return replace(self, effects=tuple(sorted(self.effects, key=lambda a: chain_key(a.effect))))
 
     def without(self, name: str) -> Model:
         """The model with that effect switched off."""
@@ -251,7 +251,7 @@ def _written_effect(where: str, name: str, written: Mapping[str, str], folder: P
         return effect_named(name)
     if set(written) != {"term", "on"}:
         raise ModelError(f"{where}, {name}: a formula needs both term and on (term: k * v * abs(w), on: v).")
-    if name in all_effects():
+    if name in effect_names():
         raise ModelError(f"{where}: {name} is the name of a listed effect; give the formula another one.")
     return formula_effect(name, written["term"], written["on"])
 

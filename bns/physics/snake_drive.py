@@ -25,6 +25,9 @@ class SnakePhysics:
     `causes` holds, after `drive`, why each driven cycle was unstable (empty: it was stable).
     """
 
+    repeatable = True
+    renderable = True
+
     def __init__(self, parameters: SnakeParameters) -> None:
         self._parameters = parameters
         self._body = Body(parameters)

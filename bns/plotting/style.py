@@ -246,15 +246,20 @@ def _tick_alike(ax: Axes) -> None:
 @style()
 def path_figure(spec: RunSpec, task: Task, robot: Robot, result: RunResult, stem: Path) -> Path:
     """Draw and save the path of a run's fittest controller at its end, a column wide; the path of the PNG."""
-    driven, simulated = floor_poses(robot, result.world_poses), floor_poses(robot, result.snn_poses)
-    reach_m, square = goal_reach(robot, task)
     figure = Figure(figsize=(COLUMN_IN, COLUMN_IN + 0.4))
     ax = figure.subplots()
+    path_axes(ax, spec, task, robot, result)
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return save(figure, stem)[0]
+
+
+def path_axes(ax: Axes, spec: RunSpec, task: Task, robot: Robot, result: RunResult) -> None:
+    """The same on axes that are there, without a legend."""
+    driven, simulated = floor_poses(robot, result.world_poses), floor_poses(robot, result.snn_poses)
+    reach_m, square = goal_reach(robot, task)
     draw_paths(ax, task.goals_m, reach_m, driven, simulated, square)
     success = bool(result.tables["evals"]["success"][-1])
     ax.set_title(f"{task.title}, seed {spec.seed}\nevaluation {spec.evaluations}: {outcome(success)}")
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return save(figure, stem)[0]
 
 
 def outcome(success: bool) -> str:

@@ -1,26 +1,22 @@
-"""Robots, one module each: what a command is, its bounds, operators and kinematics. Found by listing this folder."""
+"""Robots, one module each, or one object of an installed package: what a command is, its bounds, operators and kinematics."""
 
 from __future__ import annotations
 
-import pkgutil
-from importlib import import_module
-
 from bns.errors import SpecError, unknown_name
+from bns.registry import ROBOTS
 from bns.robots.base import Robot
 from bns.spec import OPTION_MARK, robot_and_options
 
 
 def robot_names() -> tuple[str, ...]:
-    """Every robot there is a module for."""
-    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if m.name not in {"base", "simulator"}))
+    """Every robot there is; none is imported."""
+    return ROBOTS.names()
 
 
 def load_robot(name: str) -> Robot:
     """The robot of that name, with the options that are added to it; SpecError for an unknown one lists those there are."""
     base, options = robot_and_options(name)
-    if base not in robot_names():
-        raise SpecError(unknown_name("robot", base, robot_names()))
-    robot: Robot = import_module(f"bns.robots.{base}").ROBOT
+    robot: Robot = ROBOTS.load(base)
     if not options:
         return robot
     for option in options:

@@ -51,31 +51,11 @@ class StagedTraining(NamedTuple):
     """Standard deviations of the substitute world, SI, a network."""
 
 
-class Robot(Protocol):
-    """A robot's commands, their bounds, its networks' inputs and outputs, and its fitness.
+class Commands(Protocol):
+    """What a robot can be told: commands (n, components) in its own units."""
 
-    Poses are (n, columns) with columns of the robot's own; `pose_columns` names what is kept of them.
-    """
-
-    name: str
-    networks: tuple[str, ...]
-    hidden: int
-    input_count: int
-    """Inputs that the networks have, up to five."""
-    sigmoid_output: bool
-    recipe: StagedTraining | None
-    """None: the static simulator learns from random controllers, and its noise is that of its residuals."""
-    repeats_inputs: bool
-    """Whether the same inputs come up again and again, so that training gains by taking them together."""
-    radii_m: tuple[float, ...]
     bounds: CommandBounds
     command_columns: tuple[str, ...]
-    options: tuple[str, ...]
-    """What its simulator can do beyond the source, switched on by ``ROBOT+OPTION`` as its name in a spec."""
-    measured_columns: tuple[str, ...]
-    """Columns of its table of measurements."""
-    given_columns: Mapping[str, tuple[float, float]]
-    """Columns, SI, of a file of commands to be driven as they are; the lowest and the highest value allowed."""
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """A random population."""
@@ -83,55 +63,25 @@ class Robot(Protocol):
     def random_controllers(self, key: Key, count: int, length: int) -> Population:
         """Random controllers that all have the same number of commands."""
 
-    def near(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+    def perturb(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
         """Allowed commands (n, components) as far from these as a mutation can go."""
 
-    def inputs(self, commands: np.ndarray) -> np.ndarray:
-        """Normalised network inputs (inputs, n) float32 of one controller's commands (n, components)."""
+    def driven_ms(self, commands: np.ndarray) -> float:
+        """How long these commands drive, in milliseconds."""
 
-    def displacements(self, outputs: np.ndarray) -> np.ndarray:
-        """Displacements (n, networks), SI, in the robot's frame, of network outputs (networks, n)."""
 
-    def targets(self, displacements: np.ndarray) -> np.ndarray:
-        """The inverse of `displacements`: network targets (networks, n) float32."""
+class CommandFiles(Protocol):
+    """Commands that a user wrote in a file, to be driven as they are."""
 
-    def with_options(self, names: tuple[str, ...]) -> Robot:
-        """The robot with some of its options, and no others, switched on."""
+    given_columns: Mapping[str, tuple[float, float]]
+    """Columns, SI, of such a file; the lowest and the highest value allowed."""
 
-    def poses(self, displacements: np.ndarray, commands: np.ndarray | None = None) -> np.ndarray:
-        """Poses (n, columns) after each displacement, from the start of every task; ``commands`` (n, components), which led to
-        them, where what lies between two commands is simulated too."""
+    def parse_commands(self, rows: np.ndarray) -> np.ndarray:
+        """Commands (n, components) of rows (n, `given_columns`) within their limits; SpecError for one that is none."""
 
-    def measured_displacements(self, poses: np.ndarray) -> np.ndarray:
-        """Displacements (n, networks) between measured poses, the first from the start."""
 
-    def learnable(self, displacements: np.ndarray) -> np.ndarray:
-        """Which displacements (n, networks) each network may learn from, bool (networks, n)."""
-
-    def start_pose(self) -> np.ndarray:
-        """Pose (1, columns) of a robot that has not moved yet."""
-
-    def moved(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
-        """Poses (n, columns) turned about the origin, counter-clockwise, and then shifted by (2,)."""
-
-    def marked_unstable(self, poses: np.ndarray, commands: Sequence[int]) -> np.ndarray:
-        """Poses (n, columns) of commands, some of which (numbers from 1) a person called unstable."""
-
-    def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
-        """What is kept of poses, by name with its unit, (n,) each; x_m, y_m and heading_rad always."""
-
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
-        """The commands (m, components) that are driven when this controller is picked."""
-
-    def score(
-        self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
-        parents: Scores | None = None,
-    ) -> Scores:
-        """Fitness of every controller on simulator networks (networks, W); stream is for robots with noise in evolution.
-
-        parents: scores of the generation that this one was bred from, on the same networks: a robot may take over from them
-        what cannot have changed. The scores are the same with them and without.
-        """
+class Evolution(Protocol):
+    """How controllers are bred."""
 
     def breed(
         self,
@@ -149,8 +99,70 @@ class Robot(Protocol):
     def diversity(self, population: Population, scores: Scores) -> float:
         """Diversity of a population that was scored."""
 
-    def judge(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
-        """Fitness and goals reached of one driven path."""
+
+class Networks(Protocol):
+    """The simulator networks of a robot: what goes in, what comes out, and how they are made."""
+
+    networks: tuple[str, ...]
+    hidden: int
+    input_count: int
+    """Inputs that the networks have, up to five."""
+    sigmoid_output: bool
+    recipe: StagedTraining | None
+    """None: the static simulator learns from random controllers, and its noise is that of its residuals."""
+    repeats_inputs: bool
+    """Whether the same inputs come up again and again, so that training gains by taking them together."""
+
+    def inputs(self, commands: np.ndarray) -> np.ndarray:
+        """Normalised network inputs (inputs, n) float32 of one controller's commands (n, components)."""
+
+    def displacements(self, outputs: np.ndarray) -> np.ndarray:
+        """Displacements (n, networks), SI, in the robot's frame, of network outputs (networks, n)."""
+
+    def targets(self, displacements: np.ndarray) -> np.ndarray:
+        """The inverse of `displacements`: network targets (networks, n) float32."""
+
+    def learnable(self, displacements: np.ndarray) -> np.ndarray:
+        """Which displacements (n, networks) each network may learn from, bool (networks, n)."""
+
+
+class Kinematics(Protocol):
+    """From displacements to poses (n, columns) and back."""
+
+    def start_pose(self) -> np.ndarray:
+        """Pose (1, columns) of a robot that has not moved yet."""
+
+    def poses(self, displacements: np.ndarray, commands: np.ndarray | None = None) -> np.ndarray:
+        """Poses (n, columns) after each displacement, from the start of every task; ``commands`` (n, components), which led to
+        them, where what lies between two commands is simulated too."""
+
+    def measured_displacements(self, poses: np.ndarray) -> np.ndarray:
+        """Displacements (n, networks) between measured poses, the first from the start."""
+
+    def transform(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
+        """Poses (n, columns) turned about the origin, counter-clockwise, and then shifted by (2,)."""
+
+
+class Fitness(Protocol):
+    """How well a controller does at a task."""
+
+    radii_m: tuple[float, ...]
+
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
+        """The commands (m, components) that are driven when this controller is picked."""
+
+    def score(
+        self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
+        parents: Scores | None = None,
+    ) -> Scores:
+        """Fitness of every controller on simulator networks (networks, W); stream is for robots with noise in evolution.
+
+        parents: scores of the generation that this one was bred from, on the same networks: a robot may take over from them
+        what cannot have changed. The scores are the same with them and without.
+        """
+
+    def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
+        """Fitness and goals reached of one driven path (n, columns)."""
 
     def succeeded(self, poses: np.ndarray, task: Task) -> bool:
         """Whether a driven path counts as success."""
@@ -158,17 +170,65 @@ class Robot(Protocol):
     def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
         """Whether the path visits all goals in order, for each of `radii_m`."""
 
-    def given(self, rows: np.ndarray) -> np.ndarray:
-        """Commands (n, components) of rows (n, `given_columns`) within their limits; SpecError for one that is none."""
 
-    def driven_ms(self, commands: np.ndarray) -> float:
-        """How long these commands drive, in milliseconds."""
+class Stability(Protocol):
+    """What a person who watches can say of a drive."""
+
+    marks_unstable: bool
+    """Can a command be unstable, so that whoever watches is asked for it?"""
+
+    def marked_unstable(self, poses: np.ndarray, commands: Sequence[int]) -> np.ndarray:
+        """Poses (n, columns) of commands, some of which (numbers from 1) a person called unstable."""
+
+
+class Drawing(Protocol):
+    """What is drawn and kept of a drive."""
+
+    measured_columns: tuple[str, ...]
+    """Columns of its table of measurements."""
+
+    def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
+        """What is kept of poses, by name with its unit, (n,) each; x_m, y_m and heading_rad always."""
 
     def measurements(self, trial: int, commands: np.ndarray, poses: np.ndarray) -> pd.DataFrame:
         """The rows of the table of measurements for commands (n, components) and the poses (n, columns) they led to."""
 
 
-def turned(points: np.ndarray, turn_rad: float) -> np.ndarray:
+class Options(Protocol):
+    """What a robot's simulator can do beyond the source."""
+
+    options: tuple[str, ...]
+    """Switched on by ``ROBOT+OPTION`` as the robot's name in a spec."""
+
+    def with_options(self, names: tuple[str, ...]) -> Robot:
+        """The robot with some of its options, and no others, switched on."""
+
+
+class Robot(
+    Commands, CommandFiles, Evolution, Networks, Kinematics, Fitness, Stability, Drawing, Options, Protocol
+):
+    """All that is asked of a robot. Poses have columns of the robot's own; `pose_columns` names what is kept of them."""
+
+    name: str
+    physics: str
+    """The module whose ``build(robot, model)`` makes its physics world; empty where it has none."""
+    simulators: str
+    """The package with the folder ``data`` in which its static simulator lies, NAME.safetensors."""
+    two_wheeled: bool
+    """Is it a `TwoWheeled`?"""
+
+
+class TwoWheeled(Robot, Protocol):
+    """A robot on two driven wheels."""
+
+    world_model: str
+    """The model that its physics world drives: a name, or the path of a YAML file."""
+
+    def wheel_speeds_m_s(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Left and right speeds m/s and durations s, each (n,), of commands (n, components)."""
+
+
+def rotate(points: np.ndarray, turn_rad: float) -> np.ndarray:
     """Points (n, 2) turned about the origin, counter-clockwise."""
     cos, sin = np.cos(turn_rad), np.sin(turn_rad)
     return points @ np.array([[cos, sin], [-sin, cos]])

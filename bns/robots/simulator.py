@@ -22,6 +22,9 @@ from safetensors.numpy import save
 
 from bns.engine.snn import INPUTS, PER_NEURON, hidden_count
 from bns.errors import ModelError
+from bns.extras import extra
+from bns.robots import load_robot
+from bns.spec import robot_and_options
 
 if TYPE_CHECKING:
     import torch
@@ -142,8 +145,9 @@ def load_simulator(path: Path | str) -> StaticSimulator:
 
 
 def static_path(robot: str) -> Path:
-    """Where the static simulator of a robot lies in the package."""
-    return Path(str(resources.files("bns.robots") / "data" / f"{robot}.safetensors"))
+    """Where the static simulator of a robot lies in the robot's package; SpecError if there is no such robot."""
+    base = robot_and_options(robot)[0]
+    return Path(str(resources.files(load_robot(base).simulators) / "data" / f"{robot}.safetensors"))
 
 
 @cache
@@ -161,7 +165,8 @@ def load_static_simulator(robot: str) -> StaticSimulator:
 
 def to_torch(networks: tuple[str, ...], weights: np.ndarray) -> torch.nn.ModuleDict:
     """The networks as torch modules, float32: inputs and outputs are the normalised ones of the robot."""
-    import torch  # noqa: PLC0415  # a second to import, and a run does not need it
+    with extra("torch"):
+        import torch  # noqa: PLC0415  # a second to import, and a run does not need it
 
     def module(hidden: int) -> torch.nn.Module:
         layers = {

@@ -84,7 +84,7 @@ class CommandSampler:
 
     def again(self, commands: np.ndarray, variants: int) -> Patterns:
         """The same commands once more, and others near each."""
-        near = self.robot.near(np.repeat(commands, variants, axis=0), self.key, 1 + self.driven)
+        near = self.robot.perturb(np.repeat(commands, variants, axis=0), self.key, 1 + self.driven)
         return self.drive(np.concatenate([commands, near]))
 
 

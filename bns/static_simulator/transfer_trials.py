@@ -74,7 +74,7 @@ def _rows(robot: Robot, task: Task, poses: np.ndarray, simulated: np.ndarray, ab
     table.insert(0, "step", np.arange(len(table)))
     return table.assign(
         **about,
-        goals_reached=robot.judge(poses, task)[1],
+        goals_reached=robot.evaluate_path(poses, task)[1],
         final_error_m=float(np.hypot(*(there[1] - there[0]))),
         outcome=outcome(robot, task, poses, len(simulated)),
     )

@@ -7,15 +7,17 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from time import perf_counter
 
-from distributed import Worker, WorkerPlugin
-
 from bns.errors import ClusterError
+from bns.extras import extra
 from bns.spec import RunSpec
 from bns.store.provenance import provenance
 from bns.store.record import RunRecord
 from bns.sweep.executor import Job, without_result
 from bns.sweep.job import describe
 from bns.sweep.workers import LEFT_TO_PARENT
+
+with extra("cluster"):
+    from distributed import Worker, WorkerPlugin
 
 
 def carry_out(job: Job, spec: RunSpec, run_id: str) -> RunRecord:

@@ -8,12 +8,14 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Self
 
-import dask
-from distributed import Client, Future, LocalCluster
-
 from bns.errors import ClusterError
+from bns.extras import extra
 from bns.sweep.dask_job import LeavesSignals
 from bns.sweep.executor import ATTEMPTS
+
+with extra("cluster"):
+    import dask
+    from distributed import Client, Future, LocalCluster
 
 PATIENCE_S = 600.0
 """How long a sweep waits for a scheduler that went away, or for the first worker."""

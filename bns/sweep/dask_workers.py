@@ -11,15 +11,17 @@ from datetime import UTC, datetime
 from queue import Empty, SimpleQueue
 from typing import Self
 
-from distributed import Future, KilledWorker
-
 from bns.errors import ClusterError
+from bns.extras import extra
 from bns.spec import RunSpec
 from bns.store.record import RunRecord
 from bns.sweep.dask_job import carry_out
 from bns.sweep.dask_link import PATIENCE_S, DaskLink
 from bns.sweep.executor import Job, attempted, without_result
 from bns.sweep.job import run_job
+
+with extra("cluster"):
+    from distributed import Future, KilledWorker
 
 _FETCH_S = 30.0
 _PAUSE_S = 0.2

@@ -19,6 +19,7 @@ from bns.errors import SpecError, unknown_name
 from bns.robots import load_robot
 from bns.spec import FIELDS, RunSpec, checked
 from bns.sweep.combos import Parts, check_size, combinations
+from bns.sweep.shipped_sweeps import sweep_file
 from bns.sweep.yaml_lines import Located, parse_yaml, read_text
 from bns.tasks import task_names
 
@@ -66,8 +67,8 @@ class Sweep:
 
 
 def load_sweep(path: str | Path) -> Sweep:
-    """Read a sweep file; SpecError that begins with ``file:line:`` for whatever is wrong in it."""
-    path = Path(path)
+    """Read a sweep file, or a shipped one by its name; SpecError that begins with ``file:line:`` for whatever is wrong in it."""
+    path = sweep_file(path)
     return parse_sweep(read_text(path), path)
 
 

@@ -12,9 +12,11 @@ from pathlib import Path
 from bns.bootstrap.loop import RunResult
 from bns.spec import RunSpec
 from bns.store.lock import SweepLockedError
+from bns.store.reader import finished
 from bns.store.record import RunRecord
 from bns.store.writer import Writer
 from bns.sweep import memory
+from bns.sweep.digests import WorldDigests
 
 _PATIENCE_S = 60.0
 
@@ -46,6 +48,15 @@ def keep_run(
         row |= gpu_columns()
     with patient_writer(results, sweep) as writer:
         writer.append(RunRecord(spec, row, result.tables))
+
+
+def check_keepable(spec: RunSpec, results: Path, sweep: str, digest: str) -> None:
+    """StoreError if a run in the world of this digest cannot be kept there: better found before the run than after it."""
+    with patient_writer(results, sweep):
+        if finished(results, sweep):
+            digests = WorldDigests(results, sweep)
+            digests.read()
+            digests.compare(spec.task, spec.world, digest)
 
 
 @contextmanager

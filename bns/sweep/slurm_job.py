@@ -9,17 +9,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
-from submitit.helpers import DelayedSubmission
-
+from bns.extras import extra
 from bns.sweep.cores import cores
 from bns.sweep.grid import Sweep
 from bns.sweep.runner import Summary, run_sweep
 from bns.sweep.shard import Shard
 
+with extra("cluster"):
+    from submitit.helpers import DelayedSubmission
+
 SIGNAL_S, GRACE_S = 120, 60.0
 """How long before the end of its time a job is told, and how long runs in flight may then take to finish."""
 
-_TOLD = signal.SIGUSR2
+_TOLD = getattr(signal, "SIGUSR2", signal.SIGTERM)  # Windows, which has no SLURM, lacks the first
 _ASK_S = 30.0
 
 

@@ -37,7 +37,8 @@ _ONE_THREAD = dict.fromkeys(
     ),
     "1",
 )
-LEFT_TO_PARENT = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
+_NAMES = ("SIGINT", "SIGTERM", "SIGUSR1", "SIGUSR2")  # the last two are not there on Windows
+LEFT_TO_PARENT = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
 """Terminals send the first to all of a process group, batch systems the others to all processes of a job."""
 
 _PARENT_CHECK_S = 1.0

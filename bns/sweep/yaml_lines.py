@@ -121,7 +121,7 @@ def read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise SpecError(
-            f"there is no sweep file {path}. Give the path of a YAML file; the shipped ones lie in sweeps/."
+            f"there is no sweep file {path}. Give a YAML file, or the name of a sweep that comes with bns: khepera, snake, …"
         ) from None
     except OSError as fault:
         raise SpecError(f"sweep file {path} cannot be read: {fault.strerror}.") from None

@@ -1,16 +1,19 @@
-"""Goal tasks, one YAML file each under the robot's name."""
+"""Goal tasks, one YAML file each under the robot's name; those of packages come as files or objects."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import yaml
 
 from bns.errors import SpecError, unknown_name
+from bns.registry import Part, Registry
 from bns.spec import robot_and_options
 
 UNBOUNDED = (float("inf"), float("inf"))
@@ -32,12 +35,43 @@ class Task:
     surface_m: tuple[float, float] = UNBOUNDED
 
 
+class _Tasks(Registry):
+    """Tasks by ``ROBOT.TASK``: a YAML file of ours, or an entry point that leads to a `Task` or to a package with TASK.yaml."""
+
+    def _files(self) -> Iterable[Part]:
+        for robot in resources.files(__name__).iterdir():
+            if robot.is_dir():
+                files = (file.name for file in robot.iterdir() if file.name.endswith(".yaml"))
+                yield from (Part(f"{robot.name}.{file.removesuffix('.yaml')}", f"{__name__}.{robot.name}") for file in files)
+
+    def _opened(self, part: Part) -> Task:
+        robot, name = part.name.split(".", 1)
+        if part.entry is None:
+            return task_of(name, yaml.safe_load((resources.files(__name__) / robot / f"{name}.yaml").read_text()))
+        task: Task = super()._opened(part)
+        return task
+
+    def _checked(self, part: Part, found: Any) -> Task:
+        name = part.name.split(".", 1)[-1]
+        if isinstance(found, ModuleType):
+            found = task_of(name, yaml.safe_load((resources.files(found) / f"{name}.yaml").read_text(encoding="utf-8")))
+        if not isinstance(found, Task):
+            raise SpecError(f"it is no bns.tasks.Task, and no package with a file {name}.yaml")
+        if found.name != name:
+            raise SpecError(f"it calls itself {found.name!r}; the entry point must be called ROBOT.{found.name}")
+        return found
+
+
+TASKS = _Tasks("task", "tasks", "bns.tasks", "", "", (), SpecError)
+
+
 def task_names(robot: str) -> tuple[str, ...]:
     """Tasks of a robot, by name; its options have no part in them."""
-    folder = resources.files(__name__) / robot_and_options(robot)[0]
-    if not folder.is_dir():
+    prefix = robot_and_options(robot)[0] + "."
+    found = tuple(sorted(name.removeprefix(prefix) for name in TASKS.names() if name.startswith(prefix)))
+    if not found:
         raise SpecError(f"robot {robot!r} has no tasks.")
-    return tuple(sorted(f.name.removesuffix(".yaml") for f in folder.iterdir() if f.name.endswith(".yaml")))
+    return found
 
 
 def default_task(robot: str) -> str:
@@ -50,7 +84,8 @@ def load_task(robot: str, name: str) -> Task:
     """Read a task; SpecError for an unknown one lists those there are."""
     if name not in task_names(robot):
         raise SpecError(unknown_name(f"task of robot {robot}", name, task_names(robot)))
-    return task_of(name, yaml.safe_load((resources.files(__name__) / robot_and_options(robot)[0] / f"{name}.yaml").read_text()))
+    task: Task = TASKS.load(f"{robot_and_options(robot)[0]}.{name}")
+    return task
 
 
 def task_of(name: str, content: dict[str, Any]) -> Task:

@@ -80,7 +80,9 @@ class BackgroundDriver:
         else:
             done, rounds = self._driven(evaluation, controller, advance)
         self.rounds += rounds
-        poses = self._robot.marked_unstable(in_task_frame(self._robot, done.poses), done.unstable)
+        poses = in_task_frame(self._robot, done.poses)
+        if self._robot.marks_unstable:
+            poses = self._robot.marked_unstable(poses, done.unstable)
         return Drive(done.commands, poses, rounds)
 
     def evaluated(self, evaluation: int, drive: Drive, row: Mapping[str, Any]) -> None:

@@ -47,7 +47,7 @@ def read_commands(path: Path, robot: Robot) -> list[tuple[np.ndarray, np.ndarray
     starts = _starts(path, table, robot)
     try:
         return [
-            (robot.given(group[list(limits)].to_numpy()), starts[int(group.index[0])])
+            (robot.parse_commands(group[list(limits)].to_numpy()), starts[int(group.index[0])])
             for _, group in numbers.groupby("trial", sort=True)
         ]
     except SpecError as error:

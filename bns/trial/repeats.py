@@ -47,7 +47,9 @@ def repeats_table(drives: Sequence[Evaluation], evaluation: int, robot: Robot, t
 
 
 def _rows(drive: Evaluation, robot: Robot, task: Task) -> pd.DataFrame:
-    poses = robot.marked_unstable(in_task_frame(robot, drive.poses), drive.unstable)
+    poses = in_task_frame(robot, drive.poses)
+    if robot.marks_unstable:
+        poses = robot.marked_unstable(poses, drive.unstable)
     rows = pd.DataFrame(robot.pose_columns(np.vstack([robot.start_pose(), poses])))
     rows.insert(0, "step", np.arange(len(rows)))
     for name, values in zip(robot.command_columns, drive.commands[: len(poses)].T, strict=True):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
-from bns.bootstrap.loop import run
+from bns.bootstrap.loop import Progress, run
 from bns.console import live_view
 from bns.errors import BnsError, HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
@@ -65,6 +66,15 @@ class OpenedRig:
     log: HardwareLog
 
 
+@dataclass(frozen=True)
+class KeptTrial:
+    """A trial that is in the store: the run and how it went, its folder, the report as text."""
+
+    result: TrialResult
+    folder: Path
+    text: str
+
+
 @contextmanager
 def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stopping) -> Iterator[OpenedRig]:
     """Open clock, emulation, journal and platform; at the end, however it comes, the robot is stopped, seen to stand, let go."""
@@ -85,18 +95,23 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         )
 
 
-def carry_out(spec: RunSpec, how: TrialSetup, results: Path) -> str:
-    """Carry out a trial, store it, draw its path; the report as text. TrialPausedError, StopNotConfirmedError, HardwareError."""
+def carry_out(spec: RunSpec, how: TrialSetup, results: Path, on_evaluation: Progress = lambda _row: None) -> KeptTrial:
+    """Carry out a trial, store it, draw its path. TrialPausedError, StopNotConfirmedError, HardwareError.
+
+    ``on_evaluation`` is called with each evaluation's row, those of a trial that is gone on with included.
+    """
     how.rig.check_task(load_task(spec.robot, spec.task).goals_m)
     folder = TrialFolder(results, spec, how.emulated)
     past = folder.open(how.resume)
     try:
-        return _kept(spec, how, results, folder, _driven(spec, how, folder, past))
+        return _kept(spec, how, results, folder, _driven(spec, how, folder, past, on_evaluation))
     finally:
         folder.close()
 
 
-def _driven(spec: RunSpec, how: TrialSetup, folder: TrialFolder, past: list[Evaluation]) -> TrialResult:
+def _driven(
+    spec: RunSpec, how: TrialSetup, folder: TrialFolder, past: list[Evaluation], on_evaluation: Progress
+) -> TrialResult:
     """The loop with the robot as its driver; measurements are written however it ends."""
     started, robot = datetime.now(UTC), load_robot(spec.robot)
     start = on_floor(robot, robot.start_pose())[0]
@@ -105,7 +120,7 @@ def _driven(spec: RunSpec, how: TrialSetup, folder: TrialFolder, past: list[Eval
             opened.log.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
             opened.log.sync()
             driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log)
-            result = _looped(spec, how, driver, past, started)
+            result = _looped(spec, how, driver, past, started, on_evaluation)
             _repeated(spec, how, driver, folder, result)
             opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
     except HardwareError:
@@ -120,7 +135,12 @@ def _driven(spec: RunSpec, how: TrialSetup, folder: TrialFolder, past: list[Eval
 
 
 def _looped(
-    spec: RunSpec, how: TrialSetup, driver: TrialDriver, past: list[Evaluation], started: datetime
+    spec: RunSpec,
+    how: TrialSetup,
+    driver: TrialDriver,
+    past: list[Evaluation],
+    started: datetime,
+    on_evaluation: Progress,
 ) -> TrialResult:
     robot = load_robot(spec.robot)
     world = RobotWorld("robot-emulated" if how.emulated else "robot")
@@ -128,7 +148,12 @@ def _looped(
         live_view(spec, driver.live_text) as show,
         BackgroundDriver(robot, driver, past, how.most_rounds, how.until_success) as background,
     ):
-        result = run(spec, show, world, background)
+
+        def tell(row: Mapping[str, Any]) -> None:
+            show(row)
+            on_evaluation(row)
+
+        result = run(spec, tell, world, background)
     wall_s = (datetime.now(UTC) - started).total_seconds()
     return TrialResult(result, driver.stops_s, driver.ends, background.waited_share, background.rounds, started, wall_s)
 
@@ -146,13 +171,14 @@ def _repeated(spec: RunSpec, how: TrialSetup, driver: TrialDriver, folder: Trial
     result.repeats.extend(bool(rows["success"].iloc[0]) for _, rows in table.groupby("repeat"))
 
 
-def _kept(spec: RunSpec, how: TrialSetup, results: Path, folder: TrialFolder, result: TrialResult) -> str:
+def _kept(spec: RunSpec, how: TrialSetup, results: Path, folder: TrialFolder, result: TrialResult) -> KeptTrial:
     keep_run(spec, result.run, results, SWEEP_EMULATED if how.emulated else SWEEP, result.started, result.wall_s)
     robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
     figure = path_figure(spec, task, robot, result.run, folder.path / "path")
     lines = report(spec, result, f"emulated, at {how.speed:g} times its speed" if how.emulated else "robot")
     lines += [f"measurements and journal: {folder.path}", f"path: {figure}"]
-    return "\n".join(lines + ([_figures(spec, results, folder)] if how.figures else []))
+    lines += [_figures(spec, results, folder)] if how.figures else []
+    return KeptTrial(result, folder.path, "\n".join(lines))
 
 
 def _figures(spec: RunSpec, results: Path, folder: TrialFolder) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ import pandas as pd
 from bns.engine.philox import Key, Purpose
 from bns.measurements import write_measurements
 from bns.robots.base import Robot
-from bns.worlds.base import World
+from bns.worlds.base import RenderableWorld, World
 
 
 class LoggedWorld:
@@ -20,7 +21,7 @@ class LoggedWorld:
         self._world, self._robot = world, robot
         self._trials: list[pd.DataFrame] = []
         self.digest = world.digest
-        self.repeatable = getattr(world, "repeatable", True)
+        self.repeatable, self.renderable = world.repeatable, world.renderable
 
     def drive(self, commands: np.ndarray, key: Key, purpose: Purpose, step: int) -> np.ndarray:
         """As the world it stands before."""
@@ -28,6 +29,14 @@ class LoggedWorld:
         if purpose is Purpose.WORLD_EVALUATED:
             self._trials.append(self._robot.measurements(step, commands[: len(poses)], poses))
         return poses
+
+    def render(self, commands: np.ndarray, picture: Path) -> None:
+        """As the world it stands before, which must be renderable; the picture's drive is no trial."""
+        cast(RenderableWorld, self._world).render(commands, picture)
+
+    def check_picture(self, picture: Path) -> None:
+        """As the world it stands before, which must be renderable."""
+        cast(RenderableWorld, self._world).check_picture(picture)
 
     def write(self, path: Path) -> None:
         """All trials so far, as .csv or .parquet."""

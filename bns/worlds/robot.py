@@ -6,13 +6,14 @@ import numpy as np
 
 from bns.engine.philox import Key, Purpose
 from bns.errors import SpecError
-from bns.robots.base import Robot, on_floor, turned
+from bns.robots.base import Robot, on_floor, rotate
 
 
 class RobotWorld:
     """The world of a trial, in whose loop a driver of its own has the robot."""
 
     repeatable = False
+    renderable = False
 
     def __init__(self, digest: str) -> None:
         self.digest = digest
@@ -29,7 +30,7 @@ def in_task_frame(robot: Robot, poses: np.ndarray) -> np.ndarray:
     """
     was, start = (on_floor(robot, pose)[0] for pose in (poses[:1], robot.start_pose()))
     turn_rad = start[2] - was[2]
-    return robot.moved(poses[1:], turn_rad, start[:2] - turned(was[None, :2], turn_rad)[0])
+    return robot.transform(poses[1:], turn_rad, start[:2] - rotate(was[None, :2], turn_rad)[0])
 
 
 def build(robot: Robot) -> RobotWorld:

@@ -13,6 +13,9 @@ from bns.robots.simulator import load_static_simulator
 class SubstituteWorld:
     """Displacements of the static simulator, disturbed with the standard deviations of its residuals."""
 
+    repeatable = True
+    renderable = False
+
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._simulator = load_static_simulator(robot.name)

@@ -9,11 +9,13 @@ import pandas as pd
 import pytest
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
+from statsmodels.stats.multitest import multipletests
 
 from analysis import influence
 from analysis.importance import at_the_end, chance, permutation_importances, sums_of_squares, variance_shares
 from analysis.intervals import band, bootstrap, mean_interval, ratios, resampled
 from analysis.labels import CELL
+from analysis.multiple_tests import holm
 from analysis.results import Results
 from analysis.selection import selections
 from analysis.trials import first_in_a_row
@@ -174,3 +176,18 @@ def test_a_band_over_unknown_samples_is_unknown():
     low, _ = band(np.array([[1.0, NAN], [2.0, 3.0]]))
     assert low[0] == pytest.approx(1.025)
     assert np.isnan(low[1])
+
+
+def test_holm_gives_what_is_worked_out_by_hand():
+    np.testing.assert_allclose(holm([0.01, 0.04, 0.03, 0.005]), [0.03, 0.06, 0.06, 0.02], rtol=1e-15)
+    assert list(holm([0.9, 0.8])) == [1.0, 1.0]
+    assert list(holm([0.2])) == [0.2]
+    assert len(holm([])) == 0
+
+
+def test_holm_is_that_of_statsmodels_bit_for_bit():
+    random = np.random.default_rng(5)
+    for n in (1, 2, 7, 500):
+        p = random.random(n) ** 4
+        p[n // 2 :] = p[n // 2]  # ties
+        assert list(holm(p)) == list(multipletests(p, method="holm")[1])

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, delayed
 from scipy.stats import binomtest, wilcoxon
-from statsmodels.stats.multitest import multipletests
 
+from analysis.multiple_tests import holm
 from bns.cuda.batch import Batch
 from bns.cuda.device import OutOfDeviceMemoryError, device_name
 from bns.errors import DeviceError
@@ -115,7 +115,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def report(comparisons: Sequence[Comparison], path: Path | None) -> int:
     """Print all; 1 if any differs."""
-    adjusted = multipletests([one.p for one in comparisons], method="holm")[1]
+    adjusted = holm([one.p for one in comparisons])
     for one, p in zip(comparisons, adjusted, strict=True):
         print(one.in_words(p))
     if path is not None:

@@ -24,8 +24,8 @@ def drive(robot, learning, **changes):
     planned = one.robot.plan(one.start.controller(who), weights, one.task)
     poses = build_world("substitute", one.robot).drive(planned, KEY, purpose, 2)
     seen = predict(weights, one.robot.inputs(planned), one.robot.sigmoid_output)
-    fitness, goals = one.robot.judge(poses, one.task)
-    simulated = one.robot.judge(one.robot.poses(one.robot.displacements(seen), planned), one.task)[0]
+    fitness, goals = one.robot.evaluate_path(poses, one.task)
+    simulated = one.robot.evaluate_path(one.robot.poses(one.robot.displacements(seen), planned), one.task)[0]
     expected = {
         "fitness_simulation": simulated, "fitness_world": fitness, "goals_reached": goals, "commands": len(planned),
         "driven_ms": one.robot.driven_ms(planned), "success": float(one.robot.succeeded(poses, one.task)),

@@ -149,7 +149,7 @@ def test_an_explanation_is_not_driven_apart_from_itself(narrow):
 def test_an_experiment_decides_in_half_the_time_of_random_commands(narrow):
     d, predictor = narrow
     assert d.verdict == "tie"
-    arena = arena_of(predictor.tracks, "1.6x1.2", "0,0,90")
+    arena = arena_of(predictor.tracks, (1.6, 1.2), (0.0, 0.0, np.pi / 2))
     proposal = propose(d, arena, bounds_of(predictor.tracks, NOMINAL, None), 4)
     pair = next(c for c in proposal.model_pairs if "dead-zone" in {c.first, c.second})
     assert not pair.indistinguishable
@@ -252,11 +252,13 @@ def test_what_cannot_be_asked_is_refused_before_the_work(tmp_path, more, message
 @pytest.mark.parametrize(
     ("arena", "start", "speeds", "message"),
     [
-        ("2", None, None, "width x height"),
-        ("0.01x3", None, None, "width x height"),
-        (None, "1,2", None, "X,Y,DEGREES"),
-        (None, "99,0,0", None, "outside of the arena"),
-        (None, None, "0.3,0.1", "LOW,HIGH"),
+        (2, None, None, "width and height"),
+        ((0.01, 3), None, None, "each above 0.1"),
+        (None, (1, 2), None, "X,Y,DEGREES"),
+        (None, (1, 2, np.nan), None, "X,Y,DEGREES"),
+        (None, (99, 0, 0), None, "outside of the arena"),
+        (None, None, (0.3, 0.1), "LOW,HIGH"),
+        (None, None, "fast", "LOW,HIGH"),
     ],
 )
 def test_limits_that_make_no_sense_are_refused(narrow, arena, start, speeds, message):

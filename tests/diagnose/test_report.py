@@ -13,11 +13,13 @@ from bns.cli.main import main
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.report.plain_language import PLAIN, figures_in_words
+from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.report.shown_paths import shown_paths
 from bns.measurements import write_measurements
-from bns.physics.effects import all_effects
+from bns.physics.effects import effect_named
 from bns.physics.formula import formula_effect
+from bns.physics.order import ORDER
+from bns.registry import EFFECTS
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -183,5 +185,6 @@ def test_numbers_are_rounded_to_what_is_known_of_them(number, said):
 
 
 def test_every_listed_effect_is_described_in_everyday_words():
-    assert set(PLAIN) == set(all_effects())
-    assert all(word not in text for text in PLAIN.values() for word in ("omega", "residual", "parameter"))
+    words = {name: effect_named(name).in_words for name in EFFECTS.own}
+    assert all("effect “" not in text for name, text in words.items() if name in ORDER)
+    assert all(word not in text for text in words.values() for word in ("omega", "residual", "parameter"))

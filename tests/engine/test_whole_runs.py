@@ -113,6 +113,7 @@ class Silent:
     """A world without noise, which answers as networks do that nobody trained; it remembers what it was asked."""
 
     digest = "w-silent"
+    repeatable = True
 
     def __init__(self):
         self.asked = []

@@ -158,7 +158,7 @@ def measured_case(case: Case, seed: int) -> dict[str, object] | None:
     if d.verdict not in {"tie", "insufficient-data"} or not {(case.truth,), (case.rival,)} <= names:
         print(f"{case.truth} / {case.rival}: {d.verdict} {sorted(names)}", file=sys.stderr)
         return None
-    arena = arena_of(predictor.tracks, "1.6x1.2", "0,0,90")
+    arena = arena_of(predictor.tracks, (1.6, 1.2), (0.0, 0.0, np.pi / 2))
     bounds = bounds_of(predictor.tracks, model, None)
     plans = {"proposed": propose(d, arena, bounds, MINUTES, seed=seed).plan, "random": random_plan(arena, bounds, seed)}
     out: dict[str, object] = {"truth": case.truth, "rival": case.rival, "seed": seed, "verdict": d.verdict}

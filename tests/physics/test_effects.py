@@ -2,6 +2,7 @@
 
 import inspect
 import pkgutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from bns.physics.differential_drive import observe, simulate
 from bns.physics.effect import STAGES, number
 from bns.physics.effects import all_effects, effect_named
 from bns.physics.model import Model
+from bns.physics.order import ORDER
 from bns.physics.signals import Body, Flow, Stamps, View, Wheels
+from bns.registry import EFFECTS
 
 SIGNALS = dict(zip(STAGES, (Wheels, Body, Flow, Stamps, View), strict=True))
 IDEAL = Model(wheelbase_m=0.0884)
@@ -38,8 +41,37 @@ def seen(model, rows=slice(None)):
 
 def test_one_effect_a_file_under_its_own_name():
     files = {m.name.replace("_", "-") for m in pkgutil.iter_modules(effects.__path__)}
-    assert files == set(all_effects())
+    assert files == set(EFFECTS.own)
     assert len(files) >= 13
+    assert all(effect.name == name for name, effect in all_effects().items())
+
+
+def test_effects_act_in_the_order_of_one_tuple_and_stage_by_stage():
+    listed = [name for name in ORDER if name in EFFECTS.own]
+    assert len(listed) >= 20
+    assert len(set(ORDER)) == len(ORDER)
+    model = Model(wheelbase_m=0.1)
+    for name in sorted(listed):
+        model = model.with_effect(name, **effect_named(name).neutral)
+    assert [active.effect.name for active in model.arranged().effects] == listed
+    stages = [STAGES.index(effect_named(name).stage) for name in listed]
+    assert stages == sorted(stages)
+
+
+def test_an_effect_of_a_user_has_a_place_and_words_without_saying_so():
+    gain = effect_named("speed-gain")
+    own = replace(gain, name="own", sentence="", measurement="")
+    assert effect_named("speed-limit").place < own.place < effect_named("acceleration-limit").place
+    assert own.in_words == "the effect “own”"
+    assert gain.in_words == gain.sentence != ""
+    late = replace(own, after="motor-lag")
+    assert effect_named("motor-lag").place < late.place < effect_named("wheelbase").place
+    model = IDEAL.with_active(late, (1.1,)).with_active(effect_named("motor-lag"), (0.1,)).with_active(gain, (1.2,))
+    assert [active.effect.name for active in model.effects] == ["speed-gain", "motor-lag", "own"]
+    with pytest.raises(ModelError, match=r"effect own: unknown place of an effect 'motor-lug'\. Did you mean 'motor-lag'"):
+        replace(own, after="motor-lug")
+    with pytest.raises(ModelError, match="effect own: unknown stage"):
+        replace(own, stage="wheels")
 
 
 @every_effect
@@ -47,8 +79,9 @@ def test_declared_completely(effect):
     assert effect.stage in STAGES
     assert effect.parameters
     assert all(text.strip() for text in (effect.equation, effect.residuals))
-    assert effect.lookalikes
     assert set(effect.lookalikes) <= set(all_effects()) - {effect.name}
+    assert set(effect.beside) <= set(all_effects()) - {effect.name}
+    assert bool(effect.explained_by) == bool(effect.caveat)
     assert list(inspect.signature(effect.apply).parameters)[1:] == [p.name for p in effect.parameters]
 
 

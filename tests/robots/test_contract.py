@@ -53,7 +53,7 @@ def weights_of(robot, seed=0, scale=0.5):
 def test_poses_move_as_one_body(robot):
     points = np.array([[0.2, -0.1], [0.5, 0.3], [-0.4, 0.0]])
     poses, shift = poses_at(robot, points), np.array([0.3, -0.2])
-    moved = robot.moved(poses, 0.6, shift)
+    moved = robot.transform(poses, 0.6, shift)
     before, after = on_floor(robot, poses), on_floor(robot, moved)
     assert after[:, 2] - before[:, 2] == pytest.approx(0.6)
     expected = before[:, :2] @ np.array([[np.cos(0.6), np.sin(0.6)], [-np.sin(0.6), np.cos(0.6)]]) + shift
@@ -153,7 +153,7 @@ def test_score_is_what_judge_says_of_the_simulated_path(goal):
     for i in range(100):
         planned = robot.plan(population.controller(i), weights, task)
         outputs = predict(weights, robot.inputs(planned), robot.sigmoid_output)
-        judged.append(robot.judge(robot.poses(robot.displacements(outputs)), task))
+        judged.append(robot.evaluate_path(robot.poses(robot.displacements(outputs)), task))
     # The same float32 outputs but for the order of sums at the end of a vector loop.
     np.testing.assert_allclose(scores.fitness, [fitness for fitness, _ in judged], rtol=1e-5)
     assert scores.goals_reached.tolist() == [reached for _, reached in judged]
@@ -190,12 +190,12 @@ def test_what_is_taken_over_from_the_parents_is_what_would_be_computed(goal, rat
 def test_fitness_is_positive_finite_and_better_for_a_drive_through_the_goals(goal):
     robot, task = goal
     through = poses_at(robot, task.goals_m)
-    fitness, reached = robot.judge(through, task)
+    fitness, reached = robot.evaluate_path(through, task)
     assert reached == len(task.goals_m)
     assert robot.succeeded(through, task)
     assert not robot.succeeded(through[:-1], task)
     assert robot.successes(through, task) == (True,) * len(robot.radii_m)
-    backwards, fewer = robot.judge(through[::-1], task)
+    backwards, fewer = robot.evaluate_path(through[::-1], task)
     assert 0 < backwards < fitness < np.inf
     assert fewer < reached
 
@@ -205,7 +205,7 @@ def test_a_path_that_is_not_finite_is_worth_nothing(goal):
     for bad in (np.nan, np.inf):
         path = poses_at(robot, np.zeros((4, 2)))
         path[2, :8] = bad
-        assert robot.judge(path, task)[0] == 0
+        assert robot.evaluate_path(path, task)[0] == 0
         assert not robot.succeeded(path, task)
         assert not any(robot.successes(path, task))
 

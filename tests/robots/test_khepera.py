@@ -145,14 +145,14 @@ def test_a_heading_beyond_bounds_is_failed_arithmetic():
     assert scores.fitness[0] > 0
     for commands, fitness in zip((2, 3), scores.fitness, strict=True):
         poses = ROBOT.poses(np.tile([0.0, 0.1, turn], (commands, 1)))
-        assert ROBOT.judge(poses, CIRCLE)[0] == pytest.approx(fitness, rel=1e-9)
+        assert ROBOT.evaluate_path(poses, CIRCLE)[0] == pytest.approx(fitness, rel=1e-9)
 
 
 @pytest.mark.parametrize("turn", [0.001, 1.0, 2.9, -1.7, 3000.0, -3000.0])
 def test_directions_are_sine_and_cosine_whatever_the_heading(turn):
     some, weights = lists(12), constant(ahead=0.05, turn=turn)
     poses = ROBOT.poses(ROBOT.displacements(np.tile(weights[:, -1:], 12)))
-    by_judge = ROBOT.judge(poses, CIRCLE)
+    by_judge = ROBOT.evaluate_path(poses, CIRCLE)
     assert ROBOT.score(some, weights, CIRCLE).fitness[0] == pytest.approx(by_judge[0], rel=1e-9)
 
 
@@ -181,7 +181,7 @@ def test_success_and_goals_reached_agree_on_the_goal_radius():
     random, agreed = np.random.default_rng(0), 0
     for _ in range(300):
         poses = np.column_stack([random.uniform(-0.25, 0.25, (60, 2)), np.zeros(60)])
-        all_reached = ROBOT.judge(poses, CIRCLE)[1] == 4
+        all_reached = ROBOT.evaluate_path(poses, CIRCLE)[1] == 4
         assert ROBOT.successes(poses, CIRCLE)[0] == all_reached
         agreed += all_reached
     assert 5 < agreed < 295

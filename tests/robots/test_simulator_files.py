@@ -121,8 +121,8 @@ def test_the_shipped_simulator_cannot_be_changed_by_accident():
 
 
 def test_a_robot_without_a_static_simulator_says_how_to_make_one():
-    with pytest.raises(ModelError, match="make it: bns precompute --robot nothing"):
-        load_static_simulator("nothing")
+    with pytest.raises(ModelError, match=r"make it: bns precompute --robot snake\+rigid"):
+        load_static_simulator("snake+rigid")
 
 
 def test_what_a_run_was_trained_on_comes_along(tmp_path):

@@ -41,30 +41,30 @@ def test_default_task_is_the_first_of_the_source():
 def test_fitness_of_a_path_worked_out_by_hand():
     # Reaches the first region, ends 0.5 m below the second's middle, one position outside the surface.
     points = [[0.2, 0.2], [0.3, -0.95], [0.3, -0.8]]
-    fitness, reached, used = path.judge(seen_at(points), TWO)
+    fitness, reached, used = path.evaluate_path(seen_at(points), TWO)
     assert (reached, used) == (1, 3)
     assert fitness == pytest.approx(1 / (path.PENALTY_M + 0.5))
     # Never gets anywhere: its distance to the first goal, and a penalty for each goal after that one.
-    assert path.judge(seen_at([[0.3, 0.0]]), THREE)[0] == pytest.approx(1 / (0.3 + 2 * path.PENALTY_M))
+    assert path.evaluate_path(seen_at([[0.3, 0.0]]), THREE)[0] == pytest.approx(1 / (0.3 + 2 * path.PENALTY_M))
 
 
 def test_a_region_is_a_square_with_its_edge():
     for x, y, inside in ((0.5, 0.1, True), (0.11, 0.49, True), (0.51, 0.3, False), (0.3, 0.09, False)):
-        assert path.judge(seen_at([[x, y]]), TWO)[1] == inside
+        assert path.evaluate_path(seen_at([[x, y]]), TWO)[1] == inside
 
 
 def test_success_is_worth_most_and_what_comes_after_it_does_not_count():
     points = [[0.3, 0.3], [0.3, -0.3], [5.0, 5.0]]
-    fitness, reached, used = path.judge(seen_at(points), TWO)
+    fitness, reached, used = path.evaluate_path(seen_at(points), TWO)
     assert (fitness, reached, used) == (1 / path.SMALLEST_SUM_M, 2, 2)
 
 
 def test_unstable_cycles_cost_a_penalty_each_but_for_the_last_one_of_a_success():
     wavering = seen_at([[0.3, 0.3], [0.3, -0.3]])
     wavering[0, 8] = 0
-    assert path.judge(wavering, TWO)[0] == pytest.approx(1 / path.PENALTY_M)
+    assert path.evaluate_path(wavering, TWO)[0] == pytest.approx(1 / path.PENALTY_M)
     wavering[:, 8] = [1, 0]  # as printed, the walk breaks off before the check
-    assert path.judge(wavering, TWO)[0] == pytest.approx(1 / path.SMALLEST_SUM_M)
+    assert path.evaluate_path(wavering, TWO)[0] == pytest.approx(1 / path.SMALLEST_SUM_M)
 
 
 def test_frames_have_y_from_yellow_to_green_and_x_to_its_right():
@@ -84,7 +84,7 @@ def noisy_twin(controller, weights, task, rows):
     for row in rows:
         noisy = moved.copy()
         noisy[:, :4] += row[: len(moved)]
-        worth.append(path.judge(path.walk(noisy), task)[0])
+        worth.append(path.evaluate_path(path.walk(noisy), task)[0])
     return np.mean(worth)
 
 

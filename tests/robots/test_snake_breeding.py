@@ -55,7 +55,7 @@ def test_what_is_near_is_a_mutation_of_everything():
     commands = ROBOT.random_controllers(KEY, 1, 50).controller(0)
     moves = 2 * component_draws(KEY, Purpose.PROBE, 3, (1, 50, 5))[0] - 1
     wanted = allowed(mutated(commands, np.ones(commands.shape, bool), moves))
-    np.testing.assert_array_equal(ROBOT.near(commands, KEY, 3), wanted)
+    np.testing.assert_array_equal(ROBOT.perturb(commands, KEY, 3), wanted)
 
 
 def test_one_alone_goes_on_as_it_is():

@@ -77,7 +77,7 @@ def test_rollouts_are_their_twins_with_every_option(name):
         for row in rows:
             noisy = moved.copy()
             noisy[:, :4] += row[: len(moved)]
-            worth.append(robot.judge(robot.poses(noisy, in_full), TASK)[0])
+            worth.append(robot.evaluate_path(robot.poses(noisy, in_full), TASK)[0])
         assert scores.fitness[i] == pytest.approx(np.mean(worth), rel=1e-4)
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import gzip
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import yaml
 
@@ -29,6 +30,8 @@ class Measured:
     digest: str
     robot: str = ""
     """What a column ``robot`` says; "" where there is none."""
+    table: pd.DataFrame = field(default_factory=pd.DataFrame, repr=False, compare=False)
+    """The rows that the tracks were made of."""
 
 
 def load_measured(path: str | Path, robot: str | None = None, more: Sequence[Path] = ()) -> Measured:
@@ -38,11 +41,37 @@ def load_measured(path: str | Path, robot: str | None = None, more: Sequence[Pat
     of ``path``, under their file's name. DataError if a file cannot be used.
     """
     path = Path(path)
-    table = _of_one_robot(_joined([path, *more]), robot)
+    table = _joined([path, *more])
+    digest = hashlib.sha256(b"".join(p.read_bytes() for p in (path, *more))).hexdigest()[:20]
+    return measured_table(table, path, digest, robot)
+
+
+def measured_table(table: pd.DataFrame, path: Path, digest: str = "", robot: str | None = None) -> Measured:
+    """Check a table that was read and mapped already. ``path`` names it; ``digest``: by default that of its values."""
+    table = _of_one_robot(table, robot)
     of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
     tracks, findings = _tracks(table)
-    digest = hashlib.sha256(b"".join(p.read_bytes() for p in (path, *more))).hexdigest()[:20]
-    return Measured(path, tracks, tuple(findings), digest, of)
+    return Measured(path, tracks, tuple(findings), digest or table_sha256(table)[:20], of, table)
+
+
+def table_sha256(table: pd.DataFrame) -> str:
+    """SHA-256 (64 digits) of a table's values: the same for the same numbers from .csv, .parquet or memory.
+
+    Columns go in by name in alphabetical order; numbers as 64-bit floats (every NaN and 0 alike), all else as text.
+    """
+    whole = hashlib.sha256(str(len(table)).encode())
+    for name in sorted(map(str, table.columns)):
+        values = table[name]
+        whole.update(b"\0" + name.encode() + b"\0")
+        if pd.api.types.is_numeric_dtype(values):
+            numbers = values.to_numpy(dtype=np.float64, na_value=np.nan) + 0.0
+            numbers[np.isnan(numbers)] = np.nan
+            whole.update(numbers.astype("<f8").tobytes())
+        else:
+            whole.update(
+                "\0".join("" if missing else str(v) for v, missing in zip(values, values.isna(), strict=True)).encode()
+            )
+    return whole.hexdigest()
 
 
 def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:

@@ -78,6 +78,11 @@ def load_mapping(path: Path) -> dict[str, Any]:
         tree = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, yaml.YAMLError) as fault:
         raise DataError(f"The mapping {path} does not read: {fault}.") from fault
+    return checked_mapping(tree, path)
+
+
+def checked_mapping(tree: Any, path: Path) -> dict[str, Any]:
+    """A mapping that was read already, checked; ``path`` names it. DataError with the key that is wrong."""
     if not isinstance(tree, dict) or not isinstance(tree.get("columns"), dict):
         raise DataError(f"The mapping {path} must have the key columns, with an entry for each column of the table.")
     _check_keys(f"{path}", tree, _TABLE_KEYS)

@@ -11,9 +11,9 @@ from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.residuals.symbolic import NAME as FORMULA
+from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.stepwise import SelectionResult
 from bns.physics.effect import Effect
-from bns.physics.effects import all_effects
 from bns.physics.model import Model
 
 MOST, MOST_TIED = 3, 5
@@ -31,6 +31,11 @@ class CompetingModel:
     def title(self) -> str:
         """In words."""
         return " + ".join(self.names) or "nothing missing"
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects that were added."""
+        return tuple(active.effect for active in self.fit.model.effects if active.effect.name in self.names)
 
 
 def competing_models_of(d: Diagnosis) -> tuple[CompetingModel, ...]:
@@ -95,9 +100,7 @@ def _nearest(selection: SelectionResult, most: int = MOST - 1) -> list[tuple[str
 
 
 def _effects(d: Diagnosis) -> dict[str, Effect]:
-    """Every effect that an explanation may name: the catalogue and what was tried beside it."""
+    """Every effect that an explanation may add to the model."""
     assert d.selection is not None
     base = {active.effect.name for active in d.selection.nominal.model.effects}
-    tried = [a.effect for step in d.selection.steps for c in step.ranking for a in c.fit.model.effects]
-    every = {**all_effects(), **{effect.name: effect for effect in tried}}
-    return {name: effect for name, effect in every.items() if name not in base}
+    return {name: effect for name, effect in known_effects(d.selection).items() if name not in base}

@@ -2,38 +2,42 @@
 
 from __future__ import annotations
 
-import re
+from typing import cast
 
 import numpy as np
 
-from bns.diagnose.data.tracks import Tracks
+from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.design.sequences import MARGIN_M, Arena, Bounds
 from bns.errors import DataError
 from bns.physics.model import Model
 from bns.robots import load_robot, robot_names
+from bns.robots.base import TwoWheeled
 
 _TOGETHER_M = 0.15
 _TRIAL_S = (6.0, 25.0)
 _HEADING_RAD = np.pi / 2
+_LARGEST_M = 1000.0
 
 
-def arena_of(tracks: Tracks, size: str | None, start: str | None) -> Arena:
-    """The arena: where the robot was seen, or WxH metres around it; and the start of every trial.
+def arena_of(
+    tracks: Tracks, size: tuple[float, float] | None = None, start: tuple[float, float, float] | None = None
+) -> Arena:
+    """The arena: where the robot was seen, or ``size`` (width, height in m) around it; and the start of every trial.
 
-    The start is ``start`` (X,Y,DEGREES), else where the trials seen so far started if that was one place, else the arena's
-    middle, facing north. DataError for what is no arena or start.
+    The start is ``start`` (x_m, y_m, heading_rad), else where the trials seen so far started if that was one place, else
+    the arena's middle, facing north. DataError for what is no arena or start.
     """
     begins = tracks.pose[tracks.first[:-1]]
     middle = np.median(begins[:, :2], axis=0)
     together = float(np.median(np.hypot(*(begins[:, :2] - middle).T))) < _TOGETHER_M
     low, high = np.quantile(tracks.pose[:, :2], [0.005, 0.995], axis=0)
-    begin = _start(start) if start else None
+    begin = None if start is None else _checked_start(start)
     if begin is None and together:
         turn = np.angle(np.exp(1j * begins[:, 2]).mean())
         begin = (float(middle[0]), float(middle[1]), float(turn))
     if size is not None:
         centre = np.array(begin[:2]) if begin is not None else (low + high) / 2
-        half = _size(size) / 2
+        half = _checked_size(size) / 2
         low, high = centre - half, centre + half
     centre = (low + high) / 2
     begin = begin or (float(centre[0]), float(centre[1]), _HEADING_RAD)
@@ -46,8 +50,9 @@ def arena_of(tracks: Tracks, size: str | None, start: str | None) -> Arena:
     return arena
 
 
-def bounds_of(tracks: Tracks, model: Model, speeds: str | None) -> Bounds:
-    """Speeds and durations that the robot takes, together with those seen; ``speeds`` (LOW,HIGH in m/s) replaces the former."""
+def bounds_of(tracks: Tracks, model: Model, speeds: tuple[float, float] | None = None) -> Bounds:
+    """Speeds and durations that the robot takes, together with those seen; ``speeds`` (lowest, highest in m/s) replaces the
+    former. DataError for what is no range."""
     lasting = tracks.duration_s > 0
     if not lasting.any():
         raise DataError("No command of these measurements lasts any time; log poses before and after commands.")
@@ -56,46 +61,51 @@ def bounds_of(tracks: Tracks, model: Model, speeds: str | None) -> Bounds:
     short, long = (float(v) for v in np.quantile(tracks.duration_s[lasting], [0.02, 0.98]))
     name = str(model.provenance.get("begun_from", model.name)).removesuffix("-world")
     robot = load_robot(name) if name in robot_names() else None
-    if robot is not None and hasattr(robot, "wheel_speeds_m_s"):
-        left, _, lasts = robot.wheel_speeds_m_s(np.stack([robot.bounds.low, robot.bounds.high]).astype(float))
+    if robot is not None and robot.two_wheeled:
+        left, _, lasts = cast(TwoWheeled, robot).wheel_speeds_m_s(np.stack([robot.bounds.low, robot.bounds.high]).astype(float))
         low, high = min(low, float(left[0])), max(high, float(left[1]))
         short, long = min(short, float(lasts[0])), max(long, float(lasts[1]))
     if speeds is not None:
-        low, high = _pair(speeds, "--speeds", "LOW,HIGH in m/s, such as --speeds=-0.2,0.2")
+        low, high = _checked_speeds(speeds)
     per_trial = float(np.median(tracks.duration_s.sum(axis=1)))
     grid_s = 0.04
     short = max(round(short / grid_s), 1) * grid_s
     return Bounds(low, high, short, max(long, short), float(np.clip(per_trial, *_TRIAL_S)), grid_s)
 
 
-def _size(text: str) -> np.ndarray:
-    match = re.fullmatch(r"\s*([0-9.]+)\s*[xX×]\s*([0-9.]+)\s*", text)
-    try:
-        size = np.array([float(v) for v in match.groups()]) if match else None
-    except ValueError:
-        size = None
-    if size is None or not (size > 2 * MARGIN_M).all() or not (size < 1000).all():
-        raise DataError(f"--arena {text!r} is no size; write width x height in metres, each above 0.1: --arena 1.8x1.3")
-    return size
-
-
-def _start(text: str) -> tuple[float, float, float]:
-    try:
-        x, y, degrees = (float(v) for v in text.split(","))
-    except ValueError:
-        x = y = degrees = np.nan
-    if not np.isfinite([x, y, degrees]).all():
+def _checked_size(size: tuple[float, float]) -> Array:
+    sides = _numbers(size, 2)
+    if sides is None or not (sides > 2 * MARGIN_M).all() or not (sides < _LARGEST_M).all():
         raise DataError(
-            f"--start {text!r} is no pose; write X,Y,DEGREES (metres; 0 faces east, 90 north): --start 0,0,90"
+            f"The arena's size is {size!r}; it must be width and height in metres, each above {2 * MARGIN_M:g} and below "
+            f"{_LARGEST_M:g}: --arena 1.8x1.3; in Python arena=(1.8, 1.3)."
         )
-    return x, y, float(np.radians(degrees))
+    return sides
 
 
-def _pair(text: str, option: str, wanted: str) -> tuple[float, float]:
+def _checked_start(start: tuple[float, float, float]) -> tuple[float, float, float]:
+    pose = _numbers(start, 3)
+    if pose is None:
+        raise DataError(
+            f"The start is {start!r}; it must be three numbers: --start X,Y,DEGREES; in Python start=(x_m, y_m, heading_rad)."
+        )
+    return float(pose[0]), float(pose[1]), float(pose[2])
+
+
+def _checked_speeds(speeds: tuple[float, float]) -> tuple[float, float]:
+    pair = _numbers(speeds, 2)
+    if pair is None or not pair[0] < pair[1]:
+        raise DataError(
+            f"The wheels' speeds are {speeds!r}; they must be the lowest and the highest in m/s: --speeds=LOW,HIGH such as "
+            "--speeds=-0.2,0.2; in Python speeds=(-0.2, 0.2)."
+        )
+    return float(pair[0]), float(pair[1])
+
+
+def _numbers(given: object, count: int) -> Array | None:
+    """So many finite numbers, or None."""
     try:
-        low, high = (float(v) for v in text.split(","))
-    except ValueError:
-        low = high = np.nan
-    if not (np.isfinite([low, high]).all() and low < high):
-        raise DataError(f"{option} {text!r} is no range; write {wanted}.")
-    return low, high
+        values = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    return values if values.shape == (count,) and np.isfinite(values).all() else None

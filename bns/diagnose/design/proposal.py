@@ -188,7 +188,7 @@ def _model_pairs(
                 1.0 if indistinguishable else min(longer, MOST_FASTER),
                 indistinguishable,
                 decision_probability([e.first(0) for e in both]) >= TARGET_POWER,
-                tuple(independent_measurements(one.names, other.names)),
+                tuple(independent_measurements(one.effects, other.effects)),
             )
         )
     return out

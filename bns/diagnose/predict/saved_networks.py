@@ -50,9 +50,10 @@ def _robot_with(saved: StaticSimulator, file: Path) -> Robot:
     """The robot that a run's networks were made for, with its options; else the one that has such networks."""
     if "spec" in saved.provenance:
         return load_robot(json.loads(saved.provenance["spec"])["robot"])
-    robots = [load_robot(name) for name in robot_names()]
-    for robot in robots:
+    robots = []
+    for robot in map(load_robot, robot_names()):  # one by one: a broken package stops no search that ends before it
         if tuple(robot.networks) == tuple(saved.networks):
             return robot
+        robots.append(robot)
     known = "; ".join(f"{robot.name}: {', '.join(robot.networks)}" for robot in robots)
     raise ModelError(f"The networks of {file} are {', '.join(saved.networks)}; no robot has these ({known}).")

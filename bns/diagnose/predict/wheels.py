@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,7 @@ class WheelPredictor:
     tracking: tuple[float, float] | None = None
 
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
-        self.tracks = tracks
+        self.tracks, self._dt_s = tracks, dt_s
         self.grid = _grid_of(tracks, dt_s)
         self.conditions = _conditions(tracks, self.grid.node_s)
         self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
@@ -53,6 +54,9 @@ class WheelPredictor:
         kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
         self._wheels = lru_cache(kept)(self._turned)
         self._body, self._at = lru_cache(kept)(self._driven), lru_cache(kept)(self._followed)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.tracks, self._dt_s)  # what it remembers is worked out again
 
     def steps(self, model: Model) -> Steps:
         """Displacement of the tracked point since the frame before, in the frame of the robot there."""

@@ -56,6 +56,22 @@ def comparison_figure(c: Comparison, path: Path) -> Path:
     return save(figure, path)[0]
 
 
+def curves_of(c: Comparison, variable: str | None = None, direction: str | None = None) -> list[Curve]:
+    """The curves along a variable and direction; None: any. Those along what explains most come first."""
+    return [
+        curve
+        for curve in c.curves
+        if variable in {None, curve.variable} and (direction is None or curve.direction.startswith(direction))
+    ]
+
+
+def curve_axes(axes: Axes, curve: Curve, c: Comparison) -> None:
+    """One curve of a comparison on axes of its own."""
+    _draw_curve(axes, curve)
+    axes.set_ylabel(curve.direction)
+    axes.set_title(f"Measured − predicted by {c.model}, {ahead(c.near)} ahead")
+
+
 def _draw_curve(axes: Axes, curve: Curve) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.fill_between(curve.centre, curve.low, curve.high, alpha=0.3, color=OKABE_ITO[0], linewidth=0)
@@ -67,10 +83,17 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
 def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12) -> Path:
     """What each effect earns on trials held out, when added alone to the model; bars are 95 % intervals."""
     assert d.selection is not None
+    rows = min(sum(bool(np.isfinite(c.paired_comparison.elpd_diff)) for c in d.selection.steps[0].ranking), most)
+    figure = Figure(figsize=(PAGE_IN * 0.75, 0.24 * rows + 1.2))
+    ranking_axes(figure.subplots(), d, most)
+    return save(figure, path)[0]
+
+
+def ranking_axes(axes: Axes, d: Diagnosis, most: int = 12) -> None:
+    """The same on axes that are there."""
+    assert d.selection is not None
     step = d.selection.steps[0]
     shown = [c for c in step.ranking if np.isfinite(c.paired_comparison.elpd_diff)][:most][::-1]
-    figure = Figure(figsize=(PAGE_IN * 0.75, 0.24 * len(shown) + 1.2))
-    axes = figure.subplots()
     selected = {*d.effects}
     for row, c in enumerate(shown):
         colour = OKABE_ITO[2] if c.name in selected else GREY if c.rejected_because else OKABE_ITO[0]
@@ -85,15 +108,19 @@ def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12) -> Path:
     axes.set_xlabel("gain in log-likelihood a trial, on trials held out")
     axes.set_title(f"verdict: {d.verdict}" + (f" ({', '.join(d.effects)})" if d.effects else ""))
     axes.legend(loc="lower right")
-    return save(figure, path)[0]
 
 
 @style()
 def error_by_step_figure(m: ExtendedModel, path: Path) -> Path:
     """The error by step: nominal model, each effect added in turn, noise floor; one line a horizon."""
-    names = [r.name if r.name == "nominal" else f"+ {r.name}" for r in m.error_by_step]
     figure = Figure(figsize=(PAGE_IN * 0.75, 3.0))
-    axes = figure.subplots()
+    error_by_step_axes(figure.subplots(), m)
+    return save(figure, path)[0]
+
+
+def error_by_step_axes(axes: Axes, m: ExtendedModel) -> None:
+    """The same on axes that are there."""
+    names = [r.name if r.name == "nominal" else f"+ {r.name}" for r in m.error_by_step]
     for colour, marker, horizon in zip(OKABE_ITO, "os^D", m.error_by_step[0].error, strict=False):
         values = [1e3 * r.error[horizon] for r in m.error_by_step]
         axes.plot(range(len(values)), values, marker=marker, color=colour, label=f"{ahead(horizon)}")
@@ -105,4 +132,3 @@ def error_by_step_figure(m: ExtendedModel, path: Path) -> Path:
     axes.set_ylabel("position error on trials held out (mm)")
     axes.legend(title="horizon (dotted: noise floor)", loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.set_title("Error ladder")
-    return save(figure, path)[0]

@@ -7,40 +7,12 @@ import numpy as np
 from bns.diagnose.design.competing_models import without_last
 from bns.diagnose.diagnosis import Diagnosis, numbers_of
 from bns.diagnose.estimate.fit import Fit
-
-PLAIN = {
-    "speed-gain": "the wheels turn faster or slower than they are told to",
-    "wheel-mismatch": "one wheel is larger than the other",
-    "wheelbase": "the wheels stand closer together or further apart than the model says",
-    "motor-lag": "the motors follow their commands with a lag",
-    "command-delay": "commands reach the motors late",
-    "dead-zone": "a part of every wheel's speed is lost to friction",
-    "speed-limit": "the wheels cannot turn faster than a limit",
-    "acceleration-limit": "the wheels' speed can change only so fast",
-    "turn-slip": "turning costs forward speed",
-    "side-slip": "the robot slides sideways in curves",
-    "battery-sag": "the robot becomes slower as its battery empties",
-    "floor-slope": "the robot drifts to one side of the floor, as on a slope",
-    "yaw-bias": "the robot turns a little to one side whenever it moves",
-    "tether-pull": "something pulls the robot towards one place, as a cable does",
-    "clock-offset": "the camera's clock and the commands' clock disagree",
-    "clock-drift": "the camera's clock runs faster or slower than the commands' clock",
-    "understeer": "how far the robot turns depends on how fast it drives",
-    "marker-offset": "the tracked marker does not sit over the middle of the axle",
-    "camera-scale": "the camera's positions are too large or too small",
-    "camera-rotation": "the camera's positions are turned against the robot's headings",
-}
-"""Effect -> what happens, in everyday words."""
+from bns.diagnose.select.known_effects import known_effects
 
 _UNITS = {"s": (1e3, "ms"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "rad": (57.29578, "°"), "rad/s": (57.29578, "°/s")}
 """SI unit -> factor and unit for people."""
 _LARGE = 1.0
 _CAUSES = 3
-
-
-def described(name: str) -> str:
-    """An effect in everyday words; its own name where nobody wrote any."""
-    return PLAIN.get(name, f"the effect “{name}”")
 
 
 def figures_in_words(value: float, low: float | None, high: float | None, unit: str) -> tuple[str, str]:
@@ -86,9 +58,9 @@ def numbers_in_words(fit: Fit, names: tuple[str, ...]) -> list[dict[str, str]]:
 
 def headline(d: Diagnosis) -> str:
     """The verdict in one sentence or two."""
-    said = _all_of(d.effects)
+    said = _all_of(d, d.effects)
     if d.verdict == "tie" and d.selection is not None:
-        causes = [_all_of(names) for names in (d.selection.accepted, *d.selection.competing_models)]
+        causes = [_all_of(d, names) for names in (d.selection.accepted, *d.selection.competing_models)]
         some = [f"that {cause}" for cause in causes[:_CAUSES]] + (["something else"] if len(causes) > _CAUSES else [])
         return f"The model misses either {', or '.join(some)}. These measurements cannot say which."
     return {
@@ -100,8 +72,10 @@ def headline(d: Diagnosis) -> str:
     }[d.verdict]
 
 
-def _all_of(names: tuple[str, ...]) -> str:
-    return " and ".join(described(name) for name in names)
+def _all_of(d: Diagnosis, names: tuple[str, ...]) -> str:
+    """What happens where these effects are at work, in everyday words."""
+    known = known_effects(d.selection) if d.selection else {}
+    return " and ".join(known[name].in_words for name in names)
 
 
 def certainty(d: Diagnosis) -> str:

@@ -46,7 +46,7 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
     if d.formula is not None:
         values = ", ".join(f"{name} = {value:.4g}" for name, value in d.formula.values.items())
         yield f"\ncandidate term: {d.formula.term}   added to {d.formula.on}; {values}"
-        yield f"  bns add unlisted --term '{d.formula.term}' --on {d.formula.on} … adds it"
+        yield f"  bns add DATA unlisted --term '{d.formula.term}' --on {d.formula.on} … adds it"
     if d.notes:
         yield "\nnotes:"
         yield from (f"  - {note}" for note in d.notes)

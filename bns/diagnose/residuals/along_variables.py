@@ -19,6 +19,7 @@ from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
 from bns.physics.effect import Effect, Parameter
+from bns.physics.order import FORMULAS
 from bns.physics.signals import Body
 
 SHARE = "share_of_motion"
@@ -119,7 +120,7 @@ def probe_effect(channel: str, curve: Array, heading_rad: Array) -> Effect:
         residuals="",
         lookalikes=(),
         apply=apply,
-        rank=116,
+        after=FORMULAS,
     )
 
 

@@ -8,10 +8,13 @@ from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Self
 
-import cv2
 import numpy as np
 
+from bns.extras import extra
 from bns.hardware.clock import EmulatedClock
+
+with extra("robot"):
+    import cv2
 
 _BOUNDARY = b"frame"
 _QUALITY = 92

@@ -13,9 +13,9 @@ from bns.hardware.emulators.body import DifferentialBody
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.khepera import KheperaEmulator
 from bns.hardware.emulators.terminal import HangUp, PseudoTerminal
-from bns.hardware.emulators.watchers import emulated_tracker
 from bns.hardware.khepera import firmware
 from bns.hardware.rig import Rig
+from bns.hardware.tracking.kinds import emulated
 from bns.physics.model import load_model
 from bns.robots.khepera import START
 
@@ -32,7 +32,7 @@ class EmulatedKheperaRig:
         self._line = PseudoTerminal(self.robot, folder, "khepera")
         self._hang_up = HangUp(self._line, clock)
         self.robot.cut_line = self._hang_up.cut
-        tracker, self._watcher = emulated_tracker(rig.tracker, folder, self.body.seen, clock, plan.of("tracker"), seed)
+        tracker, self._watcher = emulated(rig.tracker, folder, self.body.seen, clock, plan.of("tracker"), seed)
         self.rig = replace(rig, port=str(self._line.path), tracker=tracker)
 
     def put_down(self, pose: np.ndarray) -> None:

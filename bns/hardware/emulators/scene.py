@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
+from bns.extras import extra
 from bns.hardware.tracking.lens import Lens
+
+with extra("robot"):
+    import cv2
 
 _OVER = 3  # samples a pixel and axis: edges come out grey where they should
 _FLOOR_BGR = (120, 125, 130)

@@ -6,7 +6,6 @@ import contextlib
 import os
 import select
 import threading
-import tty
 from pathlib import Path
 from typing import Protocol, Self
 
@@ -45,6 +44,8 @@ class PseudoTerminal:
         """A new line in the place of the one that was cut."""
         with self._lock:
             self.cut()
+            import tty  # noqa: PLC0415  # Windows has no pseudo-terminals
+
             self._master, self._slave = os.openpty()
             tty.setraw(self._slave)
             os.set_blocking(self._master, False)  # a host that does not read must not stop the pump

@@ -1,10 +1,10 @@
-"""Emulated trackers' devices, one for each kind of tracker: a Wii remote's pipe, or a camera with its calibration."""
+"""Emulated cameras above a robot, with their calibration, and the markers that the robot wears."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -12,23 +12,12 @@ from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.camera import CameraEmulator
 from bns.hardware.emulators.faults import Faults
 from bns.hardware.emulators.scene import Patch, Scene, disc, tag
-from bns.hardware.emulators.wii import WiiEmulator
 from bns.hardware.tracking.calibration import Calibration
-from bns.hardware.tracking.kinds import checked
 from bns.hardware.tracking.lens import Lens, looking_down
-from bns.hardware.tracking.wii import overhead
 
-Pose = Callable[[float], np.ndarray]
 Wears = Callable[[float], list[Patch]]
 """Time -> the markers on a robot as they lie then."""
 YELLOW_BGR, GREEN_BGR = (30, 210, 240), (60, 180, 40)
-
-
-class Device(Protocol):
-    """What can be taken away again."""
-
-    def close(self) -> None:
-        """Take it away."""
 
 
 def emulated_lens(scale: float = 1.0, height_m: float = 2.0, tilt_rad: float = 0.05) -> Lens:
@@ -36,17 +25,6 @@ def emulated_lens(scale: float = 1.0, height_m: float = 2.0, tilt_rad: float = 0
     matrix = np.array([[700.0 * scale, 0.0, 640.0 * scale], [0.0, 700.0 * scale, 360.0 * scale], [0.0, 0.0, 1.0]])
     size = (round(1280 * scale), round(720 * scale))
     return looking_down(matrix, np.array([-0.25, 0.08, 0.001, -0.0005, 0.0]), size, height_m, tilt_rad)
-
-
-def emulated_tracker(
-    settings: Mapping[str, Any], folder: Path, pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
-) -> tuple[dict[str, Any], Device]:
-    """An emulated device that watches a rigid robot; the tracker's settings with its address, and the device."""
-    checked(settings)
-    if settings["kind"] == "wii":
-        path = folder / "wiimote"
-        return {**settings, "device": str(path)}, WiiEmulator(path, pose, overhead(settings), clock, faults, seed)
-    return emulated_camera(settings, folder, lambda now_s: worn(settings, pose(now_s)), clock, faults, seed)
 
 
 def emulated_camera(
@@ -83,13 +61,17 @@ def _film(lens: Lens, wears: Wears, clock: EmulatedClock, faults: Faults, seed: 
     return render
 
 
-def worn(settings: Mapping[str, Any], pose: np.ndarray) -> list[Patch]:
-    """The markers that a robot at `pose` (3,) wears for this tracker."""
+def worn_tag(settings: Mapping[str, Any], pose: np.ndarray) -> list[Patch]:
+    """The printed marker that a robot at `pose` (3,) wears for an aruco tracker."""
     x_m, y_m, heading_rad = (float(v) for v in pose)
-    height_m = float(settings["height_m"])
-    if settings["kind"] == "aruco":
-        return [tag(int(settings.get("number", 0)), float(settings["side_m"]), x_m, y_m, heading_rad, height_m)]
+    number, height_m = int(settings.get("number", 0)), float(settings["height_m"])
+    return [tag(number, float(settings["side_m"]), x_m, y_m, heading_rad, height_m)]
+
+
+def worn_discs(settings: Mapping[str, Any], pose: np.ndarray) -> list[Patch]:
+    """The two discs that a robot at `pose` (3,) wears for a colour tracker."""
+    x_m, y_m, heading_rad = (float(v) for v in pose)
+    height_m, diameter_m = float(settings["height_m"]), float(settings["diameter_m"])
     half = float(settings.get("distance_m", 0.1)) / 2 * np.array([np.cos(heading_rad), np.sin(heading_rad)])
-    diameter_m = float(settings["diameter_m"])
     ends = ((YELLOW_BGR, -half), (GREEN_BGR, half))
     return [disc(colour, diameter_m, x_m + dx, y_m + dy, height_m) for colour, (dx, dy) in ends]

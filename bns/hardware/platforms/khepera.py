@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.sight import Sight, Tracker
 from bns.robots.khepera import UNITS_PER_M_S
+
+RIG = resources.files("bns.hardware") / "rigs" / "khepera.yaml"
 
 _TICK_S = 0.1
 _HEARTBEATS = 5

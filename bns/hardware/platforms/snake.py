@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from bns.hardware.tracking.kinds import checked, open_tracker
 
 REPEATS = 3
 """How often a trial drives its final controller, unless it is told otherwise: the source drove it three times (section 5.7)."""
+RIG = resources.files("bns.hardware") / "rigs" / "snake.yaml"
 
 
 class SnakePlatform:

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Camera, Frame, FrameTracker, open_camera
-from bns.hardware.tracking.kinds import Settings
+from bns.hardware.tracking.kinds import Device, Pose, Settings
 from bns.hardware.tracking.lens import Lens
 from bns.hardware.tracking.rigid import fit
 from bns.hardware.tracking.sight import Sight
+
+if TYPE_CHECKING:
+    from bns.hardware.clock import EmulatedClock
+    from bns.hardware.emulators.faults import Faults
+with extra("robot"):
+    import cv2
 
 SETTINGS = Settings(("camera", "calibration", "side_m", "height_m"), ("number",), ("side_m", "height_m"))
 _WORST_SHARE = 0.1
@@ -61,3 +67,12 @@ def open_tracker(settings: Mapping[str, Any], clock: Clock) -> FrameTracker:
     find = detector(settings)
     camera: Camera = open_camera(settings, clock)
     return FrameTracker(camera, find.find)
+
+
+def emulate(
+    settings: Mapping[str, Any], folder: Path, pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
+) -> tuple[dict[str, Any], Device]:
+    """An emulated camera above a robot that wears the marker."""
+    from bns.hardware.emulators.watchers import emulated_camera, worn_tag  # noqa: PLC0415  # a real robot needs no emulators
+
+    return emulated_camera(settings, folder, lambda t_s: worn_tag(settings, pose(t_s)), clock, faults, seed)

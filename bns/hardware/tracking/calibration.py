@@ -9,11 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.tracking.lens import Lens
+
+with extra("robot"):
+    import cv2
 
 FEWEST_VIEWS, FEWEST_CORNERS = 8, 8
 WORST_RMS_PX = 1.0

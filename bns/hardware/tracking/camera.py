@@ -8,13 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import cv2
 import numpy as np
 
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.calibration import check_size, load_calibration
 from bns.hardware.tracking.sight import Sight
+
+with extra("robot"):
+    import cv2
 
 _FIRST_FRAME_S = 10.0
 

@@ -5,18 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 
 from bns.errors import HardwareError
+from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Frame, FrameTracker, open_camera
-from bns.hardware.tracking.kinds import Settings
+from bns.hardware.tracking.kinds import Device, Pose, Settings
 from bns.hardware.tracking.lens import Lens
 from bns.hardware.tracking.sight import Sight
+
+if TYPE_CHECKING:
+    from bns.hardware.clock import EmulatedClock
+    from bns.hardware.emulators.faults import Faults
+with extra("robot"):
+    import cv2
 
 SETTINGS = Settings(
     ("camera", "calibration", "diameter_m", "height_m"),
@@ -122,3 +128,12 @@ def open_tracker(settings: Mapping[str, Any], clock: Clock) -> FrameTracker:
     """The tracker of a rig."""
     find = detector(settings)
     return FrameTracker(open_camera(settings, clock), find.find)
+
+
+def emulate(
+    settings: Mapping[str, Any], folder: Path, pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
+) -> tuple[dict[str, Any], Device]:
+    """An emulated camera above a robot that wears the two discs, yellow behind."""
+    from bns.hardware.emulators.watchers import emulated_camera, worn_discs  # noqa: PLC0415  # a real robot needs no emulators
+
+    return emulated_camera(settings, folder, lambda t_s: worn_discs(settings, pose(t_s)), clock, faults, seed)

@@ -1,16 +1,18 @@
-"""Trackers by name: each module of `KINDS` has `SETTINGS` and `open_tracker(settings, clock)`."""
+"""Trackers by name: each is a module here, or of an installed package, that looks like `TrackerKind`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from importlib import import_module
-from types import ModuleType
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
 
 from bns.errors import HardwareError, unknown_name
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.sight import Tracker
+from bns.registry import TRACKERS
 
 
 class Settings(NamedTuple):
@@ -21,18 +23,53 @@ class Settings(NamedTuple):
     sizes: tuple[str, ...]
 
 
-KINDS = ("aruco", "colour", "wii")
+class Device(Protocol):
+    """An emulated device, which can be taken away again."""
+
+    def close(self) -> None:
+        """Take it away."""
+
+
+class TrackerKind(Protocol):
+    """What the module of a tracker has."""
+
+    SETTINGS: Settings
+    emulate: Callable[..., tuple[dict[str, Any], Device]] | None
+    """``emulate(settings, folder, pose, clock, faults, seed)``: an emulated device in a folder that watches a rigid robot, whose
+    pose (3,) ``pose(t_s)`` tells; the tracker's settings with the device's address, and the device. None: it has no emulation."""
+
+    def open_tracker(self, settings: Mapping[str, Any], clock: Clock) -> Tracker:
+        """The tracker of a rig, looking; HardwareError if its device cannot be used."""
+
+
+Pose = Callable[[float], np.ndarray]
 
 
 def open_tracker(settings: Mapping[str, Any], clock: Clock) -> Tracker:
     """The tracker that a rig names, looking; HardwareError if the kind is unknown or its device cannot be used."""
-    tracker: Tracker = _module(settings).open_tracker(checked(settings), clock)
-    return tracker
+    return kind_of(settings).open_tracker(checked(settings), clock)
+
+
+def kind_of(settings: Mapping[str, Any]) -> TrackerKind:
+    """The kind of tracker that a rig's settings name; HardwareError lists those there are."""
+    kind: TrackerKind = TRACKERS.load(str(settings["kind"]))
+    return kind
+
+
+def emulated(
+    settings: Mapping[str, Any], folder: Path, pose: Pose, clock: Clock, faults: Any, seed: int
+) -> tuple[dict[str, Any], Device]:
+    """An emulated device for the tracker of a rig, as `TrackerKind.emulate` says; HardwareError if its kind has none."""
+    checked(settings)
+    emulate = kind_of(settings).emulate
+    if emulate is None:
+        raise HardwareError(f"the {settings['kind']} tracker has no emulation; name a rig with another tracker, such as wii.")
+    return emulate(settings, folder, pose, clock, faults, seed)
 
 
 def checked(settings: Mapping[str, Any]) -> Mapping[str, Any]:
     """The settings without their kind; HardwareError names one that is missing, unknown or makes no sense."""
-    module, kind = _module(settings), settings["kind"]
+    module, kind = kind_of(settings), settings["kind"]
     own = {name: value for name, value in settings.items() if name != "kind"}
     needed, others, sizes = module.SETTINGS
     missing = [name for name in needed if name not in own]
@@ -46,10 +83,3 @@ def checked(settings: Mapping[str, Any]) -> Mapping[str, Any]:
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
             raise HardwareError(f"the {kind} tracker: {name} is {value!r}; it must be a number above 0.")
     return own
-
-
-def _module(settings: Mapping[str, Any]) -> ModuleType:
-    kind = settings["kind"]
-    if kind not in KINDS:
-        raise HardwareError(unknown_name("kind of tracker", str(kind), KINDS))
-    return import_module(f"bns.hardware.tracking.{kind}")

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
+
+from bns.extras import extra
+
+with extra("robot"):
+    import cv2
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,20 @@ import os
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
-from bns.hardware.tracking.kinds import Settings
+from bns.hardware.tracking.kinds import Device, Pose, Settings
 from bns.hardware.tracking.rigid import best_fit
 from bns.hardware.tracking.sight import Sight
+
+if TYPE_CHECKING:
+    from bns.hardware.clock import EmulatedClock
+    from bns.hardware.emulators.faults import Faults
 
 SETTINGS = Settings(
     ("device", "height_m", "view_rad"), ("x_m", "y_m", "up_rad", "leds_m"), ("height_m", "view_rad")
@@ -130,3 +135,13 @@ def open_tracker(settings: Mapping[str, Any], clock: Clock) -> WiiTracker:
     """The tracker of a rig."""
     camera = overhead(settings)
     return WiiTracker(str(settings["device"]), camera, clock, np.asarray(settings.get("leds_m", LEDS_M), np.float64))
+
+
+def emulate(
+    settings: Mapping[str, Any], folder: Path, pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
+) -> tuple[dict[str, Any], Device]:
+    """A pipe into which an emulated remote writes what it sees."""
+    from bns.hardware.emulators.wii import WiiEmulator  # noqa: PLC0415  # a real robot needs no emulators
+
+    path = folder / "wiimote"
+    return {**settings, "device": str(path)}, WiiEmulator(path, pose, overhead(settings), clock, faults, seed)

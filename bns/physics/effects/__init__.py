@@ -1,29 +1,36 @@
-"""Every effect there is: the modules of this folder, each with one `EFFECT`. A new effect is a new file."""
+"""Every effect there is: the modules of this folder, each with one `EFFECT`, and those of installed packages."""
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
-import pkgutil
 from functools import cache
 from pathlib import Path
 
-from bns.errors import ModelError, unknown_name
+from bns.errors import ModelError
 from bns.physics.effect import Effect
+from bns.registry import EFFECTS
+
+
+def effect_names() -> tuple[str, ...]:
+    """All names, ours in alphabetical order, then those of packages; no effect is imported."""
+    return EFFECTS.names()
 
 
 @cache
 def all_effects() -> dict[str, Effect]:
-    """Name -> effect, in alphabetical order of the names."""
-    modules = (importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__))
-    return {effect.name: effect for effect in sorted((m.EFFECT for m in modules), key=lambda e: e.name)}
+    """Name -> effect, in the order of `effect_names`; ModelError names a package whose effect cannot be used."""
+    return {name: effect_named(name) for name in effect_names()}
 
 
 def effect_named(name: str) -> Effect:
     """The effect of that name; ModelError with the names there are."""
-    if name not in all_effects():
-        raise ModelError(unknown_name("effect", name, all_effects()))
-    return all_effects()[name]
+    effect: Effect = EFFECTS.load(name)
+    return effect
+
+
+def chain_key(effect: Effect) -> tuple[float, str]:
+    """By what effects are sorted into the order in which they act; equals stay as they came."""
+    return effect.place, effect.name if EFFECTS.is_plugin(effect.name) else ""
 
 
 def effect_in_file(path: Path) -> Effect:

@@ -33,6 +33,7 @@ EFFECT = Effect(
     residuals="A start from rest falls short by half the squared speed over a: fast commands lose "
     "more than in proportion, and steps of speed are ramps.",
     lookalikes=("motor-lag", "command-delay"),
+    sentence="the wheels' speed can change only so fast",
+    measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
     apply=apply,
-    rank=60,
 )

@@ -44,6 +44,9 @@ EFFECT = Effect(
     equation="u' = u·(1 - rate·session - per_volt·(V0 - V)) for each wheel",
     residuals="Distances and turns shrink by one share that grows from trial to trial.",
     lookalikes=("speed-gain",),
+    sentence="the robot becomes slower as its battery empties",
+    measurement="log the battery's voltage (column battery_v)",
+    explained_by=("session_s", "battery_v"),
+    caveat="No session_s or battery_v was logged: the session's time is taken as the trials one right after the other.",
     apply=apply,
-    rank=30,
 )

@@ -26,6 +26,7 @@ EFFECT = Effect(
     equation="x' = x·cos(phi) - y·sin(phi), y' = x·sin(phi) + y·cos(phi)",
     residuals="The robot seems to drive at an angle to its heading, the same one always, also in reverse.",
     lookalikes=("side-slip", "marker-offset"),
+    sentence="the camera's positions are turned against the robot's headings",
+    measurement="track a straight edge laid along the direction that the headings call north",
     apply=apply,
-    rank=180,
 )

@@ -20,6 +20,7 @@ EFFECT = Effect(
     equation="x' = c·x, y' = c·y",
     residuals="All distances are wrong by the same share while all turns fit.",
     lookalikes=("speed-gain", "wheelbase"),
+    sentence="the camera's positions are too large or too small",
+    measurement="lay a tape measure on the floor in the camera's view and compare its length with the tracked one",
     apply=apply,
-    rank=170,
 )

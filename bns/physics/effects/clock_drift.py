@@ -22,6 +22,6 @@ EFFECT = Effect(
     equation="pose'(t) = pose(t - rate·t)",
     residuals="The track runs ahead of the commands or falls behind, more so the later in the trial; changes of speed show it.",
     lookalikes=("clock-offset", "speed-gain"),
+    sentence="the camera's clock runs faster or slower than the commands' clock",
     apply=apply,
-    rank=151,
 )

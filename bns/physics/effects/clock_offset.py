@@ -22,7 +22,11 @@ EFFECT = Effect(
     equation="pose'(t) = pose(t - offset)",
     residuals="The whole track is shifted along itself: errors are speed times the offset, and vanish at rest.",
     lookalikes=("command-delay", "motor-lag"),
+    sentence="the camera's clock and the commands' clock disagree",
+    measurement="film an event that both clocks stamp (an LED switched by the computer that logs the commands)",
+    beside={
+        "command-delay": "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
+    },
     apply=apply,
-    rank=150,
     per_trial_allowed=True,
 )

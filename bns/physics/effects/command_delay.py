@@ -27,6 +27,7 @@ EFFECT = Effect(
     "speed between commands, and are the same for commands of any duration above the "
     "delay.",
     lookalikes=("motor-lag", "acceleration-limit"),
+    sentence="commands reach the motors late",
+    measurement="film an LED on the robot that lights when a command arrives, with the tracker's camera",
     apply=apply,
-    rank=70,
 )

@@ -27,6 +27,6 @@ EFFECT = Effect(
     residuals="Slow commands fall short by a larger share than fast ones, in proportion to their "
     "duration; a very slow wheel stands still.",
     lookalikes=("speed-gain", "motor-lag"),
+    sentence="a part of every wheel's speed is lost to friction",
     apply=apply,
-    rank=40,
 )

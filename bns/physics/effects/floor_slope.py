@@ -23,6 +23,11 @@ EFFECT = Effect(
     equation="dx/dt += sx, dy/dt += sy while moving",
     residuals="Positions are off in one direction of the room, whatever the heading, in proportion to the time driven.",
     lookalikes=("tether-pull",),
+    sentence="the robot drifts to one side of the floor, as on a slope",
+    measurement="lay a spirit level on the floor",
+    beside={
+        "tether-pull": "A floor-slope is a tether-pull from far away: drive on both sides of the supposed anchor to tell them "
+        "apart."
+    },
     apply=apply,
-    rank=130,
 )

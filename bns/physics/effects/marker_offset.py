@@ -27,6 +27,7 @@ EFFECT = Effect(
     equation="x' = x + f·cos(theta) - s·sin(theta), y' = y + f·sin(theta) + s·cos(theta)",
     residuals="Turns on the spot move the robot on a circle; straight commands fit.",
     lookalikes=("side-slip", "turn-slip"),
+    sentence="the tracked marker does not sit over the middle of the axle",
+    measurement="measure with a ruler where the marker sits, from the middle of the axle",
     apply=apply,
-    rank=160,
 )

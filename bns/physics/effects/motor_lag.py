@@ -26,6 +26,7 @@ EFFECT = Effect(
     residuals="The first command falls short by speed times tau, whatever its duration; later "
     "commands keep a rest of the command before, and short ones suffer most.",
     lookalikes=("command-delay", "acceleration-limit", "speed-gain"),
+    sentence="the motors follow their commands with a lag",
+    measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
     apply=apply,
-    rank=80,
 )

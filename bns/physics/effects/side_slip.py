@@ -22,6 +22,6 @@ EFFECT = Effect(
     equation="s' = s + k·v·omega, s the velocity to the right",
     residuals="The path lies outside the commanded arc, more so the faster and sharper it is; headings fit.",
     lookalikes=("turn-slip", "marker-offset"),
+    sentence="the robot slides sideways in curves",
     apply=apply,
-    rank=110,
 )

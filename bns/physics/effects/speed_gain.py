@@ -24,6 +24,7 @@ EFFECT = Effect(
     equation="l' = g·l, r' = g·r",
     residuals="Distances and turns are wrong by the same share in every command, whatever its speed and duration.",
     lookalikes=("motor-lag", "dead-zone", "turn-slip"),
+    sentence="the wheels turn faster or slower than they are told to",
+    measurement="let the robot drive straight and measure the way on the floor with a tape",
     apply=apply,
-    rank=10,
 )

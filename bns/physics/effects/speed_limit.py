@@ -27,6 +27,6 @@ EFFECT = Effect(
     equation="w = min(max(u, -limit), limit) for each wheel",
     residuals="Fast commands fall short, slow ones fit; curves of two fast wheels come out straighter.",
     lookalikes=("turn-slip", "acceleration-limit"),
+    sentence="the wheels cannot turn faster than a limit",
     apply=apply,
-    rank=50,
 )

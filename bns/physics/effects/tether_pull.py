@@ -40,7 +40,8 @@ EFFECT = Effect(
     equation="dx/dt += k·(ax - x), dy/dt += k·(ay - y) while moving",
     residuals="Positions are off towards one point of the room, more so the farther the robot is from it.",
     lookalikes=("floor-slope",),
+    sentence="something pulls the robot towards one place, as a cable does",
+    measurement="repeat some trials with the cable unplugged or held up",
     apply=apply,
     starts=_starts(),
-    rank=140,
 )

@@ -23,6 +23,6 @@ EFFECT = Effect(
     equation="v' = v·max(1 - k·|omega|, 0)",
     residuals="Arcs are too short the sharper they are, left and right alike; straight commands and headings fit.",
     lookalikes=("speed-gain", "wheelbase", "side-slip"),
+    sentence="turning costs forward speed",
     apply=apply,
-    rank=100,
 )

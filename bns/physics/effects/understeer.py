@@ -25,6 +25,6 @@ EFFECT = Effect(
     equation="omega' = omega·max(1 - k·|v|, 0)",
     residuals="Turns on the spot fit; curves come out too straight, the more so the faster they are driven.",
     lookalikes=("wheelbase", "turn-slip", "speed-limit"),
+    sentence="how far the robot turns depends on how fast it drives",
     apply=apply,
-    rank=105,
 )

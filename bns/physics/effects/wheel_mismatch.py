@@ -22,6 +22,7 @@ EFFECT = Effect(
     residuals="The heading drifts to one side in proportion to the distance driven, also in "
     "straight commands; it drifts back in reverse.",
     lookalikes=("yaw-bias",),
+    sentence="one wheel is larger than the other",
+    measurement="measure both wheels' circumferences",
     apply=apply,
-    rank=20,
 )

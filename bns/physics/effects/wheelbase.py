@@ -30,6 +30,7 @@ EFFECT = Effect(
     equation="b' = e·b, so that omega = (r - l)/(e·b)",
     residuals="Every turn is too small or too large by the same share, left and right alike; straight commands fit.",
     lookalikes=("turn-slip", "wheel-mismatch"),
+    sentence="the wheels stand closer together or further apart than the model says",
+    measurement="measure the distance between the wheels' tracks, or count turns on the spot against a mark on the floor",
     apply=apply,
-    rank=90,
 )

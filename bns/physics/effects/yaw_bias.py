@@ -20,6 +20,7 @@ EFFECT = Effect(
     equation="omega' = omega + beta while moving",
     residuals="The heading drifts to one side in proportion to the time driven, whatever the speed; also in reverse.",
     lookalikes=("wheel-mismatch",),
+    sentence="the robot turns a little to one side whenever it moves",
+    measurement="lift the robot and log both wheels' own speeds (encoders)",
     apply=apply,
-    rank=120,
 )

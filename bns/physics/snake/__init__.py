@@ -17,6 +17,8 @@ def _choose_rendering() -> str:
         os.environ.setdefault(WAY, "egl" if ctypes.util.find_library("EGL") else "off")
     try:
         import mujoco  # noqa: F401, PLC0415  # whether it can be imported is what is asked
+    except ModuleNotFoundError:
+        return ""  # the modules here that drive say which extra is missing; parameters and gait need none
     except Exception as error:  # what is missing shows as an error of a kind of its own for each library
         wanted = os.environ.get(WAY)
         if wanted is None:

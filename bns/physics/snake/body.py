@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bns.extras import extra
 from bns.physics.snake.gait import cycle_angles
 from bns.physics.snake.model import GREEN, YELLOW, build_model
 from bns.physics.snake.parameters import SnakeParameters
 from bns.physics.snake.stability import BLEW_UP, Watch
+
+with extra("snake"):
+    import mujoco
 
 LOOK_EVERY = 5
 """Integration steps between two looks at stability."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import mujoco
-
+from bns.extras import extra
 from bns.physics.snake.parameters import SnakeParameters
+
+with extra("snake"):
+    import mujoco
 
 YELLOW, GREEN = "yellow", "green"
 """Names of the marker sites; green is at the end with the Arduino and the tether."""

@@ -7,14 +7,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from bns.errors import ModelError
+from bns.extras import extra
 from bns.physics.snake import UNUSABLE
 from bns.physics.snake.body import OnStep
+
+with extra("snake"):
+    import mujoco
 
 WIDTH_PX, HEIGHT_PX, FRAMES_A_SECOND = 960, 544, 25
 VIEW_M = 2.3
@@ -64,13 +67,12 @@ def check_ending(path: Path) -> None:
 
 def _check_encoder(path: Path) -> None:
     try:
-        import imageio_ffmpeg  # noqa: PLC0415  # brings its own encoder; only films need it
+        with extra("snake"):
+            import imageio_ffmpeg  # noqa: PLC0415  # brings its own encoder; only films need it
 
         imageio_ffmpeg.get_ffmpeg_exe()
     except (ImportError, RuntimeError) as error:
-        raise ModelError(
-            f"cannot render to {path}: no encoder of films ({error}); pip install imageio-ffmpeg, or let the name end in .png."
-        ) from error
+        raise ModelError(f"cannot render to {path}: no encoder of films. {error}, or let the name end in .png.") from error
 
 
 def camera(model: mujoco.MjModel) -> Draw:

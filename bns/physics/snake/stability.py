@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import mujoco
 import numpy as np
 
+from bns.extras import extra
 from bns.physics.snake.parameters import SnakeParameters
+
+with extra("snake"):
+    import mujoco
 
 TIPPED, COLLISION, STALLED, BLEW_UP = "tipped-over", "self-collision", "torque-limit", "not-finite"
 CAUSES = (TIPPED, COLLISION, STALLED, BLEW_UP)

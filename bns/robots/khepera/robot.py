@@ -16,7 +16,7 @@ from bns.engine.evolution import CommandBounds, Population, diversity, random_po
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.snn import INPUTS
 from bns.measurements import COLUMNS, trial_table
-from bns.robots.base import RandomStream, Scores, turned
+from bns.robots.base import RandomStream, Scores, rotate
 from bns.robots.khepera.rollout import inputs, roll_out
 from bns.robots.khepera.rules import (
     GOAL_RADIUS_M,
@@ -34,7 +34,7 @@ UNITS_PER_M_S = 144_010.0
 
 
 class Khepera:
-    """Implements `bns.robots.base.Robot`."""
+    """Implements `bns.robots.base.TwoWheeled`."""
 
     name = "khepera"
     networks = ("dx", "dy", "dtheta")
@@ -51,6 +51,11 @@ class Khepera:
         "left_m_s": (-0.3, 0.3), "right_m_s": (-0.3, 0.3), "duration_s": (0.001, 60.0),
     }  # fmt: skip
     options: tuple[str, ...] = ()
+    physics = "bns.physics.khepera_drive"
+    world_model = "khepera-world"
+    simulators = "bns.robots"
+    two_wheeled = True
+    marks_unstable = False
 
     def with_options(self, names: tuple[str, ...]) -> Khepera:
         """There are none."""
@@ -67,7 +72,7 @@ class Khepera:
         commands = (LOW + u * (HIGH - LOW)).astype(np.float32)
         return Population(commands, np.full(count, length, np.int32))
 
-    def near(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+    def perturb(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
         """Commands (n, 3), each component moved within its mutation span."""
         u = uniforms(key, Purpose.PROBE, step, 1, len(commands))[0, :, :3]
         moved = commands + (2 * u - 1) * self.bounds.mutation_span
@@ -113,9 +118,9 @@ class Khepera:
         """Position, m, and heading, rad."""
         return dict(zip(("x_m", "y_m", "heading_rad"), poses.T, strict=True))
 
-    def moved(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
+    def transform(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
         """Poses (n, 3) turned about the origin, then shifted."""
-        return np.column_stack([turned(poses[:, :2], turn_rad) + shift_m, poses[:, 2] + turn_rad])
+        return np.column_stack([rotate(poses[:, :2], turn_rad) + shift_m, poses[:, 2] + turn_rad])
 
     def marked_unstable(self, poses: np.ndarray, commands: Sequence[int]) -> np.ndarray:
         """As they are: no command of two wheels is unstable."""
@@ -152,7 +157,7 @@ class Khepera:
         fitness, reached, failures, outputs = roll_out(population, weights, task.goals_m, known)
         return Scores(fitness, reached, failures, outputs=outputs)
 
-    def judge(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
+    def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
         """Fitness per metre, and goals reached, of one path; 0 where `score` would call the arithmetic failed."""
         # As in `score`, the heading that a command begins with counts, not the one that the last command ends with.
         total, goal = math.inf if np.any(np.abs(poses[:-1, 2]) > LARGEST_HEADING_RAD) else 0.0, 0
@@ -174,7 +179,7 @@ class Khepera:
         """Whether all goals are visited in order, within each radius."""
         return tuple(_visited(poses, task.goals_m, radius) == len(task.goals_m) for radius in self.radii_m)
 
-    def given(self, rows: np.ndarray) -> np.ndarray:
+    def parse_commands(self, rows: np.ndarray) -> np.ndarray:
         """In the firmware's units and ms."""
         return rows * np.array([UNITS_PER_M_S, UNITS_PER_M_S, 1000.0])
 

@@ -63,7 +63,7 @@ def _mutate_all(commands, low, high, span, step, k0, k1):  # type: ignore[no-unt
         mutate(commands[j], 1.0, low, high, span, j, 0, step, _PROBE, k0, k1)
 
 
-def near(commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+def perturb(commands: np.ndarray, key: Key, step: int) -> np.ndarray:
     """Cycles (n, 5) with every component moved at random within its mutation span."""
     moved = np.array(commands, np.float32)
     _mutate_all(moved, BOUNDS.low, BOUNDS.high, BOUNDS.mutation_span, np.uint32(step), *key.words)

@@ -72,7 +72,7 @@ def middles(observations: np.ndarray) -> np.ndarray:
     return (observations[:, 4:6] + observations[:, 6:8]) / 2
 
 
-def judge(observations: np.ndarray, task: Task) -> tuple[float, int, int]:
+def evaluate_path(observations: np.ndarray, task: Task) -> tuple[float, int, int]:
     """Algorithm 3 over one path: fitness per metre (0 if not finite), goals reached, cycles until the last goal or to the end."""
     total, goal, used = 0.0, 0, len(observations)
     half_x, half_y = task.surface_m[0] / 2, task.surface_m[1] / 2

@@ -11,7 +11,7 @@ from bns.engine.evolution import Population, diversity
 from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import predict
 from bns.errors import SpecError
-from bns.robots.base import RandomStream, Scores, StagedTraining, turned
+from bns.robots.base import RandomStream, Scores, StagedTraining, rotate
 from bns.robots.snake import cycles, path, posture, table
 from bns.robots.snake.rollout import evaluate
 from bns.robots.snake.rules import (
@@ -39,6 +39,10 @@ class Snake:
 
     name = "snake"
     options = ("changes", "rigid")
+    physics = "bns.physics.snake_drive"
+    simulators = "bns.robots"
+    two_wheeled = False
+    marks_unstable = True
     networks = ("dx_yellow", "dy_yellow", "dx_green", "dy_green", "stable")
     hidden = 100
     input_count = 4
@@ -69,9 +73,9 @@ class Snake:
         """Controllers of `length` random cycles, apart from every population's draws."""
         return cycles.random_cycles(key, Purpose.PROBE, 0, count, length)
 
-    def near(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
+    def perturb(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
         """Cycles (n, 5), each component moved within its mutation span."""
-        return cycles.near(commands, key, step)
+        return cycles.perturb(commands, key, step)
 
     def inputs(self, commands: np.ndarray) -> np.ndarray:
         """Inputs (5, n): A_lat, A_vert, ω, α, each from -1 to 1, and one that is not used."""
@@ -122,9 +126,9 @@ class Snake:
         markers = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
         return named | dict(zip(markers, poses[:, 4:8].T, strict=True)) | {"stable": poses[:, path.STABLE] >= 0.5}
 
-    def moved(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
+    def transform(self, poses: np.ndarray, turn_rad: float, shift_m: np.ndarray) -> np.ndarray:
         """Observations (n, 9) whose markers are turned about the origin, then shifted."""
-        markers = turned(poses[:, : path.STABLE].reshape(-1, 2), turn_rad) + shift_m
+        markers = rotate(poses[:, : path.STABLE].reshape(-1, 2), turn_rad) + shift_m
         return np.column_stack([markers.reshape(len(poses), path.STABLE), poses[:, path.STABLE]])
 
     def marked_unstable(self, poses: np.ndarray, commands: Sequence[int]) -> np.ndarray:
@@ -137,7 +141,7 @@ class Snake:
         """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2)."""
         in_full = cycles.in_full(controller)
         outputs = predict(weights, self.inputs(in_full), self.sigmoid_output)
-        return in_full[: path.judge(self.poses(self.displacements(outputs), in_full), task)[2]]
+        return in_full[: path.evaluate_path(self.poses(self.displacements(outputs), in_full), task)[2]]
 
     def score(
         self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
@@ -193,19 +197,19 @@ class Snake:
         used = population.lengths if scores.used is None else scores.used
         return diversity(Population(population.commands, used), self.bounds)
 
-    def judge(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
+    def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
         """Algorithm 3: fitness per metre, goals reached."""
-        return path.judge(poses, task)[:2]
+        return path.evaluate_path(poses, task)[:2]
 
     def succeeded(self, poses: np.ndarray, task: Task) -> bool:
         """Whether all regions are reached in order."""
-        return path.judge(poses, task)[1] == len(task.goals_m)
+        return path.evaluate_path(poses, task)[1] == len(task.goals_m)
 
     def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
         """Empty: regions have no radius."""
         return ()
 
-    def given(self, rows: np.ndarray) -> np.ndarray:
+    def parse_commands(self, rows: np.ndarray) -> np.ndarray:
         """A cycle a row, driven once; SpecError where one would lift the body higher than it bends."""
         if ((rows[:, 1] >= rows[:, 0]) & rows[:, :2].any(axis=1)).any():  # both 0: it lies still
             raise SpecError("a cycle's a_vert_rad must be below its a_lat_rad: a body that lifts higher than it bends tips over")

@@ -1,22 +1,22 @@
-"""Backends that carry out a sweep. Each is a module of this folder, found by its name, with two functions.
+"""Backends that carry out a sweep. Each is a module of this folder, or of an installed package, with two functions.
 
 ``placement(request)`` says what would run where (`Placement`); ``carry_out(sweep, request)`` does it and gives a `Summary`.
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from typing import Protocol
 
-from bns.errors import ClusterError, unknown_name
+from bns.errors import ClusterError
+from bns.extras import MissingExtraError
+from bns.registry import EXECUTORS
 from bns.sweep.grid import Sweep
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
 
 
 class Backend(Protocol):
-    """What every module here has."""
+    """What every executor has."""
 
     def placement(self, request: Request) -> Placement:
         """What would run where."""
@@ -26,20 +26,14 @@ class Backend(Protocol):
 
 
 def executor_names() -> tuple[str, ...]:
-    """Names of all modules here."""
-    return tuple(sorted(module.name for module in pkgutil.iter_modules(__path__)))
+    """All names; none is imported."""
+    return EXECUTORS.names()
 
 
 def load_executor(name: str) -> Backend:
     """The backend called ``name``; ClusterError if there is none or its libraries are not installed."""
-    if name not in executor_names():
-        raise ClusterError(unknown_name("executor", name, executor_names()))
     try:
-        return importlib.import_module(f"{__name__}.{name}")
-    except ModuleNotFoundError as error:
-        if (error.name or "").startswith("bns"):
-            raise
-        raise ClusterError(
-            f"--executor {name} needs the library {error.name}, which is not installed. Install it with: "
-            "pip install 'bns[cluster]'"
-        ) from error
+        backend: Backend = EXECUTORS.load(name)
+    except MissingExtraError as error:
+        raise ClusterError(f"--executor {name}: {error}") from error
+    return backend

@@ -13,9 +13,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import submitit
-
 from bns.errors import ClusterError
+from bns.extras import extra
 from bns.store.reader import finished
 from bns.sweep.grid import Sweep
 from bns.sweep.order import ordered_specs
@@ -23,6 +22,9 @@ from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
 from bns.sweep.shard import Shard
 from bns.sweep.slurm_job import SIGNAL_S, ShardJob
+
+with extra("cluster"):
+    import submitit
 
 SHARDS = 16
 LARGEST_ARRAY = 1000

@@ -1,0 +1,115 @@
+"""`bns.add`: effects added to a model, fitted to measurements, with the error before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike, fspath
+from typing import Any
+
+import pandas as pd
+from matplotlib.axes import Axes
+
+from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.provenance import provenance
+from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.measurements import Log
+from bns.api.model import Given, Model
+from bns.diagnose.adding import ExtendedModel, add_effects, effect_from
+from bns.diagnose.diagnosis import numbers_of
+from bns.diagnose.report.figures import error_by_step_axes
+from bns.diagnose.report.text import extension_text
+from bns.errors import ModelError
+from bns.physics.effect import Effect
+
+Wanted = str | PathLike[str] | Effect
+
+
+@dataclass(frozen=True, repr=False)
+class AddResult(Shown):
+    """A model with effects added and all its numbers refitted."""
+
+    ready: Prepared
+    extended: ExtendedModel
+
+    @property
+    def model(self) -> Model:
+        """The new model, with 95 % intervals and where its numbers come from; `bns.Model.save` writes it."""
+        return Model(self.extended.model)
+
+    @property
+    def errors(self) -> pd.DataFrame:
+        """Position error on trials held out (m, root mean square): a row a step (nominal, each effect added in turn, noise
+        floor), a column a horizon."""
+        steps = {step.name: dict(step.error) for step in self.extended.error_by_step}
+        return pd.DataFrame({**steps, "noise floor": dict(self.extended.floor)}).T.rename_axis("step")
+
+    def summary(self) -> str:
+        """The error by step, and the numbers."""
+        return extension_text(self.extended)
+
+    def to_json(self) -> dict[str, Any]:
+        """One object of plain values, the same that `bns add --json` prints."""
+        return {
+            "model": self.extended.model.name,
+            "effects": [step.name for step in self.extended.error_by_step[1:]],
+            "parameters": numbers_of(self.extended.fit),
+            "error": {step.name: {h: float(v) for h, v in step.error.items()} for step in self.extended.error_by_step},
+            "noise_floor": {h: float(v) for h, v in self.extended.floor.items()},
+            "provenance": provenance(self.ready.model, self.ready.log.sha256),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """The error at every step of the way, a line a horizon; dotted: the noise floor."""
+        return drawn(ax, lambda axes: error_by_step_axes(axes, self.extended), (5.4, 3.0))
+
+    def _line(self) -> str:
+        first, last = self.extended.error_by_step[0].error, self.extended.error_by_step[-1].error
+        added = " + ".join(step.name for step in self.extended.error_by_step[1:])
+        horizon = self.ready.predictor.near
+        fell = f"{1e3 * first[horizon]:.1f} mm to {1e3 * last[horizon]:.1f} mm"
+        return f"{self.ready.model.name} + {added}: {fell}, {horizon} ahead"
+
+
+def add(
+    log: Log,
+    effects: Wanted | Sequence[Wanted],
+    model: Given,
+    *,
+    term: str | None = None,
+    on: str = "v",
+    per_trial: bool = False,
+    progress: Progress | None = None,
+) -> AddResult:
+    """Add effects to a model one after the other, and fit all of its numbers to measurements.
+
+    Args:
+        log: a file, a table, or `bns.Measurements`.
+        effects: names of listed effects (`bns.effects`), Python files with an ``EFFECT``, `bns.Effect`, or several of these.
+        model: `bns.Model`, or the name or file of one.
+        term: makes the one name given a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w, s, east or north.
+        per_trial: an effect that may differ from trial to trial (clock-offset) has a value of its own in each.
+        progress: told what is being done.
+
+    Raises:
+        ModelError: no such effect or model, or the model has the effect already.
+        DataError: measurements that cannot be used, or of another robot.
+    """
+    wanted = [effects] if isinstance(effects, str | PathLike | Effect) else list(effects)
+    if not wanted:
+        raise ModelError("No effect is given; give at least one name of bns.effects().")
+    if term is not None and len(wanted) != 1:
+        names = ", ".join(map(_name, wanted))
+        raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
+    chosen = [_effect(each, term, on) for each in wanted]
+    ready = prepared(log, model)
+    ticks(progress)("fitting")
+    return AddResult(ready, add_effects(ready.predictor, ready.model, chosen, ready.measured, per_trial))
+
+
+def _effect(wanted: Wanted, term: str | None, on: str) -> tuple[Effect, Mapping[str, str]]:
+    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), term, on)
+
+
+def _name(wanted: Wanted) -> str:
+    return wanted.name if isinstance(wanted, Effect) else fspath(wanted)

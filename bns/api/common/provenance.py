@@ -1,0 +1,21 @@
+"""What a result was made from: the same program, model and data give the same result."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+from bns import __version__
+from bns.physics.model import Model
+from bns.spec import ENGINE_VERSION
+
+
+def provenance(model: Model, data_sha256: str) -> dict[str, Any]:
+    """Versions of package and engine, SHA-256 (64 digits) of the model's canonical JSON and of the data's canonical bytes."""
+    return {
+        "bns_version": __version__,
+        "engine_version": ENGINE_VERSION,
+        "model": model.name,
+        "model_sha256": hashlib.sha256(model.canonical_json().encode()).hexdigest(),
+        "data_sha256": data_sha256,
+    }

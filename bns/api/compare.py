@@ -1,0 +1,111 @@
+"""`bns.compare`: a model, or a run's networks, held against measurements as it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import pandas as pd
+from matplotlib.axes import Axes
+
+from bns.api.common.prepared import prepared, prepared_networks
+from bns.api.common.provenance import provenance
+from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.measurements import Log, Measurements
+from bns.api.model import Given, Model
+from bns.diagnose.comparison import Comparison
+from bns.diagnose.comparison import compare as held_against
+from bns.diagnose.predict.networks import NetworkPredictor
+from bns.diagnose.report.figures import curve_axes, curves_of
+from bns.diagnose.report.network_text import network_errors_text
+from bns.diagnose.report.text import ahead, comparison_text
+from bns.diagnose.residuals.network_errors import NetworkErrors, why_wrong
+from bns.errors import DataError
+
+
+@dataclass(frozen=True, repr=False)
+class CompareResult(Shown):
+    """How far predictions are off, and where.
+
+    ``comparison`` holds everything as found; ``causes`` says why a run's networks are wrong, None for a model and for networks
+    that came without their training patterns.
+    """
+
+    log: Measurements
+    model: Model
+    comparison: Comparison
+    causes: NetworkErrors | None = None
+    of_networks: bool = False
+
+    @property
+    def errors(self) -> pd.DataFrame:
+        """A row a horizon: position_m, forward_m, left_m (m), heading_rad (rad), root mean square, position_se_m, windows (how
+        many), noise_floor_m (what tracking noise alone would show at most)."""
+        table = pd.DataFrame(self.comparison.errors).T
+        table["noise_floor_m"] = pd.Series(self.comparison.floor)
+        return table.rename_axis("horizon")
+
+    @property
+    def residual_dependence(self) -> pd.DataFrame:
+        """What a free curve along each variable would explain: variable, velocity, share (of the loss), p_value."""
+        return pd.DataFrame(
+            self.comparison.as_json()["residual_dependence"], columns=["variable", "velocity", "share", "p_value"]
+        )
+
+    @property
+    def worst(self) -> pd.DataFrame:
+        """The worst moments: trial, t_s (s), position_m (m), heading_rad (rad)."""
+        return pd.DataFrame([vars(moment) for moment in self.comparison.worst])
+
+    def summary(self) -> str:
+        """Errors at every horizon, what explains them, the worst moments; of networks also why they are wrong."""
+        text = comparison_text(self.comparison)
+        return text if self.causes is None else f"{text}\n\n{network_errors_text(self.causes)}"
+
+    def to_json(self) -> dict[str, Any]:
+        """One object of plain values, the same that `bns compare --json` prints."""
+        causes = {} if self.causes is None else {"causes": self.causes.as_json()}
+        findings = [vars(each) for each in self.log.measured.findings]
+        made_of = {"provenance": provenance(self.model, self.log.sha256)}
+        return {**self.comparison.as_json(), **causes, "findings": findings, **made_of}
+
+    def plot(self, ax: Axes | None = None, variable: str | None = None, direction: str | None = None) -> Axes:
+        """Mean error a second along one variable (by default the one that explains most), with its 95 % band.
+
+        DataError if there is no such variable or direction, or no curve at all.
+        """
+        curves = curves_of(self.comparison, variable, direction)
+        if not curves:
+            known = ", ".join(dict.fromkeys(curve.variable for curve in self.comparison.curves)) or "none"
+            raise DataError(
+                f"There is no curve along {variable or 'any variable'} {direction or ''}; there are: {known}."
+            )
+        return drawn(ax, lambda axes: curve_axes(axes, curves[0], self.comparison))
+
+    def _line(self) -> str:
+        c = self.comparison
+        near = c.errors[c.near]
+        error = f"{1e3 * near['position_m']:.1f} mm off" if near.get("windows") else "nothing to compare"
+        return f"{c.model} on {self.log.name}: {error}, {ahead(c.near)} ahead, {c.trials} trials"
+
+
+def compare(log: Log, model: Given, *, progress: Progress | None = None) -> CompareResult:
+    """Hold a model as it is against measurements; nothing is fitted.
+
+    Args:
+        log: a file, a table, or `bns.Measurements`.
+        model: `bns.Model`, the name or file of one, networks (.safetensors), or a robot's static simulator (``snake``).
+        progress: told what is being done.
+
+    Raises:
+        DataError: measurements that cannot be used, or of another robot.
+        ModelError: no such model.
+    """
+    networks = prepared_networks(log, model)
+    ready = networks or prepared(log, model, slim=False)
+    ticks(progress)("comparing")
+    result = held_against(ready.predictor, ready.model)
+    kept = isinstance(ready.predictor, NetworkPredictor) and ready.predictor.learned_from.size > 0
+    causes = why_wrong(cast("NetworkPredictor", ready.predictor)) if kept else None
+    of_networks = isinstance(ready.predictor, NetworkPredictor)
+    return CompareResult(ready.log, ready.model, result, causes, of_networks)

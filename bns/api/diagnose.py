@@ -1,0 +1,151 @@
+"""`bns.diagnose`: which physical effect a model lacks, how sure that is, and what else it could be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+from matplotlib.axes import Axes
+
+from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.provenance import provenance
+from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.measurements import Log
+from bns.api.model import Given, Model
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.diagnosis import diagnose as find
+from bns.diagnose.report.figures import ranking_axes
+from bns.diagnose.report.text import diagnosis_text
+from bns.errors import DataError
+from bns.physics.effect import Effect
+from bns.physics.effects import effect_in_file
+
+if TYPE_CHECKING:
+    from bns.api.propose import ProposeResult
+    from bns.api.report import ReportResult
+
+RANKING = ("rank", "elpd_diff", "dse", "p_value", "rejected_because")
+
+
+@dataclass(frozen=True, repr=False)
+class DiagnoseResult(Shown):
+    """A verdict and what it rests on; ``diagnosis`` holds everything as found, ``ready`` what it was found from."""
+
+    ready: Prepared
+    diagnosis: Diagnosis
+
+    @property
+    def verdict(self) -> str:
+        """none, effects, tie, unlisted or insufficient-data."""
+        return self.diagnosis.verdict
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects that the model lacks, in the order in which they were found."""
+        return self.diagnosis.effects
+
+    @property
+    def model(self) -> Model:
+        """The model refitted with these effects; the model as it was where there was too little to fit."""
+        fitted = self.diagnosis.model
+        return self.ready.model if fitted is None else Model(fitted)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What should be known beside the verdict, a sentence or two each."""
+        return self.diagnosis.notes
+
+    @property
+    def ranking(self) -> pd.DataFrame:
+        """What each effect earns when added alone, the best first: a row an effect, by its name.
+
+        rank (from 0), elpd_diff (log-likelihood a trial, on trials held out, above the model without it), dse (its standard
+        error), p_value, rejected_because (why it is not considered; "" if it is), and the fitted numbers, {name: value, SI}.
+        """
+        ranked = self.diagnosis.as_json()["ranking"]
+        rows = [
+            {
+                "rank": place,
+                "elpd_diff": entry["elpd_diff"],
+                "dse": entry["dse"],
+                "p_value": entry["p_value"],
+                "rejected_because": entry["rejected_because"],
+                "values": {name: number["value"] for name, number in entry["parameters"].items()},
+            }
+            for place, entry in enumerate(ranked)
+        ]
+        names = pd.Index([entry["name"] for entry in ranked], name="effect")
+        return pd.DataFrame(rows, index=names, columns=[*RANKING, "values"])
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """The numbers of the accepted effects: effect, parameter, value, se, low, high (95 % interval), unit, at_bound."""
+        listed = self.diagnosis.as_json()["parameters"]
+        rows = [
+            {"effect": e, "parameter": p, **number} for e, numbers in listed.items() for p, number in numbers.items()
+        ]
+        return pd.DataFrame(rows, columns=["effect", "parameter", "value", "se", "low", "high", "unit", "at_bound"])
+
+    @property
+    def errors(self) -> pd.DataFrame:
+        """Position error on trials held out (m): a row a horizon, columns before, after, noise_floor."""
+        return pd.DataFrame(self.diagnosis.error or {}).T.rename_axis("horizon")
+
+    def summary(self) -> str:
+        """Verdict first; then numbers, errors, ranking, notes."""
+        return diagnosis_text(self.diagnosis)
+
+    def to_json(self) -> dict[str, Any]:
+        """One object of plain values, the same that `bns diagnose --json` prints."""
+        return {**self.diagnosis.as_json(), "provenance": provenance(self.ready.model, self.ready.log.sha256)}
+
+    def plot(self, ax: Axes | None = None, most: int = 12) -> Axes:
+        """What each effect earns on trials held out, with 95 % intervals. DataError where there was too little to search."""
+        if self.diagnosis.selection is None:
+            raise DataError(f"Nothing was ranked: {'; '.join(self.notes)}")
+        return drawn(ax, lambda axes: ranking_axes(axes, self.diagnosis, most), (5.4, 3.8))
+
+    def propose(self, **limits: Any) -> ProposeResult:
+        """The next experiment, as `bns.propose` gives it, without diagnosing again."""
+        from bns.api.propose import proposed  # noqa: PLC0415  # it builds on this module
+
+        return proposed(self, **limits)
+
+    def report(self, path: str | PathLike[str] = "report.html", **limits: Any) -> ReportResult:
+        """The page, as `bns.report` gives it, without diagnosing again."""
+        from bns.api.report import reported  # noqa: PLC0415  # it builds on this module
+
+        return reported(self, path, **limits)
+
+    def _line(self) -> str:
+        lacks = f" ({', '.join(self.effects)})" if self.effects else ""
+        return f"{self.verdict}{lacks}; {self.ready.model.name} on {self.ready.log.name}, {len(self.ready.log)} trials"
+
+
+def diagnose(
+    log: Log,
+    model: Given,
+    *,
+    also: Iterable[Effect | str | PathLike[str]] = (),
+    progress: Progress | None = None,
+) -> DiagnoseResult:
+    """Find what a model lacks.
+
+    Args:
+        log: a file, a table, or `bns.Measurements`; ten trials are the fewest that say anything.
+        model: `bns.Model`, or the name or file of one.
+        also: effects of your own, tried beside the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
+        progress: told what is being looked at; the share that is done is not known (None).
+
+    Raises:
+        DataError: measurements that cannot be used, or of another robot.
+        ModelError: no such model, or an effect's file that cannot be used.
+    """
+    own = [each if isinstance(each, Effect) else effect_in_file(Path(each)) for each in also]
+    ready = prepared(log, model)
+    found = find(ready.predictor, ready.model, extra={effect.name: effect for effect in own}, tick=ticks(progress))
+    return DiagnoseResult(ready, found)

@@ -1,0 +1,100 @@
+"""`bns.Model`: a robot's model by name, from a file, or from its numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import html
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from bns.errors import ModelError, unknown_name
+from bns.physics import model as physics
+from bns.physics.model import BASES, load_model
+
+Given = str | PathLike[str] | physics.Model
+
+
+class Model(physics.Model):
+    """A differential drive with the effects that are switched on.
+
+    ``Model("khepera")`` is a model of the package, ``Model("mine.yaml")`` one of a file, ``Model(wheelbase_m=0.2)`` (or
+    ``Model("differential-drive", wheelbase_m=0.2)``) a plain drive. Fields given by name replace those of the model:
+    wheelbase_m (m), dt_s (s), jitter_relative (share of the commanded speed), noise_position_m (m), noise_heading_rad (rad).
+    A model never changes; `with_effect`, `without` and the like give another.
+
+    Raises:
+        ModelError: there is no such model, or a number is out of bounds; the message says what is allowed.
+    """
+
+    def __init__(self, given: Given | None = None, /, **fields: Any) -> None:
+        known = [field.name for field in dataclasses.fields(physics.Model)]
+        for name in fields:
+            if name not in known:
+                raise ModelError(unknown_name("field of a model", name, known))
+        super().__init__(**{**_fields(given, fields), **fields})
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the model as a YAML file that `bns.Model` and every command read back; its path.
+
+        ModelError unless the name ends in .yaml or .yml.
+        """
+        from bns.diagnose.adding import model_yaml  # noqa: PLC0415  # loads the fits
+        from bns.store.files import publish  # noqa: PLC0415
+
+        target = checked_target(Path(path))
+        publish(model_yaml(self).encode(), target.with_name(f".{target.name}.part"), target)
+        return target
+
+    @property
+    def sha256(self) -> str:
+        """Of the canonical JSON: all that changes numbers, neither name nor reasons; 64 digits."""
+        return hashlib.sha256(self.canonical_json().encode()).hexdigest()
+
+    def summary(self) -> str:
+        """The numbers, one effect a line."""
+        lines = [f"model {self.name}: {self.base}, wheelbase {self.wheelbase_m:g} m"]
+        for active in self.effects:
+            units = {p.name: p.unit for p in active.effect.parameters}
+            numbers = ", ".join(f"{name} = {value:.5g} {units[name]}" for name, value in active.by_name.items())
+            lines.append(f"  {active.effect.name}: {numbers}" + (f" ({active.basis})" if active.basis else ""))
+        if self.jitter_relative:
+            lines.append(f"  motors vary by {self.jitter_relative:g} of their speed from command to command")
+        if self.noise_position_m or self.noise_heading_rad:
+            lines.append(f"  noise of a pose: {self.noise_position_m:g} m, {self.noise_heading_rad:g} rad")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        names = ", ".join(active.effect.name for active in self.effects)
+        line = f"<Model: {self.name}, wheelbase {self.wheelbase_m:g} m, effects: {names or 'none'}>"
+        return line if len(line) <= 200 else f"{line[:198]}…>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(self.summary())}</pre>"
+
+
+def checked_target(path: Path) -> Path:
+    """ModelError unless a model can be written there."""
+    if path.suffix not in {".yaml", ".yml"}:
+        raise ModelError(f"A model cannot be written to {path}; let the name end in .yaml.")
+    if not path.absolute().parent.is_dir():
+        raise ModelError(f"There is no folder {path.parent} to write {path.name} into; make it first.")
+    return path
+
+
+def as_model(given: Given) -> Model:
+    """A model as it is, of its name or of its file."""
+    return given if isinstance(given, Model) else Model(given)
+
+
+def _fields(given: Given | None, fields: dict[str, Any]) -> dict[str, Any]:
+    """The fields of what is given, which those given by name replace."""
+    if given is None or (isinstance(given, str) and given in BASES):
+        if "wheelbase_m" not in fields:
+            raise ModelError(
+                f"The model {given or BASES[0]} needs its wheelbase: --wheelbase METRES; in Python bns.Model(wheelbase_m=0.2)."
+            )
+        return {} if given is None else {"name": given}
+    model = given if isinstance(given, physics.Model) else load_model(fspath(given))
+    return {field.name: getattr(model, field.name) for field in dataclasses.fields(physics.Model)}

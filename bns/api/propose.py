@@ -1,0 +1,146 @@
+"""`bns.propose`: the next experiment, commands that tell rival explanations apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.axes import Axes
+
+from bns.api.common.provenance import provenance
+from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.diagnose import DiagnoseResult, diagnose
+from bns.api.measurements import Log
+from bns.api.model import Given
+from bns.diagnose.design.limits import arena_of, bounds_of
+from bns.diagnose.design.proposal import Proposal
+from bns.diagnose.design.proposal import propose as search
+from bns.diagnose.report.proposal_figure import trial_axes
+from bns.diagnose.report.proposal_text import proposal_text
+from bns.errors import DataError
+from bns.physics.effect import Effect
+from bns.store.files import publish
+
+MOST_MINUTES = 600.0
+
+
+@dataclass(frozen=True, repr=False)
+class ProposeResult(Shown):
+    """An experiment; ``proposal`` holds everything as worked out, ``diagnosis`` what it is to decide about."""
+
+    diagnosis: DiagnoseResult
+    proposal: Proposal
+
+    @cached_property
+    def commands(self) -> pd.DataFrame:
+        """The trial file, a row a command: trial, left_m_s, right_m_s (m/s), duration_s (s), start_x_m, start_y_m (m),
+        start_heading_rad (rad). Empty where no commands would decide anything."""
+        return self.proposal.commands()
+
+    @property
+    def model_pairs(self) -> pd.DataFrame:
+        """A row a pair of explanations: first, second, power (chance of a decision), minutes (until nine in ten decide),
+        times_faster (than plain random commands), indistinguishable (no commands tell them apart), already_decided (so far),
+        independent_measurements."""
+        return pd.DataFrame([vars(pair) for pair in self.proposal.model_pairs])
+
+    @property
+    def power(self) -> float:
+        """Chance that every pair is decided that commands can decide."""
+        return self.proposal.power
+
+    def summary(self, written: str = "") -> str:
+        """What stands against what, and what the experiment would decide; ``written``: the file that the commands are in."""
+        return proposal_text(self.proposal, written)
+
+    def to_csv(self, path: str | PathLike[str]) -> Path:
+        """Write the commands as a file that `bns trial --commands` drives; its path. DataError where there are none."""
+        target = checked_output(Path(path), "The commands", ".csv")
+        if not len(self.proposal.plan):
+            raise DataError(f"{target} is not written: no commands would decide anything.")
+        publish(self.commands.to_csv(index=False).encode(), target.with_name(f".{target.name}.part"), target)
+        return target
+
+    def to_json(self) -> dict[str, Any]:
+        """One object of plain values, the same that `bns propose --json` prints."""
+        ready = self.diagnosis.ready
+        return {**self.proposal.as_json(), "provenance": provenance(ready.model, ready.log.sha256)}
+
+    def plot(self, ax: Axes | None = None, trial: int = 0) -> Axes:
+        """One proposed trial (by its number from 0) in the arena, as each explanation foresees it. DataError if there is none."""
+        if not 0 <= trial < len(self.proposal.plan):
+            raise DataError(f"There is no trial {trial}; {len(self.proposal.plan)} are proposed.")
+        return drawn(ax, lambda axes: trial_axes(axes, self.proposal, trial))
+
+    def _line(self) -> str:
+        minutes = float(self.proposal.plan.lasting_s.sum() / 60)
+        models = " / ".join(model.title for model in self.proposal.competing_models)
+        return f"{len(self.proposal.plan)} trials, {minutes:.1f} min, decide with a chance of {self.power:.0%} between {models}"
+
+
+def propose(
+    log: Log,
+    model: Given,
+    *,
+    minutes: float = 10.0,
+    arena: tuple[float, float] | None = None,
+    start: tuple[float, float, float] | None = None,
+    speeds: tuple[float, float] | None = None,
+    also: Iterable[Effect | str | PathLike[str]] = (),
+    progress: Progress | None = None,
+) -> ProposeResult:
+    """Diagnose, then find the experiment that tells the remaining explanations apart.
+
+    Args:
+        log: a file, a table, or `bns.Measurements`.
+        model: `bns.Model`, or the name or file of one.
+        minutes: of driving, above 0 and at most 600.
+        arena: width and height (m) of where the robot may be; by default where it was seen.
+        start: x_m, y_m (m) and heading_rad (rad, counter-clockwise from x) of the start of every trial; by default as before.
+        speeds: lowest and highest of a wheel (m/s); by default the robot's own and those seen.
+        also: effects of your own, tried beside the listed ones.
+        progress: told what is being worked out.
+
+    Raises:
+        DataError: as `bns.diagnose`; limits that make no sense; or there are no two explanations to tell apart.
+    """
+    checked_minutes(minutes)
+    found = diagnose(log, model, also=also, progress=progress)
+    return proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=progress)
+
+
+def proposed(
+    found: DiagnoseResult,
+    *,
+    minutes: float = 10.0,
+    arena: tuple[float, float] | None = None,
+    start: tuple[float, float, float] | None = None,
+    speeds: tuple[float, float] | None = None,
+    progress: Progress | None = None,
+) -> ProposeResult:
+    """The experiment for a diagnosis that is there."""
+    checked_minutes(minutes)
+    tracks = found.ready.predictor.tracks
+    inside, bounds = arena_of(tracks, arena, start), bounds_of(tracks, found.ready.model, speeds)
+    return ProposeResult(found, search(found.diagnosis, inside, bounds, minutes, tick=ticks(progress)))
+
+
+def checked_minutes(minutes: float) -> None:
+    """DataError unless an experiment can last so long."""
+    if not (math.isfinite(minutes) and 0 < minutes <= MOST_MINUTES):
+        raise DataError(f"--minutes is {minutes:g}; it must be above 0 and at most {MOST_MINUTES:g}.")
+
+
+def checked_output(path: Path, what: str, ending: str) -> Path:
+    """The path; DataError unless a file of that ending can be written there."""
+    if path.suffix != ending or not path.absolute().parent.is_dir():
+        raise DataError(
+            f"{what} cannot be written to {path}; give a name that ends in {ending}, in a folder that is there."
+        )
+    return path

@@ -1,0 +1,108 @@
+"""`bns.report`: a diagnosis as one HTML page for people."""
+
+from __future__ import annotations
+
+import html
+import shlex
+from collections.abc import Iterable
+from dataclasses import dataclass
+from os import PathLike, fspath
+from pathlib import Path
+
+from bns.api.common.shown import Progress, Shown, ticks
+from bns.api.diagnose import DiagnoseResult, diagnose
+from bns.api.measurements import Log
+from bns.api.model import Given
+from bns.api.propose import checked_minutes, checked_output, proposed
+from bns.diagnose.report.page import gathered, report_html
+from bns.physics.effect import Effect
+from bns.store.files import publish
+
+
+@dataclass(frozen=True, repr=False)
+class ReportResult(Shown):
+    """The page that was written; goes wherever a path does (``open(report)``)."""
+
+    path: Path
+    diagnosis: DiagnoseResult
+    bytes: int
+
+    @property
+    def verdict(self) -> str:
+        """That of the diagnosis."""
+        return self.diagnosis.verdict
+
+    def summary(self) -> str:
+        """Verdict, and where the page is."""
+        size = f"{self.bytes / 1e6:.1f} MB"
+        return (
+            f"verdict: {self.verdict}\nwritten to {self.path} ({size}): one file, to be opened in a browser or mailed"
+        )
+
+    def __fspath__(self) -> str:
+        return fspath(self.path)
+
+    def _line(self) -> str:
+        return f"{self.path}, verdict {self.verdict}"
+
+    def _repr_html_(self) -> str:
+        return f'<a href="{html.escape(str(self.path))}">{html.escape(self._line())}</a>'
+
+
+def report(
+    log: Log,
+    model: Given,
+    path: str | PathLike[str] = "report.html",
+    *,
+    minutes: float = 10.0,
+    arena: tuple[float, float] | None = None,
+    start: tuple[float, float, float] | None = None,
+    speeds: tuple[float, float] | None = None,
+    also: Iterable[Effect | str | PathLike[str]] = (),
+    progress: Progress | None = None,
+) -> ReportResult:
+    """Diagnose, propose the next experiment, and write both as one page that needs no other file and no network.
+
+    ``path`` must end in .html. The rest is as for `bns.propose`.
+
+    Raises:
+        DataError: measurements that cannot be used, limits that make no sense, a page that cannot be written.
+        ModelError: no such model.
+    """
+    checked_minutes(minutes)
+    checked_output(Path(path), "The report", ".html")
+    found = diagnose(log, model, also=also, progress=progress)
+    return reported(found, path, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=progress)
+
+
+def reported(
+    found: DiagnoseResult,
+    path: str | PathLike[str],
+    *,
+    minutes: float = 10.0,
+    arena: tuple[float, float] | None = None,
+    start: tuple[float, float, float] | None = None,
+    speeds: tuple[float, float] | None = None,
+    command: dict[str, str] | None = None,
+    progress: Progress | None = None,
+) -> ReportResult:
+    """The page of a diagnosis that is there. ``command``: words (data, model) that the commands shown on the page repeat."""
+    checked_minutes(minutes)
+    target, ready = checked_output(Path(path), "The report", ".html"), found.ready
+    material = gathered(
+        ready.measured,
+        ready.predictor,
+        ready.model,
+        found.diagnosis,
+        lambda: proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=progress).proposal,
+        ticks(progress),
+    )
+    page = report_html(material, command or repeated(fspath(ready.measured.path), ready.model.name)).encode()
+    publish(page, target.with_name(f".{target.name}.part"), target)
+    return ReportResult(target, found, len(page))
+
+
+def repeated(data: str, model: str, wheelbase_m: float | None = None) -> dict[str, str]:
+    """The words of a command line that the next ones repeat."""
+    base = [] if wheelbase_m is None else ["--wheelbase", f"{wheelbase_m:g}"]
+    return {"data": shlex.quote(data), "model": shlex.join(["--model", model, *base])}

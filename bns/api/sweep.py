@@ -1,0 +1,255 @@
+"""`bns.Sweep`: many runs, as a sweep file describes them, in Python."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import yaml
+
+from bns.api.common.shown import Progress, Shown, plain, silent
+from bns.errors import SpecError
+from bns.sweep.budget import Budget
+from bns.sweep.confirm import confirmation
+from bns.sweep.executors import load_executor
+from bns.sweep.grid import Sweep as Described
+from bns.sweep.grid import load_sweep, parse_sweep
+from bns.sweep.plan import Plan
+from bns.sweep.plan import plan as foretell
+from bns.sweep.report import planned, summed_up
+from bns.sweep.request import Placement, Request
+from bns.sweep.runner import Summary
+from bns.sweep.shard import Shard
+from bns.sweep.status import SweepRow, sweep_status
+
+_Path = str | PathLike[str]
+Combos = Mapping[str, Sequence[Any]]
+_WHERE = "of the sweep"
+
+
+@dataclass(frozen=True, repr=False)
+class SweepResult(Shown):
+    """Where a sweep stands after `Sweep.run`. ``counts``: total, done, failed, quarantined, new, new_failed, stopped_by."""
+
+    counts: Summary
+    results: Path
+
+    @property
+    def done(self) -> int:
+        """Runs that went well, those of earlier calls included."""
+        return self.counts.done
+
+    @property
+    def finished(self) -> bool:
+        """Has every run a result, good or bad?"""
+        return self.counts.remaining == 0
+
+    def load(self, table: str = "evals") -> pd.DataFrame:
+        """The rows of this sweep, as `bns.load` gives them."""
+        from bns.store.reader import load  # noqa: PLC0415  # only who looks waits for the reader
+
+        return load(self.results, table, where={"sweep": self.counts.sweep})
+
+    def summary(self) -> str:
+        """Where the sweep stands, and how to go on."""
+        return summed_up(self.counts, self.results)
+
+    def _line(self) -> str:
+        c = self.counts
+        lost = f", {c.failed} failed, {c.quarantined} quarantined" if c.failed or c.quarantined else ""
+        return f"{c.sweep}, {c.done} of {c.total} done ({c.new} now){lost}, in {self.results}"
+
+
+@dataclass(frozen=True, repr=False)
+class SweepPlan(Shown):
+    """What a sweep would take; ``plan``: total, done, remaining, seconds_estimate, bytes_estimate, basis."""
+
+    plan: Plan
+    place: Placement
+
+    def summary(self) -> str:
+        """Runs, time and disk."""
+        return planned(self.plan, self.place)
+
+    def _line(self) -> str:
+        p = self.plan
+        return f"{p.sweep}, {p.total} runs, {p.done} done, about {p.seconds_estimate:.0f} s with {self.place.where}"
+
+
+class Sweep(Shown):
+    """Runs of every combination of parameters, on several seeds.
+
+    Args:
+        name: under which the store keeps the runs; letters, digits, - and _.
+        robot: khepera or snake, with options (snake+changes).
+        grid: parameter -> its values; the product of all.
+        zip: parameter -> its values, taken in step; multiplied with the grid.
+        fixed: parameter -> the one value.
+        exclude: combinations of the product with all these values are left out.
+        include: further combinations, on top of ``fixed``.
+        seeds: how many, from ``first_seed`` on.
+
+    Parameters are those of `bns.run`, without robot and seed. The same combination is the same run, with the same name and
+    numbers, as in a sweep file (YAML).
+
+    Raises:
+        SpecError: what is not allowed, and what is.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        robot: str,
+        *,
+        grid: Combos | None = None,
+        zip: Combos | None = None,
+        fixed: Mapping[str, Any] | None = None,
+        exclude: Iterable[Mapping[str, Any]] | None = None,
+        include: Iterable[Mapping[str, Any]] | None = None,
+        seeds: int = 1,
+        first_seed: int = 0,
+    ) -> None:
+        tree: dict[str, Any] = {"name": name, "robot": robot, "seeds": seeds, "first_seed": first_seed}
+        parts = {"fixed": fixed, "grid": grid, "zip": zip, "exclude": exclude, "include": include}
+        tree |= {key: _plain_part(part) for key, part in parts.items() if part is not None}
+        self._described = _parsed(tree)
+
+    @classmethod
+    def from_file(cls, path: _Path) -> Sweep:
+        """The sweep of a file; SpecError that begins with ``file:line:`` for whatever is wrong in it."""
+        return cls._of(load_sweep(Path(path)))
+
+    @classmethod
+    def _of(cls, described: Described) -> Sweep:
+        sweep = cls.__new__(cls)
+        sweep._described = described
+        return sweep
+
+    @property
+    def name(self) -> str:
+        """Under which the store keeps the runs."""
+        return self._described.name
+
+    @property
+    def combinations(self) -> pd.DataFrame:
+        """A row a combination, a column a parameter that is given."""
+        return pd.DataFrame(list(self._described.combos))
+
+    @property
+    def described(self) -> Described:
+        """The same for the library's own functions."""
+        return self._described
+
+    def __len__(self) -> int:
+        """How many runs."""
+        return self._described.total
+
+    def to_yaml(self) -> str:
+        """The text of a sweep file that describes the same runs."""
+        return self._described.text
+
+    def run(
+        self,
+        results: _Path,
+        *,
+        jobs: int | None = None,
+        device: str = "cpu",
+        executor: str | None = None,
+        scheduler: str | None = None,
+        shard: tuple[int, int] | None = None,
+        budget_s: float | None = None,
+        retry_failed: bool = False,
+        progress: Progress | None = None,
+    ) -> SweepResult:
+        """Carry out what has no result yet; what is done is skipped, so an interrupted sweep goes on where it stopped.
+
+        Args:
+            results: folder of all results.
+            jobs: worker processes (default: one a core).
+            device: cpu, or cuda for the GPU of this machine.
+            executor: joblib (default), dask or slurm; ``scheduler``: address of a Dask scheduler.
+            shard: (k, n): only the k-th (from 1) of n shares.
+            budget_s: stop in time, seconds.
+            retry_failed: do failed and quarantined runs again.
+            progress: told the share that is done.
+
+        Raises:
+            StoreError: the results cannot be written, or another process writes this sweep.
+            SpecError: options that do not go together. ClusterError, DeviceError: machines that are not there.
+        """
+        told = progress or silent
+        share = None if shard is None else Shard.parse(f"{shard[0]}/{shard[1]}")
+        request = Request(
+            results=Path(results),
+            jobs=jobs,
+            budget=Budget(budget_s),
+            retry_failed=retry_failed,
+            shard=share,
+            on_progress=lambda at: told((at.total - at.remaining) / max(at.total, 1), f"{at.done} of {at.total} runs"),
+            scheduler=scheduler,
+        )
+        way = load_executor(_way(device, executor, jobs))
+        return SweepResult(way.carry_out(self._described, request), Path(results))
+
+    def plan(self, results: _Path = "results", *, jobs: int | None = None) -> SweepPlan:
+        """What is left to do and what it would take; nothing is written. Without stored runs one short run is timed."""
+        place = load_executor("joblib").placement(Request(results=Path(results), jobs=jobs))
+        return SweepPlan(foretell(self._described, Path(results), place.workers), place)
+
+    def status(self, results: _Path = "results") -> pd.DataFrame:
+        """A row a task: sweep, task, done, failed, quarantined, total, remaining, mean_wall_s (s), last (when a run began)."""
+        rows = [row for row in sweep_status(Path(results)) if row.sweep == self.name]
+        fields = [field.name for field in dataclasses.fields(SweepRow)]
+        table = pd.DataFrame([dataclasses.asdict(row) for row in rows], columns=fields)
+        table["remaining"] = [row.remaining for row in rows]
+        return table
+
+    def confirmation(self, results: _Path, top: int) -> Sweep | None:
+        """The ``top`` best combinations of each task on as many fresh seeds; None while runs of this sweep are to do."""
+        more = confirmation(self._described, Path(results), top)
+        return None if more is None else Sweep._of(more)
+
+    def summary(self) -> str:
+        """The sweep file."""
+        return f"{self._line()}\n\n{self.to_yaml()}"
+
+    def _line(self) -> str:
+        d = self._described
+        tasks = ", ".join(d.runs_by_task())
+        return f"{d.name}: {d.robot}, {tasks}; {len(d.combos)} combinations on {d.seeds} seeds, {d.total} runs"
+
+
+def _parsed(tree: dict[str, Any]) -> Described:
+    """The sweep of plain values, read as a file would be; complaints name no file."""
+    where = Path(_WHERE)
+    try:
+        text = yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+        return parse_sweep(text, where)
+    except yaml.YAMLError as fault:
+        raise SpecError(
+            f"A sweep is made of numbers, texts and lists, and this holds something else: {fault}."
+        ) from fault
+    except SpecError as fault:
+        raise SpecError(re.sub(rf"^{_WHERE}:\d+: ", "", str(fault))) from None
+
+
+def _plain_part(part: Any) -> Any:
+    """A mapping or a list of mappings, of plain values."""
+    return plain(dict(part)) if isinstance(part, Mapping) else [plain(dict(each)) for each in part]
+
+
+def _way(device: str, executor: str | None, jobs: int | None) -> str:
+    """Name of the executor; SpecError if a GPU and other machines are asked for at once."""
+    if device == "cpu":
+        return executor or "joblib"
+    if executor not in {None, device} or jobs is not None:
+        raise SpecError(
+            f"The device {device} is the GPU of this machine; leave out jobs and executor, or take device='cpu'."
+        )
+    return device

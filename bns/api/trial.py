@@ -1,0 +1,184 @@
+"""`bns.trial`: a run whose world is a robot, or its emulator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any, Unpack
+
+from matplotlib.axes import Axes
+
+from bns.api.common.shown import Progress, Shown
+from bns.api.measurements import Measurements
+from bns.api.run import Parameters, Row, RunResult, spec_of, telling
+from bns.errors import HardwareError, SpecError
+from bns.hardware.emulators.faults import FaultPlan, load_plan
+from bns.hardware.rig import load_rig, shipped_rig
+from bns.robots import load_robot
+from bns.spec import RunSpec, robot_and_options
+from bns.tasks import default_task
+from bns.trial.folder import MEASUREMENTS
+from bns.trial.report import TrialResult as Driven
+from bns.trial.session import MOST_ROUNDS, TrialSetup, carry_out
+
+_Path = str | PathLike[str]
+
+
+@dataclass(frozen=True, repr=False)
+class TrialResult(Shown):
+    """A trial that is in the store. ``folder`` holds its journal and measurements, ``driven`` how the robot did."""
+
+    run: RunResult
+    folder: Path
+    driven: Driven
+    text: str
+
+    @cached_property
+    def measurements(self) -> Measurements:
+        """What was commanded and where the robot was, of every drive."""
+        return Measurements(self.folder / MEASUREMENTS)
+
+    def summary(self) -> str:
+        """When the goals were reached first, how the robot did, where everything is."""
+        return self.text
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """The path of the fittest controller, as `bns.RunResult` draws it, cm."""
+        return self.run.plot(ax)
+
+    def _line(self) -> str:
+        evals, spec = self.run.evals, self.run.spec
+        return f"{spec.robot}, {spec.task}, seed {spec.seed}, {len(evals)} evaluations driven, in {self.folder}"
+
+
+def trial(
+    robot: str = "khepera",
+    task: str | None = None,
+    *,
+    rig: _Path | None = None,
+    emulated: bool = False,
+    results: _Path = "results",
+    seed: int = 0,
+    speed: float | None = None,
+    faults: _Path | FaultPlan | None = None,
+    unattended: bool = False,
+    resume: bool = False,
+    most_rounds: int = MOST_ROUNDS,
+    until_success: int | None = None,
+    repeats: int | None = None,
+    figures: bool = False,
+    progress: Progress | None = None,
+    on_evaluation: Callable[[Row], None] | None = None,
+    **parameters: Unpack[Parameters],
+) -> TrialResult:
+    """Carry out a run on a robot: training and evolution go on while it drives.
+
+    Args:
+        robot: khepera or snake.
+        task: a goal task of that robot; by default the first of its study.
+        rig: the file of your set-up (docs/trials.md): port, tracker, surface.
+        emulated: drive the emulator of the robot, by the same drivers; needs no rig.
+        results: folder of all results; the trial has a folder of its own in its ``trials``.
+        seed: of this run.
+        speed: of the emulator's clock: as fast as it goes, or 1 for the pace of a robot (as `bns trial` has it).
+        faults: what the emulator shall do wrong: a plan or its file.
+        unattended: nobody is there to be asked.
+        resume: go on from the last evaluation driven.
+        most_rounds: of training and evolution while one controller drives.
+        until_success: end when so many driven controllers in a row have reached all goals.
+        repeats: how often the final controller is driven (default: as the robot's study has it); kept in repeats.csv.
+        figures: also draw the trial's page of figures.
+        progress: told the share that is done and the evaluation.
+        on_evaluation: called with each evaluation's row.
+        **parameters: all else, as for `bns.run`.
+
+    Raises:
+        HardwareError: a port, robot, camera or plan that cannot be used; nothing has moved.
+        TrialPausedError: stopped with the robot confirmed still; ``resume=True`` goes on.
+        StopNotConfirmedError: the robot may still be moving.
+        SpecError: a parameter that there is none of, or whose value is not allowed.
+    """
+    setup = trial_setup(
+        robot,
+        rig,
+        emulated=emulated,
+        speed=(math.inf if emulated else None) if speed is None else speed,
+        faults=faults,
+        unattended=unattended,
+        resume=resume,
+        most_rounds=most_rounds,
+        until_success=until_success,
+        figures=figures,
+        repeats=repeats,
+    )
+    spec = trial_spec(robot, task, seed=seed, **parameters)
+    return driven(spec, setup, results, progress=progress, on_evaluation=on_evaluation)
+
+
+def trial_spec(robot: str, task: str | None = None, *, record: str = "paths", **parameters: Any) -> RunSpec:
+    """The spec of a trial; the task is the first of the robot's study where none is given. SpecError as for a run."""
+    if record == "full":
+        raise SpecError(
+            "record is 'full'; a robot drives no probes and no fittest of a generation: take evals or paths."
+        )
+    named = task or default_task(load_robot(robot).name)
+    return spec_of({**parameters, "robot": robot, "task": named, "world": "robot", "record": record})
+
+
+def trial_setup(
+    robot: str,
+    rig: _Path | None = None,
+    *,
+    emulated: bool = False,
+    speed: float | None = None,
+    faults: _Path | FaultPlan | None = None,
+    unattended: bool = False,
+    resume: bool = False,
+    most_rounds: int = MOST_ROUNDS,
+    until_success: int | None = None,
+    figures: bool = True,
+    repeats: int | None = None,
+) -> TrialSetup:
+    """Rig, clock and operator; HardwareError for what does not go together."""
+    if rig is None and not emulated:
+        raise HardwareError(
+            "a real robot needs --rig FILE, which names its port, tracker and surface (docs/trials.md shows one); "
+            "without a robot at hand, say --emulated (in Python rig=FILE, emulated=True)."
+        )
+    if speed is not None and not speed > 0.0:
+        raise HardwareError(f"--speed is {speed:g}; it must be above 0.")
+    for name, given in (("faults", faults), ("speed", speed)):
+        if not emulated and given is not None:
+            raise HardwareError(f"--{name} is for --emulated; a real robot has its own.")
+    of, _ = robot_and_options(robot)
+    plan = faults if isinstance(faults, FaultPlan) else FaultPlan() if faults is None else load_plan(Path(faults))
+    return TrialSetup(
+        shipped_rig(of) if rig is None else load_rig(Path(rig), of),
+        emulated,
+        1.0 if speed is None else speed,
+        plan,
+        unattended,
+        resume,
+        most_rounds,
+        until_success,
+        figures,
+        repeats,
+    )
+
+
+def driven(
+    spec: RunSpec,
+    setup: TrialSetup,
+    results: _Path,
+    *,
+    progress: Progress | None = None,
+    on_evaluation: Callable[[Row], None] | None = None,
+) -> TrialResult:
+    """Carry out the trial of a spec on a set-up, and keep it."""
+    kept = carry_out(spec, setup, Path(results), telling(spec, progress, on_evaluation))
+    run = RunResult(spec, kept.result.run, kept.result.wall_s, {})
+    return TrialResult(run, kept.folder, kept.result, kept.text)

@@ -1,0 +1,128 @@
+"""A parser that says what was probably meant, takes no abbreviations, and goes on understanding the old spellings."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+SHELLS = ("bash", "zsh", "tcsh")
+
+
+class Parser(argparse.ArgumentParser):
+    """`argparse.ArgumentParser` with suggestions.
+
+    ``rewrite``: from the words of the command line to what they are written as today, for spellings that are on their way out.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **{**options, "allow_abbrev": False})
+        self.rewrite: Callable[[list[str]], list[str]] = list
+
+    def parse_known_args(  # type: ignore[override]  # only as it is called here
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """As its parent's, but nothing stays unknown: a command's own usage is shown, not that of ``bns``."""
+        words = self.rewrite(list(sys.argv[1:] if args is None else args))
+        for word in self._own(words):
+            if word.startswith("--") and len(word) > 2 and " " not in word:
+                self._check_option(word.partition("=")[0])
+        found, unknown = super().parse_known_args(words, namespace)
+        if unknown:
+            self.error(f"{' '.join(unknown)}: nothing is expected there")
+        return found, unknown
+
+    def _own(self, words: list[str]) -> Iterable[str]:
+        """The words that are not a command's below this one, nor behind ``--``."""
+        below = self._commands()
+        for word in words:
+            if word == "--" or (below and not word.startswith("-")):
+                return
+            yield word
+
+    def _check_option(self, option: str) -> None:
+        valid = [name for name in self._option_string_actions if name.startswith("--")]
+        if option not in valid:
+            self.error(f"there is no option {option}.{_meant(option, valid)}")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
+            near = get_close_matches(str(value), action.choices, n=1, cutoff=0.5)
+            usage: argparse.ArgumentParser = action.choices[near[0]] if near else self
+            usage.print_usage(sys.stderr)
+            self.exit(2, f"bns: there is no command {value}.{_meant(value, action.choices)} All of them: bns --help\n")
+        super()._check_value(action, value)
+
+    def _commands(self) -> dict[str, argparse.ArgumentParser]:
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                return dict(action.choices)
+        return {}
+
+
+def _meant(given: str, valid: Iterable[str]) -> str:
+    names = list(valid)
+    begun = [name for name in names if len(given) > 3 and name.startswith(given)]
+    near = begun[:1] or get_close_matches(given, names, n=1, cutoff=0.6)
+    return f" Did you mean {near[0]}?" if near else ""
+
+
+class Completion(argparse.Action):
+    """Print the completion of the command line for a shell, and end."""
+
+    def __call__(self, parser: argparse.ArgumentParser, _options: object, shell: Any, _name: str | None = None) -> None:
+        """``shell`` is one of `SHELLS`."""
+        import shtab
+
+        _mark_files(parser, shtab.FILE, shtab.DIRECTORY)
+        print(shtab.complete(parser, shell))
+        parser.exit(0)
+
+
+def _mark_files(parser: argparse.ArgumentParser, file: object, folder: object) -> None:
+    """Say of every argument that is a path that the shell knows how to complete it."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                _mark_files(below, file, folder)
+        elif action.type is Path:
+            action.complete = folder if action.metavar == "DIR" else file  # type: ignore[attr-defined]  # shtab's
+
+
+class OldFolder(argparse.Action):
+    """A folder that is written as an option today: it works, with a warning. ``metavar`` is the option."""
+
+    def __call__(self, parser: argparse.ArgumentParser, options: Any, value: Any, _name: str | None = None) -> None:
+        """Take the value over."""
+        warn_old(parser.prog, str(value), f"{self.metavar} {value}")
+        setattr(options, self.dest, Path(value))  # no `type`: that would convert the absence, too
+
+
+def warn_old(command: str, old: str, new: str) -> None:
+    """Say on stderr what to write from the next release on."""
+    print(f"bns: warning: {command} … {old} is an old spelling, gone in the next release; write {new}", file=sys.stderr)
+
+
+def data_first(words: list[str]) -> list[str]:
+    """``EFFECT … --data FILE``, as `bns add` was once written, as ``FILE EFFECT …``, with a warning."""
+    for place, word in enumerate(words):
+        option, equals, value = word.partition("=")
+        if option == "--data" and (equals or place + 1 < len(words)):
+            file, rest = (value, words[place + 1 :]) if equals else (words[place + 1], words[place + 2 :])
+            warn_old("bns add", f"--data {file}", f"bns add {file} EFFECT")
+            return [file, *words[:place], *rest]
+    return words
+
+
+def add_results(parser: argparse.ArgumentParser, *, once_positional: bool = False) -> None:
+    """``--results DIR``; ``once_positional``: the folder alone is understood as well, with a warning."""
+    parser.add_argument(
+        "--results", type=Path, default=Path("results"), metavar="DIR", help="folder of all results (default: results)"
+    )
+    if once_positional:
+        parser.add_argument(
+            "results", nargs="?", default=argparse.SUPPRESS, action=OldFolder, metavar="--results", help=argparse.SUPPRESS
+        )  # fmt: skip

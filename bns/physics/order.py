@@ -1,0 +1,38 @@
+"""The order in which effects act, from the command to the camera."""
+
+from __future__ import annotations
+
+OTHERS, DECOYS, FORMULAS = "others", "decoys", "formulas"
+"""Places for effects that are not in the catalogue: those of users, decoys, formulas."""
+
+ORDER = (
+    "speed-gain",
+    "wheel-mismatch",
+    "battery-sag",
+    "dead-zone",
+    "speed-limit",
+    OTHERS,
+    "acceleration-limit",  # exact for commands, which are constant in a step: so before delay and lag
+    "command-delay",
+    "motor-lag",
+    "wheelbase",
+    "turn-slip",
+    "understeer",
+    "side-slip",
+    DECOYS,
+    FORMULAS,
+    "yaw-bias",
+    "floor-slope",
+    "tether-pull",
+    "clock-offset",
+    "clock-drift",
+    "marker-offset",
+    "camera-scale",
+    "camera-rotation",
+)
+"""Stages come first (wheel, body, world, clock, measure); this is the order of effects that are put together by the machine."""
+
+
+def place(name: str, after: str) -> float:
+    """The place of an effect in the chain: its own in `ORDER`, or right after ``after``."""
+    return float(ORDER.index(name)) if name in ORDER else ORDER.index(after) + 0.5

@@ -1,0 +1,294 @@
+"""What a researcher types after ``import bns``: it works, says what it is in a line, and agrees with the command line."""
+
+import copy
+import inspect
+import json
+import pickle
+import subprocess
+import sys
+from typing import get_type_hints
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import bns
+from bns.api.common.shown import Shown
+from bns.api.run import Parameters
+from bns.cli.main import main
+from bns.measurements import write_measurements
+from bns.physics.effects import all_effects
+from bns.spec import FIELDS
+from bns.sweep.grid import load_sweep
+from bns.sweep.order import ordered_specs
+from tests.diagnose.worlds import hidden, measured
+
+SMALL = {"population_size": 20, "evaluations": 4, "generations_per_evaluation": 2}
+LIMITS = {"minutes": 2, "arena": (1.6, 1.2), "start": (0.0, 0.0, np.pi / 2), "speeds": (-0.2, 0.2)}
+
+
+@pytest.fixture(scope="module")
+def table():
+    return measured(hidden(dead_zone={"width_m_s": 0.006}), trials=12, ends_only=True, speeds=(0.085, 0.115), seed=4)
+
+
+@pytest.fixture(scope="module")
+def log(table, tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "log.csv"
+    write_measurements(table, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(log):
+    return bns.diagnose(log, bns.Model("khepera"))
+
+
+@pytest.fixture(scope="module")
+def results(log, found, tmp_path_factory):
+    """One of everything."""
+    folder = tmp_path_factory.mktemp("work")
+    sweep = bns.Sweep(name="s", robot="khepera", grid={"mutation_rate": [0.1, 0.3]}, fixed={"task": "circle", **SMALL})
+    return {
+        "log": bns.Measurements(log),
+        "model": bns.Model("khepera").with_effect("motor-lag", tau_s=0.1),
+        "run": bns.run(robot="khepera", task="infinity", seed=3, keep=folder / "results", **SMALL),
+        "sweep": sweep,
+        "swept": sweep.run(folder / "results", jobs=1),
+        "plan": sweep.plan(folder / "results", jobs=1),
+        "compared": bns.compare(log, "khepera"),
+        "diagnosed": found,
+        "added": bns.add(log, "motor-lag", bns.Model("khepera")),
+        "proposed": found.propose(**LIMITS),
+        "reported": found.report(folder / "report.html", minutes=2),
+        "trial": bns.trial(
+            "khepera", emulated=True, results=folder / "results", **{**SMALL, "evaluations": 2, "max_commands": 4}
+        ),
+    }
+
+
+def test_importing_loads_nothing_else():
+    code = "import sys, bns; print(*sorted({'numpy', 'pandas', 'inspect', 'matplotlib'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_every_name_is_listed_there_and_documented():
+    assert set(bns.__all__) <= set(dir(bns))
+    for name in bns.__all__:
+        thing = getattr(bns, name)
+        assert name == "__version__" or len(thing.__doc__) > 20, name
+        assert name == "__version__" or callable(thing), name
+    with pytest.raises(AttributeError, match="no attribute 'evolve'"):
+        bns.evolve  # noqa: B018
+
+
+def test_functions_whose_folder_has_their_name_stay_functions_and_folders():
+    import bns.diagnose.data.load as load  # noqa: PLR0402  # the form that walks through the folders
+    from bns.trial import folder
+
+    assert callable(bns.diagnose)
+    assert callable(bns.trial)
+    assert bns.diagnose.data.load is load
+    assert folder.JOURNAL
+    assert "log" in inspect.signature(bns.diagnose).parameters
+    assert "emulated" in inspect.signature(bns.trial).parameters
+    assert pickle.loads(pickle.dumps(bns.diagnose)) is bns.diagnose
+
+
+def test_every_result_is_one_line_a_text_and_a_cell(results):
+    for name, result in results.items():
+        assert "\n" not in repr(result), name
+        assert 10 < len(repr(result)) <= 200, name
+        assert len(result.summary()) > 20, name
+        assert result._repr_html_().startswith("<"), name
+        assert isinstance(result, Shown | bns.Model), name
+
+
+def test_every_result_is_copied_and_pickled(results):
+    for name, result in results.items():
+        assert repr(copy.deepcopy(result)) == repr(result), name
+        assert repr(pickle.loads(pickle.dumps(result))) == repr(result), name
+
+
+@pytest.mark.parametrize("name", ["run", "compared", "diagnosed", "added", "proposed", "trial", "log"])
+def test_plots_are_axes_and_leave_nothing_behind(results, name):
+    plot = results[name].plot_paths if name == "log" else results[name].plot
+    before = dict(plt.rcParams)
+    own = plot()
+    assert isinstance(own, Axes)
+    assert own.has_data()
+    assert own._repr_png_().startswith(b"\x89PNG")
+    given = Figure().subplots()
+    assert plot(ax=given) is given
+    assert given.has_data()
+    assert plt.get_fignums() == []
+    assert dict(plt.rcParams) == before
+
+
+def test_a_run_is_the_same_with_and_without_a_store(results):
+    run = results["run"]
+    again = bns.run(robot="khepera", task="infinity", seed=3, **SMALL)
+    kept = bns.load(run.files["path"].parents[1], where={"run_id": run.run_id})
+    assert (
+        again.evals["fitness_world"].tolist() == run.evals["fitness_world"].tolist() == kept["fitness_world"].tolist()
+    )
+    assert again.files == {}
+    other = bns.run(robot="khepera", task="infinity", seed=4, **SMALL)
+    assert other.evals["fitness_world"].tolist() != run.evals["fitness_world"].tolist()
+
+
+def test_progress_is_a_share_and_a_text():
+    told = []
+    bns.run(**SMALL, progress=lambda share, text: told.append((share, text)))
+    assert [share for share, _ in told] == [0.25, 0.5, 0.75, 1.0]
+    assert told[-1][1] == "evaluation 4 of 4"
+
+
+def test_parameters_that_there_are_none_of_are_refused_by_name():
+    assert set(get_type_hints(Parameters)) == set(FIELDS) - {"robot", "task", "world", "seed"}
+    with pytest.raises(bns.SpecError, match="mutation_rate is 40"):
+        bns.run(mutation_rate=40)
+    with pytest.raises(bns.BnsError, match="Did you mean 'mutation_rate'"):
+        bns.run(mutation_rat=0.1)
+
+
+def test_a_sweep_in_python_is_that_of_a_file(tmp_path, results):
+    sweep = bns.Sweep(
+        "two",
+        "khepera",
+        grid={"mutation_rate": np.array([0.1, 0.3])},
+        zip={"evaluations": range(2, 4), "max_commands": (10, 20)},
+        fixed={"task": "infinity"},
+        exclude=[{"mutation_rate": 0.3, "evaluations": 3}],
+        include=[{"task": "circle"}],
+        seeds=3,
+        first_seed=5,
+    )
+    (tmp_path / "two.yaml").write_text(
+        "name: two\nrobot: khepera\nseeds: 3\nfirst_seed: 5\ngrid: {mutation_rate: [0.1, 0.3]}\nfixed: {task: infinity}\n"
+        "zip: {evaluations: [2, 3], max_commands: [10, 20]}\nexclude: [{mutation_rate: 0.3, evaluations: 3}]\n"
+        "include: [{task: circle}]\n"
+    )
+    ids = [spec.run_id for spec in ordered_specs(load_sweep(tmp_path / "two.yaml"))]
+    assert [spec.run_id for spec in ordered_specs(sweep.described)] == ids
+    assert [spec.run_id for spec in ordered_specs(bns.Sweep.from_file(tmp_path / "two.yaml").described)] == ids
+    assert len(sweep) == len(ids) == 12
+    assert results["swept"].finished
+    assert results["swept"].load("runs")["status"].tolist() == ["ok", "ok"]
+    assert results["sweep"].status(results["swept"].results)["done"].tolist() == [2]
+    with pytest.raises(bns.SpecError, match=r"^unknown parameter 'mutation_rat'"):
+        bns.Sweep("s", "khepera", grid={"mutation_rat": [0.1]})
+    with pytest.raises(bns.SpecError, match="something else"):
+        bns.Sweep("s", "khepera", fixed={"task": object()})
+
+
+def test_models_are_had_by_name_file_and_numbers(tmp_path):
+    drawn = bns.Model("khepera")
+    assert bns.Model(wheelbase_m=0.2).wheelbase_m == bns.Model("differential-drive", wheelbase_m=0.2).wheelbase_m == 0.2
+    other = bns.Model("khepera", wheelbase_m=0.1).with_effect("motor-lag", tau_s=0.1)
+    assert isinstance(other, bns.Model)
+    again = bns.Model(other.save(tmp_path / "mine.yaml"))
+    assert again.sha256 == other.sha256 != drawn.sha256
+    assert again.values_of("motor-lag") == {"tau_s": 0.1}
+    for wrong, message in (({}, "needs its wheelbase"), ({"wheel_base": 1}, "Did you mean 'wheelbase_m'")):
+        with pytest.raises(bns.ModelError, match=message):
+            bns.Model(**wrong)
+    with pytest.raises(bns.ModelError, match=r"end in \.yaml"):
+        other.save(tmp_path / "mine.txt")
+
+
+def test_measurements_are_the_same_from_a_file_a_table_and_a_mapping(log, table, tmp_path):
+    write_measurements(table, tmp_path / "log.parquet")
+    from_file, from_table = bns.Measurements(log), bns.Measurements(pd.read_csv(log))
+    assert from_file.sha256 == from_table.sha256 == bns.Measurements(tmp_path / "log.parquet").sha256
+    assert bns.Measurements(table.assign(x_m=table["x_m"] + 1e-9)).sha256 != from_table.sha256
+    assert from_file.trials["commands"].tolist() == [5] * 12
+    assert len(bns.Measurements(log, tmp_path / "log.parquet")) == len(bns.Measurements([log, log])) == 24
+    names = {name: {"from": name} for name in ("trial", "t_s", "left_m_s", "right_m_s", "x_m", "y_m")}
+    turned = table.assign(yaw=np.degrees(table["heading_rad"])).drop(columns="heading_rad")
+    mapped = bns.Measurements(turned, mapping={"columns": {**names, "heading_rad": {"from": "yaw", "unit": "deg"}}})
+    assert np.allclose(mapped.frame["heading_rad"], table["heading_rad"])
+    with pytest.raises(bns.DataError, match="heading_rad"):
+        bns.Measurements(turned)
+    with pytest.raises(bns.DataError, match="There is no file"):
+        bns.compare("gone.csv", "khepera")
+
+
+def test_a_table_and_its_file_have_one_diagnosis(found, log):
+    from_table = bns.diagnose(pd.read_csv(log), "khepera")
+    assert from_table.to_json() == found.to_json()
+    assert from_table.summary() == found.summary()
+
+
+def test_a_diagnosis_in_frames(found):
+    best = found.ranking.index[0]
+    assert found.verdict == "tie"
+    assert found.ranking["rank"].tolist() == list(range(len(found.ranking)))
+    assert found.ranking.loc[best, "elpd_diff"] > 3 * found.ranking.loc[best, "dse"] > 0
+    assert set(found.parameters["effect"]) == set(found.effects) == {a.effect.name for a in found.model.effects}
+    assert (found.errors["after"] <= found.errors["before"]).all()
+    few = bns.diagnose(found.ready.log.frame.query("trial < 4"), "khepera")
+    assert (few.verdict, few.model.effects, len(few.ranking)) == ("insufficient-data", (), 0)
+    with pytest.raises(bns.DataError, match="Nothing was ranked: 4 trials"):
+        few.plot()
+
+
+def test_what_is_added_lowers_the_error_step_by_step(log):
+    added = bns.add(log, ["dead-zone", bns.effects().index[0]], "khepera")
+    assert added.errors.index.tolist() == ["nominal", "dead-zone", "acceleration-limit", "noise floor"]
+    assert added.errors.loc["dead-zone", "command"] < added.errors.loc["nominal", "command"]
+    assert [active.effect.name for active in added.model.effects] == added.to_json()["effects"]
+    with pytest.raises(bns.ModelError, match="has dead-zone already"):
+        bns.add(log, "dead-zone", added.model)
+    mine = bns.Effect("my-drag", "body", (bns.Parameter("k", "s", -1, 1, (-0.5, 0.5), 0.0, "drag"),), "", "", (), _drag)
+    assert bns.add(log, mine, "khepera").errors.index[1] == "my-drag"
+
+
+def _drag(body, k):
+    from dataclasses import replace
+
+    return replace(body, forward_m_s=body.forward_m_s * (1 - k * abs(body.yaw_rad_s)))
+
+
+def test_a_proposal_is_commands_inside_limits(results, tmp_path):
+    proposal = results["proposed"]
+    commands = pd.read_csv(proposal.to_csv(tmp_path / "next.csv"))
+    assert commands.shape == proposal.commands.shape
+    assert commands["left_m_s"].between(-0.2, 0.2).all()
+    assert (commands["start_x_m"] == 0).all()
+    with pytest.raises(bns.DataError, match="There is no trial 999"):
+        proposal.plot(trial=999)
+    with pytest.raises(bns.DataError, match="width and height"):
+        results["diagnosed"].propose(arena="2x3")
+
+
+def test_the_catalogue_has_every_effect():
+    listed = bns.effects()
+    assert listed.index.tolist() == list(all_effects())
+    assert listed.loc["motor-lag", "parameters"].startswith("tau_s (s): ")
+    assert (listed["meaning"].str.len() > 15).all()
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose", "add", "propose"])
+def test_the_command_line_prints_what_the_functions_give(command, log, found, results, tmp_path, capsys):
+    ours = {
+        "compare": lambda: results["compared"],
+        "diagnose": lambda: found,
+        "add": lambda: results["added"],
+        "propose": lambda: results["proposed"],
+    }[command]()
+    typed = {
+        "compare": [str(log)],
+        "diagnose": [str(log)],
+        "add": ["motor-lag", "--data", str(log), "-o", str(tmp_path / "new.yaml")],
+        "propose": [str(log), "--minutes", "2", "--arena", "1.6x1.2", "--start", "0,0,90", "--speeds=-0.2,0.2"],
+    }[command]
+    assert main([command, *typed, "--model", "khepera", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer == json.loads(json.dumps(ours.to_json()))
+    assert answer["provenance"]["bns_version"] == bns.__version__
+    assert len(answer["provenance"]["model_sha256"]) == len(answer["provenance"]["data_sha256"]) == 64

@@ -1,0 +1,1 @@
+"""Parts that packages outside the tree bring."""

@@ -1,0 +1,112 @@
+"""What an installation without extras, or a system that is not POSIX, gives: an explanation, never a traceback."""
+
+import subprocess
+import sys
+
+import pytest
+
+from bns.errors import BnsError
+from bns.extras import LIBRARIES, MissingExtraError, extra
+
+POSIX = ("fcntl", "termios", "pty", "resource", "grp", "pwd", "tty")
+BLOCKED = """
+import sys
+for name in {blocked!r}:
+    sys.modules[name] = None
+from bns.cli.main import main
+sys.exit(sum(main(arguments) for arguments in {commands!r}))
+"""
+IMPORT_ALL = """
+import builtins, importlib, pkgutil, signal, warnings
+import bns
+really = builtins.__import__
+
+def guarded(name, globals=None, *rest, **named):
+    importer = (globals or {{}}).get("__name__", "")
+    if name in {blocked!r} and importer.split(".")[0] == "bns":
+        raise ModuleNotFoundError("No module named " + name, name=name)
+    return really(name, globals, *rest, **named)
+
+builtins.__import__ = guarded
+for name in ("SIGUSR1", "SIGUSR2", "SIGALRM", "SIGHUP"):
+    delattr(signal, name)
+imported = 0
+for module in pkgutil.walk_packages(bns.__path__, "bns."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+        imported += 1
+from bns.store import shared
+from bns.hardware.terminal_error import TerminalError
+assert shared.fcntl is None and TerminalError is OSError, "the block has no effect"
+print(imported)
+"""
+
+
+def carried_out(code):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=200, check=False)
+
+
+def test_every_module_is_imported_where_nothing_of_posix_is_there():
+    done = carried_out(IMPORT_ALL.format(blocked=POSIX))
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 100
+
+
+MISSING = {
+    "mujoco": ("snake", ["run", "--robot", "snake", "--world", "physics", "--evaluations", "1"]),
+    "imageio_ffmpeg": ("snake", ["run", "--robot", "snake", "--world", "physics", "--render", "film.mp4"]),
+    "cv2": ("robot", ["calibrate", "--print-board", "board.png"]),
+    "dynamixel_sdk": ("robot", ["trial", "--robot", "snake", "--emulated", "--yes"]),
+    "serial": ("robot", ["doctor"]),
+    "distributed": ("cluster", ["sweep", "khepera-small", "--executor", "dask", "--dry-run"]),
+    "submitit": ("cluster", ["sweep", "khepera-small", "--executor", "slurm", "--dry-run"]),
+}
+ONE_BY_ONE = """
+import sys
+from bns.cli.main import main
+for library, (_, arguments) in {missing!r}.items():
+    before = sys.modules.pop(library, None)
+    sys.modules[library] = None
+    print(library, main(arguments), file=sys.stderr)
+    sys.modules.pop(library)
+    if before is not None:
+        sys.modules[library] = before
+"""
+
+
+def test_a_library_that_is_missing_is_named_with_its_extra(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = carried_out(ONE_BY_ONE.format(missing=MISSING))
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    said = done.stderr.splitlines()
+    for library, (name, _) in MISSING.items():
+        [place] = [number for number, line in enumerate(said) if line == f"{library} 2"]
+        assert f"needs the library {library}, which is not installed" in said[place - 1]
+        assert f"pip install 'bns[{name}]'" in said[place - 1]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_networks_as_torch_modules_say_what_to_install(monkeypatch):
+    from bns.robots.simulator import load_static_simulator, to_torch
+
+    saved = load_static_simulator("khepera")
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(MissingExtraError, match=r"library torch.*pip install 'bns\[torch\]'"):
+        to_torch(saved.networks, saved.weights)
+
+
+def test_the_core_needs_no_extra(tmp_path):
+    """Runs of both robots, with every library of every extra away."""
+    everything = [library for libraries in LIBRARIES.values() for library in libraries]
+    quick = ["--evaluations", "1", "--population-size", "8", "--training-iterations-per-evaluation", "1"]
+    arguments = ["run", *quick, "--results", str(tmp_path), "--save-snn", str(tmp_path / "nets.safetensors")]
+    snake = ["run", "--robot", "snake", *quick, "--results", str(tmp_path)]
+    done = carried_out(BLOCKED.format(blocked=everything, commands=[arguments, snake]))
+    assert done.returncode == 0, done.stderr
+
+
+def test_only_a_library_of_that_extra_is_explained():
+    with pytest.raises(ModuleNotFoundError, match="no_such_thing"), extra("snake"):
+        import no_such_thing  # noqa: F401
+    assert issubclass(MissingExtraError, BnsError)
