@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bns.cli.parser import Parser, data_first
+from bns.cli.parser import Parser, add_trust, data_first
 from bns.errors import DataError
 
 if TYPE_CHECKING:
@@ -62,6 +62,8 @@ def add_commands(command: Adder) -> None:
         add_model_options(one)
         one.add_argument("--figures", type=Path, metavar="DIR", help="also draw figures into this folder")
     add_effect_options(found)
+    for one in (held, more):
+        add_trust(one, also=True)
 
 
 def add_model_options(parser: argparse.ArgumentParser) -> None:
@@ -95,6 +97,7 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.py",
         help="an effect of your own to try beside the listed ones",
     )
+    add_trust(parser)
 
 
 def import_(options: argparse.Namespace) -> int:
