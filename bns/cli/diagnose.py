@@ -107,7 +107,7 @@ def import_(options: argparse.Namespace) -> int:
     from bns.diagnose.data.apply_mapping import applied
     from bns.diagnose.data.checks import checked
     from bns.diagnose.data.guess_mapping import drafted
-    from bns.diagnose.data.load import read_table
+    from bns.diagnose.data.load import naming, read_table
     from bns.diagnose.data.mapping import load_mapping, mapping_beside
     from bns.diagnose.report.text import findings_text
     from bns.measurements import write_measurements
@@ -120,8 +120,9 @@ def import_(options: argparse.Namespace) -> int:
             f"{options.data.name}.import.yaml, or give such a file with --map; docs/logs.md has all that may stand in it. "
             f"A beginning, guessed from the names, to be checked line by line:\n\n{drafted(table)}"
         )
-    table = applied(table, mapping, options.data.parent, read_table)
-    checked_table, findings = checked(table)
+    with naming(options.data):
+        table = applied(table, mapping, options.data.parent, read_table)
+        checked_table, findings = checked(table)
     write_measurements(table, options.output)
     if options.map:
         beside = options.data.with_name(options.data.name + ".import.yaml")
