@@ -18,7 +18,15 @@ from bns.safe_yaml import Lines, read_yaml
 BOMB = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
     f"{after}: &{after} [{','.join([f'*{before}'] * 9)}]\n" for before, after in zip("abcdefgh", "bcdefghi", strict=True)
 )
-BAD = {"bomb": BOMB, "deep": "a: " + "[" * 4000, "nul": "a: \x00", "list": "[1, 2]", "number": "3", "empty": "", "twice": "a: 1\na: 2"}
+BAD = {
+    "bomb": BOMB,
+    "deep": "a: " + "[" * 4000,
+    "nul": "a: \x00",
+    "list": "[1, 2]",
+    "number": "3",
+    "empty": "",
+    "twice": "a: 1\na: 2",
+}
 
 
 def of_rig(path):

@@ -46,7 +46,7 @@ def answer(connection: duckdb.DuckDBPyConnection, results: Path, sql: str, *, bo
 
 def _fetched(connection: duckdb.DuckDBPyConnection, sql: str) -> pa.Table:
     """The rows, as long as they are not too many: they are counted as they come, and not made all at once."""
-    reader = connection.execute(sql).to_arrow_reader(_ROWS_AT_ONCE)
+    reader = connection.sql(sql).to_arrow_reader(_ROWS_AT_ONCE)
     batches, rows, size = [], 0, 0
     for batch in reader:
         batches.append(batch)

@@ -269,8 +269,8 @@ def _check_length(table: pd.DataFrame) -> None:
     lasted = times.max() - times.min()
     if lasted.max() > _LONGEST_TRIAL_S:
         raise DataError(
-            f"Trial {lasted.idxmax()} lasts {lasted.max():g} s, from its first t_s to its last; {_LONGEST_TRIAL_S:g} s are allowed. "
-            "Is one of its times wrong?"
+            f"Trial {lasted.idxmax()} lasts {lasted.max():g} s, from its first t_s to its last; {_LONGEST_TRIAL_S:g} s are "
+            "allowed. Is one of its times wrong?"
         )
 
 
