@@ -83,9 +83,9 @@ def parse_yaml(text: str, path: Path) -> Located:
         raise SpecError(f"{path}:1: not valid YAML: {_first_line(fault)}.") from None
     if node is None:
         raise SpecError(f"{path}:1: the file is empty. It needs at least the keys 'name' and 'robot'.")
-    fault = excess(node, loops=False)
-    if fault:
-        raise SpecError(f"{path}:{fault.removeprefix('line ')}")
+    beyond = excess(node, loops=False)
+    if beyond:
+        raise SpecError(f"{path}:{beyond.removeprefix('line ')}")
     return Located(node, loader, path)
 
 
