@@ -138,9 +138,21 @@ def empty(table: str) -> pa.Table:
 
 
 def file_metadata(
-    table: str, sweep: str, *, spec_hash: str, git_sha: str, git_clean: bool | None, bns_version: str
+    table: str,
+    sweep: str,
+    *,
+    spec_hash: str,
+    git_sha: str,
+    git_clean: bool | None,
+    bns_version: str,
+    task: str = "",
+    parts: Mapping[str, str] | None = None,
 ) -> bytes:
-    """The JSON that stands in every file's key-value metadata under ``METADATA_KEY``."""
+    """The JSON that stands in every file's key-value metadata under ``METADATA_KEY``; its digest is added last.
+
+    ``parts`` (of table "runs" alone): by name, the digests of the fold's other tables, "" of one that is lost.
+    """
+    vouched = {} if parts is None else {"parts": dict(parts)}
     return json.dumps(
         {
             "schema_version": SCHEMA_VERSION,
@@ -150,6 +162,8 @@ def file_metadata(
             "git_sha": git_sha,
             "git_clean": git_clean,
             "bns_version": bns_version,
+            "task": task,
+            **vouched,
         }
     ).encode()
 
