@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from bns.bootstrap.evolver import Evolver
+from bns.bootstrap.simulators import NetworkSimulator
 from bns.engine.philox import Key, Purpose
 from bns.engine.snn import predict
 from bns.errors import StoreError
@@ -60,9 +61,10 @@ def _evolved(robot: Robot, task: Task, trial: int, weights: np.ndarray) -> Evolv
         max_commands=COMMANDS,
         generations_per_evaluation=ROUND,
     )
-    evolver = Evolver.start(robot, task, Key.of_run(trial, 0, robot.name, f"validate {task.name}"), spec, weights)
+    simulator = NetworkSimulator(robot, task, weights)
+    evolver = Evolver.start(robot, task, Key.of_run(trial, 0, robot.name, f"validate {task.name}"), spec, simulator)
     for _ in range(MOST_ROUNDS):
-        evolver.evolve(weights)
+        evolver.evolve(simulator)
         if evolver.scores.goals_reached[evolver.order[0]] == len(task.goals_m):
             break
     return evolver

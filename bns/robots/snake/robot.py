@@ -137,9 +137,11 @@ class Snake:
         marked[[number - 1 for number in commands], path.STABLE] = 0.0
         return marked
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
+    def plan(self, controller: np.ndarray, weights: np.ndarray | None, task: Task) -> np.ndarray:
         """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2)."""
         in_full = cycles.in_full(controller)
+        if weights is None:
+            return in_full
         outputs = predict(weights, self.inputs(in_full), self.sigmoid_output)
         return in_full[: path.evaluate_path(self.poses(self.displacements(outputs), in_full), task)[2]]
 
@@ -149,10 +151,16 @@ class Snake:
     ) -> Scores:
         """Mean fitness over ten noisy evaluations, all controllers under the same noise; without a stream there is none."""
         commands = population.commands
+        outputs = predict(weights, self.inputs(commands.reshape(-1, commands.shape[2])), self.sigmoid_output)
+        return self.walk(population, self.displacements(outputs), task, stream)
+
+    def walk(
+        self, population: Population, displacements: np.ndarray, task: Task, stream: RandomStream | None = None
+    ) -> Scores:
+        """As `score`, from displacements (cycles, 5)."""
+        commands = population.commands
         n, length, _ = commands.shape
-        moves = np.ascontiguousarray(
-            self.displacements(predict(weights, self.inputs(commands.reshape(n * length, -1)), self.sigmoid_output)).T
-        )
+        moves = np.ascontiguousarray(displacements.T)
         fitness, reached, used = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int32)
         half = (task.region_m / 2, task.surface_m[0] / 2, task.surface_m[1] / 2)
         noise = self._noise(stream, length * MOST_REPEATS)
