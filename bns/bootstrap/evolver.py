@@ -80,6 +80,11 @@ class Evolver:
             if self.spec.record == "full":
                 self.history.append(Generation(self.generations, self.fittest(), self.best_fitness, self.mean_fitness))
 
+    def replace(self, who: np.ndarray, others: Population) -> None:
+        """Put others, as many as there are controllers, in the places of some; they are scored when evolution goes on."""
+        self.population.commands[who], self.population.lengths[who] = others.commands[who], others.lengths[who]
+        self.population.origin[who] = -1
+
     def _score(self, simulator: Simulator, parents: Scores | None = None) -> None:
         stream = RandomStream(self.key, self.generations)
         self.scores = simulator.score(self.population, stream, parents)
