@@ -8,9 +8,9 @@ After Grefenstette and Ramsey ("An approach to anytime learning", 1992):
 4. evolution goes on in the simulator: `advance`, each generation in an environment drawn from the means and spreads
 
 Silent there, chosen here: the estimate is the maximum of the posterior of a drawing's most common effects (`COMMON`), with a
-normal prior of one spread, from the latest drives (option ``window``), so that a robot that changes is followed; spreads are those
-of the Laplace approximation. "Differ" means by more than two spreads in any number. Option ``restart`` of the population is
-replaced by random controllers then; the best stay.
+normal prior of one spread, from the latest drives (option ``window``), so that a robot that changes is followed; spreads are
+those of the Laplace approximation. "Differ" means by more than two spreads in any number. Option ``restart`` of the population
+is replaced by random controllers then; the best stay.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ After Zagal and Ruiz-del-Solar ("Combining simulation and reality in evolutionar
 3. simulators evolve so that the mean difference of fitness over the latest drives falls: `advance`
 4. again from 1, on the simulator that is best now
 
-Silent there, chosen here: a simulator is a point in the space of a drawing's most common effects (`COMMON`); the driven one is the
-winner of the spec's real-world selection tournament; one drive a round; the latest ``memory`` drives count. Nothing but fitness is used of
-a drive, which is the approach's point: no tracking is needed.
+Silent there, chosen here: a simulator is a point in the space of a drawing's most common effects (`COMMON`); the driven one is
+the winner of the spec's real-world selection tournament; one drive a round; the latest ``memory`` drives count. Nothing but
+fitness is used of a drive, which is the approach's point: no tracking is needed.
 """
 
 from __future__ import annotations

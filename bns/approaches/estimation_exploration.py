@@ -7,8 +7,8 @@ After Bongard and Lipson ("Nonlinear system identification using coevolution of 
 3. controllers evolve on the best model, and the fittest is driven: `advance` and `pick`, after the tests
 
 Silent there, chosen here: a model is the drawing with any of `CATALOGUE`'s effects; its error is that of displacements, with one
-percent on top for every effect, so that of equals the simplest wins; disagreement is the variance of the positions that the best models
-(option ``voters``) foretell, summed over the commands; a test is one of random command lists, of which there are ``candidates``. The
+percent on top for every effect, so that of equals the simplest wins; disagreement is the variance of the positions that the best
+models (option ``voters``) foretell, summed over the commands; a test is one of ``candidates`` random command lists. The
 population of models goes on from test to test. Drives of step 3 are learned from as well.
 """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
@@ -40,7 +41,7 @@ class Evolver:
     history: list[Generation] = field(default_factory=list)
 
     @classmethod
-    def start(cls, robot: Robot, task: Task, key: Key, spec: RunSpec, simulator: Simulator) -> Evolver:
+    def start(cls, robot: Robot, task: Task, key: Key, spec: RunSpec, simulator: Simulator) -> Self:
         """A random population, scored on a first simulator."""
         population = robot.initial_population(key, spec.population_size, spec.min_commands, spec.max_commands)
         return cls(robot, task, key, spec, population, simulator.score(population, RandomStream(key, 0)))

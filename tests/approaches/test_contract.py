@@ -16,7 +16,13 @@ SMALL = {
     "evaluations": 6, "population_size": 12, "generations_per_evaluation": 2, "training_iterations_per_evaluation": 5,
     "world": "physics", "max_commands": 12,
 }  # fmt: skip
-OPTIONS = {"precomputed": "+iterations=20", "then-on-robot": "+iterations=20+population=2", "on-robot": "+population=3"}
+OPTIONS = {
+    "precomputed": "+iterations=20",
+    "then-on-robot": "+iterations=20+population=2",
+    "on-robot": "+population=3",
+    "back-to-reality": "+models=4+generations=2",
+    "estimation-exploration": "+models=4+generations=2+candidates=5",
+}
 """Small enough for a test, with more than one generation on the robot."""
 SNAKE = ("bns", "on-robot", "precomputed", "then-on-robot")
 NAMES = APPROACHES.names()
@@ -32,7 +38,14 @@ def numbers(one, **how):
 
 
 def test_the_approaches_that_there_are():
-    assert set(NAMES) >= {"bns", "precomputed", "on-robot", "then-on-robot"}
+    physical = {"anytime", "back-to-reality", "estimation-exploration", "transferability"}
+    assert set(NAMES) >= physical | set(SNAKE)
+
+
+@pytest.mark.parametrize("name", sorted(set(NAMES) - set(SNAKE)))
+def test_approaches_on_a_model_of_two_wheels_say_so(name):
+    with pytest.raises(SpecError, match=f"the approach {name}.* has a physics model of two wheels, and the snake has none"):
+        run(spec(name, robot="snake", task="two-regions", world="substitute"))
 
 
 @pytest.mark.parametrize("name", NAMES)
