@@ -58,8 +58,8 @@ def _draw(evals: pd.DataFrame) -> FigureResult:
     note(figure, f"{where}; {counted(n, 'run')}, {least} at least of each approach; bands: {INTERVALS}.")
     shows = (
         f"Task {where}, {first.sweep}. (a, b) Share of runs whose fittest controller completes the task after so many "
-        f"evaluations, and robot minutes (every drive charged, with the spec's overhead). (c) Share of runs in which {LASTING} successes in "
-        f"a row have not begun yet (Kaplan-Meier). n = {n} runs, {least} at least of each approach; {INTERVALS}."
+        f"evaluations, and robot minutes (every drive charged, with the spec's overhead). (c) Share of runs in which {LASTING} "
+        f"successes in a row have not begun yet (Kaplan-Meier). n = {n} runs, {least} at least of each approach; {INTERVALS}."
     )
     table = pd.DataFrame(tables)
     name = f"{NAME}-{first.sweep}-{first.robot}-{first.task}-{str(first.world).split('/')[-1].removesuffix('.yaml')}"

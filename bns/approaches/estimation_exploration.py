@@ -46,9 +46,9 @@ class EstimationExploration(Physical):
         "tests": Option(0.3, 0.0, 1.0, "share of the evaluations that are tests"),
         "commands": Option(10, 1, 1000, "commands in a test"),
         "candidates": Option(40, 1, 100_000, "random tests of which one is driven; 1: tests are random"),
-        "models": Option(16, 2, 10_000, "models in their population"),
+        "models": Option(12, 2, 10_000, "models in their population"),
         "voters": Option(6, 2, 10_000, "best models that are asked which test to drive"),
-        "generations": Option(6, 1, 10_000, "generations of models after each drive"),
+        "generations": Option(3, 1, 10_000, "generations of models after each drive"),
     }
 
     def __init__(self, setting: Setting, robot: TwoWheeled, space: ModelSpace) -> None:

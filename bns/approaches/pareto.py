@@ -1,7 +1,7 @@
 """NSGA-II on controllers: fitness on a physics model, and how far from the world a controller is thought to be.
 
-Sorting into fronts and crowding distances are pymoo's (Blank and Deb, 2020): the reference implementation that is kept up, whose
-author of NSGA-II is one of its own. Variation is the robot's, as in every approach, so that the same controllers are searched.
+Sorting into fronts and crowding distances are pymoo's (Blank and Deb, 2020), which is kept up and has an author of NSGA-II among
+its own. Variation is the robot's, as in every approach, so that the same controllers are searched.
 """
 
 from __future__ import annotations

@@ -102,7 +102,7 @@ def test_tests_on_which_models_disagree_find_hidden_numbers_with_fewer_drives_th
     world, errors = hidden(speed_gain={"gain": 0.93}, motor_lag={"tau_s": 0.15}), {1: [], 40: []}
     for seed in range(4):
         for candidates, found in errors.items():
-            name = f"estimation-exploration+tests=1+commands=3+generations=8+candidates={candidates}"
+            name = f"estimation-exploration+tests=1+commands=3+models=16+generations=8+candidates={candidates}"
             approach = started(name, seed, evaluations=5)
             drive(approach, world, 3)
             found.append(error_on_fresh_commands(approach.simulator, world))
