@@ -74,7 +74,7 @@ DIAGNOSE_FLOORS = (
     {"predict"},
     {"estimate"},
     {"select", "residuals"},
-    {"caveats"},
+    {"caveats", "values"},
     {"adding", "comparison", "diagnosis"},
     {"design"},
     {"report"},

@@ -92,8 +92,12 @@ class DiagnoseResult(Shown):
 
     @property
     def errors(self) -> pd.DataFrame:
-        """Position error on trials held out (m): a row a horizon, columns before, after, noise_floor."""
-        return pd.DataFrame(self.diagnosis.error or {}).T.rename_axis("horizon")
+        """Position error (m) on held-out trials, before and after on the same windows: a row a horizon.
+
+        Columns before, after (root mean square), median_before, median_after, change, change_low, change_high (95 %, paired
+        by trial), noise_floor (of the tracking), windows, windows_left_out.
+        """
+        return pd.DataFrame(self.diagnosis.as_json()["error"]).T.rename_axis("horizon")
 
     def summary(self) -> str:
         """Verdict first; then numbers, errors, ranking, notes."""

@@ -21,7 +21,7 @@ from bns.cli.compiling import say_if_compiling
 from bns.cli.option_types import add_spec_options, duration, positive
 from bns.cli.parser import SHELLS, Completion, Parser, add_results
 from bns.cli.sweep_options import DEVICES
-from bns.cli.trial_options import add_looking_options, add_trial_options
+from bns.cli.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.errors import BnsError
 from bns.spec import FIELDS, RunSpec
 
@@ -135,6 +135,7 @@ def _add_single_runs(command: measuring.Adder) -> None:
     ill.add_argument(
         "--rig", type=Path, metavar="FILE", help="your set-up (YAML): its robot and tracker are asked, too"
     )
+    add_servo_options(command("servos", servos, "set up AX-12 servos: who answers, their ids, their settings"))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -186,6 +187,13 @@ def doctor(options: argparse.Namespace) -> int:
     from bns.cli.doctor import checked_up
 
     return checked_up(options)
+
+
+def servos(options: argparse.Namespace) -> int:
+    """Set up servos."""
+    from bns.cli.servos import served
+
+    return served(options)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,8 @@ def diagnosed(model, **how):
 def test_nothing_is_found_where_nothing_is_hidden():
     found = diagnosed(NOMINAL)
     assert (found.verdict, found.effects) == ("none", ())
-    assert found.error["1s"]["before"] == found.error["1s"]["after"]
+    error = found.as_json()["error"]["1s"]
+    assert error["before"] == error["after"]
 
 
 def test_one_effect_is_named_with_its_size():

@@ -185,9 +185,7 @@ def _gaps_and_losses(trial: str, rows: pd.DataFrame, findings: list[Finding]) ->
                 findings.append(Finding(trial, int(rows.index[i]), f"no row for {t[i + 1] - t[i]:.2f} s"))
     lost = rows[list(POSE)].isna().any(axis=1)
     if lost.any():
-        findings.append(
-            Finding(trial, int(rows.index[lost][0]), f"{lost.sum()} poses lost, the first here")
-        )
+        findings.append(Finding(trial, int(rows.index[lost][0]), f"{lost.sum()} poses lost, the first here"))
 
 
 def _units(table: pd.DataFrame) -> None:
@@ -219,7 +217,9 @@ def _units(table: pd.DataFrame) -> None:
     if _turns_as_degrees(table):
         raise DataError("Headings turn far more than the wheels can make them: heading_rad looks like degrees.")
     if len(ways) and np.abs(ways[:, 2]).sum() > 0.3:
-        told, seen = ways[np.abs(ways[:, 2]) <= np.median(np.abs(ways[ways[:, 2] != 0, 2])), 2:].T  # larger ones may be rounds
+        told, seen = ways[
+            np.abs(ways[:, 2]) <= np.median(np.abs(ways[ways[:, 2] != 0, 2])), 2:
+        ].T  # larger ones may be rounds
         same = float(told @ seen / np.sqrt((told @ told) * (seen @ seen) + 1e-300))
         if same < -0.5:
             raise DataError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,8 +16,10 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import Finding, checked
 from bns.diagnose.data.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.data.mapping import mapping_beside
+from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracks import Tracks, tracks_of
 from bns.errors import DataError
+from bns.measurements import POSE
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,21 @@ def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:
         cycles, findings = checked_cycles(table)
         return cycle_tracks(cycles), findings
     usable, findings = checked(table)
-    return tracks_of(usable), findings
+    tracks = tracks_of(usable)
+    return without_faults(tracks), [*findings, *_jump_findings(tracks, usable)]
+
+
+def _jump_findings(tracks: Tracks, usable: pd.DataFrame) -> Iterator[Finding]:
+    """A jump that lasts, in words; ``usable``: the rows that the tracks were made of."""
+    rows = np.flatnonzero(usable[list(POSE)].notna().all(axis=1))
+    for frame in np.flatnonzero(jumps(tracks)):
+        moved = float(np.hypot(*(tracks.pose[frame] - tracks.pose[frame - 1])[:2]))
+        trial = tracks.names[tracks.trial[frame]]
+        text = (
+            f"the tracked pose jumps by {1e3 * moved:.0f} mm at {tracks.t_s[frame]:.2f} s and stays there: another marker was "
+            "taken for the robot's, or somebody moved it; nothing is judged by the poses that follow in this trial"
+        )
+        yield Finding(trial, int(rows[frame]), text)
 
 
 def read_table(path: Path) -> pd.DataFrame:

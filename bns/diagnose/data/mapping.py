@@ -111,17 +111,30 @@ def _check_trials(path: Path, tree: Mapping[str, Any]) -> None:
     if "trials" not in tree:
         return
     split = tree["trials"]
-    if not isinstance(split, dict) or len(split) != 1 or not set(split) <= set(SPLITS) or not _positive(*split.values()):
-        raise DataError(f"{path}: trials is {split!r}; write one of {{standing_s: 1}}, {{lasting_s: 20}}, {{gap_s: 2}}.")
+    if (
+        not isinstance(split, dict)
+        or len(split) != 1
+        or not set(split) <= set(SPLITS)
+        or not _positive(*split.values())
+    ):
+        raise DataError(
+            f"{path}: trials is {split!r}; write one of {{standing_s: 1}}, {{lasting_s: 20}}, {{gap_s: 2}}."
+        )
     if "trial" in tree["columns"]:
-        raise DataError(f"{path}: trials are cut by {next(iter(split))} and named by a column; leave out one of the two.")
+        raise DataError(
+            f"{path}: trials are cut by {next(iter(split))} and named by a column; leave out one of the two."
+        )
 
 
 def _check_also(path: Path, others: Any) -> None:
     if not isinstance(others, list):
         raise DataError(f"{path}: also is {others!r}; it must be a list of {{file: NAME, columns: ...}}.")
     for other in others:
-        if not isinstance(other, dict) or not isinstance(other.get("file"), str) or not isinstance(other.get("columns"), dict):
+        if (
+            not isinstance(other, dict)
+            or not isinstance(other.get("file"), str)
+            or not isinstance(other.get("columns"), dict)
+        ):
             raise DataError(f"{path}: also has {other!r}; write {{file: NAME, columns: ...}}.")
         _check_keys(f"{path}: also", other, _ALSO_KEYS)
         _check_columns(path, other["columns"])
@@ -147,13 +160,17 @@ def _check_unit(path: Path, name: str, entry: Mapping[str, Any]) -> None:
     wanted = "m" if entry.get("counts") and _SI.get(name) == "m/s" else _SI.get(name)
     if wanted is not None and UNITS[unit][0] != wanted:
         fitting = ", ".join(u for u, (kind, _) in UNITS.items() if kind == wanted)
-        more = "; of turns of a wheel, give no unit but scale: its radius in metres" if unit in {"rad/s", "deg/s"} else ""
+        more = (
+            "; of turns of a wheel, give no unit but scale: its radius in metres" if unit in {"rad/s", "deg/s"} else ""
+        )
         raise DataError(f"{path}: {name} cannot be in {unit}; it may be in {fitting}{more}.")
 
 
 def _check_quaternion(path: Path, name: str, entry: Mapping[str, Any]) -> None:
     source, quaternion = entry["from"], entry.get("unit") == "quaternion"
     if quaternion != isinstance(source, list) or (quaternion and len(source) != 4):
-        raise DataError(f"{path}: {name}: a quaternion is {{from: [QX, QY, QZ, QW], unit: quaternion}}; given: {source!r}.")
+        raise DataError(
+            f"{path}: {name}: a quaternion is {{from: [QX, QY, QZ, QW], unit: quaternion}}; given: {source!r}."
+        )
     if "up" in entry and (not quaternion or entry["up"] not in _UP):
         raise DataError(f"{path}: {name}: up is {entry['up']!r}; it is for quaternions, and z or y.")

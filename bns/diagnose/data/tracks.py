@@ -44,6 +44,8 @@ class Tracks:
     start_s: Array
     start_known: bool
     extra: Mapping[str, Array] = field(default_factory=dict)
+    jumped: NDArray[np.bool_] | None = None
+    """Frames (frames,) whose pose no drive leads to from the frame before (`tracker_faults`); None: there are none."""
 
     def __len__(self) -> int:
         return len(self.names)
@@ -55,16 +57,16 @@ class Tracks:
 
     @cached_property
     def is_first(self) -> NDArray[np.bool_]:
-        """Frames that begin a trial, (frames,)."""
+        """Frames that begin a trial, or go on elsewhere after a jump of the tracker; (frames,)."""
         found = np.zeros(len(self.t_s), dtype=bool)
         found[self.first[:-1]] = True
-        return found
+        return found if self.jumped is None else found | self.jumped
 
     def only(self, chosen: NDArray[np.int64]) -> Tracks:
         """Some of the trials, in the order of ``chosen``."""
         selected = [np.arange(self.first[i], self.first[i + 1]) for i in chosen]
         return replace(
-            self._at(selected),
+            self.at_frames(selected),
             names=tuple(self.names[i] for i in chosen),
             left_m_s=self.left_m_s[chosen],
             right_m_s=self.right_m_s[chosen],
@@ -74,14 +76,14 @@ class Tracks:
 
     def thinned(self, every: int) -> Tracks:
         """Every so-manieth frame of each trial, its last one too; the commands stay as they are."""
-        return self._at(
+        return self.at_frames(
             [
                 np.unique(np.append(np.arange(a, b, every), b - 1)) if b > a else np.arange(a, b)
                 for a, b in pairwise(self.first)
             ]
         )
 
-    def _at(self, selected: Sequence[NDArray[np.int64]]) -> Tracks:
+    def at_frames(self, selected: Sequence[NDArray[np.int64]]) -> Tracks:
         """These frames, an array a trial."""
         frames = np.concatenate(selected)
         return replace(
@@ -90,7 +92,14 @@ class Tracks:
             t_s=self.t_s[frames],
             pose=self.pose[frames],
             extra={name: values[frames] for name, values in self.extra.items()},
+            jumped=None if self.jumped is None else self._jumped_since(selected),
         )
+
+    def _jumped_since(self, selected: Sequence[NDArray[np.int64]]) -> NDArray[np.bool_]:
+        """Is there a jump between a taken frame and the taken one before?"""
+        assert self.jumped is not None
+        count = np.cumsum(self.jumped)
+        return np.concatenate([np.diff(count[rows], prepend=count[rows[:1]]) > 0 for rows in selected])
 
 
 def slimmed(tracks: Tracks) -> Tracks:

@@ -12,7 +12,7 @@ from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.residuals.symbolic import NAME as FORMULA
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.stepwise import SelectionResult
+from bns.diagnose.select.result import SelectionResult
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 

@@ -62,7 +62,9 @@ def bounds_of(tracks: Tracks, model: Model, speeds: tuple[float, float] | None =
     name = str(model.provenance.get("begun_from", model.name)).removesuffix("-world")
     robot = load_robot(name) if name in robot_names() else None
     if robot is not None and robot.two_wheeled:
-        left, _, lasts = cast(TwoWheeled, robot).wheel_speeds_m_s(np.stack([robot.bounds.low, robot.bounds.high]).astype(float))
+        left, _, lasts = cast(TwoWheeled, robot).wheel_speeds_m_s(
+            np.stack([robot.bounds.low, robot.bounds.high]).astype(float)
+        )
         low, high = min(low, float(left[0])), max(high, float(left[1]))
         short, long = min(short, float(lasts[0])), max(long, float(lasts[1]))
     if speeds is not None:

@@ -12,7 +12,8 @@ from bns.errors import DataError
 from bns.physics.model import Model
 from bns.robots import robot_names
 
-_FACTOR = 1.8
+_FACTOR = 3.0
+"""Skid-steered robots turn as if their wheels stood up to twice as far apart; beyond that it is another robot, or units."""
 _EXPLAINED = 0.25
 """Another robot it is if turns that are scaled leave less than this share of the deviation."""
 _FEWEST = 5

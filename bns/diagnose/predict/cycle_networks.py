@@ -96,7 +96,9 @@ class CyclePredictor:
     def at_frames(self, frames: NDArray[np.int64]) -> dict[str, Array]:
         """`variables` of the cycle or change that begins at some frames."""
         last = self._step_s.shape[1] - 1
-        return {n: v[self.tracks.trial[frames], np.minimum(self._at[frames], last)] for n, v in self.variables().items()}
+        return {
+            n: v[self.tracks.trial[frames], np.minimum(self._at[frames], last)] for n, v in self.variables().items()
+        }
 
     def scores(self) -> Mapping[str, Mapping[str, float]]:
         """R², regression, RMSE and bias (SI) of each network of displacements; of stability the shares it calls right."""

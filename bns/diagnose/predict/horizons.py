@@ -29,6 +29,11 @@ class Errors:
     left_m: Array
     heading_rad: Array
 
+    def only(self, kept: NDArray[np.bool_]) -> Errors:
+        """Some of the windows."""
+        frames = self.trial[kept], self.start[kept], self.end[kept]
+        return Errors(*frames, self.forward_m[kept], self.left_m[kept], self.heading_rad[kept])
+
     @property
     def position_m(self) -> Array:
         """Distance between predicted and measured position, (windows,)."""

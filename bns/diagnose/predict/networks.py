@@ -55,7 +55,9 @@ class NetworkPredictor(WheelPredictor):
         lasting = tracks.duration_s[trial] > 0
         speeds = np.column_stack([tracks.left_m_s[trial], tracks.right_m_s[trial]])[lasting]
         unit = self._robot.wheel_speeds_m_s(np.ones((1, 3)))  # type: ignore[attr-defined]  # of a differential drive
-        return np.column_stack([speeds[:, 0] / unit[0], speeds[:, 1] / unit[1], tracks.duration_s[trial][lasting] / unit[2]])
+        return np.column_stack(
+            [speeds[:, 0] / unit[0], speeds[:, 1] / unit[1], tracks.duration_s[trial][lasting] / unit[2]]
+        )
 
     def measured(self) -> Array:
         """As the networks' own steps: forward, left and turn since the frame before as tracked, (frames, 3)."""

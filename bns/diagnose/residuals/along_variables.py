@@ -124,6 +124,26 @@ def probe_effect(channel: str, curve: Array, heading_rad: Array) -> Effect:
     )
 
 
+def flexible_columns(problem: Problem, fit: Fit, variable: str, channel: str, *, centred: bool = False) -> Array:
+    """Change of the whitened innovations a unit of each basis function of a free curve, (frames, 3, k).
+
+    ``centred``: every basis function has mean zero over the steps, so that the curve cannot stand for what acts everywhere.
+    """
+    variables = problem.predictor.variables()
+    basis = next(functions for name, functions in curves(variables) if name == variable)
+    if centred:
+        basis = [function - function.mean() for function in basis]
+    return _columns(problem, fit, channel, basis, variables["heading_rad"])
+
+
+def losses_with_columns(problem: Problem, fit: Fit, columns: Array) -> Array:
+    """Held-out losses (trials,) of a fitted model with these columns beside its own numbers, at the better penalty."""
+    joint = np.concatenate([fit.jacobian, columns], axis=2)
+    equations = problem.normal_equations(joint, fit.whitened)
+    tried = [_held_out_losses(problem, fit, joint, equations, penalty) for penalty in PENALTIES]
+    return min(tried, key=lambda losses: float(losses.sum()))
+
+
 def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array) -> Array:
     """Change of the whitened innovations a unit of each basis function, (frames, 3, k)."""
     small = 1e-3 if channel in {"yaw_rad_s", SHARE} else 1e-4
@@ -144,7 +164,12 @@ def _earned(problem: Problem, fit: Fit, columns: Array) -> PairedComparison:
 
 
 def _gain(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, penalty: float) -> tuple[float, float]:
-    """Held-out gain of a linear addition to a fitted model, each trial judged by a fit to the others.
+    """Held-out gain of a linear addition to a fitted model, each trial judged by a fit to the others."""
+    return paired_elpd_diff(fit.held_out, _held_out_losses(problem, fit, joint, equations, penalty))
+
+
+def _held_out_losses(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, penalty: float) -> Array:
+    """Losses (trials,) with a linear addition to a fitted model, each trial judged by a fit to the others.
 
     The model's own numbers move along with it. ``penalty``: how many typical trials speak for the addition being nothing.
     """
@@ -157,4 +182,4 @@ def _gain(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, 
     against = (gradients.sum(axis=0) - gradients) / scale
     steps = -np.linalg.solve(others, against[..., None])[..., 0] / scale
     moved = innovations_after(problem.predictor.tracks.first, joint, fit.whitened, steps)
-    return paired_elpd_diff(fit.held_out, problem.per_trial(huber(moved)))
+    return problem.per_trial(huber(moved))
