@@ -16,7 +16,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from bns.api.common.shown import Progress, Shown, drawn, silent
-from bns.approaches import approach_named
+from bns.approaches import check_networked
 from bns.bootstrap import loop
 from bns.errors import ModelError, SpecError, unknown_name
 from bns.measurements import check_table_name
@@ -268,12 +268,6 @@ def _on_gpu(spec: RunSpec, tell: Callable[[Row], None]) -> loop.RunResult:
     from bns.cuda.single import run as run_there  # noqa: PLC0415  # numba's CUDA support need not be installed
 
     return run_there(spec, tell)
-
-
-def check_networked(spec: RunSpec) -> None:
-    """SpecError if the approach has no networks that could be kept."""
-    if not approach_named(spec.approach).networked:
-        raise SpecError(f"the approach {spec.approach} has no networks to write; leave --save-snn out.")
 
 
 def check_renderable(spec: RunSpec, world: World, path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bns.approaches.base import Approach, Setting
 from bns.engine.philox import Key
+from bns.errors import SpecError
 from bns.options import OPTION_MARK, parsed_options
 from bns.registry import APPROACHES
 from bns.robots.base import Robot
@@ -21,3 +22,9 @@ def start_approach(robot: Robot, task: Task, key: Key, spec: RunSpec) -> Approac
     """The spec's approach at the beginning of a run; SpecError for an option that it has not, or a robot that it cannot take."""
     kind = approach_named(spec.approach)
     return kind.start(Setting(robot, task, key, spec, parsed_options(spec.approach, kind.options)))
+
+
+def check_networked(spec: RunSpec) -> None:
+    """SpecError if the approach has no networks that could be kept."""
+    if not approach_named(spec.approach).networked:
+        raise SpecError(f"the approach {spec.approach} has no networks to write; leave --save-snn out.")
