@@ -18,7 +18,7 @@ from bns.errors import SpecError, unknown_name
 from bns.options import OPTION_MARK, parsed_options
 from bns.registry import APPROACHES, WORLDS, Registry
 
-ENGINE_VERSION = 2
+ENGINE_VERSION = 3
 """Raised whenever the same spec would give other numbers; part of every run's name."""
 
 RADII_CM = (7, 10, 14, 20)

@@ -70,6 +70,7 @@ def upward(module: str, rooms: list[tuple[str, int]]) -> list[str]:
 
 
 DIAGNOSE_FLOORS = (
+    {"settings"},
     {"data"},
     {"predict"},
     {"estimate"},

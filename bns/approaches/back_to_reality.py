@@ -42,7 +42,7 @@ class BackToReality(Physical):
 
     def pick(self, evaluation: int) -> np.ndarray:
         """Step 2: not always the fittest, so that simulators are judged by different ones."""
-        return self.simulator.plan(self.evolver.pick(evaluation))
+        return self.plan(self.evolver.pick(evaluation))
 
     def advance(self) -> None:
         """Steps 3 and 1."""

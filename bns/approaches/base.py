@@ -78,6 +78,9 @@ class Approach(Protocol):
     def advance(self) -> None:
         """One round of all that goes on between two drives."""
 
+    def plan(self, controller: np.ndarray, generation: int | None = None) -> np.ndarray:
+        """What is driven of a controller of this generation, or of an earlier one of this round."""
+
     def fittest(self) -> np.ndarray:
         """The best controller (n, components) that it has now, as far as it knows."""
 

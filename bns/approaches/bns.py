@@ -16,7 +16,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
 
     def pick(self, evaluation: int) -> np.ndarray:
         """Step 1: the winner of the real-world selection tournament."""
-        return self.simulator.plan(self.evolver.pick(evaluation))
+        return self.plan(self.evolver.pick(evaluation))
 
     def advance(self) -> None:
         """Steps 2 and 3: train, copy the training networks over the evolution networks, evolve on those."""

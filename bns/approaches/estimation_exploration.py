@@ -78,7 +78,7 @@ class EstimationExploration(Physical):
         tests = self.robot.random_controllers(key, self.setting.whole("candidates"), self.setting.whole("commands"))
         voters = range(min(self.setting.whole("voters"), len(self.models)))
         simulators = [PhysicsSimulator(self.robot, self.setting.task, self.models.model(rank)) for rank in voters]
-        return self.simulator.plan(tests.controller(int(disagreement(simulators, tests).argmax())))
+        return self.plan(tests.controller(int(disagreement(simulators, tests).argmax())))
 
     def _error(self, model: Model) -> float:
         return self.drives.error(model) * (1 + COST_OF_AN_EFFECT * len(model.effects))

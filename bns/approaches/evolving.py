@@ -37,6 +37,10 @@ class Evolving:
         """The best controller in simulation."""
         return self.evolver.fittest()
 
+    def plan(self, controller: np.ndarray, generation: int | None = None) -> np.ndarray:
+        """What is driven of a controller of this generation, or of an earlier one of this round."""
+        return self.evolver.plan(controller, self.simulator, generation)
+
     def evolve(self) -> None:
         """As many generations as the spec has for an evaluation."""
         with self.timed("evolution_cpu_s"):

@@ -45,7 +45,7 @@ class OnRobot(Evolving):
 
     def pick(self, evaluation: int) -> np.ndarray:
         """Step 1: whose turn it is."""
-        return self.simulator.plan(self.on_robot.next())
+        return self.plan(self.on_robot.next())
 
     def learn(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
         """Its fitness; and steps 2 and 3 when all were driven."""

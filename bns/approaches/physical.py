@@ -38,7 +38,7 @@ class Physical(Evolving):
 
     def pick(self, evaluation: int) -> np.ndarray:
         """The fittest on the model."""
-        return self.simulator.plan(self.fittest())
+        return self.plan(self.fittest())
 
     def learn(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
         """Keep the drive."""

@@ -51,7 +51,7 @@ class Precomputed(NeuroSimulation):
         """Steps 1 and 4: random commands while data is gathered, then the fittest."""
         if evaluation <= self.gathering:
             return self.setting.robot.plan(self._random.controller(evaluation - 1), None, self.setting.task)
-        return self.simulator.plan(self.fittest())
+        return self.plan(self.fittest())
 
     def learn(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
         """Step 1: data; later drives teach nothing."""

@@ -35,7 +35,7 @@ class ThenOnRobot(Precomputed):
 
     def pick(self, evaluation: int) -> np.ndarray:
         """Random commands while data is gathered; then whose turn it is on the robot."""
-        return super().pick(evaluation) if self.on_robot is None else self.simulator.plan(self.on_robot.next())
+        return super().pick(evaluation) if self.on_robot is None else self.plan(self.on_robot.next())
 
     def learn(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
         """Data at first; then the fitness of one controller."""

@@ -87,7 +87,7 @@ class Transferability(Physical):
         evolver, front = self.pareto, np.flatnonzero(self.pareto.fronts == 0)
         seen = behaviours(evolver.paths[front], evolver.population.lengths[front])
         furthest = front[self.archive.distances(seen).min(axis=1).argmax()]
-        return self.simulator.plan(evolver.population.controller(int(furthest)))
+        return self.plan(evolver.population.controller(int(furthest)))
 
     def learn(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
         """Step 3."""

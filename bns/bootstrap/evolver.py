@@ -60,6 +60,10 @@ class Evolver:
         """The best controller in simulation."""
         return self.population.controller(int(self.order[0]))
 
+    def plan(self, controller: np.ndarray, simulator: Simulator, generation: int | None = None) -> np.ndarray:
+        """What is driven of a controller of this generation, or of an earlier one: cut under the draws it was scored with."""
+        return simulator.plan(controller, RandomStream(self.key, self.generations if generation is None else generation))
+
     def evolve(self, simulator: Simulator) -> None:
         """Score the population on a new simulator, then breed and score generation after generation."""
         self.history.clear()

@@ -135,13 +135,13 @@ class Recorder:
         """Controller, path in the world and in simulation. A robot drives only what was picked: that one stands in."""
         if self._once:
             return self._path
-        fittest = approach.simulator.plan(approach.fittest())
+        fittest = approach.plan(approach.fittest())
         poses = self._drive(fittest, Purpose.WORLD_FITTEST, evaluation)
         return fittest, poses, approach.simulator.poses(fittest)
 
     def _record_full(self, evaluation: int, approach: Approach) -> None:
         for generation in approach.history:
-            best = approach.simulator.plan(generation.best)
+            best = approach.plan(generation.best, generation.number)
             driven = self._drive(best, Purpose.WORLD_GENERATION, generation.number)
             self._generations.add(
                 evaluation=evaluation,

@@ -31,8 +31,8 @@ class Simulator(Protocol):
     ) -> Scores:
         """Fitness of every controller; stream and parents as in `bns.robots.base.Fitness.score`."""
 
-    def plan(self, controller: np.ndarray) -> np.ndarray:
-        """The commands (m, components) that are driven when this controller is picked."""
+    def plan(self, controller: np.ndarray, stream: RandomStream | None = None) -> np.ndarray:
+        """The commands (m, components) that are driven when this controller is picked; stream: the draws it was scored with."""
 
     def poses(self, commands: np.ndarray) -> np.ndarray:
         """Poses (n, columns) after each of these commands (n, components)."""
@@ -53,9 +53,9 @@ class NetworkSimulator:
         """By the robot's own compiled kernels."""
         return self.robot.score(population, self.weights, self.task, stream, parents)
 
-    def plan(self, controller: np.ndarray) -> np.ndarray:
+    def plan(self, controller: np.ndarray, stream: RandomStream | None = None) -> np.ndarray:
         """As the robot plans with networks."""
-        return self.robot.plan(controller, self.weights, self.task)
+        return self.robot.plan(controller, self.weights, self.task, stream)
 
     def poses(self, commands: np.ndarray) -> np.ndarray:
         """One command's displacement after the other."""
@@ -93,7 +93,7 @@ class PhysicsSimulator:
         sides = (np.where(there, values.reshape(there.shape), 0.0) for values in (left, right, duration))
         return simulate(replace(self.model, dt_s=STEP_S), *sides, start=self.robot.start_pose()[0])
 
-    def plan(self, controller: np.ndarray) -> np.ndarray:
+    def plan(self, controller: np.ndarray, stream: RandomStream | None = None) -> np.ndarray:
         """A controller is driven as it is."""
         return self.robot.plan(controller, None, self.task)
 
@@ -117,7 +117,7 @@ class NoSimulator:
         n = len(population)
         return Scores(np.zeros(n), np.zeros(n, np.int32), 0)
 
-    def plan(self, controller: np.ndarray) -> np.ndarray:
+    def plan(self, controller: np.ndarray, stream: RandomStream | None = None) -> np.ndarray:
         """All of its commands: nothing says how many the task needs."""
         return self.robot.plan(controller, None, self.task)
 

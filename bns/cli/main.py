@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bns import __version__
+from bns.cli import calibrate as calibrating
 from bns.cli import diagnose as measuring
 from bns.cli import examples as listing
 from bns.cli import report as reporting
@@ -93,6 +94,7 @@ def _parser() -> Parser:
     measuring.add_commands(command)
     reporting.add_commands(command)
     simulating.add_commands(command)
+    calibrating.add_commands(command)
     listing.add_commands(command)
     return parser
 

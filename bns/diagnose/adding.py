@@ -77,6 +77,7 @@ def add_effects(
             raise ModelError(
                 f"The model {model.name} has {effect.name} already; it is refitted whenever something is added."
             )
+    effects = [(effect.scaled(model.wheelbase_m), written) for effect, written in effects]
     first = problem_for(predictor, model).pose_filter
     steps = [_step(predictor, model, effects[: k + 1], per_trial) for k in range(len(effects))]
     judged = [

@@ -12,11 +12,10 @@ from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
+from bns.diagnose.settings import DEFAULTS
 
-MOST_EFFECTS = 6
-"""Effects that a selection accepts at most: beyond, each one mends what the others left of a seventh."""
-NOTABLE = 0.01
-"""An effect that would have earned this share of the loss, but is rejected, is mentioned."""
+MOST_EFFECTS = DEFAULTS.select.most_effects
+NOTABLE = DEFAULTS.verdict.notable
 
 
 def notes_on(

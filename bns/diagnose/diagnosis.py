@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +10,9 @@ import numpy as np
 
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import Tracks
+from bns.diagnose.estimate.calibration import calibrated
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
+from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.significance import fewest_trials
@@ -24,14 +26,14 @@ from bns.diagnose.residuals.unexplained import Unexplained, unexplained
 from bns.diagnose.select.equivalents import equivalent_pairs
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
+from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import before_and_after, dependence_values, numbers_of, ranked_values, ties_of
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
 VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
-FEW_TRIALS = 40
-_HINT = 3.0
-"""A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
+FEW_TRIALS = DEFAULTS.verdict.few_trials
+_HINT = DEFAULTS.verdict.hint
 
 
 WITH_EFFECTS = "with the effects"
@@ -52,6 +54,8 @@ class Diagnosis:
     errors: PairedErrors | None = None
     """Of the model as given and, where effects were accepted, of the model with them: on trials held out."""
     notes: tuple[str, ...] = ()
+    calibration: Fit | None = None
+    """Of single relative motions: all numbers of robot and sensor fitted together (`calibrated`)."""
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -80,6 +84,7 @@ class Diagnosis:
             "residual_dependence": [dependence_values(p) for p in self.residual_dependence],
             "outliers": [vars(o) for o in self.rest.outliers],
             "notes": list(self.notes),
+            "calibration": numbers_of(self.calibration) if self.calibration else {},
         }
 
     def _formula(self) -> dict[str, Any] | None:
@@ -103,9 +108,13 @@ def diagnose(
     *,
     extra: Mapping[str, Effect] | None = None,
     tick: Callable[[str], None] = lambda _: None,
+    barred: Collection[str] = (),
 ) -> Diagnosis:
-    """What the model lacks on these tracks. A set of effects with which the held-out error does not fall is withdrawn."""
-    search = StepwiseSelection(predictor, model, extra, tick)
+    """What the model lacks on these tracks, effects named in ``barred`` aside.
+
+    A set of effects with which the held-out error does not fall is withdrawn.
+    """
+    search = StepwiseSelection(predictor, model, extra, tick, barred)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
@@ -133,7 +142,9 @@ def diagnose(
     verdict = _verdict(selection, rest.any, hint)
     tick("longer explanations")
     others = [
-        effect for name, effect in listed(selection.nominal.model, extra).items() if name not in selection.accepted
+        effect
+        for name, effect in listed(selection.nominal.model, extra, predictor.tracks, barred).items()
+        if name not in selection.accepted
     ]
     pairs = [] if rest.any else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
     return Diagnosis(
@@ -144,6 +155,7 @@ def diagnose(
         formula,
         errors,
         tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, imitating)),
+        calibrated(predictor, model, barred),
     )
 
 

@@ -18,6 +18,7 @@ from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_after
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
 from bns.physics.order import FORMULAS
 from bns.physics.signals import Body
@@ -27,16 +28,11 @@ SHARE = "share_of_motion"
 CHANNELS = ("forward_m_s", "sideways_m_s", "yaw_rad_s", SHARE)
 WORLD = ("east_m_s", "north_m_s")
 """Velocities in the world's frame, for what a place does to the robot."""
-KNOTS = 5
-"""Bends of a free curve: at these many quantiles of the variable."""
-FIELD = 5
-"""A field over the floor has so many bumps a side."""
-PENALTIES = (1.0, 30.0)
-"""How strongly curves are drawn to zero, in expected squares of the standardised curve; the better one counts."""
-CHANCE = 0.02
-"""Chance of any false alarm over all variables and channels."""
-LEAST = 0.0015
-"""Least gain that counts, as a share of the loss."""
+KNOTS = DEFAULTS.residuals.knots
+FIELD = DEFAULTS.residuals.field_bumps
+PENALTIES = DEFAULTS.residuals.penalties
+CHANCE = DEFAULTS.residuals.chance
+LEAST = DEFAULTS.residuals.least
 
 
 @dataclass(frozen=True)
@@ -52,7 +48,7 @@ class ResidualDependence:
 def residual_dependence(problem: Problem, fit: Fit) -> list[ResidualDependence]:
     """Every variable with every velocity, the best first."""
     variables = problem.predictor.variables()
-    headings, usual = variables["heading_rad"], float(fit.losses.mean())
+    headings, usual = variables.get("heading_rad"), float(fit.losses.mean())
 
     def compare_clocks(tried: tuple[str, list[Array], str]) -> ResidualDependence:
         variable, basis, channel = tried
@@ -101,7 +97,7 @@ def _bumps(x: Array, y: Array, side: int) -> list[Array]:
     ]
 
 
-def probe_effect(channel: str, curve: Array, heading_rad: Array) -> Effect:
+def probe_effect(channel: str, curve: Array, heading_rad: Array | None) -> Effect:
     """An effect that adds ``size`` times a curve (trials, steps) to one velocity while the robot moves, or to all as a share."""
 
     def apply(body: Body, size: float) -> Body:
@@ -109,6 +105,7 @@ def probe_effect(channel: str, curve: Array, heading_rad: Array) -> Effect:
             return body.scaled(1 + size * curve)
         added = size * curve * body.moving
         if channel in WORLD:
+            assert heading_rad is not None  # a field over the floor comes of places
             return body.with_drift(channel.removesuffix("_m_s"), added, heading_rad)
         return body.with_added(channel, added)
 
@@ -133,7 +130,7 @@ def flexible_columns(problem: Problem, fit: Fit, variable: str, channel: str, *,
     basis = next(functions for name, functions in curves(variables) if name == variable)
     if centred:
         basis = [function - function.mean() for function in basis]
-    return _columns(problem, fit, channel, basis, variables["heading_rad"])
+    return _columns(problem, fit, channel, basis, variables.get("heading_rad"))
 
 
 def losses_with_columns(problem: Problem, fit: Fit, columns: Array) -> Array:
@@ -144,7 +141,7 @@ def losses_with_columns(problem: Problem, fit: Fit, columns: Array) -> Array:
     return min(tried, key=lambda losses: float(losses.sum()))
 
 
-def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array) -> Array:
+def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array | None) -> Array:
     """Change of the whitened innovations a unit of each basis function, (frames, 3, k)."""
     small = 1e-3 if channel in {"yaw_rad_s", SHARE} else 1e-4
     out = np.empty((*fit.whitened.shape, len(basis)))

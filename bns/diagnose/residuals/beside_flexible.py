@@ -17,11 +17,10 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.significance import MIN_Z, paired_elpd_diff
 from bns.diagnose.residuals.along_variables import ResidualDependence, flexible_columns, losses_with_columns
+from bns.diagnose.settings import DEFAULTS
 
-TERMS = 2
-"""Flexible terms put beside the effects at most, each along another variable: two fields have 50 numbers, as many as trials."""
-MAJORITY_CHANCE = 0.05
-"""An effect that acts everywhere helps more than half of the trials; by luck alone so many are helped with this chance."""
+TERMS = DEFAULTS.residuals.flexible_terms
+MAJORITY_CHANCE = DEFAULTS.residuals.majority_chance
 
 
 def surviving(
