@@ -147,29 +147,35 @@ def with_version(path, version):
     table = pq.read_table(path, partitioning=None)
     known = json.loads(table.schema.metadata[b"bns"])
     text = json.dumps({name: known[name] for name in OLD_KEYS} | {"schema_version": version}).encode()
+    if version < 2:
+        table = table.drop_columns([name for name in ("approach", "robot_s") if name in table.column_names])
     if version == 0 and "arithmetic_failures" in table.column_names:
         table = table.drop_columns(["arithmetic_failures"])
     pq.write_table(table.replace_schema_metadata({b"bns": text}), path)
 
 
-def test_older_files_name_the_command_that_rewrites_them(store):
-    before = load(store).assign(arithmetic_failures=0)
+@pytest.mark.parametrize("version", [0, 1])
+def test_older_files_name_the_command_that_rewrites_them(store, version):
+    stored = load(store)
+    driven_s = stored.groupby("run_id").driven_ms.cumsum() / 1000 + 30 * stored.evaluation
+    old = stored.run_id.isin(ids_in(files(store, "evals")[0]))
+    before = stored.assign(robot_s=stored.robot_s.where(~old, driven_s))
+    if version == 0:
+        before.loc[old, "arithmetic_failures"] = 0
     for table in ("evals", "runs"):
-        with_version(files(store, table)[0], 0)
+        with_version(files(store, table)[0], version)
     for read in (load, connect, lambda results: finished(results, "s")):
-        with pytest.raises(StoreError, match=rf"version 0, older than 1.* bns compact --results {store}"):
+        with pytest.raises(StoreError, match=rf"version {version}, older than 2.* bns compact --results {store}"):
             read(store)
     assert compact(store).upgraded_files == 2
-    after = load(store)
-    old = after["arithmetic_failures"] == 0
-    assert old.sum() >= 9
-    pdt.assert_frame_equal(after.assign(arithmetic_failures=0), before, check_dtype=False)
+    assert old.sum() == 9
+    pdt.assert_frame_equal(load(store), before, check_dtype=False)
 
 
 def test_newer_files_name_the_update(store):
-    with_version(files(store, "evals")[1], 2)
+    with_version(files(store, "evals")[1], 3)
     for read in (load, compact):
-        with pytest.raises(StoreError, match=r"schema version 2, newer than 1.* pip install -U bns"):
+        with pytest.raises(StoreError, match=r"schema version 3, newer than 2.* pip install -U bns"):
             read(store)
 
 
