@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -84,6 +85,21 @@ class Measurements(Shown):
     def measured(self) -> Measured:
         """The same for the library's own functions: tracks as arrays, findings, digest."""
         return self._measured
+
+    def without(self, trials: Iterable[str]) -> Measurements:
+        """The same measurements without some trials, by their names. DataError if there is no such trial, or none is left."""
+        left_out, table = set(map(str, trials)), self._measured.table
+        of = table["trial"].astype(str)
+        unknown = sorted(left_out - set(of))
+        if unknown:
+            raise DataError(f"There is no trial {', '.join(unknown)}; there are {', '.join(dict.fromkeys(of))}.")
+        if not left_out:
+            return self
+        if set(of) <= left_out:
+            raise DataError("All trials are left out; keep at least one.")
+        fewer = copy(self)
+        fewer.__dict__ = {"_measured": measured_table(table[~of.isin(left_out)], self._measured.path)}
+        return fewer
 
     @cached_property
     def sha256(self) -> str:

@@ -1,0 +1,53 @@
+"""Widgets that every screen has: panes with the page's style, messages beside fields, buttons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import resources
+from typing import Any
+
+import panel as pn
+
+from bns.app.html import message
+
+CSS = (resources.files("bns.app") / "style.css").read_text(encoding="utf-8")
+WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
+
+
+def html(text: str = "", **more: Any) -> Any:
+    """A pane of HTML that was put together by `bns.app.html`, which escapes."""
+    return pn.pane.HTML(text, stylesheets=[CSS], **{**WIDE, "margin": (4, 8), **more})
+
+
+def heading(text: str) -> Any:
+    """Of a part of a screen."""
+    return html(f"<h2 style='font-size:17px;margin:4px 0'>{text}</h2>")
+
+
+def button(name: str, clicked: Callable[[], object], kind: str = "default", **more: Any) -> Any:
+    """A button that does something."""
+    made = pn.widgets.Button(name=name, button_type=kind, width=None, **more)
+    made.on_click(lambda _event: clicked())
+    return made
+
+
+def drawn(figure: Any) -> Any:
+    """A Bokeh figure that takes the width there is."""
+    return pn.pane.Bokeh(figure, **WIDE)
+
+
+def beside(*parts: Any, least: int = 300) -> Any:
+    """Parts next to each other where there is room, below each other where there is none."""
+    cells = [pn.Column(part, styles={"flex": f"1 1 {least}px", "min-width": f"min({least}px, 100%)"}) for part in parts]
+    return pn.FlexBox(*cells, flex_wrap="wrap", gap="8px", **WIDE)
+
+
+class Problem:
+    """Where the library's message stands, beside the field that it is about."""
+
+    def __init__(self) -> None:
+        self.view = html()
+
+    def show(self, text: str) -> None:
+        """The message; "" takes it away."""
+        self.view.object = message(text)
