@@ -18,6 +18,7 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.cycles import CycleTracks
 from bns.diagnose.data.load import Measured, load_measured, measured_table, read_table, table_sha256
 from bns.diagnose.data.mapping import checked_mapping, load_mapping
+from bns.diagnose.predict.check_robot import suggested_wheelbase_m
 from bns.diagnose.report.text import findings_text
 from bns.errors import DataError
 from bns.plotting.style import OKABE_ITO
@@ -100,6 +101,12 @@ class Measurements(Shown):
         fewer = copy(self)
         fewer.__dict__ = {"_measured": measured_table(table[~of.isin(left_out)], self._measured.path)}
         return fewer
+
+    @cached_property
+    def suggested_wheelbase_m(self) -> float | None:
+        """The distance of the wheels (m) with which a plain drive turns as this robot did; None where nothing tells."""
+        tracks = self._measured.tracks
+        return None if isinstance(tracks, CycleTracks) else suggested_wheelbase_m(tracks)
 
     @cached_property
     def sha256(self) -> str:

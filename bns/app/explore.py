@@ -31,7 +31,9 @@ class Explorer:
 
     def start(self, browser: bool = True) -> Explorer:
         """Answer in the background, as notebooks need it."""
-        self._thread: Any = threading.Thread(target=self._server.serve, args=(browser,), name="bns-explore", daemon=True)
+        self._thread: Any = threading.Thread(
+            target=self._server.serve, args=(browser,), name="bns-explore", daemon=True
+        )
         self._thread.start()
         return self
 

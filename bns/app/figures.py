@@ -80,7 +80,9 @@ class LadderFigure:
 
     def __init__(self) -> None:
         self.source = ColumnDataSource({"name": [], "error": [], "low": [], "high": []})
-        self.figure = _figure("", "", "position error (mm)", height=240, x_range=FactorRange(), y_range=(0, 1), tools="hover,reset")
+        self.figure = _figure(
+            "", "", "position error (mm)", height=240, x_range=FactorRange(), y_range=(0, 1), tools="hover,reset"
+        )
         self.figure.scatter("name", "error", source=self.source, size=11, color=BLUE)
         self.figure.line("name", "error", source=self.source, color=BLUE)
         self.figure.add_layout(
@@ -96,7 +98,9 @@ class LadderFigure:
         self.figure.x_range.factors = names
         values = {key: [1e3 * getattr(m, f"{key}_m") for m in e.models] for key in ("rms", "low", "high")}
         self.source.data = {"name": names, "error": values["rms"], "low": values["low"], "high": values["high"]}
-        self.figure.y_range.end = 1.1 * max([v for v in (*values["rms"], *values["high"]) if np.isfinite(v)], default=1.0)
+        self.figure.y_range.end = 1.1 * max(
+            [v for v in (*values["rms"], *values["high"]) if np.isfinite(v)], default=1.0
+        )
         self._noise.location = 1e3 * e.noise_floor_m if np.isfinite(e.noise_floor_m) else 0
         self.figure.title.text = "Error and its 95 % interval; dotted: noise of the tracking"
 
@@ -147,7 +151,9 @@ class WindowFigures:
         self.time = self._scatter("Over time", "time in the trial (s)", "t_s")
         self.along = self._scatter("Along a variable", "", "along")
         self.trial = self._scatter("By trial", "trial, by number from 0", "number")
-        self.floor = _figure("On the floor: the larger, the worse", "x, east (m)", "y, north (m)", tools=_TOOLS, **_FLOOR)
+        self.floor = _figure(
+            "On the floor: the larger, the worse", "x, east (m)", "y, north (m)", tools=_TOOLS, **_FLOOR
+        )
         self._dots(self.floor, "x_m", "y_m", "size")
         self.all = (self.time, self.along, self.trial, self.floor)
 
@@ -168,7 +174,9 @@ class WindowFigures:
 
     def fill(self, table: Any, variable: str, noise_floor_m: float) -> None:
         """``table``: the windows, a row each, of `Workbench.windows`."""
-        columns = {name: table[name].to_numpy() for name in ("t_s", "number", "error_mm", "x_m", "y_m", "trial", "from_s")}
+        columns = {
+            name: table[name].to_numpy() for name in ("t_s", "number", "error_mm", "x_m", "y_m", "trial", "from_s")
+        }
         largest = max(float(columns["error_mm"].max()), 1e-9) if len(table) else 1.0
         size = 4 + 14 * columns["error_mm"] / largest
         self.source.selected.indices = []

@@ -59,7 +59,9 @@ class _Checked(HTTPMessageDelegate):
         if self._guard.lets_in(path, headers):
             return self._inner.headers_received(start_line, headers)
         self._refused = True
-        answer = HTTPHeaders({"Content-Length": str(len(_REFUSED)), "Content-Type": "text/plain", "Connection": "close"})
+        answer = HTTPHeaders(
+            {"Content-Length": str(len(_REFUSED)), "Content-Type": "text/plain", "Connection": "close"}
+        )
         self._connection.write_headers(ResponseStartLine("HTTP/1.1", 403, "Forbidden"), answer, _REFUSED)
         self._connection.finish()
         return None

@@ -20,7 +20,9 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = 
     """A table that scrolls sideways by itself; the first cell of a row is its heading."""
     head = "".join(f'<th scope="col">{escape(str(c))}</th>' for c in columns)
     body = "".join(
-        f'<tr><th scope="row">{escape(str(row[0]))}</th>' + "".join(f"<td>{escape(str(v))}</td>" for v in row[1:]) + "</tr>"
+        f'<tr><th scope="row">{escape(str(row[0]))}</th>'
+        + "".join(f"<td>{escape(str(v))}</td>" for v in row[1:])
+        + "</tr>"
         for row in rows
     )
     title = f"<caption>{escape(caption)}</caption>" if caption else ""
@@ -67,8 +69,7 @@ def mm(metres: float) -> str:
 def effect_text(effect: Effect, badges: Sequence[str], numbers: Mapping[str, Mapping[str, Any]], alone: str) -> str:
     """What an effect is, what it looks like, its fitted numbers, what it earns alone, and what to beware of."""
     fitted = "".join(
-        f"<br><b>{escape(name)}</b> = {n['value']:.5g} {escape(n['unit'])} "
-        f"({' '.join(filter(None, _interval(n)))})"
+        f"<br><b>{escape(name)}</b> = {n['value']:.5g} {escape(n['unit'])} ({' '.join(filter(None, _interval(n)))})"
         for name, n in numbers.items()
         if n["value"] is not None
     )

@@ -8,7 +8,11 @@ import panel as pn
 
 from bns.app.jobs import Jobs
 from bns.app.parts import CSS, WIDE, html
+from bns.app.screens.data import DataScreen
 from bns.app.screens.effects import EffectsScreen
+from bns.app.screens.model import ModelScreen
+from bns.app.screens.next import NextScreen
+from bns.app.screens.where import WhereScreen
 from bns.app.tab import Tab, Tabs
 
 TITLE = "bns explore"
@@ -36,9 +40,22 @@ class Screens:
     def __init__(self, tab: Tab, name: str) -> None:
         self._said = html('<p class="bns-say" role="status"></p>')
         self._jobs = Jobs(pn.state.curdoc, self._say)
-        self._screens = {"Effects": EffectsScreen(tab, self._jobs)}
+        self._screens: dict[str, Any] = {
+            "Data": DataScreen(tab, self._jobs),
+            "Model": ModelScreen(tab, self._jobs),
+            "Where it fails": WhereScreen(tab, self._jobs),
+            "Effects": EffectsScreen(tab, self._jobs),
+            "Next": NextScreen(tab, self._jobs),
+        }
         names = list(self._screens)
-        self._chosen = pn.widgets.RadioButtonGroup(name="Screen", options=names, value=names[0], button_type="primary", button_style="outline", **WIDE)
+        self._chosen = pn.widgets.RadioButtonGroup(
+            name="Screen",
+            options=names,
+            value="Effects" if tab.bench else names[0],
+            button_type="primary",
+            button_style="outline",
+            **WIDE,
+        )
         self._chosen.param.watch(lambda event: self._enter(event.new), "value")
         self._shown = pn.Column(**WIDE)
         self.view = pn.Column(self._chosen, self._said, self._shown, **WIDE)

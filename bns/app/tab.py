@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from bns.api.compare import CompareResult, compare
+from bns.api.diagnose import diagnose
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model, as_model
 from bns.app.background import Background
@@ -22,6 +23,7 @@ from bns.diagnose.data.load import read_table
 from bns.errors import DataError, ModelError
 
 FIRST_MODEL = "khepera"
+_LONGEST_S = 600.0
 MOST_TABS = 16
 """Tabs whose state is kept; the one that was looked at longest ago goes first."""
 
@@ -95,6 +97,14 @@ class Tab:
         if key not in self._compared:
             self._compared[key] = compare(self.bench.ready.log, model)
         return self._compared[key]
+
+    def report(self, path: Path) -> bytes:
+        """The page of `bns report`, written to ``path``: of the diagnosis that is there, else of a new one."""
+        assert self.bench is not None
+        if self.diagnosis.result is None:
+            self.diagnosis.wait(_LONGEST_S)
+        found = self.diagnosis.result or diagnose(self.bench.ready.log, self.model)
+        return found.report(path).path.read_bytes()
 
     def _lay_on(self) -> None:
         """Log and model on the bench, all switches off; why that cannot be is kept in words."""

@@ -178,4 +178,3 @@ def _guessed(model: Model, moved: set[str]) -> Model:
         replace(a, basis="guess", reason=reason, intervals={}) if a.effect.name in moved else a for a in model.effects
     )
     return Model(model, effects=effects)
-

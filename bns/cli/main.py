@@ -13,6 +13,7 @@ from pathlib import Path
 from bns import __version__
 from bns.cli import diagnose as measuring
 from bns.cli import examples as listing
+from bns.cli import explore as exploring
 from bns.cli import report as reporting
 from bns.cli import results as looking
 from bns.cli import simulators as simulating
@@ -93,6 +94,7 @@ def _parser() -> Parser:
     measuring.add_commands(command)
     reporting.add_commands(command)
     simulating.add_commands(command)
+    exploring.add_commands(command)
     listing.add_commands(command)
     return parser
 

@@ -16,16 +16,15 @@ _EVERY_MS = 500
 
 
 class DiagnosisPart:
-    """``found``: called when there is something new to show."""
+    """``found``: called when there is something new to show; ``switch_on``: with the effects that were found."""
 
-    def __init__(self, tab: Tab, found: Callable[[], None]) -> None:
-        self._tab, self._found = tab, found
+    def __init__(self, tab: Tab, found: Callable[[], None], switch_on: Callable[[tuple[str, ...]], None]) -> None:
+        self._tab, self._found, self._switch_to = tab, found, switch_on
         self._said = html()
         self._begin = button("Diagnose in the background", self._start, "primary")
         self._stop = button("Stop", self._end)
         self._switch_on = button("Switch on what it found", self._take)
         self._clock: Any = None
-        self.take: Callable[[tuple[str, ...]], None] = lambda _names: None
         buttons = pn.FlexBox(self._begin, self._stop, self._switch_on)
         self.view = pn.Column(heading("What is missing?"), buttons, self._said, **WIDE)
 
@@ -63,7 +62,7 @@ class DiagnosisPart:
     def _take(self) -> None:
         result = self._tab.diagnosis.result
         if result is not None:
-            self.take(result.effects)
+            self._switch_to(result.effects)
 
     def _look(self) -> None:
         work = self._tab.diagnosis

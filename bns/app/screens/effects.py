@@ -39,7 +39,7 @@ class EffectsScreen:
         self._horizon = pn.widgets.Select(name="Error how far ahead", options=["1s"], width=160)
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
         self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
-        self._diagnosis = DiagnosisPart(tab, self._refresh_effects)
+        self._diagnosis = DiagnosisPart(tab, self._refresh_effects, self._switch_to)
         self._name = pn.widgets.TextInput(name="Name", value="mine", width=110)
         self._term = pn.widgets.TextInput(name="Formula", placeholder="k * v * abs(w)", width=220)
         self._on = pn.widgets.Select(name="Added to", options=list(ON), width=90)
@@ -90,6 +90,13 @@ class EffectsScreen:
         if on != (name in self._tab.now.on):
             self._tab.history.to(self._tab.now.switched(name, on))
             self.update()
+
+    def _switch_to(self, names: tuple[str, ...]) -> None:
+        state = self._tab.now
+        for name in names:
+            state = state if name in state.on else state.switched(name, True)
+        self._tab.history.to(state)
+        self.update()
 
     def _show_if_current(self, shown: Shown) -> None:
         if shown.switches.on == self._tab.now.on and not self._tab.now.by_hand:
@@ -147,7 +154,9 @@ class EffectsScreen:
     def _refresh_effects(self) -> None:
         if self._shown is not None:
             for each in self._effects.values():
-                each.refresh(self._shown, self._diagnosis.alone(each.effect.name), self._diagnosis.ties(each.effect.name))
+                each.refresh(
+                    self._shown, self._diagnosis.alone(each.effect.name), self._diagnosis.ties(each.effect.name)
+                )
 
     def _sync_switches(self, state: Switches) -> None:
         for name, each in self._effects.items():
