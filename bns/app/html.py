@@ -69,7 +69,7 @@ def mm(metres: float) -> str:
 def effect_text(effect: Effect, badges: Sequence[str], numbers: Mapping[str, Mapping[str, Any]], alone: str) -> str:
     """What an effect is, what it looks like, its fitted numbers, what it earns alone, and what to beware of."""
     fitted = "".join(
-        f"<br><b>{escape(name)}</b> = {n['value']:.5g} {escape(n['unit'])} ({' '.join(filter(None, _interval(n)))})"
+        f"<br><b>{escape(name)}</b> = {n['value']:.5g} {escape(n['unit'])} ({_in_words(n)})"
         for name, n in numbers.items()
         if n["value"] is not None
     )
@@ -81,9 +81,10 @@ def effect_text(effect: Effect, badges: Sequence[str], numbers: Mapping[str, Map
     )
 
 
-def _interval(n: Mapping[str, Any]) -> tuple[str, str]:
+def _in_words(n: Mapping[str, Any]) -> str:
+    """A number with its 95 % interval, in units for people."""
     value, interval = figures_in_words(n["value"], n["low"], n["high"], n["unit"])
-    return value, f"; 95 %: {interval}" if interval else ""
+    return escape(f"{value}; 95 %: {interval}" if interval else value)
 
 
 def message(text: str) -> str:

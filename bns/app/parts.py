@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable
+from html import escape
 from importlib import resources
 from typing import Any
 
@@ -12,6 +14,7 @@ from bns.app.html import message
 
 CSS = (resources.files("bns.app") / "style.css").read_text(encoding="utf-8")
 WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
+_ON_TOP = "@media (max-width: 720px) { :host { order: -1; } }"
 
 
 def html(text: str = "", **more: Any) -> Any:
@@ -36,10 +39,17 @@ def drawn(figure: Any) -> Any:
     return pn.pane.Bokeh(figure, **WIDE)
 
 
-def beside(*parts: Any, least: int = 300) -> Any:
-    """Parts next to each other where there is room, below each other where there is none."""
-    cells = [pn.Column(part, styles={"flex": f"1 1 {least}px", "min-width": f"min({least}px, 100%)"}) for part in parts]
-    return pn.FlexBox(*cells, flex_wrap="wrap", gap="8px", **WIDE)
+def beside(*parts: Any, least: int = 300, first: Any = None) -> Any:
+    """Parts next to each other where there is room, below each other where there is none, ``first`` on top then."""
+    styles = {"flex": f"1 1 {least}px", "min-width": f"min({least}px, 100%)"}
+    cells = [pn.Column(part, styles=styles, stylesheets=[_ON_TOP] if part is first else [], **WIDE) for part in parts]
+    return pn.Row(*cells, styles={"flex-wrap": "wrap", "gap": "8px"}, **WIDE)
+
+
+def download(name: str, filename: str, content: bytes, kind: str) -> str:
+    """A link, as HTML, that saves ``content``: a real one, which the keyboard reaches as well."""
+    data = base64.b64encode(content).decode()
+    return f'<a class="bns-download" download="{escape(filename)}" href="data:{kind};base64,{data}">{escape(name)}</a>'
 
 
 class Problem:

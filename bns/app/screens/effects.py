@@ -235,7 +235,7 @@ class EffectsScreen:
             self._time,
             **WIDE,
         )
-        return pn.Column(self._problem.view, beside(left, right, least=330), **WIDE)
+        return pn.Column(self._problem.view, beside(left, right, least=330, first=right), **WIDE)
 
 
 def _on_change(widget: Any, what: str, act: Callable[[], object]) -> None:

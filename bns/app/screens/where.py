@@ -36,6 +36,7 @@ class WhereScreen:
         self._shown: Shown | None = None
         self._windows = pd.DataFrame()
         self._bench: Workbench | None = None
+        self._to_choose = True  # the variable that explains most is shown, until the user wants another
         for widget, act in (
             (self._which, self._begin),
             (self._horizon, self._fill),
@@ -61,7 +62,7 @@ class WhereScreen:
             names = list(bench.ready.predictor.tracks.names)
             self._trial.options = dict(zip(names, range(len(names)), strict=True))
             self._horizon.options, self._horizon.value = list(bench.horizons), bench.ready.predictor.near
-            self._variable.options = list(bench.ready.predictor.variables())
+            self._variable.options, self._to_choose = list(bench.ready.predictor.variables()), True
         self._begin()
 
     def _begin(self) -> None:
@@ -93,8 +94,8 @@ class WhereScreen:
         ]
         self._explained.object = table(["variable", "velocity", "share of loss", "p"], explained, "What a free curve along each variable would explain")  # fmt: skip
         best = [p.variable for p in comparison.residual_dependence if p.variable in self._variable.options]
-        if best and self._variable.value == self._variable.options[0]:
-            self._variable.value = best[0]
+        if best and self._to_choose:
+            self._to_choose, self._variable.value = False, best[0]
         self._worst.options = {
             f"trial {w.trial}, from {w.t_s:.2f} s: {1e3 * w.position_m:.1f} mm": (w.trial, w.t_s)
             for w in comparison.worst
