@@ -11,7 +11,7 @@ from bns.api.model import Given
 from bns.errors import BnsError
 
 
-class _Stopped(Exception):
+class _StoppedError(Exception):
     """Raised where the diagnosis tells what it is doing, when nobody wants to know any more."""
 
 
@@ -58,13 +58,13 @@ class Background:
     def _work(self, log: Log, model: Given) -> None:
         try:
             self.result = diagnose(log, model, progress=self._tick)
-        except _Stopped:
+        except _StoppedError:
             self.why = "stopped"
         except BnsError as fault:
             self.why = str(fault)
 
     def _tick(self, _share: float | None, text: str) -> None:
         if self._asked_to_stop.is_set():
-            raise _Stopped
+            raise _StoppedError
         self._doing = text
         self._looked_at += 1

@@ -13,7 +13,7 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.paired_errors import HorizonErrors
 from bns.plotting.style import BLUE, GREY, OKABE_ITO, RED
 
-_TOOLS = "pan,wheel_zoom,box_select,lasso_select,tap,reset"
+_TOOLS = "box_select,lasso_select,tap,pan,wheel_zoom,reset"
 _FLOOR = {"match_aspect": True, "aspect_scale": 1}
 _MOST_POINTS = 4000
 """More of a path no screen shows."""

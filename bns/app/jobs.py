@@ -31,6 +31,9 @@ class Jobs:
                     result = future.result()
                 except BnsError as fault:
                     failed(str(fault))
+                except Exception as fault:
+                    failed(f"This should not have happened: {type(fault).__name__}: {fault}")
+                    raise
                 else:
                     done(result)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 import panel as pn
@@ -72,4 +73,4 @@ class Screens:
         screen.enter()
 
     def _say(self, text: str) -> None:
-        self._said.object = f'<p class="bns-say" role="status">{text}{" …" if text else ""}</p>'
+        self._said.object = f'<p class="bns-say" role="status">{escape(text)}{" …" if text else ""}</p>'

@@ -5,14 +5,18 @@ from __future__ import annotations
 import asyncio
 import secrets
 import signal
+import socket
 import threading
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
+
+from panel.io.server import get_server
+from tornado.ioloop import IOLoop
 
 from bns.app.guard import LOOPBACK, Guard
 from bns.errors import BnsError
-from bns.extras import extra
 
 LARGEST_UPLOAD = 1 << 29
 """Bytes of one message of the browser: a log of a million poses as text is about 100 MB."""
@@ -22,31 +26,24 @@ _ENDING = (signal.SIGINT, signal.SIGTERM)
 class PageServer:
     """Serves pages that ``page`` makes, one for every tab, until it is stopped.
 
-    ``port`` 0: any that is free. BnsError if the port is taken; MissingExtraError without Panel.
+    ``port`` 0: any that is free. BnsError if the port is taken.
     """
 
     def __init__(self, page: Callable[[], Any], port: int = 0) -> None:
-        with extra("app"):
-            from panel.io.server import get_server  # noqa: PLC0415  # takes seconds, and not everybody has it
-
+        _check_free(port)
         self._loop = asyncio.new_event_loop()
         asyncio.set_event_loop(self._loop)
         self.token = secrets.token_urlsafe(16)
-        try:
-            self._server = get_server(
-                {"/": page},
-                port=port,
-                address=LOOPBACK,
-                title="bns explore",
-                prefix=self.token,
-                use_xheaders=False,
-                websocket_max_message_size=LARGEST_UPLOAD,
-                loop=_current_loop(),
-            )
-        except OSError as fault:
-            raise BnsError(
-                f"Port {port} of this machine cannot be had ({fault.strerror}); give another one: --port N."
-            ) from fault
+        self._server = get_server(
+            {"/": page},
+            port=port,
+            address=LOOPBACK,
+            title="bns explore",
+            prefix=self.token,
+            use_xheaders=False,
+            websocket_max_message_size=LARGEST_UPLOAD,
+            loop=IOLoop.current(),
+        )
         self.port = int(self._server.port)
         http = self._server._http  # Bokeh has no public way to stand before its handlers
         application: Any = http.request_callback
@@ -63,12 +60,15 @@ class PageServer:
         asyncio.set_event_loop(self._loop)
         self._server.start()
         if threading.current_thread() is threading.main_thread():
-            for ending in _ENDING:
-                self._loop.add_signal_handler(ending, self._loop.stop)
+            with suppress(NotImplementedError):  # on Windows Ctrl-C raises KeyboardInterrupt
+                for ending in _ENDING:
+                    self._loop.add_signal_handler(ending, self._loop.stop)
         if browser:
             self._loop.call_soon(webbrowser.open, self.address)
         try:
             self._loop.run_forever()
+        except KeyboardInterrupt:
+            pass
         finally:
             self._server.stop()
             self._loop.run_until_complete(self._loop.shutdown_asyncgens())
@@ -80,7 +80,13 @@ class PageServer:
             self._loop.call_soon_threadsafe(self._loop.stop)
 
 
-def _current_loop() -> Any:
-    from tornado.ioloop import IOLoop  # noqa: PLC0415  # comes with Panel
-
-    return IOLoop.current()
+def _check_free(port: int) -> None:
+    """BnsError if nobody can listen there."""
+    with socket.socket() as tried:
+        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            tried.bind((LOOPBACK, port))
+        except OSError as fault:
+            raise BnsError(
+                f"Port {port} of this machine cannot be had ({fault.strerror}); give another one: --port N."
+            ) from fault

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import secrets
+import shutil
 import tempfile
+import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,15 +46,16 @@ class Tab:
     history: History = field(default_factory=History)
     diagnosis: Background = field(default_factory=Background)
     why_no_bench: str = ""
-    _folder: tempfile.TemporaryDirectory[str] = field(
-        default_factory=lambda: tempfile.TemporaryDirectory(prefix="bns-explore-")
-    )
+    _folder: Path | None = None
     _compared: dict[Any, CompareResult] = field(default_factory=dict)
 
     @property
     def folder(self) -> Path:
         """Where uploaded files lie while the tab lives."""
-        return Path(self._folder.name)
+        if self._folder is None:
+            self._folder = Path(tempfile.mkdtemp(prefix="bns-explore-"))
+            weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+        return self._folder
 
     def open(self, log: Log, words: str, mapping: Mapping[str, Any] | None = None) -> None:
         """Another log; DataError if it cannot be used, and everything stays as it was."""

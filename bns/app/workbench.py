@@ -40,9 +40,9 @@ BY_HAND = "by hand"
 class Shown:
     """What the page shows of one state of the switches.
 
-    ``model``: with the effects, fitted, or its numbers moved by hand; ``steps``: what the models of the list of errors predict, as
-    they were judged: as given, with each effect in turn, by hand; ``numbers``: {effect: {parameter: value, low, high, unit, …}} as `bns add --json` has them; ``badges``:
-    effect -> what to beware of.
+    ``model``: with the effects, fitted, or its numbers moved by hand; ``steps``: what the models of the list of errors predict,
+    as they were judged: as given, with each effect in turn, by hand; ``numbers``: {effect: {parameter: {value, low, high, …}}}
+    as `bns add --json` has them; ``badges``: effect -> what to beware of.
     """
 
     switches: Switches

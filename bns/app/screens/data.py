@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -52,10 +53,11 @@ class DataScreen:
         if log is None:
             self._said.object = "<p>Nothing is open yet.</p>"
             return
-        self._said.object = f"<p id='bns-log'><b>{log.summary().splitlines()[0].strip('<>')}</b></p>"
+        self._said.object = f"<p id='bns-log'><b>{escape(log.summary().splitlines()[0])}</b></p>"
         rows = [[f.trial, f.row, f.text] for f in log.measured.findings[:MOST_FINDINGS]]
         more = f" (the first {MOST_FINDINGS})" if len(log.measured.findings) > MOST_FINDINGS else ""
-        self._findings.object = table(["trial", "row", "what"], rows, f"What is odd{more}", "bns-findings") if rows else "<p>Nothing odd in the data.</p>"  # fmt: skip
+        findings = table(["trial", "row", "what"], rows, f"What is odd{more}", "bns-findings")
+        self._findings.object = findings if rows else "<p>Nothing odd in the data.</p>"
         names = [str(n) for n in log.trials["trial"]]
         self._left_out.options, self._left_out.value = names, list(self._tab.left_out)
         self._draw()
@@ -145,9 +147,7 @@ class DataScreen:
             button("Open the sample", self._open_sample, "primary"),
             self._path,
             button("Open the file", self._open_path),
-            html(
-                "<p>Or drop files on the button: logs (.csv, .parquet), with the mapping FILE.import.yaml where one belongs to it.</p>"
-            ),
+            html("<p>Or drop files on the button: logs (.csv, .parquet), and FILE.import.yaml where one has it.</p>"),
             self._file,
             self._problem.view,
             self._map,

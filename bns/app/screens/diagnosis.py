@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import escape
 from typing import Any
 
 import panel as pn
@@ -70,13 +71,13 @@ class DiagnosisPart:
         result = work.result
         self._switch_on.disabled = result is None or not result.effects
         if work.at_work:
-            self._said.object = f"<p>{work.progress}</p>"
+            self._said.object = f"<p>{escape(work.progress)}</p>"
             return
         if self._clock is not None:
             self._clock.stop()
             self._clock = None
         if result is not None:
-            self._said.object = f"<p><b>{headline(result.diagnosis)}</b> {certainty(result.diagnosis)}</p>"
+            self._said.object = f"<p id='bns-verdict'><b>{escape(headline(result.diagnosis))}</b> {escape(certainty(result.diagnosis))}</p>"
         else:
             self._said.object = message(work.why)
         self._found()

@@ -121,12 +121,14 @@ class EffectsScreen:
         bench, shown = self._tab.bench, self._shown
         if bench is None or shown is None or self._trial.value is None:
             return
-        t_s, measured = bench.measured(self._trial.value)
+        number = self._trial.value
+        t_s, measured = bench.measured(number)
+        trial = f"Trial {bench.ready.predictor.tracks.names[number]}"
         for picture, steps, name in (
             (self._before, shown.steps[0], "as given"),
             (self._after, shown.steps[-1], shown.names[-1] if len(shown.names) > 1 else "now: nothing added"),
         ):
-            picture.fill(f"Trial {bench.ready.predictor.tracks.names[self._trial.value]}: {name}", t_s, measured, bench.path(steps, self._trial.value))  # fmt: skip
+            picture.fill(f"{trial}: {name}", t_s, measured, bench.path(steps, number))
         if len(t_s) and t_s[-1] > 0:
             self._time.end = float(t_s[-1])
         self._show_time()

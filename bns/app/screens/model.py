@@ -25,7 +25,9 @@ class ModelScreen:
         self._name = pn.widgets.Select(name="A robot of the catalogue", options=model_names(), **WIDE)
         self._path = pn.widgets.TextInput(name="Or a model file of this machine", placeholder="mine.yaml", **WIDE)
         self._file = pn.widgets.FileInput(name="Or drop a model file", accept=".yaml,.yml")
-        self._wheelbase = pn.widgets.FloatInput(name="Or a differential drive: wheelbase (m)", value=0.1, start=0.001, end=10, step=0.001, **WIDE)  # fmt: skip
+        self._wheelbase = pn.widgets.FloatInput(
+            name="Or a differential drive: wheelbase (m)", value=0.1, start=0.001, end=10, step=0.001, **WIDE
+        )
         self._suggestion = html()
         self._file.param.watch(lambda _event: self._take_uploaded(), "value")
         left = pn.Column(

@@ -26,7 +26,9 @@ class OneEffect:
         self.effect, self._move, self._quiet = effect, move, False
         said = f"{effect.name}: {effect.in_words}"
         # a group of one: Bokeh's single checkbox has no label that a screen reader or a click would find
-        self._box = pn.widgets.CheckBoxGroup(options={said: effect.name}, margin=(6, 8, 0, 8), stylesheets=[_WRAPPED], **WIDE)
+        self._box = pn.widgets.CheckBoxGroup(
+            options={said: effect.name}, margin=(6, 8, 0, 8), stylesheets=[_WRAPPED], **WIDE
+        )
         self._box.param.watch(lambda event: None if self._quiet else switch(effect.name, bool(event.new)), "value")
         self._text = html(effect_text(effect, (), {}, ""), margin=(0, 8, 4, 30))
         self._sliders: dict[str, Any] = {}

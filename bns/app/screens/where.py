@@ -92,7 +92,8 @@ class WhereScreen:
             [p.variable, p.channel, f"{p.share:.2%}", f"{p.paired_comparison.p_value:.2g}"]
             for p in comparison.residual_dependence[:8]
         ]
-        self._explained.object = table(["variable", "velocity", "share of loss", "p"], explained, "What a free curve along each variable would explain")  # fmt: skip
+        columns = ["variable", "velocity", "share of loss", "p"]
+        self._explained.object = table(columns, explained, "What a free curve along each variable would explain")
         best = [p.variable for p in comparison.residual_dependence if p.variable in self._variable.options]
         if best and self._to_choose:
             self._to_choose, self._variable.value = False, best[0]

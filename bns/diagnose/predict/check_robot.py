@@ -109,9 +109,9 @@ def _check_directions(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.
 
 
 def suggested_wheelbase_m(tracks: Tracks) -> float | None:
-    """The wheelbase (m) with which a plain drive turns as these tracks do, over windows of a second; None where they tell nothing.
+    """The wheelbase (m) with which a plain drive turns as these tracks do, over windows of a second.
 
-    Turns of more than half a round between two poses would mislead it.
+    None where they tell nothing. Turns of more than half a round between two poses would mislead it.
     """
     start, end = windows(tracks, "1s")
     told = np.cumsum(WheelPredictor(tracks).steps(Model(wheelbase_m=1.0)).body[:, 2])
