@@ -20,6 +20,7 @@ _MOST_POINTS = 4000
 
 
 def _figure(title: str, x: str, y: str, tools: str = "pan,wheel_zoom,reset", height: int = 300, **more: Any) -> Any:
+    drag = {"active_drag": "box_select"} if "box_select" in tools else {}
     made = figure(
         title=title,
         x_axis_label=x,
@@ -29,6 +30,7 @@ def _figure(title: str, x: str, y: str, tools: str = "pan,wheel_zoom,reset", hei
         min_width=280,
         sizing_mode="stretch_width",
         toolbar_location="above",
+        **drag,
         **more,
     )
     made.toolbar.logo = None

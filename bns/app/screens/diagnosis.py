@@ -77,7 +77,8 @@ class DiagnosisPart:
             self._clock.stop()
             self._clock = None
         if result is not None:
-            self._said.object = f"<p id='bns-verdict'><b>{escape(headline(result.diagnosis))}</b> {escape(certainty(result.diagnosis))}</p>"
+            said, sure = escape(headline(result.diagnosis)), escape(certainty(result.diagnosis))
+            self._said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}</p>"
         else:
             self._said.object = message(work.why)
         self._found()
