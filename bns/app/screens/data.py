@@ -13,7 +13,7 @@ import panel as pn
 from bns.app.figures import LogFigure
 from bns.app.html import table
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
 from bns.app.tab import Tab, draft_for, mapping_of
 from bns.diagnose.data.cycles import CycleTracks
 from bns.examples import FOLDER
@@ -157,7 +157,7 @@ class DataScreen:
             self._said,
             self._bench_problem.view,
             drawn(self._picture.figure),
-            pn.FlexBox(self._left_out, pn.Column(self._leave, self._brushed)),
+            row(self._left_out, pn.Column(self._leave, self._brushed)),
             self._findings,
             **WIDE,
         )

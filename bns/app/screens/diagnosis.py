@@ -9,7 +9,7 @@ from typing import Any
 import panel as pn
 
 from bns.app.html import message
-from bns.app.parts import WIDE, button, heading, html
+from bns.app.parts import WIDE, button, heading, html, row
 from bns.app.tab import Tab
 from bns.diagnose.report.plain_language import certainty, headline
 
@@ -26,7 +26,7 @@ class DiagnosisPart:
         self._stop = button("Stop", self._end)
         self._switch_on = button("Switch on what it found", self._take)
         self._clock: Any = None
-        buttons = pn.FlexBox(self._begin, self._stop, self._switch_on)
+        buttons = row(self._begin, self._stop, self._switch_on)
         self.view = pn.Column(heading("What is missing?"), buttons, self._said, **WIDE)
 
     def enter(self) -> None:

@@ -10,7 +10,7 @@ import panel as pn
 from bns.app.figures import LadderFigure, PathFigure
 from bns.app.html import error_list, message
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
 from bns.app.screens.diagnosis import DiagnosisPart
 from bns.app.screens.one_effect import OneEffect
 from bns.app.switches import Switches, Term
@@ -221,15 +221,15 @@ class EffectsScreen:
         variables = "; ".join(f"{name}: {text}" for name, text in VARIABLES.items())
         formula = pn.Column(
             heading("A formula of your own"),
-            pn.FlexBox(self._name, self._term, self._on, self._add_term, align_items="end"),
+            row(self._name, self._term, self._on, self._add_term, align_items="end"),
             self._formula_problem.view,
             html(f"<details><summary>what may stand in it</summary>{variables}</details>"),
             **WIDE,
         )
         left = pn.Column(self._diagnosis.view, self._switches, formula, **WIDE)
         right = pn.Column(
-            pn.FlexBox(self._undo, self._redo, self._fit),
-            pn.FlexBox(self._horizon, self._trial),
+            row(self._undo, self._redo, self._fit),
+            row(self._horizon, self._trial),
             self._errors,
             drawn(self._ladder.figure),
             self._warnings,

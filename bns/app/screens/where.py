@@ -12,7 +12,7 @@ from bns.api.compare import CompareResult
 from bns.app.figures import PathFigure, WindowFigures
 from bns.app.html import mm, table
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, beside, drawn, heading, html
+from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, row
 from bns.app.tab import Tab
 from bns.app.workbench import Shown, Workbench
 from bns.diagnose.report.tables import AHEAD
@@ -155,10 +155,10 @@ class WhereScreen:
 
     def _laid_out(self) -> Any:
         p = self._pictures
-        path = pn.Column(pn.FlexBox(self._trial, self._worst), drawn(self._path.figure), self._time, **WIDE)
+        path = pn.Column(row(self._trial, self._worst), drawn(self._path.figure), self._time, **WIDE)
         return pn.Column(
             self._problem.view,
-            pn.FlexBox(self._which, self._horizon, self._variable, align_items="end"),
+            row(self._which, self._horizon, self._variable, align_items="end"),
             beside(self._errors, self._explained),
             heading("Every window: brush in one picture, see it in all"),
             self._brushed,
