@@ -17,7 +17,7 @@ from typing import Any
 from bns.errors import SpecError, unknown_name
 from bns.registry import WORLDS, Registry
 
-ENGINE_VERSION = 2
+ENGINE_VERSION = 3
 """Raised whenever the same spec would give other numbers; part of every run's name."""
 
 RADII_CM = (7, 10, 14, 20)

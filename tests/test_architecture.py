@@ -71,11 +71,12 @@ def upward(module: str, rooms: list[tuple[str, int]]) -> list[str]:
 
 
 DIAGNOSE_FLOORS = (
+    {"settings"},
     {"data"},
     {"predict"},
     {"estimate"},
     {"select", "residuals"},
-    {"caveats"},
+    {"caveats", "values"},
     {"adding", "comparison", "diagnosis"},
     {"design"},
     {"report"},

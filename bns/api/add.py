@@ -16,10 +16,10 @@ from bns.api.common.shown import Progress, Shown, drawn, ticks
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
 from bns.diagnose.adding import ExtendedModel, Memory, add_effects, effect_from
-from bns.diagnose.diagnosis import numbers_of
 from bns.diagnose.predict.paired_errors import noise_json
 from bns.diagnose.report.figures import error_by_step_axes
 from bns.diagnose.report.text import extension_text
+from bns.diagnose.values import numbers_of
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 

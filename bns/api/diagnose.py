@@ -22,7 +22,7 @@ from bns.diagnose.report.figures import ranking_axes
 from bns.diagnose.report.text import diagnosis_text
 from bns.errors import DataError
 from bns.physics.effect import Effect
-from bns.physics.effects import effect_in_file
+from bns.physics.effects import effect_in_file, effect_named
 
 if TYPE_CHECKING:
     from bns.api.propose import ProposeResult
@@ -144,6 +144,7 @@ def diagnose(
     model: Given,
     *,
     also: Iterable[Effect | str | PathLike[str]] = (),
+    without_effects: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> DiagnoseResult:
     """Find what a model lacks.
@@ -152,6 +153,7 @@ def diagnose(
         log: a file, a table, or `bns.Measurements`; ten trials are the fewest that say anything.
         model: `bns.Model`, or the name or file of one.
         also: effects of your own, tried beside the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
+        without_effects: names of listed effects that are not to be tried.
         progress: told what is being looked at; the share that is done is not known (None).
 
     Raises:
@@ -160,5 +162,7 @@ def diagnose(
     """
     own = [each if isinstance(each, Effect) else effect_in_file(Path(each)) for each in also]
     ready = prepared(log, model)
-    found = find(ready.predictor, ready.model, extra={effect.name: effect for effect in own}, tick=ticks(progress))
+    barred = [effect_named(name).name for name in without_effects]
+    extra = {effect.name: effect for effect in own}
+    found = find(ready.predictor, ready.model, extra=extra, tick=ticks(progress), barred=barred)
     return DiagnoseResult(ready, found)

@@ -58,6 +58,11 @@ class Evolver:
         """The best controller in simulation."""
         return self.population.controller(int(self.order[0]))
 
+    def plan(self, controller: np.ndarray, weights: np.ndarray, generation: int | None = None) -> np.ndarray:
+        """What is driven of a controller of this generation, or of an earlier one: cut under the draws it was scored with."""
+        stream = RandomStream(self.key, self.generations if generation is None else generation)
+        return self.robot.plan(controller, weights, self.task, stream)
+
     def evolve(self, weights: np.ndarray) -> None:
         """Score the population on new networks, then breed and score generation after generation."""
         self.history.clear()

@@ -36,7 +36,7 @@ class NeuroSimulation:
 
     def pick(self, evaluation: int) -> np.ndarray:
         """The commands (n, components) to be driven next."""
-        return self.robot.plan(self.evolver.pick(evaluation), self.weights, self.task)
+        return self.evolver.plan(self.evolver.pick(evaluation), self.weights)
 
     def learn(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
         """Take what a drive measured into the training set: poses (m, columns) of commands (n, components), m <= n."""

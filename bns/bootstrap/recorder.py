@@ -146,13 +146,13 @@ class Recorder:
         """Controller, path in the world and in simulation. A robot drives only what was picked: that one stands in."""
         if self._once:
             return self._path
-        fittest = self._robot.plan(evolver.fittest(), weights, self._task)
+        fittest = evolver.plan(evolver.fittest(), weights)
         poses = self._drive(fittest, Purpose.WORLD_FITTEST, evaluation)
         return fittest, poses, self._simulated(fittest, weights)
 
     def _record_full(self, evaluation: int, evolver: Evolver, weights: np.ndarray) -> None:
         for generation in evolver.history:
-            best = self._robot.plan(generation.best, weights, self._task)
+            best = evolver.plan(generation.best, weights, generation.number)
             driven = self._drive(best, Purpose.WORLD_GENERATION, generation.number)
             self._generations.add(
                 evaluation=evaluation,

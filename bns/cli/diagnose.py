@@ -26,7 +26,7 @@ Adder = Callable[[str, Callable[[argparse.Namespace], int], str], Parser]
 def add_commands(command: Adder) -> None:
     """The parsers of these commands; ``command`` makes one of a name, a function and a text."""
     read = command("import", import_, "turn a log with other columns or units into a table of measurements")
-    read.add_argument("data", type=Path, metavar="LOG", help="a .csv or .parquet file")
+    read.add_argument("data", type=Path, metavar="LOG", help="a .csv, .parquet or .tuple file (one JSON object a line)")
     read.add_argument(
         "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml beside the log"
     )
@@ -94,6 +94,13 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="FILE.py",
         help="an effect of your own to try beside the listed ones",
+    )
+    parser.add_argument(
+        "--without-effect",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a listed effect that is not to be tried, say because it was measured apart",
     )
 
 
@@ -168,7 +175,7 @@ def diagnosed(options: argparse.Namespace) -> DiagnoseResult:
 
     model, log = model_of(options), log_of(options)
     with ticking("diagnosing") as tick:
-        found = find(log, model, also=options.also, progress=tick)
+        found = find(log, model, also=options.also, without_effects=options.without_effect, progress=tick)
     _say_thinned(found.ready)
     return found
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bns import __version__
+from bns.cli import calibrate as calibrating
 from bns.cli import diagnose as measuring
 from bns.cli import examples as listing
 from bns.cli import explore as exploring
@@ -22,7 +23,7 @@ from bns.cli.compiling import say_if_compiling
 from bns.cli.option_types import add_spec_options, duration, positive
 from bns.cli.parser import SHELLS, Completion, Parser, add_results
 from bns.cli.sweep_options import DEVICES
-from bns.cli.trial_options import add_looking_options, add_trial_options
+from bns.cli.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.errors import BnsError
 from bns.spec import FIELDS, RunSpec
 
@@ -95,6 +96,7 @@ def _parser() -> Parser:
     reporting.add_commands(command)
     simulating.add_commands(command)
     exploring.add_commands(command)
+    calibrating.add_commands(command)
     listing.add_commands(command)
     return parser
 
@@ -137,6 +139,7 @@ def _add_single_runs(command: measuring.Adder) -> None:
     ill.add_argument(
         "--rig", type=Path, metavar="FILE", help="your set-up (YAML): its robot and tracker are asked, too"
     )
+    add_servo_options(command("servos", servos, "set up AX-12 servos: who answers, their ids, their settings"))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -188,6 +191,13 @@ def doctor(options: argparse.Namespace) -> int:
     from bns.cli.doctor import checked_up
 
     return checked_up(options)
+
+
+def servos(options: argparse.Namespace) -> int:
+    """Set up servos."""
+    from bns.cli.servos import served
+
+    return served(options)
 
 
 if __name__ == "__main__":

@@ -85,6 +85,7 @@ def add_effects(
             raise ModelError(
                 f"The model {model.name} has {effect.name} already; it is refitted whenever something is added."
             )
+    effects = [(effect.scaled(model.wheelbase_m), written) for effect, written in effects]
     memory = {} if memory is None else memory
     judged = [_judged(predictor, model, effects[: k + 1], per_trial, memory) for k in range(len(effects))]
     first = steps_of(predictor, problem_for(predictor, model).pose_filter, model)

@@ -18,10 +18,11 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import Errors
 from bns.diagnose.predict.paired_errors import PairedErrors, judged_windows, noise_json, paired_errors, plain
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.model import Model
 
-BINS = 8
+BINS = DEFAULTS.verdict.bins
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from bns.errors import StoreError
 from bns.robots.base import Robot
 from bns.robots.simulator import load_static_simulator
 from bns.spec import RunSpec
+from bns.static_simulator.train_in_stages import evolving
 from bns.tasks import Task
 from bns.worlds.base import World
 
@@ -39,7 +40,7 @@ def validate(
     for trial in range(TRIALS):
         progress(trial, TRIALS)
         evolver = _evolved(robot, task, trial, simulator.weights)
-        planned = robot.plan(evolver.fittest(), simulator.weights, task)
+        planned = evolver.plan(evolver.fittest(), simulator.weights)
         outputs = predict(simulator.weights, robot.inputs(planned), robot.sigmoid_output)
         simulated = robot.poses(robot.displacements(outputs), planned)
         about = {"trial": trial + 1, "commands": len(planned), "generations": evolver.generations}
@@ -60,6 +61,7 @@ def _evolved(robot: Robot, task: Task, trial: int, weights: np.ndarray) -> Evolv
         max_commands=COMMANDS,
         generations_per_evaluation=ROUND,
     )
+    robot = evolving(robot)
     evolver = Evolver.start(robot, task, Key.of_run(trial, 0, robot.name, f"validate {task.name}"), spec, weights)
     for _ in range(MOST_ROUNDS):
         evolver.evolve(weights)

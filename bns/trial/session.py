@@ -16,7 +16,7 @@ from bns.errors import BnsError, HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.platform import Emulation, Platform, platform_module
+from bns.hardware.platform import Emulation, Platform, platform_module, repeats_of
 from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
 from bns.plotting.scripts import draw, scripts
@@ -160,7 +160,7 @@ def _looped(
 
 def _repeated(spec: RunSpec, how: TrialSetup, driver: TrialDriver, folder: TrialFolder, result: TrialResult) -> None:
     """Drive the final controller as often as is asked for; all its paths go into the trial's folder."""
-    count = platform_module(how.rig.robot).REPEATS if how.repeats is None else how.repeats
+    count = repeats_of(platform_module(how.rig.robot)) if how.repeats is None else how.repeats
     if count == 1:
         return
     evaluation = final_evaluation(result.run.tables["evals"])

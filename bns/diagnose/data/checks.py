@@ -14,20 +14,19 @@ import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
 from bns.diagnose.data.merge_topics import without_commands
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import COLUMNS, COMMANDS, POSE
 
-_HELD = 0.2
-_JUMP_M = 0.02
-_JUMP_RAD = 0.35
-_JUMP_ROUNDS = 6
-_NEAR_S = 0.4
-_LONG_STEP_S = 30.0
-_FINER = ((1e6, "nanoseconds"), (3e3, "microseconds"), (0.0, "milliseconds"))
-"""A step between rows above so many seconds was written in such a unit."""
-_UNTOLD_RATIO = 1.5
-_DEGREES_AT_LEAST = 150.0
-"""Radians a metre: a wheelbase of under a centimetre, or degrees."""
+_HELD = DEFAULTS.data.held_share
+_JUMP_M = DEFAULTS.data.jump_m
+_JUMP_RAD = DEFAULTS.data.jump_rad
+_JUMP_ROUNDS = DEFAULTS.data.jump_rounds
+_NEAR_S = DEFAULTS.data.jump_near_s
+_LONG_STEP_S = DEFAULTS.data.long_step_s
+_FINER = DEFAULTS.data.finer_units
+_UNTOLD_RATIO = DEFAULTS.data.untold_ratio
+_DEGREES_AT_LEAST = DEFAULTS.data.degrees_rad_m
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from bns.diagnose.data.checks import Finding, check_columns, forward_in_time, to_numbers
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.robots.snake.table import COLUMNS, GAIT, MARKERS
 
-_LARGEST_RAD = 2 * np.pi + 1e-6
-_LONGEST_M = 5.0
-"""Markers further apart than this are in centimetres or millimetres."""
-_STRETCHED_M = 0.10
-"""A cycle ends in the posture in which it began: markers that drift apart by more have been mistaken, or the robot rolled."""
+_LARGEST_RAD = DEFAULTS.data.cycle_largest_rad
+_LONGEST_M = DEFAULTS.data.cycle_longest_m
+_STRETCHED_M = DEFAULTS.data.cycle_stretched_m
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,6 +16,7 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import Finding, checked
 from bns.diagnose.data.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.data.mapping import mapping_beside
+from bns.diagnose.data.relative_motions import read_json_lines
 from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracks import Tracks, tracks_of
 from bns.errors import DataError
@@ -91,6 +92,10 @@ def _jump_findings(tracks: Tracks, usable: pd.DataFrame) -> Iterator[Finding]:
     for frame in np.flatnonzero(jumps(tracks)):
         moved = float(np.hypot(*(tracks.pose[frame] - tracks.pose[frame - 1])[:2]))
         trial = tracks.names[tracks.trial[frame]]
+        if tracks.relative:
+            text = f"the sensor's motion, {1e3 * moved:.0f} mm, is one that no drive leads to: it is left out"
+            yield Finding(trial, int(rows[frame]), text)
+            continue
         text = (
             f"the tracked pose jumps by {1e3 * moved:.0f} mm at {tracks.t_s[frame]:.2f} s and stays there: another marker was "
             "taken for the robot's, or somebody moved it; nothing is judged by the poses that follow in this trial"
@@ -106,6 +111,8 @@ def read_table(path: Path) -> pd.DataFrame:
         if path.name.endswith((".csv", ".csv.gz")):
             separator, decimal = _written(path)
             return pd.read_csv(path, sep=separator, decimal=decimal)
+        if path.suffix == ".tuple":
+            return read_json_lines(path)
         if path.suffix == ".parquet":
             return pd.read_parquet(path)
     except (ValueError, OSError, yaml.YAMLError) as fault:

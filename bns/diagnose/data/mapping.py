@@ -56,11 +56,16 @@ _SI = {
     "session_s": "s",
     "before_left_m_s": "m/s",
     "before_right_m_s": "m/s",
+    "duration_s": "s",
+    "left_m": "m",
+    "right_m": "m",
 }
 REPEATED = ("kept", "lost")
 SPLITS = ("standing_s", "lasting_s", "gap_s")
 _LENGTHS = ("wheelbase_m", "hold_commands_s")
-_TABLE_KEYS = ("columns", "also", *_LENGTHS, "trials", "repeated_poses")
+DURATION, WAYS = "duration_s", ("left_m", "right_m")
+"""Of a log of single relative motions (``relative: true``): how long each took, and the way of each wheel in it."""
+_TABLE_KEYS = ("columns", "also", *_LENGTHS, "trials", "repeated_poses", "relative")
 _ALSO_KEYS = ("file", "columns")
 _KEYS = ("from", "unit", "scale", "offset", "clockwise", "zero_deg", "up", "counts")
 _UP = ("z", "y")
@@ -91,6 +96,8 @@ def checked_mapping(tree: Any, path: Path) -> dict[str, Any]:
     for name in _LENGTHS:
         if name in tree and not _positive(tree[name]):
             raise DataError(f"{path}: {name} is {tree[name]!r}; it must be a number above 0.")
+    if not isinstance(tree.get("relative", False), bool):
+        raise DataError(f"{path}: relative is {tree['relative']!r}; it must be true or false.")
     _check_trials(path, tree)
     _check_columns(path, tree["columns"])
     _check_also(path, tree.get("also", []))

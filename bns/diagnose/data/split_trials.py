@@ -6,13 +6,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import BEFORE, COMMANDS, SESSION
 
-STILL_M_S = 1e-3
-"""Wheels told to be slower than this stand: encoders tremble."""
-KEPT_S = 1.0
-"""How much standing a trial keeps before and after its drive: late starts and slow stops are seen there."""
+STILL_M_S = DEFAULTS.data.still_m_s
+KEPT_S = DEFAULTS.data.kept_standing_s
 
 
 def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:

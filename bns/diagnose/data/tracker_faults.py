@@ -13,19 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.settings import DEFAULTS
 
-LEAST_M, LEAST_RAD = 0.02, 0.35
-"""No smaller change of pose between two frames is called a jump: the bounds of `checks` for one that comes back."""
-WAYS = 3.0
-"""Nor is a change of less than three times the way of the faster wheel: no slip or gear error is as large."""
-USUAL = 12.0
-"""Nor is one of less than twelve times what is usual in the trial (median): fast robots and coarse trackers differ."""
-MOST_CUT = 0.2
-"""No more of the poses than this is given up for what comes after a jump: the cost in precision is then under 12 %."""
-FEWEST_FRAMES = 20
-"""A trial with fewer frames takes what is usual from all trials."""
-AROUND_S = 1.0
-"""The wheels' fastest command within a second either way counts: a robot may lag, and clocks may differ."""
+LEAST_M = DEFAULTS.data.jump_m
+LEAST_RAD = DEFAULTS.data.jump_rad
+WAYS = DEFAULTS.data.fault_ways
+USUAL = DEFAULTS.data.fault_usual
+MOST_CUT = DEFAULTS.data.fault_most_cut
+FEWEST_FRAMES = DEFAULTS.data.fault_fewest_frames
+AROUND_S = DEFAULTS.data.fault_around_s
 
 
 def without_faults(tracks: Tracks) -> Tracks:

@@ -14,15 +14,13 @@ from itertools import pairwise
 import numpy as np
 
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.settings import DEFAULTS
 
-SETTLED_S = 0.5
-"""A robot told to stop is taken to stand after this long: ten times the lag of a small robot's motors."""
-FEWEST_AT_REST = 30
-"""Fewer poses at rest than these say too little (the standard deviation within 13 %)."""
-WIDTH, ORDER = 7, 2
-"""Frames under one parabola. At 10 Hz that is 0.6 s, in which a robot's path bends little under one command."""
-SLOWEST_HZ = 8.0
-"""Below this frame rate a parabola through `WIDTH` frames does not follow a robot."""
+SETTLED_S = DEFAULTS.data.settled_s
+FEWEST_AT_REST = DEFAULTS.data.fewest_at_rest
+WIDTH = DEFAULTS.data.parabola_frames
+ORDER = DEFAULTS.data.parabola_order
+SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
 _NORMAL = 0.6745
 
 

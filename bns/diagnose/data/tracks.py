@@ -12,14 +12,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bns.diagnose.settings import DEFAULTS
 from bns.measurements import BEFORE, COMMANDS, POSE, SESSION
 
 Array = NDArray[np.float64]
 
-MOST_FRAMES = 16_000
-"""More frames than these are thinned out before a search: it takes time in proportion, and neighbours say the same."""
-RUN_UP_S = 5.0
-"""How long a robot that was in motion when its trial began is taken to have driven like that: any lag has settled."""
+MOST_FRAMES = DEFAULTS.data.most_frames
+RUN_UP_S = DEFAULTS.data.run_up_s
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,13 @@ class Tracks:
         found = np.zeros(len(self.t_s), dtype=bool)
         found[self.first[:-1]] = True
         return found if self.jumped is None else found | self.jumped
+
+    @cached_property
+    def relative(self) -> bool:
+        """Are these single relative motions: two poses a trial, the first exactly zero? (One, where the motion was a fault.)"""
+        frames = np.diff(self.first)
+        two = len(frames) and frames.max() == 2 and np.median(frames) == 2
+        return bool(two and not self.pose[self.first[:-1][frames > 0]].any())
 
     def only(self, chosen: NDArray[np.int64]) -> Tracks:
         """Some of the trials, in the order of ``chosen``."""

@@ -8,15 +8,16 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.design.sequences import MARGIN_M, Arena, Bounds
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.model import Model
 from bns.robots import load_robot, robot_names
 from bns.robots.base import TwoWheeled
 
-_TOGETHER_M = 0.15
-_TRIAL_S = (6.0, 25.0)
-_HEADING_RAD = np.pi / 2
-_LARGEST_M = 1000.0
+_TOGETHER_M = DEFAULTS.design.together_m
+_TRIAL_S = DEFAULTS.design.trial_s
+_HEADING_RAD = DEFAULTS.design.heading_rad
+_LARGEST_M = DEFAULTS.design.largest_m
 
 
 def arena_of(

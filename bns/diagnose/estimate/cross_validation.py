@@ -14,9 +14,10 @@ from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.trial_clock_test import steps_of
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
-FOLDS = 5
+FOLDS = DEFAULTS.estimate.folds
 AS_GIVEN = "as given"
 """The name of the model that was handed in, in tables of errors."""
 

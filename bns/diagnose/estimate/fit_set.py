@@ -12,13 +12,12 @@ from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
-BETTER = 0.5
-"""A fit begun elsewhere counts as another valley if its loss is lower by this log-likelihood: less is rounding of the search."""
-ROUNDS = 3
-"""Noise and numbers are settled in turn so often; the second round changes numbers by hundredths of a standard error."""
+BETTER = DEFAULTS.estimate.valley_better
+ROUNDS = DEFAULTS.estimate.set_rounds
 
 
 def fit_set(

@@ -11,20 +11,18 @@ from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import windows
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.model import Model
 from bns.robots import robot_names
 
-_FACTOR = 3.0
-"""Skid-steered robots turn as if their wheels stood up to twice as far apart; beyond that it is another robot, or units."""
-_EXPLAINED = 0.25
-"""Another robot it is if turns that are scaled leave less than this share of the deviation."""
-_FEWEST = 5
-_LEAST_TURN_M = 0.002
-"""A smaller difference of the wheels' ways says nothing of their distance."""
-_CLEAR_M, _ARC_RAD = 0.02, 1.2
-_TOGETHER, _TURNED_RAD = 0.8, 1.05
-"""Directions agree if their mean is longer than this; a camera that is askew by less is an effect (`camera-rotation`)."""
+_FACTOR = DEFAULTS.predict.robot_factor
+_EXPLAINED = DEFAULTS.predict.robot_explained
+_FEWEST = DEFAULTS.predict.robot_fewest
+_CLEAR_M = DEFAULTS.predict.robot_clear_m
+_ARC_RAD = DEFAULTS.predict.robot_arc_rad
+_TOGETHER = DEFAULTS.predict.robot_together
+_TURNED_RAD = DEFAULTS.predict.robot_turned_rad
 
 
 def check_named_robot(robot: str, model: Model) -> None:
@@ -117,7 +115,7 @@ def suggested_wheelbase_m(tracks: Tracks) -> float | None:
     told = np.cumsum(WheelPredictor(tracks).steps(Model(wheelbase_m=1.0)).body[:, 2])
     heading = np.concatenate([np.unwrap(tracks.pose[a:b, 2]) for a, b in pairwise(tracks.first)])
     commanded, seen = told[end] - told[start], heading[end] - heading[start]
-    clear = np.abs(commanded) > _LEAST_TURN_M
+    clear = np.abs(commanded) > _CLEAR_M
     if clear.sum() < _FEWEST:
         return None
     ratio = _scale(seen[clear], commanded[clear])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.cycles import CycleTracks
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Steps
+from bns.diagnose.settings import DEFAULTS
 from bns.engine.snn import predict
 from bns.physics.model import Model
 from bns.physics.signals import Body
@@ -20,10 +21,9 @@ from bns.robots.snake.robot import Snake
 from bns.robots.snake.table import GAIT
 from bns.static_simulator.train_in_stages import accuracy
 
-SEVERAL = 3
-"""Cycles of the middle horizon."""
-_FEW = 3
-_LEAST_NOISE_M = 1e-4
+SEVERAL = DEFAULTS.predict.middle_cycles
+_FEW = DEFAULTS.predict.fewest_cycles
+_LEAST_NOISE_M = DEFAULTS.predict.marker_least_m
 
 
 class CyclePredictor:

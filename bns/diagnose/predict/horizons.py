@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.settings import DEFAULTS
 
 HORIZONS = ("command", "1s", "5s", "trial")
-_SECONDS = {"1s": 1.0, "5s": 5.0}
+_SECONDS = dict(DEFAULTS.predict.horizons_s)
 
 
 @dataclass(frozen=True)

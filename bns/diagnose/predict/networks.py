@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements
 from bns.engine.snn import predict
 from bns.errors import DataError
@@ -20,8 +21,7 @@ from bns.physics.model import Model
 from bns.robots.base import Robot
 from bns.robots.simulator import StaticSimulator
 
-_NEAR_S = 0.06
-"""A pose tracked this near the end of a command stands for it."""
+_NEAR_S = DEFAULTS.predict.network_near_s
 
 
 class NetworkPredictor(WheelPredictor):

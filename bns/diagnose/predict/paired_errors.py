@@ -19,12 +19,11 @@ from bns.diagnose.data.tracking_noise import TrackingNoise, tracking_noise
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.horizons import Errors, errors_of
+from bns.diagnose.settings import DEFAULTS
 
-DRAWS = 1000
-"""Bootstrap samples: the ends of a 95 % interval are then known to 10 % of its width."""
-FEWEST_TRIALS = 5
-"""Fewer trials give no interval: a bootstrap of four has 35 different samples."""
-_SEED = 20_260_101
+DRAWS = DEFAULTS.predict.interval_draws
+FEWEST_TRIALS = DEFAULTS.predict.interval_fewest_trials
+_SEED = DEFAULTS.predict.interval_seed
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.load import Measured
 from bns.diagnose.design.proposal import Proposal
-from bns.diagnose.diagnosis import Diagnosis, numbers_of
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.paired_errors import HorizonErrors, ModelError
 from bns.diagnose.report.plain_language import figures_in_words
+from bns.diagnose.values import numbers_of
 
 Table = dict[str, list[Any]]
 AHEAD = {"command": "one command", "1s": "1 second", "5s": "5 seconds", "trial": "the whole trial"}

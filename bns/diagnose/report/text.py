@@ -9,8 +9,11 @@ import numpy as np
 from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
-from bns.diagnose.diagnosis import Diagnosis, numbers_of, ties_of
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
+from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.values import numbers_of, ties_of
 from bns.physics.decoys import DECOYS
 from bns.physics.effects import all_effects
 
@@ -21,7 +24,7 @@ _VERDICTS = {
     "unlisted": "Something is missing that no listed effect explains.",
     "insufficient-data": "These measurements do not suffice for a verdict.",
 }
-_SHOWN = 8
+_SHOWN = DEFAULTS.report.rows
 
 
 def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
@@ -46,6 +49,9 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
             yield "cannot be told apart: " + ", ".join(group)
         yield from _errors(d.errors)
         yield from _ranking(d)
+    if d.calibration is not None:
+        yield "\nrobot and sensor calibrated together, each number with all others free:"
+        yield from _intervals(d.calibration)
     if d.formula is not None:
         values = ", ".join(f"{name} = {value:.4g}" for name, value in d.formula.values.items())
         yield f"\ncandidate term: {d.formula.term}   added to {d.formula.on}; {values}"
@@ -57,11 +63,15 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
 
 def _numbers(d: Diagnosis) -> Iterator[str]:
     assert d.selection is not None
-    for effect, numbers in numbers_of(d.selection.fit).items():
+    yield from _intervals(d.selection.fit, equations=True)
+
+
+def _intervals(fit: Fit, *, equations: bool = False) -> Iterator[str]:
+    for effect, numbers in numbers_of(fit).items():
         for name, n in numbers.items():
             if n["low"] is not None and n["high"] is not None:
                 yield f"  {effect}: {name} = {n['value']:.5g} {n['unit']} (95 %: {n['low']:.5g} to {n['high']:.5g})"
-        if effect in all_effects():
+        if equations and effect in all_effects():
             yield f"    {all_effects()[effect].equation}"
 
 

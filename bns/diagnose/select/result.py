@@ -50,6 +50,16 @@ class SelectionResult:
         why = {name: implausible(self.fit, name, bounds=False) for name in self.accepted}
         return {name: text for name, text in why.items() if text}
 
+    def only(self, names: tuple[str, ...]) -> SelectionResult:
+        """The result with some of its effects, refitted."""
+        if not names:
+            return self.withdrawn()
+        model = self.fit.model
+        for name in self.accepted:
+            model = model if name in names else model.without(name)
+        problem = problem_for(self.problem.predictor, model, self.problem.pose_filter.noise)
+        return replace(self, problem=problem, fit=problem.fit(model), accepted=names, competing_models=())
+
     def withdrawn(self) -> SelectionResult:
         """The result without its effects: the model as it was, its numbers refitted."""
         problem = problem_for(self.problem.predictor, self.nominal.model)

@@ -6,7 +6,7 @@ or beyond what is plausible is rejected with its reason.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import cache, partial
 
@@ -21,23 +21,18 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.plausibility import implausible
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
-FALSE_ALARM = 0.05
-"""Chance of any false alarm over the whole catalogue."""
-MIN_GAIN = 0.001
-"""Least gain that counts, as a share of the loss: honest robots vary by fractions of a percent from trial to trial."""
-SCREEN = 0.15
-"""An effect is tried in another one's place if its best start alone does this share of the other's work ..."""
-BEHIND, BEHIND_LOSS = 0.5, 20.0
-"""... and no longer if, fitted, it leaves more than this share of that work undone, and more than this loss: three
-standard errors, were it noise alone."""
-CLOCKS_CHANCE = 0.01
-"""Chance of a false alarm about clocks that differ from trial to trial."""
-MOST = 6
-"""Effects that a search accepts at most."""
+FALSE_ALARM = DEFAULTS.select.false_alarm
+MIN_GAIN = DEFAULTS.select.min_gain
+SCREEN = DEFAULTS.select.screen
+BEHIND = DEFAULTS.select.behind
+BEHIND_LOSS = DEFAULTS.select.behind_loss
+CLOCKS_CHANCE = DEFAULTS.select.clocks_chance
+MOST = DEFAULTS.select.most_effects
 
 
 class StepwiseSelection:
@@ -49,10 +44,11 @@ class StepwiseSelection:
         model: Model,
         extra: Mapping[str, Effect] | None = None,
         tick: Callable[[str], None] = lambda _: None,
+        barred: Collection[str] = (),
     ) -> None:
         self.predictor, self.model, self.tick = predictor, model.arranged(), tick
-        self._extra = extra
-        self.catalogue = listed(self.model, extra)
+        self._extra, self._barred = extra, barred
+        self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
         self._all_believed = False
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
@@ -71,7 +67,9 @@ class StepwiseSelection:
         """The search; again with a clock for each trial where these differ, since that hides what else is wrong."""
         plain = self._select()
         clocks = fit_trial_clocks(plain.problem, plain.fit)
-        if clocks is None or not self._clocks_earned(clocks, plain.fit):
+        if clocks is None or _per_trial_effect(clocks.fit.model) in self._barred:
+            return plain
+        if not self._clocks_earned(clocks, plain.fit):
             return plain
         given = self.model
         self.model = self._bare_with_clocks(clocks.fit.model, given)

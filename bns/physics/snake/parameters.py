@@ -16,8 +16,10 @@ import yaml
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import number
 
-BASIS = ("measured", "published", "guess")
+BASIS = ("measured", "published", "fitted", "guess")
 """How a value came to be known."""
+READINGS = ("tether_at_yellow", "tipped_on_the_way_fails", "tipped_on_the_way_ends", "roles_switch_on_side")
+"""Parameters that are 1 or 0: where the source can be read in two ways."""
 
 
 def _within(low: float, high: float) -> Any:
@@ -34,6 +36,7 @@ class SnakeParameters:
     body_mass_kg: float = _within(0.01, 50.0)
     tail_mass_kg: float = _within(0.0, 10.0)
     tether_drag_n: float = _within(0.0, 10.0)
+    tether_at_yellow: float = _within(0.0, 1.0)
     marker_gap_m: float = _within(0.01, 10.0)
     torque_limit_n_m: float = _within(0.01, 100.0)
     stiffness_n_m_rad: float = _within(0.01, 1000.0)
@@ -47,8 +50,13 @@ class SnakeParameters:
     settle_s: float = _within(0.0, 10.0)
     floor_friction: float = _within(0.01, 3.0)
     friction_spread: float = _within(0.0, 0.3)
+    link_friction_spread: float = _within(0.0, 1.0)
+    floor_tilt_rad: float = _within(0.0, 0.2)
     marker_noise_m: float = _within(0.0, 0.1)
     tipped_rad: float = _within(0.1, 3.2)
+    tipped_on_the_way_fails: float = _within(0.0, 1.0)
+    tipped_on_the_way_ends: float = _within(0.0, 1.0)
+    roles_switch_on_side: float = _within(0.0, 1.0)
     stalled_s: float = _within(0.0, 10.0)
     collision_n: float = _within(0.0, 100.0)
     dt_s: float = _within(1e-5, 0.02)
@@ -63,6 +71,9 @@ class SnakeParameters:
         """ModelError for numbers that are allowed each by itself, but are no body together."""
         if self.links != int(self.links):
             raise ModelError(f"snake: links is {self.links:g}; it must be a whole number.")
+        for name in READINGS:
+            if getattr(self, name) not in (0.0, 1.0):
+                raise ModelError(f"snake: {name} is {getattr(self, name):g}; it is a reading: give 1 (yes) or 0 (no).")
         if self.pitch_m <= 2 * self.radius_m:
             raise ModelError(
                 f"snake: pitch_m is {self.pitch_m:g} and radius_m {self.radius_m:g}; a link must be longer than it is wide: "
@@ -78,6 +89,11 @@ class SnakeParameters:
     def joints(self) -> int:
         """Servos: one between each two links."""
         return int(self.links) - 1
+
+    @property
+    def heavy_link(self) -> int:
+        """The link that carries the Arduino and drags the tether: the first is at yellow's end, the last at green's."""
+        return 0 if self.tether_at_yellow else int(self.links) - 1
 
     @property
     def length_m(self) -> float:
@@ -114,4 +130,9 @@ def read_parameters(text: str) -> SnakeParameters:
 @cache
 def shipped_parameters() -> SnakeParameters:
     """The parameters that ship in the package."""
-    return read_parameters((Path(str(resources.files(__package__))) / "parameters.yaml").read_text())
+    return read_parameters(shipped_text())
+
+
+def shipped_text() -> str:
+    """The file that they stand in, each with its basis and reason."""
+    return (Path(str(resources.files(__package__))) / "parameters.yaml").read_text(encoding="utf-8")

@@ -51,6 +51,9 @@ class Khepera:
         "left_m_s": (-0.3, 0.3), "right_m_s": (-0.3, 0.3), "duration_s": (0.001, 60.0),
     }  # fmt: skip
     options: tuple[str, ...] = ()
+    switched_on: tuple[str, ...] = ()
+    nguyen_widrow, flat_spot = False, 0.0
+    substitute_sd_m = None
     physics = "bns.physics.khepera_drive"
     world_model = "khepera-world"
     simulators = "bns.robots"
@@ -126,7 +129,7 @@ class Khepera:
         """As they are: no command of two wheels is unstable."""
         return poses
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
+    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, stream: RandomStream | None = None) -> np.ndarray:
         """A controller is driven as it is."""
         return controller
 
