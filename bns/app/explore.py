@@ -23,7 +23,8 @@ class Explorer:
         from bns.app.server import PageServer  # noqa: PLC0415
 
         self._server = PageServer(lambda: page(tabs), port)  # Panel would show a partial, not call it
-        self.address, self._thread = self._server.address, None
+        self.address = self._server.address
+        self._thread: threading.Thread | None = None
 
     def serve(self, browser: bool = True) -> None:
         """Answer until Ctrl-C or SIGTERM."""
@@ -31,9 +32,7 @@ class Explorer:
 
     def start(self, browser: bool = True) -> Explorer:
         """Answer in the background, as notebooks need it."""
-        self._thread: Any = threading.Thread(
-            target=self._server.serve, args=(browser,), name="bns-explore", daemon=True
-        )
+        self._thread = threading.Thread(target=self._server.serve, args=(browser,), name="bns-explore", daemon=True)
         self._thread.start()
         return self
 
@@ -72,13 +71,9 @@ def tabs_of(
     log: Log | DiagnoseResult | None, model: Given, data_words: str = "", model_words: tuple[str, ...] = ()
 ) -> Tabs:
     """What every tab begins with."""
-    first = Tab()
+    first, kept = Tab(), None
     if isinstance(log, DiagnoseResult):
-        first.diagnosis = Background(log)
-        log, model = log.ready.log, log.ready.model
-        kept = first.diagnosis
-    else:
-        kept = None
+        kept, model, log = Background(log), log.ready.model, log.ready.log
     first.take(model, model_words or (_words(model),))
     if log is not None:
         first.open(log, data_words or _words(log))

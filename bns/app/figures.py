@@ -14,7 +14,7 @@ from bns.diagnose.predict.paired_errors import HorizonErrors
 from bns.plotting.style import BLUE, GREY, OKABE_ITO, RED
 
 _TOOLS = "box_select,lasso_select,tap,pan,wheel_zoom,reset"
-_FLOOR = {"match_aspect": True, "aspect_scale": 1}
+_FLOOR: dict[str, Any] = {"match_aspect": True, "aspect_scale": 1}
 _MOST_POINTS = 4000
 """More of a path no screen shows."""
 
@@ -48,8 +48,10 @@ class PathFigure:
     """Measured (solid) and predicted (dashed) path of one trial, and where both are at a time."""
 
     def __init__(self, title: str, beside: PathFigure | None = None) -> None:
-        ranges = {} if beside is None else {"x_range": beside.figure.x_range, "y_range": beside.figure.y_range}
-        self.figure = _figure(title, "x, east (m)", "y, north (m)", **ranges, **_FLOOR)
+        ranges: dict[str, Any] = (
+            {} if beside is None else {"x_range": beside.figure.x_range, "y_range": beside.figure.y_range}
+        )
+        self.figure: Any = _figure(title, "x, east (m)", "y, north (m)", **ranges, **_FLOOR)
         self._lines = [ColumnDataSource({"x": [0.0], "y": [0.0]}) for _ in range(2)]
         self._dots = ColumnDataSource({"x": [], "y": [], "color": []})
         self._times, self._poses = np.zeros(0), (np.zeros((0, 3)), np.zeros((0, 3)))

@@ -8,7 +8,7 @@ from typing import Any
 import panel as pn
 
 from bns.app.jobs import Jobs
-from bns.app.parts import CSS, NO_WIDER, WIDE, html
+from bns.app.parts import CSS, WIDE, html
 from bns.app.screens.data import DataScreen
 from bns.app.screens.effects import EffectsScreen
 from bns.app.screens.model import ModelScreen
@@ -58,8 +58,8 @@ class Screens:
             **WIDE,
         )
         self._chosen.param.watch(lambda event: self._enter(event.new), "value")
-        self._shown = pn.Column(styles=NO_WIDER, **WIDE)
-        self.view = pn.Column(self._chosen, self._said, self._shown, styles=NO_WIDER, **WIDE)
+        self._shown = pn.Column(**WIDE)
+        self.view = pn.Column(self._chosen, self._said, self._shown, **WIDE)
         pn.state.onload(lambda: self._loaded(name))
         pn.state.on_session_destroyed(lambda _context: self._jobs.end())
 
@@ -69,7 +69,6 @@ class Screens:
 
     def _enter(self, name: str) -> None:
         screen = self._screens[name]
-        screen.view.styles = {**screen.view.styles, **NO_WIDER}
         self._shown.objects = [screen.view]
         screen.enter()
 

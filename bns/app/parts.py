@@ -13,9 +13,9 @@ import panel as pn
 from bns.app.html import message
 
 CSS = (resources.files("bns.app") / "style.css").read_text(encoding="utf-8")
-WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
 NO_WIDER = {"max-width": "calc(100vw - 28px)"}
 """What is wider than the window (a table) scrolls by itself; without this it would push everything beside it out of sight."""
+WIDE: dict[str, Any] = {"sizing_mode": "stretch_width", "styles": NO_WIDER}
 _ON_TOP = "@media (max-width: 720px) { :host { order: -1; } }"
 
 
@@ -43,14 +43,16 @@ def drawn(figure: Any) -> Any:
 
 def row(*parts: Any, **more: Any) -> Any:
     """Small parts in a line, which is broken where there is no room."""
-    return pn.FlexBox(*parts, **{**WIDE, "styles": NO_WIDER, **more})
+    return pn.FlexBox(*parts, **{**WIDE, **more})
 
 
 def beside(*parts: Any, least: int = 300, first: Any = None) -> Any:
     """Parts next to each other where there is room, below each other where there is none, ``first`` on top then."""
     styles = {"flex": f"1 1 {least}px", "min-width": f"min({least}px, 100%)", **NO_WIDER}
-    cells = [pn.Column(part, styles=styles, stylesheets=[_ON_TOP] if part is first else [], **WIDE) for part in parts]
-    return pn.Row(*cells, styles={"flex-wrap": "wrap", "gap": "8px", **NO_WIDER}, **WIDE)
+    cells = [
+        pn.Column(part, stylesheets=[_ON_TOP] if part is first else [], **{**WIDE, "styles": styles}) for part in parts
+    ]
+    return pn.Row(*cells, **{**WIDE, "styles": {"flex-wrap": "wrap", "gap": "8px", **NO_WIDER}})
 
 
 def download(name: str, filename: str, content: bytes, kind: str) -> str:

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-
 import bns
 from bns.app.switches import Switches
 from bns.app.workbench import Workbench
 from bns.examples import FOLDER
+
+pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
 LOG = FOLDER / "khepera-log.csv"
 CHROMIUM = next(

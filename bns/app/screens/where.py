@@ -127,7 +127,7 @@ class WhereScreen:
         )
         self._brushed.object = f"<p id='bns-brushed'>{what}: {rms:.2f} mm (root mean square)</p>"
         if rows:
-            worst = chosen.loc[chosen["error_mm"].idxmax()]
+            worst = chosen.iloc[int(chosen["error_mm"].to_numpy().argmax())]
             self._trial.value = int(worst["number"])
             self._time.value = min(float(worst["t_s"]), self._time.end)
 
