@@ -24,6 +24,7 @@ FLOORS = (
     {"diagnose", "plotting", "console"},
     {"trial"},
     {"api"},
+    {"app"},
     {"cli"},
     {"__main__"},
 )

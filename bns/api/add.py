@@ -15,7 +15,7 @@ from bns.api.common.provenance import provenance
 from bns.api.common.shown import Progress, Shown, drawn, ticks
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
-from bns.diagnose.adding import ExtendedModel, add_effects, effect_from
+from bns.diagnose.adding import ExtendedModel, Memory, add_effects, effect_from
 from bns.diagnose.predict.paired_errors import noise_json
 from bns.diagnose.report.figures import error_by_step_axes
 from bns.diagnose.report.text import extension_text
@@ -117,7 +117,17 @@ def add(
         raise ModelError(f"{twice} is given {given.count(twice)} times; a model has each effect once: leave the others out.")
     ready = prepared(log, model)
     ticks(progress)("fitting")
-    return AddResult(ready, add_effects(ready.predictor, ready.model, chosen, ready.measured, per_trial))
+    return added(ready, chosen, per_trial)
+
+
+def added(
+    ready: Prepared,
+    effects: Sequence[tuple[Effect, Mapping[str, str]]],
+    per_trial: bool = False,
+    memory: Memory | None = None,
+) -> AddResult:
+    """As `add`, for effects and data that are there; ``memory`` keeps fits from one call to the next."""
+    return AddResult(ready, add_effects(ready.predictor, ready.model, effects, ready.measured, per_trial, memory))
 
 
 def _effect(wanted: Wanted, term: str | None, on: str) -> tuple[Effect, Mapping[str, str]]:

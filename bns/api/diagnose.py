@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from bns.api.propose import ProposeResult
     from bns.api.report import ReportResult
 
+    Explorer = Any
+    """`bns.Explorer`: it stands on a higher floor."""
+
 RANKING = ("rank", "elpd_diff", "dse", "p_value", "rejected_because")
 
 
@@ -124,6 +127,12 @@ class DiagnoseResult(Shown):
         from bns.api.report import reported  # noqa: PLC0415  # it builds on this module
 
         return reported(self, path, **limits)
+
+    def explore(self, **options: Any) -> Explorer:
+        """This diagnosis as a page in the browser, as `bns.explore` opens it."""
+        import bns  # noqa: PLC0415  # the front door knows where the page is
+
+        return bns.explore(self, **options)
 
     def _line(self) -> str:
         lacks = f" ({', '.join(self.effects)})" if self.effects else ""

@@ -14,6 +14,7 @@ from bns import __version__
 from bns.cli import calibrate as calibrating
 from bns.cli import diagnose as measuring
 from bns.cli import examples as listing
+from bns.cli import explore as exploring
 from bns.cli import report as reporting
 from bns.cli import results as looking
 from bns.cli import simulators as simulating
@@ -95,6 +96,7 @@ def _parser() -> Parser:
     measuring.add_commands(command)
     reporting.add_commands(command)
     simulating.add_commands(command)
+    exploring.add_commands(command)
     calibrating.add_commands(command)
     listing.add_commands(command)
     return parser

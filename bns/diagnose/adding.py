@@ -13,15 +13,15 @@ import numpy as np
 import yaml
 
 from bns.diagnose.data.load import Measured
-from bns.diagnose.estimate.cross_validation import Judged, judged_errors
+from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fitting
-from bns.diagnose.estimate.trial_clock_test import with_trial_clocks
-from bns.diagnose.predict.base import Predictor
-from bns.diagnose.predict.paired_errors import PairedErrors
+from bns.diagnose.estimate.trial_clock_test import steps_of, with_trial_clocks
+from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
 from bns.diagnose.select.plausibility import implausible
 from bns.errors import ModelError
 from bns.physics.effect import Effect
@@ -41,11 +41,17 @@ class ExtendedModel:
     model: Model
     errors: PairedErrors
     warnings: tuple[str, ...] = ()
+    steps: tuple[Steps, ...] = ()
+    """What each of the models predicts, as it was judged: as given, then with each effect in turn, fitted to other trials."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """The steps: "as given", then the effects in the order in which they were added."""
         return tuple(m.name for m in next(iter(self.errors.horizons.values())).models)
+
+
+Memory = dict[tuple[str, bool, frozenset[Effect]], tuple[Judged, Fit]]
+"""Fits by what they are of: the model as given, whether clocks are each trial's own, the effects added."""
 
 
 def effect_from(text: str, term: str | None = None, on: str | None = None) -> tuple[Effect, dict[str, str]]:
@@ -64,10 +70,12 @@ def add_effects(
     effects: Sequence[tuple[Effect, Mapping[str, str]]],
     measured: Measured,
     per_trial: bool = False,
+    memory: Memory | None = None,
 ) -> ExtendedModel:
     """Add effects one after the other, each fitted with all before it; ModelError if the model has one already.
 
-    ``per_trial``: an effect that may differ from trial to trial does.
+    ``per_trial``: an effect that may differ from trial to trial does. ``memory``: fits of earlier calls with the same predictor;
+    those of this one are added.
     """
     if per_trial and not any(effect.per_trial_allowed for effect, _ in effects):
         able = ", ".join(e.name for e in all_effects().values() if e.per_trial_allowed)
@@ -79,16 +87,30 @@ def add_effects(
                 f"The model {model.name} has {effect.name} already; it is refitted whenever something is added."
             )
     effects = [(fitting(effect, model, predictor.tracks), written) for effect, written in effects]
-    first = problem_for(predictor, model).pose_filter
-    steps = [_step(predictor, model, effects[: k + 1], per_trial) for k in range(len(effects))]
-    judged = [
-        Judged(effect.name, fit.model, problem.pose_filter)
-        for (effect, _), (problem, fit) in zip(effects, steps, strict=True)
-    ]
-    errors, fit = judged_errors(predictor, first, model, judged), steps[-1][1]
-    return ExtendedModel(
-        fit, _documented(fit, model, measured, errors), errors, tuple(warnings_on(fit, effects, errors))
-    )
+    memory = {} if memory is None else memory
+    judged = [_judged(predictor, model, effects[: k + 1], per_trial, memory) for k in range(len(effects))]
+    first = steps_of(predictor, problem_for(predictor, model).pose_filter, model)
+    steps = (first, *(one.held_out(predictor) for one, _ in judged))
+    names = (AS_GIVEN, *(effect.name for effect, _ in effects))
+    errors, fit = paired_errors(predictor, list(zip(names, steps, strict=True))), judged[-1][1]
+    warnings = tuple(warnings_on(fit, effects, errors))
+    return ExtendedModel(fit, _documented(fit, model, measured, errors), errors, warnings, steps)
+
+
+def _judged(
+    predictor: Predictor,
+    model: Model,
+    effects: Sequence[tuple[Effect, Mapping[str, str]]],
+    per_trial: bool,
+    memory: Memory,
+) -> tuple[Judged, Fit]:
+    """The model with these effects, fitted and predicted on trials held out; from ``memory`` where the set is known there."""
+    key = (model.canonical_json(), per_trial, frozenset(effect for effect, _ in effects))
+    if key not in memory:
+        problem, fit = _step(predictor, model, effects, per_trial)
+        steps = held_out_steps(predictor, problem.pose_filter, fit.model)
+        memory[key] = Judged("", fit.model, problem.pose_filter, steps), fit
+    return memory[key]
 
 
 def _step(
@@ -119,14 +141,14 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
         why = implausible(fit, name, bounds=False)
         if why:
             yield f"{name} fits best, and implausibly: {why}."
-        elif _does_nothing(fit, name):
+        elif does_nothing(fit, name):
             yield f"{name} does nothing that these data show: its 95 % interval includes the value at which it changes nothing."
     for before, after in pairwise(next(iter(errors.horizons.values())).models):
         if not errors.between(before.name, after.name):
             yield f"with {after.name} the error on trials held out does not fall."
 
 
-def _does_nothing(fit: Fit, name: str) -> bool:
+def does_nothing(fit: Fit, name: str) -> bool:
     """Whether the first number of an effect cannot be told from neutral: the others say how, not whether, it acts."""
     for index, number in enumerate(fit.free):
         if number.effect == name and np.isfinite(number.parameter.neutral):

@@ -45,11 +45,19 @@ def held_out_steps(predictor: Predictor, pose_filter: Filter, model: Model) -> S
 
 @dataclass(frozen=True)
 class Judged:
-    """A model whose numbers were fitted, by a name, and the filter of the problem that they were fitted to."""
+    """A model whose numbers were fitted, by a name, and the filter of the problem that they were fitted to.
+
+    ``steps``: what `held_out_steps` gives of it, where that was worked out already.
+    """
 
     name: str
     model: Model
     pose_filter: Filter
+    steps: Steps | None = None
+
+    def held_out(self, predictor: Predictor) -> Steps:
+        """What is predicted of every trial by a fit to others."""
+        return held_out_steps(predictor, self.pose_filter, self.model) if self.steps is None else self.steps
 
 
 def judged_errors(predictor: Predictor, pose_filter: Filter, given: Model, extended: Sequence[Judged]) -> PairedErrors:
@@ -58,5 +66,5 @@ def judged_errors(predictor: Predictor, pose_filter: Filter, given: Model, exten
     The first one is `AS_GIVEN`: what `bns compare` shows of the same model and data.
     """
     steps = [(AS_GIVEN, steps_of(predictor, pose_filter, given))]
-    steps += [(one.name, held_out_steps(predictor, one.pose_filter, one.model)) for one in extended]
+    steps += [(one.name, one.held_out(predictor)) for one in extended]
     return paired_errors(predictor, steps)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,7 @@ class WheelPredictor:
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
         way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[0][:, 0]
         self.way_m = self._since_previous(way)
+        self._of_horizon = lru_cache(partial(windows, tracks))
         self._starts: dict[tuple[str, float], tuple[tuple[float, ...], ...]] = {}
         # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
         kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
@@ -124,7 +125,7 @@ class WheelPredictor:
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Back to back within each trial."""
-        return windows(self.tracks, horizon)
+        return self._of_horizon(horizon)
 
     def scores(self) -> Mapping[str, Mapping[str, float]]:
         """A model of wheels has but a path."""
