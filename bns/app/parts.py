@@ -48,7 +48,7 @@ def row(*parts: Any, **more: Any) -> Any:
 
 def beside(*parts: Any, least: int = 300, first: Any = None) -> Any:
     """Parts next to each other where there is room, below each other where there is none, ``first`` on top then."""
-    styles = {"flex": f"1 1 {least}px", "min-width": f"min({least}px, 100%)", **NO_WIDER}
+    styles = {"flex": f"1 1 {least}px", "min-width": f"min({least}px, calc(100vw - 28px))", **NO_WIDER}
     cells = [
         pn.Column(part, stylesheets=[_ON_TOP] if part is first else [], **{**WIDE, "styles": styles}) for part in parts
     ]
