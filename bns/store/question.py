@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
@@ -14,7 +15,7 @@ from bns.store.schema import SCHEMAS
 from bns.store.views import pattern
 
 MOST_ROWS, MOST_BYTES = 5_000_000, 1 << 29
-_ROWS_AT_ONCE = 100_000
+_ROWS_AT_ONCE = 2_048
 _LEVELS = ("", "/sweep=*", "/sweep=*/task=*")
 _PARQUET_NAME = re.compile(r"""["']([^"']+\.parquet)["']""")
 _EXPLAIN = re.compile(r"\s*EXPLAIN\s+(ANALYZE\s+)?", re.IGNORECASE)
@@ -48,7 +49,7 @@ def _fetched(connection: duckdb.DuckDBPyConnection, sql: str) -> pa.Table:
     """The rows, as long as they are not too many: they are counted as they come, and not made all at once."""
     reader = connection.sql(sql).to_arrow_reader(_ROWS_AT_ONCE)
     batches, rows, size = [], 0, 0
-    for batch in reader:
+    for batch in _batches(reader, sql):
         batches.append(batch)
         rows, size = rows + batch.num_rows, size + batch.nbytes
         if rows > MOST_ROWS or size > MOST_BYTES:
@@ -57,6 +58,15 @@ def _fetched(connection: duckdb.DuckDBPyConnection, sql: str) -> pa.Table:
                 "at most. Ask for fewer with WHERE or LIMIT, count or average them in the query, or read the files with bns.load."
             )
     return pa.Table.from_batches(batches, schema=reader.schema)
+
+
+def _batches(reader: pa.RecordBatchReader, sql: str) -> Iterator[pa.RecordBatch]:
+    try:
+        yield from reader
+    except OSError as error:  # what DuckDB throws while rows are made comes through Arrow as one of these
+        if "IO Error" in str(error):
+            raise duckdb.IOException(str(error)) from error
+        raise StoreError(f"DuckDB cannot answer {sql!r}: {str(error).splitlines()[0]}") from error
 
 
 def _half_of_memory_mib() -> int:

@@ -116,7 +116,7 @@ def _check_keys(where: str, given: Mapping[str, Any], valid: tuple[str, ...]) ->
 
 
 def _positive(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < math.inf
+    return isinstance(value, int | float) and not isinstance(value, bool) and value > 0
 
 
 def _check_trials(path: Path, tree: Mapping[str, Any]) -> None:
