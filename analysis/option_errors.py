@@ -15,6 +15,7 @@ from bns.diagnose.predict.horizons import errors_of
 from bns.physics.model import Model
 from bns.robots import load_robot, robot_names
 from bns.robots.simulator import load_static_simulator
+from bns.robots.snake.options import BEYOND
 from bns.robots.snake.robot import Snake
 from bns.spec import OPTION_MARK
 from bns.static_simulator.transfer_trials import measurements_path
@@ -35,8 +36,7 @@ def tracks_of(path: Path) -> CycleTracks:
 
 def variants(robot: str) -> list[str]:
     """The robot without options, with each, with all, as a spec names them."""
-    options = load_robot(robot).options
-    chosen = [one for many in range(len(options) + 1) for one in combinations(sorted(options), many)]
+    chosen = [one for many in range(len(BEYOND) + 1) for one in combinations(BEYOND, many)]
     return [OPTION_MARK.join([robot, *names]) for names in chosen]
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from bns.api.run import RunResult, run
     from bns.api.sweep import Sweep, SweepResult
     from bns.api.trial import TrialResult, trial
+    from bns.app.explore import Explorer, explore
     from bns.errors import (
         BnsError,
         ClusterError,
@@ -55,6 +56,7 @@ __all__ = [
     "DeviceError",
     "DiagnoseResult",
     "Effect",
+    "Explorer",
     "HardwareError",
     "Measurements",
     "Model",
@@ -75,6 +77,7 @@ __all__ = [
     "compare",
     "diagnose",
     "effects",
+    "explore",
     "load",
     "propose",
     "query",
@@ -95,6 +98,7 @@ _HOMES = {
     "api.run": ("RunResult", "run"),
     "api.sweep": ("Sweep", "SweepResult"),
     "api.trial": ("TrialResult", "trial"),
+    "app.explore": ("Explorer", "explore"),
     "errors": (
         *("BnsError", "ClusterError", "DataError", "DeviceError", "HardwareError", "ModelError", "SpecError"),
         *("StopNotConfirmedError", "StoreError", "TrialPausedError"),

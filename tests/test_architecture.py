@@ -11,19 +11,20 @@ import bns
 
 PACKAGE = Path(bns.__file__).parent
 FLOORS = (
-    {"errors", "examples", "extras", "registry", "shipped", "spec", "measurements", "__init__"},
+    {"errors", "examples", "extras", "options", "registry", "safe_yaml", "shipped", "spec", "measurements", "__init__"},
     {"engine"},
     {"tasks"},
     {"robots"},
     {"physics"},
     {"hardware"},
     {"worlds"},
-    {"bootstrap", "cuda", "static_simulator"},
+    {"approaches", "bootstrap", "cuda", "static_simulator"},
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "console"},
     {"trial"},
     {"api"},
+    {"app"},
     {"cli"},
     {"__main__"},
 )
@@ -70,11 +71,12 @@ def upward(module: str, rooms: list[tuple[str, int]]) -> list[str]:
 
 
 DIAGNOSE_FLOORS = (
+    {"settings"},
     {"data"},
     {"predict"},
     {"estimate"},
     {"select", "residuals"},
-    {"caveats"},
+    {"caveats", "values"},
     {"adding", "comparison", "diagnosis"},
     {"design"},
     {"report"},

@@ -59,6 +59,7 @@ MISSING = {
     "dynamixel_sdk": ("robot", ["trial", "--robot", "snake", "--emulated", "--yes"]),
     "serial": ("robot", ["doctor"]),
     "distributed": ("cluster", ["sweep", "khepera-small", "--executor", "dask", "--dry-run"]),
+    "panel": ("app", ["explore", "--no-browser"]),
     "submitit": ("cluster", ["sweep", "khepera-small", "--executor", "slurm", "--dry-run"]),
 }
 ONE_BY_ONE = """

@@ -14,7 +14,7 @@ SPEC = RunSpec(
     world="physics",
 )
 KNOWN = {
-    2: {
+    3: {
         "diversity": [0.569527, 0.366708],
         "fitness_simulation": [0.0323846, 0.0319481],
         "fitness_world": [0.0241326, 0.0241249],

@@ -100,7 +100,7 @@ def test_training_ends_where_watched_patterns_were_best_and_has_learned():
 def test_near_commands_are_allowed_ones_within_a_mutation():
     commands = ROBOT.random_controllers(KEY, 50, 1).commands[:, 0]
     near = ROBOT.perturb(commands, KEY, 1)
-    assert (near[:, 1] < near[:, 0]).all()
+    assert ((near[:, 1] < near[:, 0]) | (near[:, 0] == 0)).all()
     turned = np.abs(np.mod(near[:, 2:4] - commands[:, 2:4] + np.pi, 2 * np.pi) - np.pi)
     assert 0.05 < turned.mean() < 0.2
     assert not np.array_equal(near, ROBOT.perturb(commands, KEY, 2))
@@ -112,6 +112,13 @@ def test_accuracy_of_known_numbers():
     assert refinement.accuracy(measured, 0.5 * measured)["regression_r2"] == pytest.approx(1)
     assert refinement.accuracy(measured, measured + 0.1) == pytest.approx(
         {"r2": 1 - 0.03 / 2, "regression_r2": 1, "slope": 1, "rmse": 0.1, "bias": 0.1}
+    )
+
+
+def test_where_nothing_varies_nothing_is_explained():
+    same = np.ones(5)
+    assert refinement.accuracy(same, np.arange(5.0)) == pytest.approx(
+        {"r2": 0, "regression_r2": 0, "slope": 0, "rmse": np.sqrt(3), "bias": 1}
     )
 
 

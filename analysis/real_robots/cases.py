@@ -9,19 +9,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import yaml
 
-from analysis.intervals import bootstrap
 from bns.diagnose.data.load import Measured, load_measured
-from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.estimate.cross_validation import counted, errors_at_horizons, held_out_steps
-from bns.diagnose.predict.base import Predictor, Steps
-from bns.diagnose.predict.horizons import HORIZONS, errors_of
+from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.predict.wheels import predictor_for_search
 from bns.diagnose.report.text import diagnosis_text
-from bns.diagnose.select.stepwise import SelectionResult
 from bns.errors import DataError
 from bns.physics.model import Model
 
@@ -90,13 +85,13 @@ def diagnosed(case: Case, table: pd.DataFrame, folder: Path) -> dict[str, Any]:
     log = measured(case, table, folder)
     predictor = predictor_for_search(log.tracks)
     found = diagnose(predictor, Model(wheelbase_m=case.wheelbase_m, name="differential-drive"))
-    drawn = errors_at_horizons(predictor, predictor.steps(Model(wheelbase_m=case.drawn_m)))
+    drawn = paired_errors(predictor, [("drawn", predictor.steps(Model(wheelbase_m=case.drawn_m)))])
     answer = {
         **found.as_json(),
-        "drawn": {h: v for h, v in drawn.items() if np.isfinite(v)},
+        "drawn": {h: e.models[0].rms_m for h, e in drawn.horizons.items() if e.windows},
         "trials": len(log.tracks),
         "findings": len(log.findings),
-        "intervals": intervals(predictor, found.selection) if found.selection else {},
+        "intervals": intervals(found) if found.errors else {},
     }
     per_trial_effect = found.model.per_trial_effect if found.model else None
     answer["clocks_s"] = list(per_trial_effect.trial_values) if per_trial_effect else []
@@ -105,18 +100,8 @@ def diagnosed(case: Case, table: pd.DataFrame, folder: Path) -> dict[str, Any]:
     return answer
 
 
-def intervals(predictor: Predictor, found: SelectionResult) -> dict[str, dict[str, list[float]]]:
-    """95 % intervals of the held-out errors (m), before and after, at every horizon that the log has; the trial is the unit."""
-    models = {"before": found.nominal.model, "after": found.fit.model}
-    steps = {name: held_out_steps(predictor, found.problem.pose_filter, model) for name, model in models.items()}
-    known = [h for h in HORIZONS if len(predictor.windows(h)[0])]
-    return {h: {name: error_interval(predictor, s, h) for name, s in steps.items()} for h in known}
-
-
-def error_interval(predictor: Predictor, steps: Steps, horizon: str) -> list[float]:
-    """Ends of the bootstrap interval of `position_error`, whole trials drawn."""
-    errors, trials = errors_of(predictor, steps, horizon), len(predictor.tracks)
-    position, kept = errors.position_m, counted(errors.position_m)
-    sums = np.bincount(errors.trial[kept], position[kept] ** 2, trials)
-    counts = np.bincount(errors.trial[kept], minlength=trials).astype(float)
-    return [float(np.sqrt(end)) for end in bootstrap(sums, counts)]
+def intervals(found: Diagnosis) -> dict[str, dict[str, list[float]]]:
+    """95 % intervals of the errors (m), before and after, at every horizon that the log has; the trial is the unit."""
+    assert found.errors is not None
+    ends = {h: [[m.low_m, m.high_m] for m in e.models] for h, e in found.errors.horizons.items() if e.windows}
+    return {h: {"before": models[0], "after": models[-1]} for h, models in ends.items()}

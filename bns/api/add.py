@@ -15,10 +15,11 @@ from bns.api.common.provenance import provenance
 from bns.api.common.shown import Progress, Shown, drawn, ticks
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
-from bns.diagnose.adding import ExtendedModel, add_effects, effect_from
-from bns.diagnose.diagnosis import numbers_of
+from bns.diagnose.adding import ExtendedModel, Memory, add_effects, effect_from
+from bns.diagnose.predict.paired_errors import noise_json
 from bns.diagnose.report.figures import error_by_step_axes
 from bns.diagnose.report.text import extension_text
+from bns.diagnose.values import numbers_of
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 
@@ -39,10 +40,19 @@ class AddResult(Shown):
 
     @property
     def errors(self) -> pd.DataFrame:
-        """Position error on trials held out (m, root mean square): a row a step (nominal, each effect added in turn, noise
-        floor), a column a horizon."""
-        steps = {step.name: dict(step.error) for step in self.extended.error_by_step}
-        return pd.DataFrame({**steps, "noise floor": dict(self.extended.floor)}).T.rename_axis("step")
+        """Position error on held-out trials (m, root mean square), all on the same windows: a row a step (as given, then each
+        effect added in turn; last the noise of the tracking), a column a horizon. NaN where there are no such windows."""
+        horizons = self.extended.errors.horizons
+        steps = {
+            name: {h: e.models[k].rms_m for h, e in horizons.items()} for k, name in enumerate(self.extended.names)
+        }
+        noise = {h: e.noise_floor_m for h, e in horizons.items()}
+        return pd.DataFrame({**steps, "tracking noise": noise}).T.rename_axis("step")
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know before using the model: numbers at a bound, effects that do nothing, an error that does not fall."""
+        return self.extended.warnings
 
     def summary(self) -> str:
         """The error by step, and the numbers."""
@@ -52,23 +62,22 @@ class AddResult(Shown):
         """One object of plain values, the same that `bns add --json` prints."""
         return {
             "model": self.extended.model.name,
-            "effects": [step.name for step in self.extended.error_by_step[1:]],
+            "effects": list(self.extended.names[1:]),
             "parameters": numbers_of(self.extended.fit),
-            "error": {step.name: {h: float(v) for h, v in step.error.items()} for step in self.extended.error_by_step},
-            "noise_floor": {h: float(v) for h, v in self.extended.floor.items()},
+            "error": self.extended.errors.as_json(),
+            "tracking_noise": noise_json(self.extended.errors),
+            "warnings": list(self.extended.warnings),
             "provenance": provenance(self.ready.model, self.ready.log.sha256),
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """The error at every step of the way, a line a horizon; dotted: the noise floor."""
+        """The error at every step of the way, a line a horizon; dotted: the noise of the tracking."""
         return drawn(ax, lambda axes: error_by_step_axes(axes, self.extended), (5.4, 3.0))
 
     def _line(self) -> str:
-        first, last = self.extended.error_by_step[0].error, self.extended.error_by_step[-1].error
-        added = " + ".join(step.name for step in self.extended.error_by_step[1:])
-        horizon = self.ready.predictor.near
-        fell = f"{1e3 * first[horizon]:.1f} mm to {1e3 * last[horizon]:.1f} mm"
-        return f"{self.ready.model.name} + {added}: {fell}, {horizon} ahead"
+        e = self.extended.errors.horizons[self.ready.predictor.near]
+        fell = f"{1e3 * e.models[0].rms_m:.1f} mm to {1e3 * e.models[-1].rms_m:.1f} mm"
+        return f"{self.ready.model.name} + {' + '.join(self.extended.names[1:])}: {fell}, {e.horizon} ahead"
 
 
 def add(
@@ -102,9 +111,23 @@ def add(
         names = ", ".join(map(_name, wanted))
         raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
     chosen = [_effect(each, term, on) for each in wanted]
+    given = [effect.name for effect, _ in chosen]
+    twice = next((name for name in given if given.count(name) > 1), None)
+    if twice is not None:
+        raise ModelError(f"{twice} is given {given.count(twice)} times; a model has each effect once: leave the others out.")
     ready = prepared(log, model)
     ticks(progress)("fitting")
-    return AddResult(ready, add_effects(ready.predictor, ready.model, chosen, ready.measured, per_trial))
+    return added(ready, chosen, per_trial)
+
+
+def added(
+    ready: Prepared,
+    effects: Sequence[tuple[Effect, Mapping[str, str]]],
+    per_trial: bool = False,
+    memory: Memory | None = None,
+) -> AddResult:
+    """As `add`, for effects and data that are there; ``memory`` keeps fits from one call to the next."""
+    return AddResult(ready, add_effects(ready.predictor, ready.model, effects, ready.measured, per_trial, memory))
 
 
 def _effect(wanted: Wanted, term: str | None, on: str) -> tuple[Effect, Mapping[str, str]]:

@@ -40,9 +40,9 @@ class CompareResult(Shown):
     @property
     def errors(self) -> pd.DataFrame:
         """A row a horizon: position_m, forward_m, left_m (m), heading_rad (rad), root mean square, position_se_m, windows (how
-        many), noise_floor_m (what tracking noise alone would show at most)."""
+        many), noise_floor_m (what tracking noise alone would show; NaN where the poses cannot tell)."""
         table = pd.DataFrame(self.comparison.errors).T
-        table["noise_floor_m"] = pd.Series(self.comparison.floor)
+        table["noise_floor_m"] = pd.Series({h: self.comparison.noise_floor_m(h) for h in self.comparison.errors})
         return table.rename_axis("horizon")
 
     @property
@@ -102,7 +102,7 @@ def compare(log: Log, model: Given, *, progress: Progress | None = None) -> Comp
         ModelError: no such model.
     """
     networks = prepared_networks(log, model)
-    ready = networks or prepared(log, model, slim=False)
+    ready = networks or prepared(log, model)
     ticks(progress)("comparing")
     result = held_against(ready.predictor, ready.model)
     kept = isinstance(ready.predictor, NetworkPredictor) and ready.predictor.learned_from.size > 0

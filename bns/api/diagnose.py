@@ -22,11 +22,14 @@ from bns.diagnose.report.figures import ranking_axes
 from bns.diagnose.report.text import diagnosis_text
 from bns.errors import DataError
 from bns.physics.effect import Effect
-from bns.physics.effects import effect_in_file
+from bns.physics.effects import effect_in_file, effect_named
 
 if TYPE_CHECKING:
     from bns.api.propose import ProposeResult
     from bns.api.report import ReportResult
+
+    Explorer = Any
+    """`bns.Explorer`: it stands on a higher floor."""
 
 RANKING = ("rank", "elpd_diff", "dse", "p_value", "rejected_because")
 
@@ -92,8 +95,12 @@ class DiagnoseResult(Shown):
 
     @property
     def errors(self) -> pd.DataFrame:
-        """Position error on trials held out (m): a row a horizon, columns before, after, noise_floor."""
-        return pd.DataFrame(self.diagnosis.error or {}).T.rename_axis("horizon")
+        """Position error (m) on held-out trials, before and after on the same windows: a row a horizon.
+
+        Columns before, after (root mean square), median_before, median_after, change, change_low, change_high (95 %, paired
+        by trial), noise_floor (of the tracking), windows, windows_left_out.
+        """
+        return pd.DataFrame(self.diagnosis.as_json()["error"]).T.rename_axis("horizon")
 
     def summary(self) -> str:
         """Verdict first; then numbers, errors, ranking, notes."""
@@ -121,6 +128,12 @@ class DiagnoseResult(Shown):
 
         return reported(self, path, **limits)
 
+    def explore(self, **options: Any) -> Explorer:
+        """This diagnosis as a page in the browser, as `bns.explore` opens it."""
+        import bns  # noqa: PLC0415  # the front door knows where the page is
+
+        return bns.explore(self, **options)
+
     def _line(self) -> str:
         lacks = f" ({', '.join(self.effects)})" if self.effects else ""
         return f"{self.verdict}{lacks}; {self.ready.model.name} on {self.ready.log.name}, {len(self.ready.log)} trials"
@@ -131,14 +144,16 @@ def diagnose(
     model: Given,
     *,
     also: Iterable[Effect | str | PathLike[str]] = (),
+    without_effects: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> DiagnoseResult:
     """Find what a model lacks.
 
     Args:
-        log: a file, a table, or `bns.Measurements`; ten trials are the fewest that say anything.
+        log: a file, a table, or `bns.Measurements`; eleven trials are the fewest that say anything.
         model: `bns.Model`, or the name or file of one.
         also: effects of your own, tried beside the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
+        without_effects: names of listed effects that are not to be tried.
         progress: told what is being looked at; the share that is done is not known (None).
 
     Raises:
@@ -147,5 +162,7 @@ def diagnose(
     """
     own = [each if isinstance(each, Effect) else effect_in_file(Path(each)) for each in also]
     ready = prepared(log, model)
-    found = find(ready.predictor, ready.model, extra={effect.name: effect for effect in own}, tick=ticks(progress))
+    barred = [effect_named(name).name for name in without_effects]
+    extra = {effect.name: effect for effect in own}
+    found = find(ready.predictor, ready.model, extra=extra, tick=ticks(progress), barred=barred)
     return DiagnoseResult(ready, found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -17,6 +18,7 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.cycles import CycleTracks
 from bns.diagnose.data.load import Measured, load_measured, measured_table, read_table, table_sha256
 from bns.diagnose.data.mapping import checked_mapping, load_mapping
+from bns.diagnose.predict.check_robot import suggested_wheelbase_m
 from bns.diagnose.report.text import findings_text
 from bns.errors import DataError
 from bns.plotting.style import OKABE_ITO
@@ -84,6 +86,27 @@ class Measurements(Shown):
     def measured(self) -> Measured:
         """The same for the library's own functions: tracks as arrays, findings, digest."""
         return self._measured
+
+    def without(self, trials: Iterable[str]) -> Measurements:
+        """The same measurements without some trials, by their names. DataError if there is no such trial, or none is left."""
+        left_out, table = set(map(str, trials)), self._measured.table
+        of = table["trial"].astype(str)
+        unknown = sorted(left_out - set(of))
+        if unknown:
+            raise DataError(f"There is no trial {', '.join(unknown)}; there are {', '.join(dict.fromkeys(of))}.")
+        if not left_out:
+            return self
+        if set(of) <= left_out:
+            raise DataError("All trials are left out; keep at least one.")
+        fewer = copy(self)
+        fewer.__dict__ = {"_measured": measured_table(table[~of.isin(left_out)], self._measured.path)}
+        return fewer
+
+    @cached_property
+    def suggested_wheelbase_m(self) -> float | None:
+        """The distance of the wheels (m) with which a plain drive turns as this robot did; None where nothing tells."""
+        tracks = self._measured.tracks
+        return None if isinstance(tracks, CycleTracks) else suggested_wheelbase_m(tracks)
 
     @cached_property
     def sha256(self) -> str:

@@ -40,12 +40,17 @@ class Model(physics.Model):
 
         ModelError unless the name ends in .yaml or .yml.
         """
-        from bns.diagnose.adding import model_yaml  # noqa: PLC0415  # loads the fits
-        from bns.store.files import publish  # noqa: PLC0415
+        from bns.store.files import publish  # noqa: PLC0415  # a model that is not saved needs no store
 
         target = checked_target(Path(path))
-        publish(model_yaml(self).encode(), target.with_name(f".{target.name}.part"), target)
+        publish(self.to_yaml().encode(), target.with_name(f".{target.name}.part"), target)
         return target
+
+    def to_yaml(self) -> str:
+        """The text of the file that `save` writes."""
+        from bns.diagnose.adding import model_yaml  # noqa: PLC0415  # loads the fits
+
+        return model_yaml(self)
 
     @property
     def sha256(self) -> str:

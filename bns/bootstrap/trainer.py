@@ -14,6 +14,11 @@ from bns.robots.base import Robot
 from bns.spec import RunSpec
 
 
+def untrained(robot: Robot, key: Key) -> np.ndarray:
+    """The networks that a robot's training begins with (networks, W)."""
+    return initial_weights(key, len(robot.networks), robot.hidden, robot.input_count, robot.nguyen_widrow)
+
+
 @dataclass
 class Trainer:
     """Networks under training and the patterns gathered so far."""
@@ -28,12 +33,12 @@ class Trainer:
     @classmethod
     def start(cls, robot: Robot, key: Key, spec: RunSpec) -> Trainer:
         """Untrained networks and no patterns."""
-        weights = initial_weights(key, len(robot.networks), robot.hidden, robot.input_count)
+        weights = untrained(robot, key)
         return cls(
             robot,
             key,
             spec.training_iterations_per_evaluation,
-            Rprop.start(weights, spec.training_algorithm, robot.sigmoid_output),
+            Rprop.start(weights, spec.training_algorithm, robot.sigmoid_output, robot.flat_spot),
             TrainingData.empty(INPUTS, len(robot.networks)),
         )
 
@@ -58,8 +63,7 @@ class Trainer:
             self.rule.train(patterns.inputs, patterns.targets, patterns.count, self.iterations)
         for failed in np.flatnonzero(~np.isfinite(self.rule.weights).all(axis=1)):
             self.failures += 1
-            untrained = initial_weights(self.key, len(self.rule.weights), self.robot.hidden, self.robot.input_count)
-            self.rule.restart(int(failed), untrained[failed])
+            self.rule.restart(int(failed), untrained(self.robot, self.key)[failed])
 
     def evolution_weights(self) -> np.ndarray:
         """A copy of the networks for evolution to work on."""

@@ -8,6 +8,8 @@ import tempfile
 from contextlib import ExitStack
 from pathlib import Path
 
+import numpy as np
+
 from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
@@ -15,22 +17,34 @@ from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.looking import from_folder, views, watch
 from bns.hardware.platform import platform_module
 from bns.hardware.rig import Rig, load_rig, shipped_rig
-from bns.hardware.tracking.calibration import Board, calibrate
+from bns.hardware.tracking.calibration import Board, Calibration, calibrate, check_scale
 from bns.hardware.tracking.camera import StreamCamera
+from bns.hardware.tracking.kinds import checked
+from bns.hardware.tracking.picture import SETTINGS as PICTURE
+from bns.hardware.tracking.wii import LEDS_M
+from bns.hardware.tracking.wii import open_tracker as open_wii
+from bns.hardware.tracking.wii_calibration import ON_THE_START, checked_tracker, hanging, look_at_lights
 
 with extra("robot"):
     import cv2
 
 _PRINT_PX_PER_M = 300 / 0.0254
+_SIZE_PX = (1280, 720)
+_ON_START = "Lay the board flat on the floor, its middle on the start, its long side east to west; then Enter: "
+_ELSEWHERE = "Lay it flat somewhere else, as far out as the camera sees all of it, turned as you like; then Enter: "
 
 
 def calibrated(options: argparse.Namespace) -> str:
     """Carry out `bns calibrate`; a report in words."""
+    if options.wii:
+        return _hung(options)
     if not 5.0 <= options.square_mm <= 1000.0:
         raise HardwareError(f"--square-mm is {options.square_mm:g}; measure the printed square, 5 to 1000 mm.")
     board = Board(square_m=options.square_mm / 1000, marker_m=0.75 * options.square_mm / 1000)
     if options.print_board is not None:
         return _printed(board, options.print_board)
+    if options.measured_mm is not None:
+        check_scale(board, options.measured_mm / 1000)
     if not options.output.absolute().parent.is_dir():
         raise HardwareError(
             f"there is no folder {options.output.parent} to write {options.output.name} into; make it first."
@@ -38,10 +52,29 @@ def calibrated(options: argparse.Namespace) -> str:
     found = from_folder(options.frames, options.floor, board) if options.frames else _filmed(options, board)
     found.save(options.output)
     height_m = float(-(found.lens.rotation.T @ found.lens.shift_m)[2])
+    few = "" if found.floor_views > 1 else "; further out than the board a single view may be a centimetre off (--places)"
     return (
         f"calibrated from {found.views} views, RMS {found.rms_px:.2f} pixels; the camera is {height_m:.2f} m above the floor\n"
+        f"floor from {found.floor_views} view{'s' * (found.floor_views > 1)}: corners kept back are off by "
+        f"{1000 * found.floor_rms_m:.1f} mm RMS, {1000 * found.floor_worst_m:.1f} mm at most{few}\n"
         f"written to {options.output}; name it in the rig's tracker as calibration"
     )
+
+
+def _hung(options: argparse.Namespace) -> str:
+    """How the Wii remote hangs, seen from a robot that stands on the task's start."""
+    if options.rig is None:
+        raise HardwareError("--wii needs --rig FILE: its tracker names the remote, its height and the LEDs.")
+    rig = load_rig(options.rig, "khepera")
+    clock, height_m = RealClock(), checked_tracker(rig.tracker)
+    leds_m = np.asarray(rig.tracker.get("leds_m", LEDS_M), np.float64)
+    tracker = open_wii(checked(rig.tracker), clock)
+    try:
+        input("Put the robot on the start, its nose to the north (up on the tasks' drawings); then Enter: ")
+        found = hanging(look_at_lights(tracker, clock, len(leds_m)), ON_THE_START, height_m, leds_m)
+    finally:
+        tracker.close()
+    return f"write these into the tracker of {options.rig}:\n{found.in_words()}"
 
 
 def _printed(board: Board, path: Path) -> str:
@@ -54,18 +87,41 @@ def _printed(board: Board, path: Path) -> str:
     return f"{path}: print it at 300 dpi without scaling, {width:.0f} x {height:.0f} mm; glue it on something flat"
 
 
-def _filmed(options: argparse.Namespace, board: Board):  # type: ignore[no-untyped-def]  # a Calibration
+def _filmed(options: argparse.Namespace, board: Board) -> Calibration:
     clock = RealClock()
-    camera = StreamCamera(options.camera, clock)
+    asked = {name: value for name in PICTURE if (value := getattr(options, name)) is not None}
+    size, insist = (_size(options.size), True) if options.size else (_SIZE_PX, False)
+    camera = StreamCamera(options.camera, clock, size, asked, insist)
     try:
+        _say("the camera's pictures: " + ", ".join(f"{name} {value:g}" for name, value in camera.picture.items()))
+        if options.measured_mm is None:
+            check_scale(board, _measured_m(board))
         kept = views(camera, board, options.views, clock, _say)
-        input("Lay the board flat on the floor, its middle on the start, its long side east to west; then Enter: ")
-        frame = camera.newest()
-        if frame is None:
-            raise HardwareError("the camera is gone; plug it in anew.")
-        return calibrate(kept, frame.picture, board, options.camera)
+        floors = []
+        for number in range(options.places):
+            input(_ON_START if number == 0 else _ELSEWHERE)
+            frame = camera.newest()
+            if frame is None:
+                raise HardwareError("the camera is gone; plug it in anew.")
+            floors.append(frame.picture)
+        return calibrate(kept, floors, board, options.camera, {name: camera.picture[name] for name in asked})
     finally:
         camera.close()
+
+
+def _measured_m(board: Board) -> float:
+    answer = input(f"Measure the printed board's long side, all {board.across} squares, in mm: ")
+    try:
+        return float(answer) / 1000
+    except ValueError as error:
+        raise HardwareError(f"{answer!r} is no length in millimetres; measure the board with a ruler.") from error
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, x, height = text.partition("x")
+    if not (x and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        raise HardwareError(f"--size is {text!r}; write width x height in pixels, as 1280x720.")
+    return int(width), int(height)
 
 
 def tracked(options: argparse.Namespace) -> str:

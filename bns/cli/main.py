@@ -11,17 +11,19 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bns import __version__
+from bns.cli import calibrate as calibrating
 from bns.cli import diagnose as measuring
 from bns.cli import examples as listing
+from bns.cli import explore as exploring
 from bns.cli import report as reporting
 from bns.cli import results as looking
 from bns.cli import simulators as simulating
 from bns.cli import sweep as sweeping
 from bns.cli.compiling import say_if_compiling
 from bns.cli.option_types import add_spec_options, duration, positive
-from bns.cli.parser import SHELLS, Completion, Parser, add_results
+from bns.cli.parser import SHELLS, Completion, Parser, add_results, add_trust, take_trust
 from bns.cli.sweep_options import DEVICES
-from bns.cli.trial_options import add_looking_options, add_trial_options
+from bns.cli.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.errors import BnsError
 from bns.spec import FIELDS, RunSpec
 
@@ -37,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     options = _parser().parse_args(arguments)
     try:
+        take_trust(options)
         return _flushed(int(options.command(options)))
     except BnsError as error:
         print(f"bns: {error}", file=sys.stderr)
@@ -93,6 +96,8 @@ def _parser() -> Parser:
     measuring.add_commands(command)
     reporting.add_commands(command)
     simulating.add_commands(command)
+    exploring.add_commands(command)
+    calibrating.add_commands(command)
     listing.add_commands(command)
     return parser
 
@@ -111,6 +116,7 @@ def _add_single_runs(command: measuring.Adder) -> None:
     one.add_argument(
         "--measurements", type=Path, metavar="FILE", help="also write what was driven as a table (.csv, .parquet)"
     )
+    add_trust(one)
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
     one.add_argument("--device", choices=DEVICES, default="cpu", help="what computes: cpu (default), or a GPU: cuda")
     one.add_argument(
@@ -135,6 +141,7 @@ def _add_single_runs(command: measuring.Adder) -> None:
     ill.add_argument(
         "--rig", type=Path, metavar="FILE", help="your set-up (YAML): its robot and tracker are asked, too"
     )
+    add_servo_options(command("servos", servos, "set up AX-12 servos: who answers, their ids, their settings"))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -186,6 +193,13 @@ def doctor(options: argparse.Namespace) -> int:
     from bns.cli.doctor import checked_up
 
     return checked_up(options)
+
+
+def servos(options: argparse.Namespace) -> int:
+    """Set up servos."""
+    from bns.cli.servos import served
+
+    return served(options)
 
 
 if __name__ == "__main__":

@@ -57,9 +57,27 @@ def add_looking_options(
     source.add_argument(
         "--print-board", type=Path, metavar="FILE", help="write the board to be printed (PNG), true to size"
     )
-    calibrating.add_argument(
-        "--floor", type=Path, metavar="FILE", help="picture of the board on the floor (default: the last)"
+    source.add_argument(
+        "--wii", action="store_true", help="find how the Wii remote of --rig hangs: mirror, orientation, place, view"
     )
+    calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii")
+    calibrating.add_argument(
+        "--floor",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help="pictures of the board flat on the floor: on the start first, then elsewhere (default: the last of --frames)",
+    )
+    calibrating.add_argument(
+        "--places", type=positive, default=3, metavar="N", help="places on the floor to lay the board on (default: 3)"
+    )
+    calibrating.add_argument("--measured-mm", type=float, metavar="MM", help="width of the whole printed board, as measured")
+    calibrating.add_argument("--size", metavar="WxH", help="of the camera's pictures (default: 1280x720, or what it has)")
+    for name in ("exposure", "focus", "white-balance"):
+        calibrating.add_argument(
+            f"--{name}", type=float, metavar="N", help="fix it, as the camera's driver counts (v4l2-ctl -L)"
+        )
     calibrating.add_argument("--square-mm", type=float, default=68.0, help="side of a printed square (default: 68, A3)")
     calibrating.add_argument("--views", type=positive, default=15, help="views to take (default: 15)")
     calibrating.add_argument("-o", "--output", type=Path, default=Path("camera.json"), metavar="FILE")
@@ -70,3 +88,24 @@ def add_looking_options(
         "--seconds", type=duration, default=5.0, metavar="TIME", help="how long to look (default: 5s)"
     )
     tracking.add_argument("--frames", type=Path, metavar="DIR", help="write annotated frames into this folder")
+
+
+def add_servo_options(parser: argparse.ArgumentParser) -> None:
+    """Of `bns servos`: `scan`, `set-id` and `check`, each at a port."""
+    parts = parser.add_subparsers(title="what to do", metavar="scan|set-id|check", required=True)
+
+    def part(name: str, text: str) -> argparse.ArgumentParser:
+        added = parts.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+        added.add_argument("--port", required=True, metavar="DEVICE", help="the bus adapter, as /dev/ttyUSB0")
+        added.set_defaults(part=name)
+        return added
+
+    part("scan", "list the servos that answer").add_argument(
+        "--all-bauds", action="store_true", help="at all rates that a servo can be set to (minutes)"
+    )
+    new = part("set-id", "give the one servo that is connected a number")
+    new.add_argument("id", type=int, metavar="ID", help="its new number, 0 to 252")
+    new.add_argument("--from", type=int, dest="old", metavar="ID", help="its present number, where several are connected")
+    part("check", "say what of the servos' settings is not as a drive needs it").add_argument(
+        "--mend", action="store_true", help="write return delay, status return level and angle limits first"
+    )

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bns.bootstrap.loop import RunResult
+from bns.bootstrap.trainer import untrained
 from bns.cuda.device import OutOfDeviceMemoryError, device_name, faults, full
 from bns.cuda.kernels import kernels_of
 from bns.cuda.settings import settings_of
@@ -17,8 +18,9 @@ from bns.cuda.support import check_supported
 from bns.engine.evolution import tournament_cdf
 from bns.engine.philox import Key, Purpose
 from bns.engine.rprop import INITIAL_STEP
-from bns.engine.snn import INPUTS, initial_weights, predict
+from bns.engine.snn import INPUTS, predict
 from bns.robots import load_robot
+from bns.robots.base import RandomStream
 from bns.robots.simulator import load_static_simulator
 from bns.spec import RunSpec
 from bns.tasks import default_task, load_task
@@ -83,7 +85,7 @@ class Batch:
             upto = min(spec.evaluations, self.evaluation)
             own, seconds = [table[run, :upto] for table in rows], self._seconds[:, :upto]
             try:
-                found.append(self._kernels.evals_of(self._kernels.driven, *own, *seconds))
+                found.append(self._kernels.evals_of(self._kernels.driven, *own, *seconds, spec.overhead_s))
             except ArithmeticError as error:
                 found.append(error)
         return found
@@ -106,7 +108,8 @@ class Batch:
             controller = self._commands[half, run, best].copy_to_host()[:length]
             patterns = int(self._counts[0].copy_to_host()[run])
             learned_from = self._X[0, run].copy_to_host()[:, :patterns].copy()
-        fittest = self.robot.plan(controller, weights, task)
+        stream = RandomStream(self._keys[run], spec.generations_per_evaluation * spec.evaluations)
+        fittest = self.robot.plan(controller, weights, task, stream)
         poses = world.drive(fittest, self._keys[run], Purpose.WORLD_FITTEST, spec.evaluations)
         outputs = predict(weights, self.robot.inputs(fittest), self.robot.sigmoid_output)
         simulated = self.robot.poses(self.robot.displacements(outputs), fittest)
@@ -138,7 +141,7 @@ class Batch:
             cdfs[1, run, :size] = tournament_cdf(size, spec.real_world_selection_size)
             population = robot.initial_population(key, size, spec.min_commands, spec.max_commands)
             lists[run, :size, : own[run]], lengths[0, run, :size] = population.commands, population.lengths
-        untrained = np.stack([initial_weights(key, networks, robot.hidden, robot.input_count) for key in self._keys])
+        began = np.stack([untrained(robot, key) for key in self._keys])
         static = load_static_simulator(robot.name)
 
         put, empty = cuda.to_device, cuda.device_array
@@ -149,10 +152,10 @@ class Batch:
         self._lengths = put(lengths)
         self._fitness = empty((runs, n), np.float64)
         self._reached, self._used, self._order = (empty((runs, n), np.int32) for _ in range(3))
-        self._untrained, self._weights = put(untrained), put(untrained)
-        self._flat = self._weights.reshape(runs, networks * untrained.shape[2])
-        self._step = put(np.full_like(untrained, INITIAL_STEP))
-        self._last_gradient, self._last_change = put(np.zeros_like(untrained)), put(np.zeros_like(untrained))
+        self._untrained, self._weights = put(began), put(began)
+        self._flat = self._weights.reshape(runs, networks * began.shape[2])
+        self._step = put(np.full_like(began, INITIAL_STEP))
+        self._last_gradient, self._last_change = put(np.zeros_like(began)), put(np.zeros_like(began))
         self._X = empty((2, runs, INPUTS, most * self._kernels.steps), np.float32)
         self._targets = empty((2, runs, networks, most * self._kernels.steps), np.float32)
         self._counts = put(np.zeros((2, runs), np.int32))

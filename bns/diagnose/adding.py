@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,16 @@ import numpy as np
 import yaml
 
 from bns.diagnose.data.load import Measured
-from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
-from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
+from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.starts import fit_with
-from bns.diagnose.estimate.trial_clock_test import with_trial_clocks
-from bns.diagnose.predict.base import Predictor
-from bns.diagnose.predict.horizons import noise_floor
+from bns.diagnose.estimate.starts import fitting
+from bns.diagnose.estimate.trial_clock_test import steps_of, with_trial_clocks
+from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
+from bns.diagnose.select.plausibility import implausible
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.effects import all_effects, effect_in_file, effect_named
@@ -28,21 +31,27 @@ from bns.physics.model import ActiveEffect, Model
 
 
 @dataclass(frozen=True)
-class ErrorStep:
-    """One step: the effect that was added ("nominal" for the first), and the held-out error at each horizon (m)."""
-
-    name: str
-    error: Mapping[str, float]
-
-
-@dataclass(frozen=True)
 class ExtendedModel:
-    """The refitted model, the errors of the steps to it, and the error that noise alone would show, at each horizon (m)."""
+    """The refitted model, the errors of the steps to it, and what to beware of.
+
+    ``errors``: of the model as given, then with each effect in turn, fitted to other trials than those it is judged on.
+    """
 
     fit: Fit
     model: Model
-    error_by_step: tuple[ErrorStep, ...]
-    floor: Mapping[str, float]
+    errors: PairedErrors
+    warnings: tuple[str, ...] = ()
+    steps: tuple[Steps, ...] = ()
+    """What each of the models predicts, as it was judged: as given, then with each effect in turn, fitted to other trials."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The steps: "as given", then the effects in the order in which they were added."""
+        return tuple(m.name for m in next(iter(self.errors.horizons.values())).models)
+
+
+Memory = dict[tuple[str, bool, frozenset[Effect]], tuple[Judged, Fit]]
+"""Fits by what they are of: the model as given, whether clocks are each trial's own, the effects added."""
 
 
 def effect_from(text: str, term: str | None = None, on: str | None = None) -> tuple[Effect, dict[str, str]]:
@@ -61,10 +70,12 @@ def add_effects(
     effects: Sequence[tuple[Effect, Mapping[str, str]]],
     measured: Measured,
     per_trial: bool = False,
+    memory: Memory | None = None,
 ) -> ExtendedModel:
     """Add effects one after the other, each fitted with all before it; ModelError if the model has one already.
 
-    ``per_trial``: an effect that may differ from trial to trial does.
+    ``per_trial``: an effect that may differ from trial to trial does. ``memory``: fits of earlier calls with the same predictor;
+    those of this one are added.
     """
     if per_trial and not any(effect.per_trial_allowed for effect, _ in effects):
         able = ", ".join(e.name for e in all_effects().values() if e.per_trial_allowed)
@@ -75,23 +86,75 @@ def add_effects(
             raise ModelError(
                 f"The model {model.name} has {effect.name} already; it is refitted whenever something is added."
             )
-    problem = problem_for(predictor, model)
-    fit = problem.fit(model)
-    error_by_step = [
-        ErrorStep("nominal", errors_at_horizons(predictor, held_out_steps(predictor, problem.pose_filter, fit.model)))
-    ]
-    for effect, written in effects:
-        fit = fit_with(problem, fit, effect)
-        problem = problem_for(predictor, fit.model, problem.pose_filter.noise)
-        added = _written(fit.model, effect.name, written)
-        fit = problem.fit(with_trial_clocks(added, effect.name) if per_trial and effect.per_trial_allowed else added)
+    effects = [(fitting(effect, model, predictor.tracks), written) for effect, written in effects]
+    memory = {} if memory is None else memory
+    judged = [_judged(predictor, model, effects[: k + 1], per_trial, memory) for k in range(len(effects))]
+    first = steps_of(predictor, problem_for(predictor, model).pose_filter, model)
+    steps = (first, *(one.held_out(predictor) for one, _ in judged))
+    names = (AS_GIVEN, *(effect.name for effect, _ in effects))
+    errors, fit = paired_errors(predictor, list(zip(names, steps, strict=True))), judged[-1][1]
+    warnings = tuple(warnings_on(fit, effects, errors))
+    return ExtendedModel(fit, _documented(fit, model, measured, errors), errors, warnings, steps)
+
+
+def _judged(
+    predictor: Predictor,
+    model: Model,
+    effects: Sequence[tuple[Effect, Mapping[str, str]]],
+    per_trial: bool,
+    memory: Memory,
+) -> tuple[Judged, Fit]:
+    """The model with these effects, fitted and predicted on trials held out; from ``memory`` where the set is known there."""
+    key = (model.canonical_json(), per_trial, frozenset(effect for effect, _ in effects))
+    if key not in memory:
+        problem, fit = _step(predictor, model, effects, per_trial)
         steps = held_out_steps(predictor, problem.pose_filter, fit.model)
-        error_by_step.append(ErrorStep(effect.name, errors_at_horizons(predictor, steps)))
-    floor = {
-        h: noise_floor(predictor, problem.pose_filter.noise, h).get("position_m", np.nan)
-        for h in error_by_step[0].error
-    }
-    return ExtendedModel(fit, _documented(fit, model, measured, error_by_step), tuple(error_by_step), floor)
+        memory[key] = Judged("", fit.model, problem.pose_filter, steps), fit
+    return memory[key]
+
+
+def _step(
+    predictor: Predictor, model: Model, effects: Sequence[tuple[Effect, Mapping[str, str]]], per_trial: bool
+) -> tuple[Problem, Fit]:
+    """The model with these effects, all numbers fitted."""
+    problem, fit, _ = fit_set(predictor, model, [effect for effect, _ in effects])
+    written = fit.model
+    for effect, how in effects:
+        written = _written(written, effect.name, how)
+        if per_trial and effect.per_trial_allowed:
+            written = with_trial_clocks(written, effect.name)
+    if per_trial:
+        problem = problem_for(predictor, written, problem.pose_filter.noise)
+    return problem, problem.fit(written, rounds=None if per_trial else 0)
+
+
+def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], errors: PairedErrors) -> Iterator[str]:
+    """What a user should know before using the model: numbers at a bound or beyond belief, effects that do nothing, no gain."""
+    added = {effect.name for effect, _ in effects}
+    for index, number in enumerate(fit.free):
+        p, value = number.parameter, float(fit.values[index])
+        if number.effect not in added:
+            continue
+        if value in {p.low, p.high} and value != p.neutral:
+            yield f"{number.effect}: {p.name} is at its bound, {value:g} {p.unit}: the data ask for more than the model allows."
+    for name in sorted(added):
+        why = implausible(fit, name, bounds=False)
+        if why:
+            yield f"{name} fits best, and implausibly: {why}."
+        elif does_nothing(fit, name):
+            yield f"{name} does nothing that these data show: its 95 % interval includes the value at which it changes nothing."
+    for before, after in pairwise(next(iter(errors.horizons.values())).models):
+        if not errors.between(before.name, after.name):
+            yield f"with {after.name} the error on trials held out does not fall."
+
+
+def does_nothing(fit: Fit, name: str) -> bool:
+    """Whether the first number of an effect cannot be told from neutral: the others say how, not whether, it acts."""
+    for index, number in enumerate(fit.free):
+        if number.effect == name and np.isfinite(number.parameter.neutral):
+            low, high = fit.interval(index)
+            return bool(low <= number.parameter.neutral <= high)
+    return False
 
 
 def _written(model: Model, name: str, written: Mapping[str, str]) -> Model:
@@ -100,7 +163,7 @@ def _written(model: Model, name: str, written: Mapping[str, str]) -> Model:
     )
 
 
-def _documented(fit: Fit, before: Model, measured: Measured, error_by_step: Sequence[ErrorStep]) -> Model:
+def _documented(fit: Fit, before: Model, measured: Measured, errors: PairedErrors) -> Model:
     """The fitted model with intervals, reasons and provenance."""
     reason = f"fitted to {len(measured.tracks)} trials of {measured.path.name} ({measured.digest})"
     effects = tuple(_with_interval(fit, active, reason) for active in fit.model.effects)
@@ -111,7 +174,8 @@ def _documented(fit: Fit, before: Model, measured: Measured, error_by_step: Sequ
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "trials": len(measured.tracks),
         "held_out_position_error_m": {
-            step.name: {h: round(float(v), 6) for h, v in step.error.items()} for step in error_by_step
+            name: {h: round(e.rms_m, 6) for h, e in errors.of(name).items() if np.isfinite(e.rms_m)}
+            for name in (m.name for m in next(iter(errors.horizons.values())).models)
         },
     }
     return replace(fit.model, effects=effects, provenance=provenance)

@@ -11,10 +11,11 @@ from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.stepwise import Candidate, SelectionResult
+from bns.diagnose.select.result import Candidate, SelectionResult
+from bns.diagnose.settings import DEFAULTS
 
-NOTABLE = 0.01
-"""An effect that would have earned this share of the loss, but is rejected, is mentioned."""
+MOST_EFFECTS = DEFAULTS.select.most_effects
+NOTABLE = DEFAULTS.verdict.notable
 
 
 def notes_on(
@@ -24,8 +25,28 @@ def notes_on(
     formula: Formula | None,
     hint: Candidate | None,
     longer: Sequence[tuple[str, ...]] = (),
+    withdrawn: Sequence[str] = (),
+    imitating: Sequence[str] = (),
 ) -> Iterator[str]:
-    """All notes, one sentence or two each. ``longer``: explanations with one effect more that fit as well."""
+    """All notes, one sentence or two each.
+
+    ``longer``: explanations with one effect more that fit as well; ``withdrawn``: effects with which the error does not fall;
+    ``imitating``: those that earn nothing beside a flexible term.
+    """
+    for name, why in selection.implausible.items():
+        yield f"{name} fits best, and implausibly: {why}. No other set predicts as well: check it by an independent measurement."
+    if len(selection.accepted) >= MOST_EFFECTS:
+        yield f"The search ends at {MOST_EFFECTS} effects; there may be more."
+    if imitating:
+        yield (
+            f"{' and '.join(imitating)} would lower the error, but only by imitating what no listed effect explains: beside a "
+            "flexible term for that, nothing is left for it to explain."
+        )
+    if withdrawn:
+        yield (
+            f"{' with '.join(withdrawn)} would fit better by likelihood, but predictions of trials held out get no better "
+            "(root mean square of the same windows): not presented as an explanation."
+        )
     yield from _on_effects(selection, tracks)
     for names in longer:
         yield f"{' with '.join(names)} would explain as much, with one effect more."

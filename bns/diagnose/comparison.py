@@ -15,12 +15,14 @@ from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.trial_clock_test import steps_of
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.predict.horizons import Errors, errors_of, noise_floor
+from bns.diagnose.predict.horizons import Errors
+from bns.diagnose.predict.paired_errors import PairedErrors, judged_windows, noise_json, paired_errors, plain
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.model import Model
 
-BINS = 8
+BINS = DEFAULTS.verdict.bins
 
 
 @dataclass(frozen=True)
@@ -47,14 +49,17 @@ class Curve:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `compare` found. ``floor``: position error (m) of tracking noise alone, at each horizon; ``near``: the horizon of
-    the worst moments and the curves; ``scores``: how well each network agrees, where the model is networks of cycles."""
+    """What `compare` found.
+
+    ``errors``: over the windows that are judged, by direction; ``judged``: the same as every other command shows them; ``near``:
+    the horizon of the worst moments and the curves; ``scores``: how well each network agrees, where the model is networks.
+    """
 
     model: str
     trials: int
     frames: int
     errors: Mapping[str, Mapping[str, float]]
-    floor: Mapping[str, float]
+    judged: PairedErrors
     residual_dependence: tuple[ResidualDependence, ...]
     worst: tuple[Moment, ...]
     curves: tuple[Curve, ...]
@@ -67,7 +72,8 @@ class Comparison:
             "model": self.model,
             "trials": self.trials,
             "frames": self.frames,
-            "error": {h: {**e, "noise_floor_m": self.floor[h]} for h, e in self.errors.items()},
+            "error": {h: {**e, **self._judged_json(h)} for h, e in self.errors.items()},
+            "tracking_noise": noise_json(self.judged),
             "residual_dependence": [
                 {
                     "variable": p.variable,
@@ -81,6 +87,14 @@ class Comparison:
             "networks": {name: dict(score) for name, score in self.scores.items()},
         }
 
+    def _judged_json(self, horizon: str) -> dict[str, Any]:
+        e = self.judged.horizons[horizon]
+        return {"noise_floor_m": plain(e.noise_floor_m), "windows_left_out": e.left_out}
+
+    def noise_floor_m(self, horizon: str) -> float:
+        """Position error of tracking noise alone; NaN where the tracks cannot tell."""
+        return self.judged.horizons[horizon].noise_floor_m
+
 
 @one_thread_each()
 def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
@@ -93,16 +107,15 @@ def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
     problem = problem_for(predictor, model)
     fit = _as_is(problem, model)
     steps = steps_of(predictor, problem.pose_filter, fit.model)
-    errors = {h: errors_of(predictor, steps, h) for h in predictor.horizons}
-    # scatter of the drive cannot be told from faults of the model before these are mended: only the camera's noise is sure
-    tracking = problem.pose_filter.noise * np.array([1, 1, 0, 0, 0])
+    judged = paired_errors(predictor, [(model.name, steps)])
+    errors = {h: judged_windows(predictor, steps, h) for h in predictor.horizons}
     dependence = residual_dependence(problem, fit)
     return Comparison(
         model.name,
         len(tracks),
         len(tracks.t_s),
         {h: e.summary(len(tracks)) for h, e in errors.items()},
-        {h: noise_floor(predictor, tracking, h).get("position_m", float("nan")) for h in predictor.horizons},
+        judged,
         tuple(dependence),
         tuple(_worst(predictor, errors[predictor.near])),
         tuple(_curves(predictor, errors[predictor.near], dependence, np.random.default_rng(seed))),
@@ -142,7 +155,9 @@ def _worst(predictor: Predictor, errors: Errors, most: int = 5) -> list[Moment]:
 def _curves(
     predictor: Predictor, errors: Errors, dependence: list[ResidualDependence], rng: np.random.Generator
 ) -> list[Curve]:
-    """Residuals along the variables that explain most, and bands from a bootstrap over trials."""
+    """Residuals along the variables that explain most, and bands from a bootstrap over trials; none of trials too short."""
+    if not len(errors.start):
+        return []
     at = predictor.at_frames(errors.start)
     names = [
         name for name in dict.fromkeys(p.variable for p in dependence if p.variable in at) if np.ptp(at[name]) > 0

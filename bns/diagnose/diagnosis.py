@@ -2,35 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
 
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import Tracks
-from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
+from bns.diagnose.estimate.calibration import calibrated
+from bns.diagnose.estimate.cross_validation import Judged, judged_errors
 from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.predict.horizons import HORIZONS, noise_floor
+from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
+from bns.diagnose.residuals.beside_flexible import surviving
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
 from bns.diagnose.select.equivalents import equivalent_pairs
-from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, Candidate, SelectionResult, StepwiseSelection
+from bns.diagnose.select.result import Candidate, SelectionResult
+from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
+from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.values import before_and_after, dependence_values, numbers_of, ranked_values, ties_of
 from bns.physics.effect import Effect
-from bns.physics.model import ActiveEffect, Model
+from bns.physics.model import Model
 
 VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
-FEW_TRIALS = 40
-_HINT = 3.0
-"""A candidate whose chance is within this factor of what would be accepted is a hint that more trials would settle."""
+FEW_TRIALS = DEFAULTS.verdict.few_trials
+_HINT = DEFAULTS.verdict.hint
 
+
+WITH_EFFECTS = "with the effects"
+"""The name of the refitted model in tables of errors."""
 
 NOTHING_LEFT = Unexplained((), None, ())
 
@@ -44,8 +51,11 @@ class Diagnosis:
     residual_dependence: tuple[ResidualDependence, ...] = ()
     rest: Unexplained = NOTHING_LEFT
     formula: Formula | None = None
-    error: Mapping[str, Mapping[str, float]] | None = None
+    errors: PairedErrors | None = None
+    """Of the model as given and, where effects were accepted, of the model with them: on trials held out."""
     notes: tuple[str, ...] = ()
+    calibration: Fit | None = None
+    """Of single relative motions: all numbers of robot and sensor fitted together (`calibrated`)."""
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -63,15 +73,18 @@ class Diagnosis:
         return {
             "verdict": self.verdict,
             "effects": list(self.effects),
+            "implausible": selection.implausible if selection else {},
             "parameters": numbers_of(selection.fit) if selection else {},
             "ties": ties_of(selection) if selection else [],
             "explanations": [list(selection.accepted), *map(list, selection.competing_models)] if selection else [],
-            "ranking": [_ranked(c) for c in (selection.steps[0].ranking if selection else ())],
-            "error": {h: {name: _plain(v) for name, v in e.items()} for h, e in (self.error or {}).items()},
+            "ranking": [ranked_values(c) for c in (selection.steps[0].ranking if selection else ())],
+            "error": before_and_after(self.errors) if self.errors else {},
+            "tracking_noise": noise_json(self.errors) if self.errors else None,
             "formula": self._formula(),
-            "residual_dependence": [_pattern(p) for p in self.residual_dependence],
+            "residual_dependence": [dependence_values(p) for p in self.residual_dependence],
             "outliers": [vars(o) for o in self.rest.outliers],
             "notes": list(self.notes),
+            "calibration": numbers_of(self.calibration) if self.calibration else {},
         }
 
     def _formula(self) -> dict[str, Any] | None:
@@ -81,9 +94,9 @@ class Diagnosis:
         return {
             "on": self.formula.on,
             "term": self.formula.term,
-            "values": {k: _plain(v) for k, v in self.formula.values.items()},
-            "elpd_diff": _plain(comparison.elpd_diff),
-            "dse": _plain(comparison.dse),
+            "values": {k: plain(v) for k, v in self.formula.values.items()},
+            "elpd_diff": plain(comparison.elpd_diff),
+            "dse": plain(comparison.dse),
             "p_value": comparison.p_value,
         }
 
@@ -95,16 +108,33 @@ def diagnose(
     *,
     extra: Mapping[str, Effect] | None = None,
     tick: Callable[[str], None] = lambda _: None,
+    barred: Collection[str] = (),
 ) -> Diagnosis:
-    """What the model lacks on these tracks."""
-    search = StepwiseSelection(predictor, model, extra, tick)
+    """What the model lacks on these tracks, effects named in ``barred`` aside.
+
+    A set of effects with which the held-out error does not fall is withdrawn.
+    """
+    search = StepwiseSelection(predictor, model, extra, tick, barred)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
-    selection = search.run()
+    selection = refitted(search.run(), predictor, model)
+    tick("errors on trials held out")
+    errors = errors_before_and_after(selection, model)
+    withdrawn: tuple[str, ...] = ()
+    if selection.accepted and not errors.falls:
+        withdrawn, selection = selection.accepted, selection.withdrawn()
+        errors = errors_before_and_after(selection, model)
     tick("what is left")
-    dependence = residual_dependence(selection.problem, selection.fit)
-    rest = unexplained(selection.problem, selection.fit, dependence)
+    dependence, rest = _left(selection)
+    imitating: tuple[str, ...] = ()
+    if rest.residual_dependence and selection.fit.model.per_trial_effect is None:
+        standing = surviving(selection.problem, selection.fit, selection.accepted, rest.residual_dependence)
+        imitating = tuple(name for name in selection.accepted if name not in standing)
+        if imitating:
+            selection = refitted(selection.only(standing), predictor, model)
+            dependence, rest = _left(selection)
+            errors = errors_before_and_after(selection, model)
     # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
     guesses = rest.residual_dependence or (tuple(dependence[:1]) if rest.outliers else ())
     formula = best_formula(selection.problem, selection.fit, guesses) if guesses else None
@@ -112,19 +142,27 @@ def diagnose(
     verdict = _verdict(selection, rest.any, hint)
     tick("longer explanations")
     others = [
-        effect for name, effect in listed(selection.nominal.model, extra).items() if name not in selection.accepted
+        effect
+        for name, effect in listed(selection.nominal.model, extra, predictor.tracks, barred).items()
+        if name not in selection.accepted
     ]
     pairs = [] if rest.any else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
-    tick("errors on trials held out")
     return Diagnosis(
         verdict,
         selection,
         tuple(dependence[:12]),
         rest,
         formula,
-        errors_before_and_after(selection),
-        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs)),
+        errors,
+        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, imitating)),
+        calibrated(predictor, model, barred),
     )
+
+
+def _left(selection: SelectionResult) -> tuple[list[ResidualDependence], Unexplained]:
+    """Residuals along every variable, and of all that is left what is too large and too certain to be luck."""
+    dependence = residual_dependence(selection.problem, selection.fit)
+    return dependence, unexplained(selection.problem, selection.fit, dependence)
 
 
 def too_little(tracks: Tracks, fewest: int) -> str:
@@ -174,86 +212,18 @@ def _hint(selection: SelectionResult, trials: int) -> Candidate | None:
     return near[0] if near else None
 
 
-def errors_before_and_after(selection: SelectionResult) -> dict[str, dict[str, float]]:
-    """Held-out position error (m) at every horizon: nominal model, with the accepted effects, and what noise alone would show."""
+def refitted(selection: SelectionResult, predictor: Predictor, given: Model) -> SelectionResult:
+    """The result with the numbers that `fit_set` finds for its effects: those that `bns add` gives for the same names."""
+    chosen = {a.effect.name: a.effect for a in selection.fit.model.effects}
+    if not selection.accepted or selection.fit.model.per_trial_effect is not None:
+        return selection
+    effects = [chosen[name] for name in selection.accepted]
+    problem, fit, _ = fit_set(predictor, given, effects, known=selection.fit.model)
+    return replace(selection, problem=problem, nominal=problem.fit(given), fit=fit)
+
+
+def errors_before_and_after(selection: SelectionResult, given: Model) -> PairedErrors:
+    """Of the model as given, and of the accepted one with its numbers fitted to other trials, on the same windows."""
     predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
-    before = errors_at_horizons(predictor, held_out_steps(predictor, pose_filter, selection.nominal.model))
-    after = errors_at_horizons(predictor, held_out_steps(predictor, pose_filter, selection.fit.model))
-    return {
-        h: {
-            "before": before[h],
-            "after": after[h],
-            "noise_floor": noise_floor(predictor, pose_filter.noise, h).get("position_m", float("nan")),
-        }
-        for h in HORIZONS
-    }
-
-
-def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
-    """{effect: {name: value, se, low, high, unit, at_bound}} of a fitted model."""
-    out: dict[str, dict[str, dict[str, Any]]] = {}
-    per_trial_effect = fit.model.per_trial_effect
-    if per_trial_effect is not None:
-        out[per_trial_effect.effect.name] = _spread(per_trial_effect)
-    for index, number in enumerate(fit.free):
-        p, (low, high) = number.parameter, fit.interval(index)
-        out.setdefault(number.effect, {})[p.name] = {
-            "value": _plain(fit.values[index]),
-            "se": _plain(fit.se(index)),
-            "low": _plain(low),
-            "high": _plain(high),
-            "unit": p.unit,
-            "at_bound": bool(fit.values[index] in {p.low, p.high}),
-        }
-    return out
-
-
-def _spread(per_trial_effect: ActiveEffect) -> dict[str, dict[str, Any]]:
-    """The mean and the standard deviation of the trials' own values, with their intervals."""
-    p, own = per_trial_effect.effect.parameters[0], np.array(per_trial_effect.trial_values)
-    scatter = float(own.std(ddof=1))
-    se = scatter / np.sqrt(len(own))
-    half = float(student.ppf(0.975, len(own) - 1)) * se
-    mean = {"value": float(own.mean()), "se": se, "low": float(own.mean()) - half, "high": float(own.mean()) + half}
-    loose = scatter / np.sqrt(2 * (len(own) - 1))
-    between = {"value": scatter, "se": loose, "low": max(scatter - 1.96 * loose, 0.0), "high": scatter + 1.96 * loose}
-    always = {"unit": p.unit, "at_bound": False}
-    return {p.name: {**mean, **always, "per_trial": True}, f"between_trials_{p.unit}": {**between, **always}}
-
-
-def ties_of(selection: SelectionResult) -> list[list[str]]:
-    """Groups of names that stand for each other: exchange one of a group for another, and the tracks are explained as well."""
-    groups: list[set[str]] = []
-    for competitor in selection.competing_models:
-        group = set(selection.accepted) ^ set(competitor)
-        touching = [g for g in groups if g & group]
-        groups = [g for g in groups if g not in touching] + [group.union(*touching)]
-    return [sorted(g) for g in groups]
-
-
-def _ranked(candidate: Candidate) -> dict[str, Any]:
-    comparison = candidate.paired_comparison
-    return {
-        "name": candidate.name,
-        "elpd_diff": _plain(comparison.elpd_diff),
-        "dse": _plain(comparison.dse),
-        "p_value": comparison.p_value,
-        "parameters": numbers_of(candidate.fit).get(candidate.name, {}),
-        "rejected_because": candidate.rejected_because,
-    }
-
-
-def _pattern(p: ResidualDependence) -> dict[str, Any]:
-    return {
-        "variable": p.variable,
-        "velocity": p.channel,
-        "elpd_diff": _plain(p.paired_comparison.elpd_diff),
-        "dse": _plain(p.paired_comparison.dse),
-        "p_value": p.paired_comparison.p_value,
-        "share": _plain(p.share),
-    }
-
-
-def _plain(value: float) -> float | None:
-    """A float that JSON knows."""
-    return float(value) if np.isfinite(value) else None
+    after = [Judged(WITH_EFFECTS, selection.fit.model, pose_filter)] if selection.accepted else []
+    return judged_errors(predictor, pose_filter, given, after)

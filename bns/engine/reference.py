@@ -67,15 +67,19 @@ def gradient(
     target: np.ndarray,
     counts: np.ndarray | None = None,
     sigmoid_output: bool = False,
+    flat_spot: float = 0.0,
 ) -> np.ndarray:
-    """Backpropagation: gradient (W,) of half the summed squared error over X (5, n) and target (n,), each counts (n,) times."""
+    """Backpropagation: gradient (W,) of half the summed squared error over X (5, n) and target (n,), each counts (n,) times.
+
+    ``flat_spot`` is added to the slope of every sigmoid.
+    """
     hidden = hidden_activations(weights, X)
     _, _, to_output, _ = split_weights(weights)
     output = predict(weights[None], X, sigmoid_output)[0]
     error = (output - np.asarray(target, np.float64)) * (1.0 if counts is None else counts)
     if sigmoid_output:
-        error = error * output * (1.0 - output)
-    at_hidden = to_output[:, None] * error * hidden * (1.0 - hidden)
+        error = error * (output * (1.0 - output) + flat_spot)
+    at_hidden = to_output[:, None] * error * (hidden * (1.0 - hidden) + flat_spot)
     neurons = np.column_stack([at_hidden @ np.asarray(X, np.float64).T, at_hidden.sum(axis=1), hidden @ error])
     return np.concatenate([neurons.ravel(), [error.sum()]])
 

@@ -31,10 +31,11 @@ class Rprop:
     last_change: np.ndarray
     backtrack: bool
     sigmoid_output: bool = False
+    flat_spot: float = 0.0
 
     @classmethod
-    def start(cls, weights: np.ndarray, algorithm: str, sigmoid_output: bool = False) -> Rprop:
-        """Begin with these networks; algorithm is ``rprop+`` or ``irprop-``."""
+    def start(cls, weights: np.ndarray, algorithm: str, sigmoid_output: bool = False, flat_spot: float = 0.0) -> Rprop:
+        """Begin with these networks; algorithm is ``rprop+`` or ``irprop-``; ``flat_spot`` is added to the slopes of sigmoids."""
         weights = weights.astype(np.float32)
         return cls(
             weights,
@@ -43,6 +44,7 @@ class Rprop:
             np.zeros_like(weights),
             algorithm == "rprop+",
             sigmoid_output,
+            flat_spot,
         )
 
     def train(self, X: np.ndarray, targets: np.ndarray, count: int, iterations: int) -> None:
@@ -68,6 +70,7 @@ class Rprop:
             iterations,
             self.backtrack,
             self.sigmoid_output,
+            np.float32(self.flat_spot),
         )
 
     def restart(self, net: int, weights: np.ndarray) -> None:
@@ -156,6 +159,29 @@ def _squashed_residuals(out, target, bias, error):  # type: ignore[no-untyped-de
 
 
 @fast
+def _lifted_residuals(out, target, bias, error, flat):  # type: ignore[no-untyped-def]  # compiled
+    """As `_squashed_residuals`, where the slope is never below ``flat``: a saturated output goes on learning."""
+    total = _ZERO
+    for p in range(out.size):
+        y = sigmoid(out[p] + bias)
+        e = (y - target[p]) * (y - y * y + flat)
+        error[p] = e
+        total += e
+    return total
+
+
+@fast
+def _lift(X, w, error, gradient, flat, a, b):  # type: ignore[no-untyped-def]  # compiled
+    """What ``flat`` on the slopes of the hidden neurons adds to their gradients: the same sums for all of them."""
+    zero = _ZERO
+    g = (zero, zero, zero, zero, zero, zero)
+    for p in range(error.size):
+        g = share(g, flat * error[p], X[0, a + p], X[1, a + p], X[2, a + p], X[3, a + p], X[4, a + p])
+    for k in range(0, w.size - 1, PER_NEURON):
+        _write(gradient, w, k, g, zero)
+
+
+@fast
 def _counted(error, counts):  # type: ignore[no-untyped-def]  # compiled
     total = _ZERO
     for p in range(error.size):
@@ -165,14 +191,17 @@ def _counted(error, counts):  # type: ignore[no-untyped-def]  # compiled
 
 
 @fast
-def _errors(out, target, counts, bias, squashed, error):  # type: ignore[no-untyped-def]  # compiled
+def _errors(out, target, counts, bias, squashed, flat, error):  # type: ignore[no-untyped-def]  # compiled
     """Derivative of half the squared error by what goes into the output, pattern by pattern, and its sum."""
-    total = _squashed_residuals(out, target, bias, error) if squashed else _residuals(out, target, bias, error)
+    if squashed and flat > _ZERO:
+        total = _lifted_residuals(out, target, bias, error, flat)
+    else:
+        total = _squashed_residuals(out, target, bias, error) if squashed else _residuals(out, target, bias, error)
     return _counted(error, counts) if counts.size > 0 else total
 
 
 @fast
-def gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squashed):  # type: ignore[no-untyped-def]  # compiled
+def gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squashed, flat):  # type: ignore[no-untyped-def]  # compiled
     """Gradient of half the summed squared error over patterns 0..n, into gradient (W,)."""
     hidden = (w.size - 1) // PER_NEURON
     gradient[:] = _ZERO
@@ -183,9 +212,11 @@ def gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squ
         o[:] = _ZERO
         for first in range(0, hidden, GROUP):
             forward4(X, w, first, hidden_out, o, a, b)
-        gradient[w.size - 1] += _errors(o, target[a:b], counts[a:b], w[w.size - 1], squashed, e)
+        gradient[w.size - 1] += _errors(o, target[a:b], counts[a:b], w[w.size - 1], squashed, flat, e)
         for first in range(0, hidden, GROUP):
             _backward4(X, w, first, hidden_out, e, gradient, a, b)
+        if flat > _ZERO:
+            _lift(X, w, e, gradient, flat, a, b)
 
 
 @inline
@@ -217,14 +248,14 @@ def _update(w, step, last_gradient, last_change, gradient, backtrack):  # type: 
 
 
 @exact
-def train_network(w, step, last_gradient, last_change, X, target, counts, n, iterations, backtrack, squashed):  # type: ignore[no-untyped-def]  # compiled
+def train_network(w, step, last_gradient, last_change, X, target, counts, n, iterations, backtrack, squashed, flat):  # type: ignore[no-untyped-def]  # compiled
     """Iterate one network in place; all arrays float32, the first four (W,), X (5, >= n), target, counts (>= n,) or empty."""
     hidden_out = np.empty(((w.size - 1) // PER_NEURON, BLOCK), np.float32)
     out = np.empty(BLOCK, np.float32)
     error = np.empty(BLOCK, np.float32)
     gradient = np.empty(w.size, np.float32)
     for _ in range(iterations):
-        gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squashed)
+        gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squashed, flat)
         _update(w, step, last_gradient, last_change, gradient, backtrack)
 
 
@@ -234,6 +265,7 @@ def gradient(
     target: np.ndarray,
     counts: np.ndarray | None = None,
     sigmoid_output: bool = False,
+    flat_spot: float = 0.0,
 ) -> np.ndarray:
     """Gradient (W,) of one network: half the summed squared error over X (5, n) and target (n,), pattern by counts (n,)."""
     hidden = hidden_count(weights.size)
@@ -249,5 +281,6 @@ def gradient(
         np.empty(BLOCK, np.float32),
         np.empty(BLOCK, np.float32),
         sigmoid_output,
+        np.float32(flat_spot),
     )
     return result

@@ -35,14 +35,29 @@ def hidden_count(weights: int) -> int:
     return (weights - 1) // PER_NEURON
 
 
-def initial_weights(key: Key, networks: int, hidden: int, inputs: int = INPUTS) -> np.ndarray:
-    """Untrained networks: uniform in [-1, 1], shape (networks, weights), float32; 0 for inputs that are not there."""
+def initial_weights(
+    key: Key, networks: int, hidden: int, inputs: int = INPUTS, nguyen_widrow: bool = False
+) -> np.ndarray:
+    """Untrained networks: uniform in [-1, 1], shape (networks, weights), float32; 0 for inputs that are not there.
+
+    ``nguyen_widrow``: in the ranges that Encog 3.2, the original's library, draws networks of sigmoids alone from: with
+    b = 0.7 n^(1/m) for n neurons of m inputs each, biases in [-b, b] and weights in [0, b].
+    """
     count = weight_count(hidden)
     draws = uniforms(key, Purpose.WEIGHTS, 0, networks, -(-count // 4)).reshape(networks, -1)
-    weights = (2.0 * draws[:, :count] - 1.0).astype(np.float32)
+    low, high = _nguyen_widrow(hidden, inputs) if nguyen_widrow else (-np.ones(count), np.ones(count))
+    weights = (low + (high - low) * draws[:, :count]).astype(np.float32)
     for absent in range(inputs, INPUTS):
         weights[:, absent:-1:PER_NEURON] = 0
     return weights
+
+
+def _nguyen_widrow(hidden: int, inputs: int) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest value of every weight of a network."""
+    to_hidden, to_output = 0.7 * hidden ** (1 / inputs), 0.7
+    low, high = np.zeros((hidden, PER_NEURON)), np.full((hidden, PER_NEURON), to_hidden)
+    low[:, INPUTS], high[:, INPUTS + 1] = -to_hidden, to_output
+    return np.append(low.ravel(), -to_output), np.append(high.ravel(), to_output)
 
 
 @inline

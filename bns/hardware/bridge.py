@@ -18,13 +18,14 @@ from bns.hardware.bridge_frames import (
     NO_ANSWER,
     POSITION,
     SERVO,
+    STARTED_S,
     STATE,
     STOP,
     STOPPED,
     VERSION,
     Frame,
-    decoded,
     encoded,
+    searched,
 )
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
@@ -42,7 +43,7 @@ _TIMEOUT_S = 0.15
 _STOP_TIMEOUT_S = 0.06
 """Twelve servos read take 12 ms, one of them silent nine more; the frames 4 ms."""
 _BETWEEN_S = 0.02
-_STARTING_S = 3.0
+_LISTEN_S = 0.02
 
 
 class BridgeChain:
@@ -53,9 +54,10 @@ class BridgeChain:
         self.limits = limits or ServoLimits()
         self._sequence, self.retries = 0, 0
         self._port = port
-        self._serial: serial.Serial | None = open_port(port, BAUD)
+        self._serial: serial.Serial | None = None
         try:
-            version, found = self._greeted()
+            self._open()
+            version, found = self._ask(HELLO, b"", 2)
         except ServoError as error:
             self.close()
             raise HardwareError(f"no bridge answers at {port} ({error}). Is its sketch loaded, is it powered?") from error
@@ -66,15 +68,15 @@ class BridgeChain:
                 "needed. Load the sketch of this bns; check cables and ids."
             )
 
-    def _greeted(self) -> bytes:
-        """Version and number of servos; an Arduino begins anew when its port is opened, and is deaf meanwhile."""
-        began_s = self._clock.now_s()
-        while True:
-            try:
-                return self._ask(HELLO, b"", 2)
-            except ServoError:
-                if self._clock.now_s() - began_s > _STARTING_S:
-                    raise
+    def _open(self) -> None:
+        """Open the port, and say nothing until the board has said hello or cannot be starting any more (see `STARTED_S`)."""
+        self._serial = open_port(self._port, BAUD)
+        data, answer, began_s = b"", None, self._clock.now_s()
+        while (answer is None or answer.kind != HELLO | ANSWER) and self._clock.now_s() - began_s < STARTED_S:
+            self._clock.sleep(_LISTEN_S)
+            data += self._serial.read(self._serial.in_waiting)
+            answer, data = searched(data)
+        self._journal.note("bridge-started", said_hello=answer is not None, seconds=self._clock.now_s() - began_s)
 
     def close(self) -> None:
         """Give the port free."""
@@ -165,7 +167,8 @@ class BridgeChain:
 
     def _once(self, frame: Frame, timeout_s: float) -> Frame | None:
         if self._serial is None:  # it had vanished, and may be back
-            self._serial = open_port(self._port, BAUD)
+            self._open()
+        assert self._serial is not None
         self._serial.reset_input_buffer()
         in_vain = self._clock.in_vain(timeout_s)
         self._journal.note("sent", data=encoded(frame).hex())
@@ -173,7 +176,7 @@ class BridgeChain:
         data, answer = b"", None
         while answer is None or answer.sequence != frame.sequence:  # an answer to an older question is passed over
             data += self._serial.read(max(1, self._serial.in_waiting))
-            answer, data = decoded(data)
+            answer, data = searched(data)
             if answer is None and in_vain():
                 self._clock.waited(timeout_s)
                 return None

@@ -9,9 +9,12 @@ START = 0xA5
 HELLO, ARM, MOVE, STATE, STOP = 1, 2, 3, 4, 5
 ANSWER = 0x80
 REFUSED = 0x7F
-VERSION = 2
+VERSION = 3
 NO_ANSWER = 0x80
 """In a servo's error byte: it did not answer the bridge."""
+STARTED_S = 2.0
+"""Opening its port starts an Arduino anew. Its boot loader listens for 0.83 s, and a byte keeps it there for 5 s more; then the
+sketch counts its servos and says hello unasked. One that has not by now was not started anew, and can be asked."""
 TORN_S = 0.05
 """Bytes whose frame's rest has not come for so long are passed over, one after the other."""
 WATCHDOG_S = 0.5
@@ -61,13 +64,35 @@ def decoded(data: bytes) -> tuple[Frame | None, bytes]:
     """
     while (at := data.find(START)) >= 0:
         data = data[at:]
-        if len(data) < _HEAD:
+        if not _is_whole(data):
             return None, data
-        end = _HEAD + data[1] + _CRC
-        if len(data) < end:
-            return None, data
-        body = data[1 : end - _CRC]
-        if crc16(body) == int.from_bytes(data[end - _CRC : end], "little"):
-            return Frame(body[1], body[2], body[3:]), data[end:]
+        frame, rest = _taken(data)
+        if frame is not None:
+            return frame, rest
         data = data[1:]
     return None, b""
+
+
+def searched(data: bytes) -> tuple[Frame | None, bytes]:
+    """As `decoded`, but a start whose rest has not come is no reason to wait: a stray start byte hides no frame behind it.
+
+    For the side that asked: it knows what must come, and a frame within a frame that is still coming would need its checksum.
+    """
+    for at in (at for at, byte in enumerate(data) if byte == START):
+        if _is_whole(data[at:]):
+            frame, rest = _taken(data[at:])
+            if frame is not None:
+                return frame, rest
+    return None, data
+
+
+def _is_whole(data: bytes) -> bool:
+    return len(data) >= _HEAD and len(data) >= _HEAD + data[1] + _CRC
+
+
+def _taken(data: bytes) -> tuple[Frame | None, bytes]:
+    """The frame at the beginning of `data`, which is long enough for it, and what follows; no frame if its checksum is wrong."""
+    end = _HEAD + data[1] + _CRC
+    body = data[1 : end - _CRC]
+    good = crc16(body) == int.from_bytes(data[end - _CRC : end], "little")
+    return (Frame(body[1], body[2], body[3:]) if good else None), data[end:]

@@ -20,7 +20,9 @@ from bns.hardware.serial_link import SerialLink
 from bns.hardware.servo_chain import ServoError
 from bns.hardware.snake_settings import snake_settings
 from bns.hardware.tracking.calibration import WORST_RMS_PX, load_calibration
+from bns.hardware.tracking.evdev import CLASS, input_devices
 from bns.hardware.tracking.kinds import open_tracker
+from bns.hardware.tracking.wii import KERNEL_NAME
 
 with extra("robot"):
     from serial.tools.list_ports import comports
@@ -42,10 +44,11 @@ class Finding:
         return f"{'ok  ' if self.fine else 'BAD '} {self.what}" + (f"\n     try: {self.next_step}" if self.next_step else "")
 
 
-def examine(rig: Rig | None, clock: Clock, devices: Path = Path("/dev")) -> Iterator[Finding]:
-    """Ports, permissions, adapters and cameras; with a rig, also its robot and its tracker."""
+def examine(rig: Rig | None, clock: Clock, devices: Path = Path("/dev"), inputs: Path = CLASS) -> Iterator[Finding]:
+    """Ports, permissions, adapters, cameras and input devices; with a rig, also its robot and its tracker."""
     yield from ports(devices)
     yield from cameras(devices)
+    yield from remotes(inputs)
     if rig is not None:
         yield from _asked(lambda: robot_of(rig, clock), "the robot")
         yield from _asked(lambda: tracker_of(rig, clock), "the tracker")
@@ -75,7 +78,7 @@ def may_use(path: Path, group: str) -> Finding:
     """Whether a device file may be read and written."""
     if os.access(path, os.R_OK | os.W_OK):
         return Finding(True, f"{path} may be used")
-    mode = stat.filemode(path.stat().st_mode)
+    mode = stat.filemode(path.stat().st_mode) if path.exists() else "there is no such file"
     return Finding(False, f"no permission to use {path} ({mode})", f"sudo usermod -aG {group} $USER, then log in again")
 
 
@@ -86,6 +89,18 @@ def cameras(devices: Path) -> Iterator[Finding]:
         yield Finding(True, "no camera at this computer (a stream's address can be used as well)")
     for camera in found:
         yield may_use(camera, "video")
+
+
+def remotes(inputs: Path) -> Iterator[Finding]:
+    """Input devices by the names that their drivers give them, and whether the infra-red camera of a Wii remote may be used."""
+    found = input_devices(inputs)
+    for device in found:
+        yield Finding(True, f"input device {device.file}: {device.name}")
+    for device in found:
+        if device.name == KERNEL_NAME:
+            yield may_use(device.file, "input")
+    if not any(device.name == KERNEL_NAME for device in found):
+        yield Finding(True, "no Wii remote is paired (press 1+2 on it; the kernel's driver is hid-wiimote)")
 
 
 def robot_of(rig: Rig, clock: Clock) -> Iterator[Finding]:

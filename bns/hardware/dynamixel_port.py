@@ -27,6 +27,7 @@ class ClockedPort(PortHandler):
         """Open it. A read sleeps until bytes are there: the SDK's own spins, and holds up whatever computes meanwhile."""
         opened: bool = super().setupPort(cflag_baud)
         self.ser.timeout = _SLICE_S
+        self.ser.exclusive = True  # two that ask on one bus take each other's answers
         return opened
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802  # the SDK's name

@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from bns.errors import HardwareError, StopNotConfirmedError
-from bns.hardware import guard_process
 from bns.hardware.clock import RealClock
 from bns.hardware.platform import Driven, Platform
 from bns.hardware.serial_link import no_port, why_not_opened
 from bns.hardware.stop import Stop
 from bns.hardware.stop_recipe import StopRecipe
 
+_SCRIPT = Path(__file__).with_name("guard_process.py")
 _BEAT_S = 0.02
 _READY_S = 10.0
 _ENDS_S = 2.0
@@ -52,7 +52,7 @@ class Guard:
         folder.mkdir(exist_ok=True)
         self.path = str(folder / "port")
         self._control, far = socket.socketpair()
-        script = [sys.executable, "-I", "-S", str(guard_process.__file__)]
+        script = [sys.executable, "-I", "-S", str(_SCRIPT)]
         with far:
             self._process = subprocess.Popen(
                 script, stdin=far.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True

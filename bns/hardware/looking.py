@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -92,10 +92,11 @@ def views(camera: StreamCamera, board: Board, count: int, clock: Clock, say: Cal
     return kept
 
 
-def from_folder(folder: Path, floor: Path | None, board: Board) -> Calibration:
-    """Calibration from pictures; the floor is seen in `floor`, or in the last of them."""
+def from_folder(folder: Path, floors: Sequence[Path], board: Board) -> Calibration:
+    """Calibration from pictures; the floor is seen in `floors`, or in the last of them."""
     found = pictures(folder)
-    flat = found[-1] if floor is None else cv2.imread(str(floor))
-    if flat is None:
-        raise HardwareError(f"cannot read the picture of the floor {floor}.")
-    return calibrate(found, flat, board, str(folder))
+    flat = [cv2.imread(str(path)) for path in floors] or [found[-1]]
+    for path, picture in zip(floors, flat, strict=False):
+        if picture is None:
+            raise HardwareError(f"cannot read the picture of the floor {path}.")
+    return calibrate(found, [picture for picture in flat if picture is not None], board, str(folder))

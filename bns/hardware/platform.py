@@ -78,8 +78,6 @@ class PlatformModule(Protocol):
     RIG: Any
     """The file with the example rig, which `--emulated` uses: a path, or what `importlib.resources` gives."""
 
-    REPEATS: int
-    """How often a trial drives its final controller, unless it is told otherwise."""
 
     def open_platform(self, rig: Any, clock: Any, journal: Any, stopping: Any) -> Platform:
         """Open port and tracker; HardwareError if they cannot be used."""
@@ -92,3 +90,8 @@ def platform_module(robot: str) -> PlatformModule:
     """The driver of a robot, found by the robot's name; HardwareError lists the robots that have one."""
     module: PlatformModule = PLATFORMS.load(robot)
     return module
+
+
+def repeats_of(module: PlatformModule) -> int:
+    """How often a trial drives its final controller, unless it is told otherwise: ``REPEATS`` of the module, once without."""
+    return int(getattr(module, "REPEATS", 1))

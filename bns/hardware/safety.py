@@ -79,11 +79,15 @@ class Watch:
 
 
 _SIGNALS = {
-    signal.SIGINT: "interrupted",
-    signal.SIGTERM: "terminated",
-    signal.SIGHUP: "the terminal was closed",
-    signal.SIGQUIT: "quit",
-    signal.SIGTSTP: "suspended",
+    number: called
+    for name, called in {
+        "SIGINT": "interrupted",
+        "SIGTERM": "terminated",
+        "SIGHUP": "the terminal was closed",
+        "SIGQUIT": "quit",
+        "SIGTSTP": "suspended",
+    }.items()
+    if (number := getattr(signal, name, None)) is not None  # Windows has the first two
 }
 """What ends a trial from outside, and how that is called."""
 
@@ -135,7 +139,7 @@ class Stopping:
 
     def _handle(self, number: int, _frame: FrameType | None) -> None:
         self.request(_SIGNALS[signal.Signals(number)])
-        self._suspended |= number == signal.SIGTSTP
+        self._suspended |= _SIGNALS[signal.Signals(number)] == "suspended"
         if self._asking:
             raise KeyboardInterrupt
 

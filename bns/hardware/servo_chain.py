@@ -26,16 +26,21 @@ class Health:
     temperature_c: float
 
 
+REFUSED_V = 13.0
+"""No rig may allow so much."""
+
+
 @dataclass(frozen=True)
 class ServoLimits:
     """What a servo must keep while it works; `torque` is the share of the highest that it is given, `load` of that one.
 
+    The makers allow 12 V; half a volt more is for the servo's own reading and for a battery that has just been charged.
     A servo at that load for `stalled_s` does not follow any more; for `stuck_s`, it has to be stopped.
     """
 
     temperature_c: float = 65.0
     low_v: float = 9.0
-    high_v: float = 13.0
+    high_v: float = 12.5
     load: float = 0.95
     torque: float = 0.8
     stalled_s: float = 0.25

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bns.errors import HardwareError, unknown_name
-from bns.hardware.servo_chain import ServoLimits
+from bns.hardware.servo_chain import REFUSED_V, ServoLimits
 from bns.physics.snake.parameters import shipped_parameters
 
 WIRINGS = ("bus", "bridge")
@@ -40,6 +40,8 @@ def snake_settings(driver: Mapping[str, Any]) -> SnakeSettings:
     limits = ServoLimits(**{name: _number(name, driver[name]) for name in _LIMITS if name in driver})
     if not 0.0 < limits.torque <= 1.0:
         raise HardwareError(f"the snake's torque is {limits.torque:g}; it is a share of the servos' highest, above 0 up to 1.")
+    if limits.high_v >= REFUSED_V:
+        raise HardwareError(f"the snake's high_v is {limits.high_v:g}; the servos' makers allow 12 V.")
     return SnakeSettings(
         wiring,
         _ids(driver.get("ids", list(range(1, model.joints + 1))), model.joints),

@@ -105,7 +105,7 @@ def observe(poses: ArrayLike, normals: ArrayLike | None, model: Model) -> Array:
 def _integrate(model: Model, grid: Grid, start: Array) -> Array:
     """Poses at every node, (batch, steps + 1, 3): each step is the arc of its mean velocities."""
     nodes = _nodes(model, grid, start, None)
-    if any(active.effect.needs_place for active in model.effects):
+    if any(active.effect.needs_place for active in model.at("body")):
         for _ in range(_PLACE_ROUNDS):
             nodes = _nodes(model, grid, start, (nodes[:, 1:] + nodes[:, :-1]) / 2.0)
     return nodes

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
+
+import numpy as np
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.order import ORDER, OTHERS, place
+from bns.physics.signals import Wheels
 
 STAGES = ("wheel", "body", "world", "clock", "measure")
 """In the order in which they act; `bns.physics.signals` says what each one passes on."""
+
+
+NEEDS = ("", "track", "motions")
+"""What data an effect is about: any; tracks in one frame, with a start and times; or single relative motions alone."""
+REFERENCE_WHEELBASE_M = 0.0884
+"""Of the Khepera III, for which ranges and starts are written down."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +40,27 @@ class Parameter:
     """The column of measurements this number goes with: known only where that was logged (battery_v)."""
     instead_of: str = ""
     """It stands back where this column was logged."""
+    size_power: float = 0.0
+    """What is plausible, and where a fit begins, grows with this power of the wheelbase: 1 for lengths and speeds."""
+    floor_share: float = 0.0
+    """A length that is no more than this share of the diagonal of where the robot was seen; 0: as large as it likes."""
+    resolution: float = 0.0
+    """A change that shows and is still small; 0: a thousandth of the plausible range."""
+
+    def within(self, diagonal_m: float) -> Parameter:
+        """The number held to its `floor_share` of a floor."""
+        if not self.floor_share:
+            return self
+        high = max(self.floor_share * diagonal_m, 4.0 * self.low)
+        return replace(self, high=high, plausible=(min(self.plausible[0], high / 2.0), high))
+
+    def scaled(self, ratio: float) -> Parameter:
+        """The number of a robot whose wheelbase is ``ratio`` times that of the reference; held within its bounds."""
+        factor = ratio**self.size_power
+        if factor == 1.0:
+            return self
+        low, high = (float(np.clip(v * factor, self.low, self.high)) for v in self.plausible)
+        return replace(self, plausible=(low, high), resolution=self.resolution * factor)
 
 
 @dataclass(frozen=True)
@@ -63,15 +93,41 @@ class Effect:
     """Its place in the chain, unless `bns.physics.order.ORDER` lists it: right after this entry of that tuple."""
     starts: tuple[tuple[float, ...], ...] = ()
     """Values from which a fit may begin; empty where any few values along each number do."""
+    starts_from: Callable[[Wheels], tuple[tuple[float, ...], ...]] | None = field(default=None, repr=False)
+    """Instead of ``starts``: from commands and tracked poses (`Conditions.seen`), for what sits somewhere or has a rhythm."""
+    needs: str = ""
+    """One of `NEEDS`."""
     needs_place: bool = False
-    """Does it look at `Body.place`?"""
+    """Does what it does depend on where the robot is (`Body.place`, or the place in a `View`)?"""
     per_trial_allowed: bool = False
     """May its one number have another value in every trial? Only effects of the stage ``clock`` may."""
 
     def __post_init__(self) -> None:
-        for kind, given, valid in (("stage of an effect", self.stage, STAGES), ("place of an effect", self.after, ORDER)):
+        for kind, given, valid in (
+            ("stage of an effect", self.stage, STAGES),
+            ("place of an effect", self.after, ORDER),
+            ("need of an effect", self.needs, NEEDS),
+        ):
             if given not in valid:
                 raise ModelError(f"effect {self.name}: {unknown_name(kind, given, valid)}")
+
+    def scaled(self, wheelbase_m: float) -> Effect:
+        """The effect with ranges and starts for a robot of this size; itself where nothing depends on it."""
+        ratio = wheelbase_m / REFERENCE_WHEELBASE_M
+        if ratio == 1.0 or not any(p.size_power for p in self.parameters):
+            return self
+        factors = [ratio**p.size_power for p in self.parameters]
+        return replace(
+            self,
+            parameters=tuple(p.scaled(ratio) for p in self.parameters),
+            starts=tuple(tuple(v * f for v, f in zip(start, factors, strict=True)) for start in self.starts),
+        )
+
+    def within(self, diagonal_m: float) -> Effect:
+        """The effect on a floor of this size; itself where nothing depends on it."""
+        if not any(p.floor_share for p in self.parameters):
+            return self
+        return replace(self, parameters=tuple(p.within(diagonal_m) for p in self.parameters))
 
     @property
     def in_words(self) -> str:

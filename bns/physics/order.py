@@ -6,19 +6,29 @@ OTHERS, DECOYS, FORMULAS = "others", "decoys", "formulas"
 """Places for effects that are not in the catalogue: those of users, decoys, formulas."""
 
 ORDER = (
+    "command-quantisation",
+    "command-rate",
     "speed-gain",
     "wheel-mismatch",
     "battery-sag",
+    "warm-up",
     "dead-zone",
+    "stribeck",
     "speed-limit",
     OTHERS,
     "acceleration-limit",  # exact for commands, which are constant in a step: so before delay and lag
     "command-delay",
     "motor-lag",
+    "heating",  # by the work that the wheels really do
+    "wheel-eccentricity",
+    "backlash",
     "wheelbase",
     "turn-slip",
+    "turn-slip-quadratic",
     "understeer",
     "side-slip",
+    "caster-swing",
+    "floor-patch",
     DECOYS,
     FORMULAS,
     "yaw-bias",
@@ -27,6 +37,9 @@ ORDER = (
     "clock-offset",
     "clock-drift",
     "marker-offset",
+    "sensor-rotation",
+    "tilted-camera",
+    "lens-distortion",
     "camera-scale",
     "camera-rotation",
 )

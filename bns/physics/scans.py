@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bns.engine.jit import exact
 from bns.physics.signals import Array
@@ -90,3 +91,80 @@ def flow_along(start: Array, moved: Array, moving_s: Array, flow: float, return_
             position += change
             nodes[row, k + 1] = position
     return nodes
+
+
+@exact
+def sampled(target: Array, step_s: Array, period_s: float) -> Array:
+    """Mean over each step of the target as it was at the last multiple of ``period_s``, counted from the start; exact."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        now, tick, held = 0.0, 0.0, 0.0
+        for k in range(target.shape[1]):
+            h = step_s[row, k]
+            if h == 0.0:
+                continue
+            way, at, end = 0.0, now, now + h
+            while tick < end - 1e-9:  # a tick that falls on the step's end belongs to the next one
+                way += held * max(tick - at, 0.0)
+                at = max(tick, at)
+                held = target[row, k]
+                tick += period_s
+            mean[row, k] = (way + held * (end - at)) / h
+            now = end
+    return mean
+
+
+@exact
+def played(target: Array, step_s: Array, gap: float) -> Array:
+    """Mean over each step of what is driven through a gap (play): at the start the forward side touches; exact."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        tooth = gap
+        for k in range(target.shape[1]):
+            h = step_s[row, k]
+            if h == 0.0:
+                continue
+            pushed = tooth + target[row, k] * h
+            tooth = min(max(pushed, 0.0), gap)
+            mean[row, k] = (pushed - tooth) / h
+    return mean
+
+
+@exact
+def trailing(angle: Array, way: Array, trail: float) -> Array:
+    """By how much an angle is off one that follows it the short way round, with the way: d(follower) = off·d(way)/trail.
+
+    In the middle of each step, (batch, steps); the follower begins at 0.
+    """
+    out = np.zeros_like(angle)
+    for row in range(angle.shape[0]):
+        follower = 0.0
+        for k in range(angle.shape[1]):
+            if way[row, k] == 0.0:
+                continue
+            off = (angle[row, k] - follower + np.pi) % (2.0 * np.pi) - np.pi
+            out[row, k] = off * np.exp(-way[row, k] / (2.0 * trail))
+            follower += off * -np.expm1(-way[row, k] / trail)
+    return out
+
+
+@exact
+def accumulated(rate: Array, step_s: Array, begin_s: Array, order: NDArray[np.int64], fade_s: float) -> Array:
+    """Mean over each step of s, where ds/dt = rate - s/fade, from one trial on to the next; exact.
+
+    ``begin_s`` (batch,): when each trial began; ``order`` (batch,): the trials by that time. s is 0 before the first.
+    """
+    mean = np.zeros_like(rate)
+    s, now = 0.0, begin_s[order[0]] if len(order) else 0.0
+    for row in order:
+        s *= np.exp(-max(begin_s[row] - now, 0.0) / fade_s)
+        now = begin_s[row]
+        for k in range(rate.shape[1]):
+            h = step_s[row, k]
+            if h == 0.0:
+                continue
+            settled, end = -np.expm1(-h / fade_s), rate[row, k] * fade_s
+            mean[row, k] = end + (s - end) * settled * fade_s / h
+            s += (end - s) * settled
+            now += h
+    return mean

@@ -30,6 +30,8 @@ class Conditions:
 
     session_s: Array | None = None
     battery_drop_v: Array | None = None
+    seen: Array | None = None
+    """Tracked x_m, y_m, heading_rad (unwrapped) between frames, (batch, steps, 3); NaN before the first and after the last."""
 
 
 NO_CONDITIONS = Conditions()
@@ -50,8 +52,26 @@ class Wheels:
         """Time since the session began; since the trial began where nobody said."""
         if self.conditions.session_s is not None:
             return self.conditions.session_s
+        return self.trial_s
+
+    @property
+    def trial_s(self) -> Array:
+        """Time since the trial began, in the middle of each step."""
         ends: Array = np.cumsum(self.step_s, axis=1)
         return ends - self.step_s / 2.0
+
+    @property
+    def places(self) -> Array:
+        """All tracked places, (n, 2); none where nothing was tracked."""
+        if self.conditions.seen is None:
+            return np.zeros((0, 2))
+        seen = self.conditions.seen[..., :2]
+        out: Array = seen[np.isfinite(seen).all(axis=-1)]
+        return out
+
+    def turning(self, left_m_s: Array, right_m_s: Array) -> Wheels:
+        """The same with other speeds."""
+        return replace(self, left_m_s=left_m_s, right_m_s=right_m_s)
 
 
 @dataclass(frozen=True)

@@ -49,6 +49,8 @@ class StagedTraining(NamedTuple):
     """Iterations of the last training; it ends earlier where patterns that are only watched get worse."""
     noise_sd: tuple[float, ...]
     """Standard deviations of the substitute world, SI, a network."""
+    evolving: tuple[str, ...] = ()
+    """Options of the robot that are on while controllers evolve on the static simulator."""
 
 
 class Commands(Protocol):
@@ -65,6 +67,12 @@ class Commands(Protocol):
 
     def perturb(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
         """Allowed commands (n, components) as far from these as a mutation can go."""
+
+    def plan(
+        self, controller: np.ndarray, weights: np.ndarray | None, task: Task, stream: RandomStream | None = None
+    ) -> np.ndarray:
+        """The commands (m, components) that are driven when this controller is picked; stream: the draws it was scored with.
+        All of them where no networks (None) say how many the task needs."""
 
     def driven_ms(self, commands: np.ndarray) -> float:
         """How long these commands drive, in milliseconds."""
@@ -108,6 +116,10 @@ class Networks(Protocol):
     input_count: int
     """Inputs that the networks have, up to five."""
     sigmoid_output: bool
+    nguyen_widrow: bool
+    """Whether untrained networks are drawn as Nguyen and Widrow did."""
+    flat_spot: float
+    """Added to the slope of a sigmoid in training."""
     recipe: StagedTraining | None
     """None: the static simulator learns from random controllers, and its noise is that of its residuals."""
     repeats_inputs: bool
@@ -148,9 +160,6 @@ class Fitness(Protocol):
 
     radii_m: tuple[float, ...]
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
-        """The commands (m, components) that are driven when this controller is picked."""
-
     def score(
         self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
         parents: Scores | None = None,
@@ -160,6 +169,12 @@ class Fitness(Protocol):
         parents: scores of the generation that this one was bred from, on the same networks: a robot may take over from them
         what cannot have changed. The scores are the same with them and without.
         """
+
+    def walk(
+        self, population: Population, displacements: np.ndarray, task: Task, stream: RandomStream | None = None
+    ) -> Scores:
+        """Fitness of every controller from the displacements (commands, networks) of all their commands, list after list,
+        whatever simulator foretold them: `score` without its networks."""
 
     def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
         """Fitness and goals reached of one driven path (n, columns)."""
@@ -195,10 +210,14 @@ class Drawing(Protocol):
 
 
 class Options(Protocol):
-    """What a robot's simulator can do beyond the source."""
+    """What a robot's simulator can do beyond the source, and other readings of it."""
 
     options: tuple[str, ...]
     """Switched on by ``ROBOT+OPTION`` as the robot's name in a spec."""
+    switched_on: tuple[str, ...]
+    """Those that are on."""
+    substitute_sd_m: float | None
+    """Standard deviation of the substitute world on every displacement, m, where it is not that of the static simulator."""
 
     def with_options(self, names: tuple[str, ...]) -> Robot:
         """The robot with some of its options, and no others, switched on."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from bns import __version__
 from bns.bootstrap.evolver import Evolver
+from bns.bootstrap.simulators import NetworkSimulator
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.rprop import Rprop
 from bns.engine.snn import initial_weights, predict
@@ -114,8 +115,8 @@ def train_in_stages(
 
 def trained(robot: Robot, key: Key, patterns: Patterns, iterations: int) -> tuple[np.ndarray, list[int]]:
     """Networks (networks, W) where they were best on the watched patterns, and after how many iterations each was."""
-    weights = initial_weights(key, len(robot.networks), robot.hidden, robot.input_count)
-    rule = Rprop.start(weights, "rprop+", robot.sigmoid_output)
+    weights = initial_weights(key, len(robot.networks), robot.hidden, robot.input_count, robot.nguyen_widrow)
+    rule = Rprop.start(weights, "rprop+", robot.sigmoid_output, robot.flat_spot)
     X, targets, present = robot.inputs(patterns.commands), robot.targets(patterns.moved), robot.learnable(patterns.moved)
     best, at = weights.copy(), [0] * len(weights)
     for net in range(len(weights)):
@@ -145,6 +146,13 @@ def worst(robot: Robot, weights: np.ndarray, patterns: Patterns, count: int, net
     return patterns.commands[ranked[::-1][:count]]
 
 
+def evolving(robot: Robot) -> Robot:
+    """The robot with those options that are on while controllers evolve on a static simulator."""
+    if robot.recipe is None or not robot.recipe.evolving:
+        return robot
+    return robot.with_options(tuple(sorted({*robot.switched_on, *robot.recipe.evolving})))
+
+
 def evolved_commands(robot: Robot, key: Key, weights: np.ndarray) -> np.ndarray:
     """The distinct commands of controllers evolved on the networks, for the last task."""
     task = load_task(robot.name, max(task_names(robot.name), key=lambda name: len(load_task(robot.name, name).goals_m)))
@@ -155,10 +163,11 @@ def evolved_commands(robot: Robot, key: Key, weights: np.ndarray) -> np.ndarray:
         generations_per_evaluation=GENERATIONS,
         max_commands=CYCLES,
     )
-    found = []
+    own, found = evolving(robot), []
+    simulator = NetworkSimulator(own, task, weights)
     for trial in range(CONTROLLERS):
-        evolver = Evolver.start(robot, task, Key(1 + trial, key.study), spec, weights)
-        evolver.evolve(weights)
+        evolver = Evolver.start(own, task, Key(1 + trial, key.study), spec, simulator)
+        evolver.evolve(simulator)
         found.append(evolver.fittest())
     return np.concatenate(found)
 
@@ -193,13 +202,14 @@ def _provenance(
 
 
 def accuracy(measured: np.ndarray, predicted: np.ndarray) -> dict[str, float]:
-    """R² of prediction, the regression of predicted on measured (slope, its R²), RMSE and bias, all in the units given."""
+    """R² of prediction, the regression of predicted on measured (slope, its R²), RMSE and bias, all in the units given; the
+    first three are 0 where all that was measured is the same."""
     spread, error = measured - measured.mean(), predicted - measured
-    slope = float((spread * predicted).sum() / (spread**2).sum())
+    varies = float((spread**2).sum())
     return {
-        "r2": float(1 - (error**2).sum() / (spread**2).sum()),
-        "regression_r2": float(np.corrcoef(measured, predicted)[0, 1] ** 2) if np.ptp(predicted) else 0.0,  # the same of all
-        "slope": slope,
+        "r2": float(1 - (error**2).sum() / varies) if varies else 0.0,
+        "regression_r2": float(np.corrcoef(measured, predicted)[0, 1] ** 2) if varies and np.ptp(predicted) else 0.0,
+        "slope": float((spread * predicted).sum() / varies) if varies else 0.0,
         "rmse": float(np.sqrt((error**2).mean())),
         "bias": float(error.mean()),
     }

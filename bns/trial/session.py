@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -18,7 +19,7 @@ from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.guard import Guard, GuardedClock, GuardedPlatform
 from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.platform import Emulation, Platform, PlatformModule, platform_module
+from bns.hardware.platform import Emulation, Platform, PlatformModule, platform_module, repeats_of
 from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
 from bns.plotting.scripts import draw, scripts
@@ -110,7 +111,7 @@ def _guard(
 ) -> Guard | None:
     """The guard of a real robot's port, where the robot's module says how it is stopped."""
     recipe_of = getattr(module, "stop_recipe", None)
-    if recipe_of is None:
+    if recipe_of is None or os.name != "posix":  # Windows has no pseudo-terminals
         return None
     log = None if journal is None else journal.with_name(GUARD_LOG)
     guard = Guard(rig.port, recipe_of(rig), rig.limits.silent_s, log)
@@ -190,7 +191,7 @@ def _looped(
 
 def _repeated(spec: RunSpec, how: TrialSetup, driver: TrialDriver, folder: TrialFolder, result: TrialResult) -> None:
     """Drive the final controller as often as is asked for; all its paths go into the trial's folder."""
-    count = platform_module(how.rig.robot).REPEATS if how.repeats is None else how.repeats
+    count = repeats_of(platform_module(how.rig.robot)) if how.repeats is None else how.repeats
     if count == 1:
         return
     evaluation = final_evaluation(result.run.tables["evals"])

@@ -12,9 +12,10 @@ from analysis.real_robots.cases import cases, diagnosed, measured, table_of, wit
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.estimate.cross_validation import errors_at_horizons, held_out_steps
+from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.trial_clock_test import fit_trial_clocks, steps_of
+from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError
 from bns.physics.model import Model
@@ -72,11 +73,14 @@ def test_optitrack_clocks_are_found_once_the_wheels_are_right():
     assert clocks is not None
     assert clocks.paired_comparison.p_value < 0.01
     assert clocks.paired_comparison.elpd_diff > 0
-    before = errors_at_horizons(predictor, predictor.steps(plain))
-    after = errors_at_horizons(predictor, held_out_steps(predictor, problem.pose_filter, fit.model))
-    assert after["trial"] < 0.5 * before["trial"]
-    with_clocks = errors_at_horizons(predictor, steps_of(predictor, problem.pose_filter, clocks.fit.model))
-    assert with_clocks["1s"] < before["1s"]
+    steps = [
+        ("plain", predictor.steps(plain)),
+        ("extended", held_out_steps(predictor, problem.pose_filter, fit.model)),
+        ("with clocks", steps_of(predictor, problem.pose_filter, clocks.fit.model)),
+    ]
+    errors = paired_errors(predictor, steps)
+    assert errors.of("extended")["trial"].rms_m < 0.5 * errors.of("plain")["trial"].rms_m
+    assert errors.of("with clocks")["1s"].rms_m < errors.of("plain")["1s"].rms_m
 
 
 @at_hand

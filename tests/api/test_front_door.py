@@ -239,8 +239,8 @@ def test_a_diagnosis_in_frames(found):
 
 def test_what_is_added_lowers_the_error_step_by_step(log):
     added = bns.add(log, ["dead-zone", bns.effects().index[0]], "khepera")
-    assert added.errors.index.tolist() == ["nominal", "dead-zone", "acceleration-limit", "noise floor"]
-    assert added.errors.loc["dead-zone", "command"] < added.errors.loc["nominal", "command"]
+    assert added.errors.index.tolist() == ["as given", "dead-zone", "acceleration-limit", "tracking noise"]
+    assert added.errors.loc["dead-zone", "command"] < added.errors.loc["as given", "command"]
     assert [active.effect.name for active in added.model.effects] == added.to_json()["effects"]
     with pytest.raises(bns.ModelError, match="has dead-zone already"):
         bns.add(log, "dead-zone", added.model)

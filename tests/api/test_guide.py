@@ -28,7 +28,7 @@ def test_the_guide_finds_what_it_hid(typed):
     values = typed["added"].model.effects[0]
     low, high = values.intervals["slip_s"]
     assert low < 0.12 < high
-    assert typed["added"].errors.loc["turn-slip", "command"] < typed["added"].errors.loc["nominal", "command"]
+    assert typed["added"].errors.loc["turn-slip", "command"] < typed["added"].errors.loc["as given", "command"]
 
 
 def test_the_guide_leaves_the_files_that_it_names(typed):

@@ -31,13 +31,13 @@ def test_added_effects_lower_the_error_and_the_model_comes_back(data, tmp_path, 
     new = tmp_path / "new.yaml"
     assert main(["add", "turn-slip", "--model", "khepera", "--data", str(data), "-o", str(new)]) == 0
     out = capsys.readouterr().out
-    assert "nominal" in out
+    assert "as given" in out
     assert "+ turn-slip" in out
     model = load_model(new)
     low, high = model.effects[0].intervals["slip_s"]
     assert low < 0.12 < high
     errors = model.provenance["held_out_position_error_m"]
-    assert errors["turn-slip"]["command"] < errors["nominal"]["command"]
+    assert errors["turn-slip"]["command"] < errors["as given"]["command"]
     assert model.effects[0].basis == "fitted"
     assert main(["add", "turn-slip", "--model", str(new), "--data", str(data), "-o", str(tmp_path / "x.yaml")]) == 2
     assert "has turn-slip already" in capsys.readouterr().err

@@ -202,4 +202,4 @@ def test_the_camera_s_noise_is_read_off_the_markers_distance():
         assert position_m == pytest.approx(sigma / np.sqrt(2), rel=0.35)
         assert heading_rad == pytest.approx(sigma * np.sqrt(2) / 0.65, rel=0.35)
     found = compare(predictor(table(off_m=(0, 0.1, 0, 0.1), scatter_m=0.002, rigid=True)), BARE)
-    assert found.floor["cycle"] < 0.02 < found.errors["cycle"]["position_m"]
+    assert found.noise_floor_m("cycle") < 0.02 < found.errors["cycle"]["position_m"]

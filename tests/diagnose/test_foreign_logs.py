@@ -16,8 +16,8 @@ from bns.diagnose.data.load import load_measured, read_table
 from bns.diagnose.data.mapping import load_mapping
 from bns.diagnose.data.split_trials import KEPT_S, split
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.estimate.cross_validation import errors_at_horizons
 from bns.diagnose.predict.check_robot import check_same_robot
+from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError
 from tests.diagnose.logs import continuous, ros
@@ -77,7 +77,8 @@ def test_a_bag_is_read_as_the_trials_that_it_holds(bag):
         assert driven.sum() == pytest.approx(given, abs=0.05)
     predictor = WheelPredictor(tracks)
     check_same_robot(predictor, NOMINAL)
-    true, wrong = (errors_at_horizons(predictor, predictor.steps(model))["trial"] for model in (SLIPPING, NOMINAL))
+    errors = paired_errors(predictor, [(m.name, predictor.steps(m)) for m in (SLIPPING, NOMINAL)]).horizons["trial"]
+    true, wrong = (m.rms_m for m in errors.models)
     assert true < 0.007
     assert wrong > 2 * true
 

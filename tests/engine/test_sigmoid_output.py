@@ -36,6 +36,18 @@ def test_gradient_is_its_twins_with_counts_and_without(n, squashed):
         np.testing.assert_allclose(fast, slow, rtol=1e-4, atol=3e-6 * (10 + n))
 
 
+@pytest.mark.parametrize("n", [3, 1300])
+def test_gradient_with_a_flat_spot_is_its_twins_and_keeps_a_saturated_output_learning(n):
+    weights, X, target = problem(n)
+    counts = np.random.default_rng(1).integers(1, 5, n).astype(np.float32)
+    slow = reference.gradient(weights[0], X, target, counts, True, 0.1)
+    fast = gradient(weights[0], X, target, counts, True, 0.1)
+    np.testing.assert_allclose(fast, slow, rtol=1e-4, atol=3e-6 * (10 + n))
+    saturated = np.abs(weights[0])
+    assert np.abs(gradient(saturated, X, target, None, True)[-1]) < 1e-3 * n
+    assert np.abs(gradient(saturated, X, target, None, True, 0.1)[-1]) > 0.02 * n
+
+
 def test_twin_gradient_is_the_slope_of_the_error():
     weights, X, target = problem(20, 4)
     row, counts = weights[0].astype(np.float64), np.arange(20) % 3

@@ -177,7 +177,7 @@ def test_an_overload_latches_until_the_torque_limit_is_written(chain, clock):
     ("fault", "registers", "message"),
     [
         ([Fault("overheat", at_s=0.5, for_s=9, servo=3)], {}, "servo 3: overheated"),
-        ([], {"present_voltage": 80}, "servo 1 has 8.0 V, not 9 to 13"),
+        ([], {"present_voltage": 80}, "servo 1 has 8.0 V, not 9 to 12.5"),
         ([], {"present_voltage": 50}, "servo 1: voltage out of its limits"),
     ],
 )

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from bns.errors import HardwareError
 from bns.hardware.bridge import BridgeChain
-from bns.hardware.bridge_frames import WATCHDOG_S, Frame, crc16, decoded, encoded
-from bns.hardware.emulators.bridge import BridgeEmulator
+from bns.hardware.bridge_frames import STARTED_S, WATCHDOG_S, Frame, crc16, decoded, encoded, searched
+from bns.hardware.emulators.bridge import BOOT_S, BridgeEmulator
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.terminal import PseudoTerminal
@@ -20,10 +20,11 @@ def bridge(tmp_path, clock):
     """bridge(*faults) -> driver, emulator."""
     opened = []
 
-    def build(*faults, count=3, asked=3, limits=None, **registers):
+    def build(*faults, count=3, asked=3, limits=None, boot_s=BOOT_S, **registers):
         struck = Faults(tuple(faults), 1, "bridge")
-        emulator = BridgeEmulator([Servo(n + 1, clock, struck, **registers) for n in range(count)], clock, struck)
+        emulator = BridgeEmulator([Servo(n + 1, clock, struck, **registers) for n in range(count)], clock, struck, boot_s)
         line = PseudoTerminal(emulator, tmp_path, f"bridge{len(opened)}")
+        emulator.send = line.send
         opened.extend([emulator, line])
         driver = BridgeChain(str(line.path), asked, clock, HardwareLog(None, clock), limits)
         opened.append(driver)
@@ -134,11 +135,29 @@ def test_alarms_are_errors(bridge, clock):
 
 
 def test_other_bridges_are_refused(bridge, monkeypatch):
-    with pytest.raises(HardwareError, match="has found 2 servos; version 2 and 3 servos are needed"):
+    with pytest.raises(HardwareError, match="has found 2 servos; version 3 and 3 servos are needed"):
         bridge(count=2)
     monkeypatch.setattr("bns.hardware.emulators.bridge.VERSION", 1)
     with pytest.raises(HardwareError, match=r"speaks version 1 .*Load the sketch of this bns"):
         bridge()
+
+
+def test_the_driver_keeps_silent_until_the_board_has_started(bridge, clock):
+    _, emulator = bridge()
+    assert clock.now_s() < STARTED_S  # asked at once, the boot loader would have waited for five seconds more
+    assert not emulator.boot_loader_heard
+
+
+def test_a_board_that_does_not_start_anew_is_asked(bridge, clock):
+    driver, _ = bridge(boot_s=0.0)
+    assert clock.now_s() >= STARTED_S
+    assert len(driver.health()) == 3
+
+
+def test_a_start_byte_before_an_answer_hides_nothing(bridge):
+    frame = Frame(4, 2, b"abc")
+    assert searched(b"\xa5\xff" + encoded(frame) + b"x") == (frame, b"x")
+    assert searched(b"\xa5\xff" + encoded(frame)[:-1])[0] is None
 
 
 def test_nonsense_is_refused_by_the_bridge(bridge):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bns.cli.main import main
-from bns.hardware.doctor import cameras, examine, latency_of, may_use, ports
+from bns.hardware.doctor import cameras, examine, latency_of, may_use, ports, remotes
 from bns.hardware.rig import load_rig
 
 RIG = """robot: khepera
@@ -68,3 +68,15 @@ def test_no_ports_at_all(tmp_path, monkeypatch):
     [found] = ports(Path(tmp_path))
     assert not found.fine
     assert "rfcomm bind" in found.next_step
+
+
+def test_input_devices_are_listed_by_name(tmp_path):
+    (none,) = remotes(tmp_path)
+    assert str(none).startswith("ok   no Wii remote is paired (press 1+2 on it")
+    for number, name in ((0, "Power Button"), (91, "Nintendo Wii Remote IR")):
+        (tmp_path / f"event{number}" / "device").mkdir(parents=True)
+        (tmp_path / f"event{number}" / "device" / "name").write_text(f"{name}\n")
+    listed, paired, usable = remotes(tmp_path)
+    assert str(listed) == "ok   input device /dev/input/event0: Power Button"
+    assert str(paired) == "ok   input device /dev/input/event91: Nintendo Wii Remote IR"
+    assert not usable.fine

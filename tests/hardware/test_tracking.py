@@ -12,7 +12,13 @@ from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.camera import CameraEmulator
 from bns.hardware.emulators.scene import Patch, Scene, disc, flat, tag
 from bns.hardware.tracking.aruco import ArucoDetector
-from bns.hardware.tracking.calibration import Board, Calibration, calibrate, check_size, load_calibration
+from bns.hardware.tracking.calibration import (
+    Board,
+    Calibration,
+    calibrate,
+    check_size,
+    load_calibration,
+)
 from bns.hardware.tracking.camera import Frame, FrameTracker, StreamCamera
 from bns.hardware.tracking.colour import ColourDetector, Markers
 from bns.hardware.tracking.kinds import open_tracker
@@ -52,7 +58,8 @@ def shots(scene):
 
 @pytest.fixture(scope="module")
 def calibration(shots):
-    return calibrate(*shots, Board(), "emulated")
+    frames, floor = shots
+    return calibrate(frames, [floor], Board(), "emulated")
 
 
 def worn(kind, pose):
@@ -165,9 +172,9 @@ def test_calibrations_that_do_not_fit(tmp_path, shots):
         check_size(Calibration(TRUE, 0.1, 12, "cam"), np.zeros((480, 640, 3)))
     frames, floor = shots
     with pytest.raises(HardwareError, match="seen in 0 of 3 frames; at least 8"):
-        calibrate([np.zeros_like(floor)] * 3, floor, Board(), "cam")
+        calibrate([np.zeros_like(floor)] * 3, [floor], Board(), "cam")
     with pytest.raises(HardwareError, match="not seen in the picture of the floor"):
-        calibrate(frames, np.zeros_like(floor), Board(), "cam")
+        calibrate(frames, [np.zeros_like(floor)], Board(), "cam")
 
 
 def test_calibrate_and_board_from_the_command_line(tmp_path, shots, capsys):

@@ -60,7 +60,7 @@ def ask(world: World, options: Sequence[str] = ()) -> Record:
     with tempfile.TemporaryDirectory() as folder:
         data = write(world, Path(folder), acceptable(world))
         began, worked = time.perf_counter(), time.process_time()
-        status, out, fault = called(["diagnose", str(data), *world.nominal.arguments, "--json", *options])
+        status, out, fault = called(["diagnose", str(data), *world.nominal.arguments, "--json", *world.options, *options])
         seconds, cpu = time.perf_counter() - began, time.process_time() - worked
     try:
         given = json.loads(out)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy.signal import lfilter
 
 from tests.hidden_effects.cause import Cause
 from tests.hidden_effects.driving import FRAME_S, Driving
@@ -30,6 +31,8 @@ class Camera:
     lost: float = 0.02
     outliers: float = 0.0
     stamp_s: float = 0.0
+    memory: float = 0.0
+    """Correlation of the noise from frame to frame (AR(1)), its standard deviation as stated."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class Layout:
     session: bool = True
     voltage: bool = False
     tail_s: float = 0.0
+    frame_s: float = FRAME_S
 
 
 def track(
@@ -91,7 +95,7 @@ def stamps(edges: np.ndarray, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     """Times (rows,) of a trial's rows, and which of them are there for a change of command alone."""
     if layout.rows == "ends":
         return edges.copy(), np.zeros(len(edges), bool)
-    frames = FRAME_S * np.arange(int(np.floor((edges[-1] + layout.tail_s) / FRAME_S + 1e-6)) + 1)
+    frames = layout.frame_s * np.arange(int(np.floor((edges[-1] + layout.tail_s) / layout.frame_s + 1e-6)) + 1)
     more = edges[np.abs(edges[:, None] - frames).min(axis=1) > 1e-6]
     t = np.concatenate([frames, more])
     order = np.argsort(t, kind="stable")
@@ -104,7 +108,11 @@ def _changes(t: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 def _noisy(rng: np.random.Generator, poses: np.ndarray, camera: Camera) -> np.ndarray:
     size = np.array([camera.position_m, camera.position_m, camera.heading_rad])
-    out = poses + rng.normal(size=poses.shape) * size
+    white = rng.normal(size=poses.shape)
+    if camera.memory and len(white) > 1:
+        white[1:] *= np.sqrt(1 - camera.memory**2)
+        white = lfilter([1.0], [1.0, -camera.memory], white, axis=0)
+    out = poses + white * size
     jumps = rng.uniform(-1, 1, poses.shape) * np.array([0.3, 0.3, 2.0])
     out += jumps * (rng.random((len(poses), 1)) < camera.outliers)
     quanta = np.array([camera.quantum_m, camera.quantum_m, camera.quantum_rad])

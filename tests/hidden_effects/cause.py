@@ -48,6 +48,10 @@ class Cause:
         """What the motors make of a command."""
         return wheels
 
+    def edges(self, edges_s: np.ndarray) -> np.ndarray:
+        """When the motors hear of commands given at these times, (n, k + 1)."""
+        return edges_s
+
     def demand(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
         """What time makes of it."""
         return wheels

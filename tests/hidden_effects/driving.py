@@ -24,6 +24,9 @@ class Robot:
 ROBOTS = {
     "khepera": Robot(0.0884, 0.0208, 0.208, ("--model", "khepera")),
     "wide": Robot(0.20, 0.05, 0.5, ("--model", "differential-drive", "--wheelbase", "0.2")),
+    "tiny": Robot(0.05, 0.012, 0.12, ("--model", "differential-drive", "--wheelbase", "0.05")),
+    "large": Robot(0.4, 0.09, 0.9, ("--model", "differential-drive", "--wheelbase", "0.4")),
+    "vehicle": Robot(1.5, 0.3, 2.5, ("--model", "differential-drive", "--wheelbase", "1.5")),
 }
 
 

@@ -8,6 +8,16 @@ import numpy as np
 from scipy.signal import lfilter
 
 from tests.hidden_effects.cause import Body, Cause, Moment
+from tests.hidden_effects.listed_floor import CasterSwing, FloorPatch, LensDistortion, QuadraticTurnSlip, TiltedCamera
+from tests.hidden_effects.listed_motors import (
+    Backlash,
+    CommandQuantisation,
+    CommandRate,
+    Heating,
+    Stribeck,
+    WarmUp,
+    WheelEccentricity,
+)
 
 
 @dataclass
@@ -233,21 +243,33 @@ class CameraRotation(Cause):
 
 
 LISTED: dict[str, type[Cause]] = {
+    "command-quantisation": CommandQuantisation,
+    "command-rate": CommandRate,
     "command-delay": CommandDelay,
     "dead-zone": DeadZone,
+    "stribeck": Stribeck,
+    "warm-up": WarmUp,
     "speed-gain": SpeedGain,
     "wheel-mismatch": WheelMismatch,
     "speed-limit": SpeedLimit,
     "battery-sag": BatterySag,
     "motor-lag": MotorLag,
     "acceleration-limit": AccelerationLimit,
+    "heating": Heating,
+    "wheel-eccentricity": WheelEccentricity,
+    "backlash": Backlash,
+    "caster-swing": CasterSwing,
     "wheelbase": Wheelbase,
     "yaw-bias": YawBias,
     "turn-slip": TurnSlip,
+    "turn-slip-quadratic": QuadraticTurnSlip,
     "side-slip": SideSlip,
+    "floor-patch": FloorPatch,
     "floor-slope": FloorSlope,
     "tether-pull": TetherPull,
     "marker-offset": MarkerOffset,
+    "tilted-camera": TiltedCamera,
+    "lens-distortion": LensDistortion,
     "camera-scale": CameraScale,
     "camera-rotation": CameraRotation,
     "clock-offset": ClockOffset,

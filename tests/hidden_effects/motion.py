@@ -60,7 +60,10 @@ def _wheels(
     for cause in causes:
         commands = cause.command(commands)
     delay = sum(cause.delay_s for cause in causes)
-    wheels = mean_commands(driving.edges_s + delay, commands * (1 + jitter), t)
+    edges = driving.edges_s
+    for cause in causes:
+        edges = cause.edges(edges)
+    wheels = mean_commands(edges + delay, commands * (1 + jitter), t)
     for cause in causes:
         wheels = cause.demand(wheels, moment)
     for cause in causes:

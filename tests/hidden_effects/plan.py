@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from tests.hidden_effects.camera import Camera, Layout
+from tests.hidden_effects.plan_further import further
 from tests.hidden_effects.world import USUAL, Parameters, World
 
 FINE, COARSE = Camera(0.0005, 0.005, 0.0001), Camera(0.003, 0.009, 0.001)
@@ -62,15 +63,8 @@ PAIRS = (
 )  # fmt: skip
 
 UNLISTED: dict[str, tuple[Parameters, Parameters]] = {
-    "sticky-patch": (
-        {"x_m": 0.8, "y_m": 0.5, "radius_m": 0.35, "loss": 0.12},
-        {"x_m": 0.6, "y_m": 0.6, "radius_m": 0.3, "loss": 0.35},
-    ),
-    "eccentricity": ({"share": 0.12, "radius_m": 0.0205}, {"share": 0.25, "radius_m": 0.0205}),
     "quadratic-gain": ({"share": -0.12, "fastest_m_s": 0.208}, {"share": 0.3, "fastest_m_s": 0.208}),
     "left-turn-slip": ({"slip_s": 0.06}, {"slip_s": 0.15}),
-    "warm-up": ({"loss": 0.08, "time_s": 4.0}, {"loss": 0.25, "time_s": 3.0}),
-    "backlash": ({"gap_m": 0.004}, {"gap_m": 0.01}),
     "left-dead-zone": ({"width_m_s": 0.004}, {"width_m_s": 0.01}),
     "heading-walk": ({"spread_rad_s": 0.03, "time_s": 4.0}, {"spread_rad_s": 0.08, "time_s": 6.0}),
     "session-drag": (
@@ -96,7 +90,7 @@ UNLISTED: dict[str, tuple[Parameters, Parameters]] = {
     "loose-wheel": ({"loss": 0.03, "from_s": 800.0}, {"loss": 0.1, "from_s": 500.0}),
     "weak-supply": ({"loss": 0.06, "fastest_m_s": 0.208}, {"loss": 0.15, "fastest_m_s": 0.208}),
 }
-REVERSING = {"backlash", "left-dead-zone", "reverse-loss", "late-start"}
+REVERSING = {"left-dead-zone", "reverse-loss", "late-start"}
 """Effects that show only where wheels reverse or stand."""
 
 TIES: dict[str, dict[str, Parameters]] = {
@@ -117,6 +111,7 @@ TIES: dict[str, dict[str, Parameters]] = {
 
 
 QUICK = {"single": 6, "pair": 3, "none": 3, "unlisted": 3, "tie": 3, "single-hard": 2}
+QUICK |= {"new": 4, "removed": 3, "triple": 2, "size": 3}
 """How many worlds of each family a quick look takes, evenly spread over it."""
 
 
@@ -129,7 +124,7 @@ FAR_TETHERS: dict[str, dict[str, Parameters]] = {
 
 def worlds(seed: int) -> list[World]:
     """All of them, in families."""
-    made = [*singles(), *pairs(), *nothing(), *unlisted(), *ties()]
+    made = [*singles(), *pairs(), *nothing(), *unlisted(), *ties(), *further()]
     return [replace(world, seed=seed) for world in made]
 
 
@@ -186,7 +181,7 @@ def unlisted() -> Iterator[World]:
             plan = "mixed" if name in REVERSING or level == "strong" else "forward"
             hidden = World(f"unlisted-{name}-{level}", "unlisted", unlisted={name: parameters}, plan=plan)
             yield replace(hidden, layout=_layout(number, "session"))
-    for name, beside in (("warm-up", "wheelbase"), ("carpet-nap", "motor-lag"), ("reverse-loss", "wheel-mismatch")):
+    for name, beside in (("speed-lag", "wheelbase"), ("carpet-nap", "motor-lag"), ("reverse-loss", "wheel-mismatch")):
         both = World(f"unlisted-{name}-and-{beside}", "unlisted", unlisted={name: UNLISTED[name][1]}, plan="mixed")
         yield replace(both, hidden={beside: STRENGTHS[beside][1]})
 

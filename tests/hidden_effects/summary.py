@@ -32,6 +32,10 @@ TARGETS = {
     "unlisted": ("unlisted recognised", 0.90),
     "tie": ("confusable sets as ties", 1.00),
     "single-hard": ("single, harder conditions", None),
+    "new": ("the longer list, one each", 0.90),
+    "removed": ("... taken out: unlisted", 0.90),
+    "triple": ("three at once, nothing else", 0.85),
+    "size": ("other sizes, rates, noise", 0.85),
 }
 COVERAGE, ERROR_RATIO, SECONDS_S = 0.90, 1.05, 60.0
 SILENT = {"none", "insufficient-data", "no answer"}

@@ -91,7 +91,7 @@ def test_a_tie_beside_another_effect_can_be_told_in_two_ways():
 
 
 def test_unlisted_and_none():
-    unlisted = World("w", "unlisted", unlisted={"warm-up": {"loss": 0.1, "time_s": 3.0}})
+    unlisted = World("w", "unlisted", unlisted={"reverse-loss": {"loss": 0.1}})
     assert judge(unlisted, read(canned("unlisted", ["battery-sag"]))) == "right"
     assert judge(unlisted, read(canned("effects", ["battery-sag"]))) == "wrong"
     assert judge(World("w", "none"), read(canned("none"))) == "right"

@@ -23,9 +23,11 @@ from tests.hidden_effects.listed import (
     WheelMismatch,
     YawBias,
 )  # fmt: skip
+from tests.hidden_effects.listed_floor import FloorPatch
+from tests.hidden_effects.listed_motors import Backlash
 from tests.hidden_effects.luck import luck
 from tests.hidden_effects.motion import mean_commands, move
-from tests.hidden_effects.unlisted import Backlash, Kicks, StickyPatch, Swing
+from tests.hidden_effects.unlisted import Kicks, Swing
 from tests.hidden_effects.unlisted_motors import LateStart, LooseWheel, Overshoot, SpeedLag, Stalls, WeakSupply
 
 BASE_M = 0.1
@@ -141,7 +143,7 @@ def test_backlash_costs_the_gap_at_each_reversal():
 
 
 def test_a_sticky_patch_slows_inside_only():
-    y = pose_after([StickyPatch(0.0, 0.0, 0.1, 0.5)], (0.1, 0.1, 3.0))[1]
+    y = pose_after([FloorPatch(0.0, 0.0, 0.1, 0.5)], (0.1, 0.1, 3.0))[1]
     assert y == pytest.approx(0.1 + 0.1 * (3.0 - 2.0), abs=2e-4)
 
 

@@ -16,34 +16,6 @@ from tests.hidden_effects.unlisted_motors import MOTORS
 
 
 @dataclass
-class StickyPatch(Cause):
-    """A round patch of floor on which the robot is slower."""
-
-    x_m: float
-    y_m: float
-    radius_m: float
-    loss: float
-    depends_on_pose = True
-
-    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
-        share = 1 - self.loss * (np.hypot(x - self.x_m, y - self.y_m) < self.radius_m)
-        return body._replace(forward=body.forward * share, turn=body.turn * share)
-
-
-@dataclass
-class Eccentricity(Cause):
-    """The left wheel's axle is not in its middle: its speed goes up and down with every turn of the wheel."""
-
-    share: float
-    radius_m: float
-
-    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
-        phase = moment.rng.uniform(0, 2 * np.pi, (len(wheels), 1))
-        angle = phase + np.cumsum(wheels[..., 0], axis=1) * moment.step_s / self.radius_m
-        return wheels * np.stack([1 + self.share * np.cos(angle), np.ones_like(angle)], axis=-1)
-
-
-@dataclass
 class QuadraticGain(Cause):
     """Speed rises faster than its command."""
 
@@ -62,33 +34,6 @@ class LeftTurnSlip(Cause):
 
     def body(self, body: Body, moment: Moment) -> Body:
         return body._replace(forward=body.forward * (1 - self.slip_s * np.maximum(body.turn, 0.0)))
-
-
-@dataclass
-class WarmUp(Cause):
-    """Slow at the beginning of each trial."""
-
-    loss: float
-    time_s: float
-
-    def demand(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
-        return wheels * (1 - self.loss * np.exp(-np.maximum(moment.trial_s, 0.0) / self.time_s))[:, None]
-
-
-@dataclass
-class Backlash(Cause):
-    """A wheel that reverses has to take up a gap before it drives."""
-
-    gap_m: float
-
-    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
-        out = np.zeros_like(wheels)
-        tooth = np.full_like(wheels[:, 0], self.gap_m)  # where in the gap the motor's tooth is: 0 or gap_m drives
-        for i in range(wheels.shape[1]):
-            motor = tooth + wheels[:, i] * moment.step_s
-            tooth = np.clip(motor, 0.0, self.gap_m)
-            out[:, i] = (motor - tooth) / moment.step_s
-        return out
 
 
 @dataclass
@@ -207,12 +152,8 @@ class Kicks(Cause):
 
 
 UNLISTED: dict[str, type[Cause]] = {
-    "sticky-patch": StickyPatch,
-    "eccentricity": Eccentricity,
     "quadratic-gain": QuadraticGain,
     "left-turn-slip": LeftTurnSlip,
-    "warm-up": WarmUp,
-    "backlash": Backlash,
     "left-dead-zone": LeftDeadZone,
     "heading-walk": HeadingWalk,
     "session-drag": SessionDrag,

@@ -11,8 +11,8 @@ import pandas as pd
 
 from tests.hidden_effects.camera import Camera, Layout, track
 from tests.hidden_effects.cause import Cause
-from tests.hidden_effects.driving import FRAME_S, ROBOTS, Driving, Robot, drive
-from tests.hidden_effects.listed import cause
+from tests.hidden_effects.driving import ROBOTS, Driving, Robot, drive
+from tests.hidden_effects.listed import LISTED, cause
 from tests.hidden_effects.luck import luck
 from tests.hidden_effects.motion import Paths, move
 from tests.hidden_effects.unlisted import UNLISTED
@@ -47,6 +47,8 @@ class World:
     layout: Layout = FRAMES
     jitter: float = 0.004
     seed: int = 0
+    barred: tuple[str, ...] = ()
+    """Listed effects that the product is told not to try: hidden as unlisted ones."""
 
     @property
     def nominal(self) -> Robot:
@@ -56,11 +58,16 @@ class World:
     def causes(self) -> list[Cause]:
         """Everything that is hidden."""
         listed = [cause(name, parameters) for name, parameters in self.hidden.items()]
-        return listed + [UNLISTED[name](**parameters) for name, parameters in self.unlisted.items()]
+        return listed + [{**LISTED, **UNLISTED}[name](**parameters) for name, parameters in self.unlisted.items()]
+
+    @property
+    def options(self) -> list[str]:
+        """How the product is told what it may not try."""
+        return [word for name in self.barred for word in ("--without-effect", name)]
 
     def driving(self) -> Driving:
         """The commands."""
-        grid = 0.001 if self.layout.rows == "frames+changes" else FRAME_S
+        grid = 0.001 if self.layout.rows == "frames+changes" else self.layout.frame_s
         return drive(luck(self.seed, self.name, "drive"), self.nominal, self.plan, self.trials, grid)
 
     def true_paths(self) -> tuple[Driving, Paths]:

@@ -29,6 +29,7 @@ every_effect = pytest.mark.parametrize("effect", all_effects().values(), ids=all
 def plausible_model(effect):
     """The effect at the plausible end that is farther from neutral."""
     ends = {p.name: max(p.plausible, key=lambda v, p=p: abs(v - p.neutral)) for p in effect.parameters}
+    ends |= {p.name: p.neutral for p in effect.parameters if p.name in {"x_m", "y_m"}}  # of a place: any may be
     limits = [p for p in effect.parameters if np.isinf(p.neutral)]
     ends |= {p.name: min(p.plausible) for p in limits}
     return IDEAL.with_effect(effect.name, **ends)

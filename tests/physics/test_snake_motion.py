@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from importlib import resources
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -19,6 +20,8 @@ from bns.robots import load_robot
 KEY = Key(1, 2)
 SIDEWINDING = [0.6, 0.3, math.pi / 3, 1.5 * math.pi]
 ROLLING = [1.43, 1.26, 3.81, 4.58]
+FALLING, ROLLING_ROUND = [0.85, 0.79, 5.18, 1.41], [0.86, 0.55, 4.6, 0.39]
+"""One leaves the robot on its side, the other goes right round and ends upright."""
 
 
 @pytest.fixture(scope="module")
@@ -96,8 +99,8 @@ def test_same_drive_twice_is_the_same(body):
     [
         (SIDEWINDING, ()),
         (ROLLING, (TIPPED,)),
-        ([1.13, 0.21, 3.3, 1.95], (COLLISION,)),
-        ([1.56, 0.96, 5.96, 2.89], (COLLISION, STALLED)),
+        ([1.56, 0.96, 5.96, 2.89], (COLLISION,)),
+        ([1.13, 0.21, 3.3, 1.95], (COLLISION, STALLED)),
     ],
 )
 def test_causes_of_instability_are_named(body, cycle, causes):
@@ -136,11 +139,64 @@ def test_physics_that_blows_up_is_an_unstable_cycle_and_the_next_drive_is_sound(
     assert world.drive(commands, KEY, Purpose.WORLD_EVALUATED, 1)[:, 8].tolist() == [1, 1]
 
 
+def stability_of(cycles, **changed):
+    world = SnakePhysics(replace(shipped_parameters(), **changed))
+    return world.drive(np.array(cycles), KEY, Purpose.WORLD_EVALUATED, 1)[:, 8].tolist()
+
+
 def test_a_robot_on_its_side_is_not_driven_on():
     world = SnakePhysics(shipped_parameters())
-    seen = world.drive(np.array([SIDEWINDING, ROLLING, SIDEWINDING]), KEY, Purpose.WORLD_EVALUATED, 1)
+    seen = world.drive(np.array([SIDEWINDING, FALLING, SIDEWINDING]), KEY, Purpose.WORLD_EVALUATED, 1)
     assert seen[:, 8].tolist() == [1, 0]
     assert [bool(causes) for causes in world.causes] == [False, True]
+
+
+def test_a_robot_that_rolled_and_stands_again_is_driven_on_unless_read_otherwise():
+    cycles = [SIDEWINDING, ROLLING_ROUND, SIDEWINDING]
+    assert stability_of(cycles) == [1, 0, 1]
+    assert stability_of(cycles, tipped_on_the_way_ends=1.0) == [1, 0]
+    assert stability_of(cycles, tipped_on_the_way_fails=0.0) == [1, 1, 1]
+    assert stability_of([SIDEWINDING, FALLING, SIDEWINDING], tipped_on_the_way_fails=0.0) == [1, 0]
+
+
+def test_a_robot_on_its_side_is_driven_on_with_exchanged_roles_where_read_so(body):
+    assert len(stability_of([FALLING, SIDEWINDING, SIDEWINDING], roles_switch_on_side=1.0)) == 3
+    lying = Body(replace(shipped_parameters(), roles_switch_on_side=1.0))
+    for one, switched in ((lying, True), (body, False)):
+        one.lay_straight()
+        one.data.qpos[3:7] = [math.cos(math.pi / 4), math.sin(math.pi / 4), 0, 0]  # on its side
+        mujoco.mj_forward(one.model, one.data)
+        one.drive_cycle([0.5, 0.0, 0.0, math.pi / 2])
+        bent = np.abs(one.data.qpos[7:])
+        assert bent[int(switched) :: 2].mean() > 3 * bent[int(not switched) :: 2].mean()
+
+
+def test_the_heavy_end_is_yellows_unless_read_otherwise(body):
+    green = Body(replace(shipped_parameters(), tether_at_yellow=0.0))
+    masses = [one.model.body_mass[1:] for one in (body, green)]
+    tail = shipped_parameters().tail_mass_kg
+    assert masses[0][0] - masses[0][1] == pytest.approx(tail)
+    np.testing.assert_allclose(masses[0], masses[1][::-1])
+    moved = [np.abs(sideways_and_along(laid(one).drive_cycle(SIDEWINDING))[:, 0]) for one in (body, green)]
+    assert moved[0][0] < moved[0][1]
+    assert moved[1][0] > moved[1][1]
+    with pytest.raises(ModelError, match=r"tether_at_yellow is 0.5; it is a reading: give 1 \(yes\) or 0 \(no\)"):
+        replace(shipped_parameters(), tether_at_yellow=0.5)
+
+
+def test_a_robot_slips_down_a_floor_that_falls_and_friction_differs_from_link_to_link(body):
+    ends = []
+    for tilt in (0.05, -0.05):
+        laid(body).set_tilt(0.0, tilt)
+        ends.append(body.drive_cycle(SIDEWINDING).after_m.mean(axis=0)[1])
+    body.set_tilt(0.0, 0.0)
+    assert ends[0] - ends[1] > 0.02
+    even = laid(body).drive_cycle(SIDEWINDING).after_m
+    body.set_friction(np.linspace(0.3, 1.7, 13))
+    uneven = laid(body).drive_cycle(SIDEWINDING).after_m
+    body.set_friction(1.0)
+    assert np.abs(uneven - even).max() > 0.005
+    np.testing.assert_array_equal(laid(body).drive_cycle(SIDEWINDING).after_m, even)
 
 
 def test_same_draws_same_drive_and_friction_differs_from_cycle_to_cycle():
@@ -154,7 +210,7 @@ def test_same_draws_same_drive_and_friction_differs_from_cycle_to_cycle():
 
 def test_a_file_of_parameters_makes_another_world(tmp_path):
     robot, text = load_robot("snake"), (resources.files("bns.physics.snake") / "parameters.yaml").read_text()
-    (tmp_path / "ice.yaml").write_text(text.replace("{value: 0.35,", "{value: 0.05,"))
+    (tmp_path / "ice.yaml").write_text(text.replace("{value: 0.25,", "{value: 0.05,"))
     (tmp_path / "half.yaml").write_text(text[: len(text) // 2].rsplit("\n", 1)[0])
     assert build(robot, str(tmp_path / "ice.yaml")).digest != build(robot).digest
     with pytest.raises(ModelError, match=r"lack .*floor_friction"):
@@ -179,7 +235,7 @@ def test_numbers_that_are_no_body_together_are_refused(changed, message):
 def test_files_that_are_no_text_or_no_yaml_are_refused(tmp_path):
     (tmp_path / "latin.yaml").write_bytes("links: 13 # Länge".encode("latin-1"))
     (tmp_path / "open.yaml").write_text("links: {value: 13")
-    for name, message in (("latin", "is not UTF-8 text"), ("open", "no valid YAML.*Correct the place it names")):
+    for name, message in (("latin", "is not UTF-8 text"), ("open", "no valid YAML.*Look at indentation")):
         with pytest.raises(ModelError, match=f"(?s){message}"):
             build(load_robot("snake"), str(tmp_path / f"{name}.yaml"))
 

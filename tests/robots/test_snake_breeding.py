@@ -7,7 +7,6 @@ from bns.engine.evolution import Population, rank, tournament_cdf
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.uniform import component_draws
 from bns.robots import load_robot
-from bns.robots.snake import cycles
 from bns.robots.snake.rules import BOUNDS, LARGEST_RATIO, MOST_REPEATS, REPEATS, TURN_RAD
 
 ROBOT, KEY = load_robot("snake"), Key(4, 2)
@@ -18,7 +17,7 @@ def twin(commands, order, cdf, rate, generation):
     draws = uniforms(KEY, Purpose.PARENTS, generation, pairs, 1)[:, 0, :2]
     parents = order[np.minimum(np.searchsorted(cdf, draws, side="right"), len(order) - 1)]
     first, second = commands[parents[:, 0]], commands[parents[:, 1]]
-    own = component_draws(KEY, Purpose.CUTS, generation, (pairs, *commands.shape[1:])) < cycles.PARENT_SHARE
+    own = component_draws(KEY, Purpose.CUTS, generation, (pairs, *commands.shape[1:])) < ROBOT.parent_share
     both = np.stack([np.where(own, first, second), np.where(own, second, first)], axis=1).reshape(-1, *commands.shape[1:])
     children = np.concatenate([commands[order[:1]], both])[: len(commands)]
     u = component_draws(KEY, Purpose.MUTATION, generation, children.shape)

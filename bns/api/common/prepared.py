@@ -44,8 +44,8 @@ class PreparedNetworks:
     model: Model
 
 
-def prepared(log: Log, model: Given, *, slim: bool = True) -> Prepared:
-    """A model over measurements. ``slim``: of very many poses only some are taken, as fits need.
+def prepared(log: Log, model: Given) -> Prepared:
+    """A model over measurements. Of very many poses only some are taken, the same by every command.
 
     Raises:
         ModelError: no such model, or networks, which have no effects.
@@ -62,7 +62,7 @@ def prepared(log: Log, model: Given, *, slim: bool = True) -> Prepared:
             f"{measured.path} holds cycles and markers, and the model {robot.name} drives wheels; "
             "compare them with networks: --model snake, or a file (.safetensors) of bns run --robot snake --save-snn FILE."
         )
-    predictor = predictor_for_search(measured.tracks) if slim else WheelPredictor(measured.tracks)
+    predictor = predictor_for_search(measured.tracks)
     if len(predictor.tracks.t_s) < len(measured.tracks.t_s):
         measured = replace(measured, tracks=predictor.tracks)
     check_same_robot(predictor, robot)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import cuda, float32
+from numba import cuda, float32, float64
 
 from bns.cuda.driving import chosen, keep, normals_of
 from bns.cuda.networks import squashed_output
@@ -41,6 +41,8 @@ _NOTHING = np.float32(0)
 _SEEN, _BOTH = (CYCLES, _NETWORKS), (2, CYCLES, _NETWORKS)
 _WARP = 32
 _REST_MS, _MS_A_RAD = 12_000.0 * SETTLE_S, 12_000.0 * STEP_RAD / JOINT_SPEED_RAD_S
+_SHARE = ROBOT.parent_share
+"""Of a child's components, how many are the first parent's."""
 _DISPLACEMENTS = 4
 """The networks that learn from stable cycles alone; after them comes stability, which learns from all."""
 
@@ -49,6 +51,7 @@ DRIVEN = ("fitness_simulation", "fitness_world", "goals_reached", "commands", "d
 STEPS = MOST_REPEATS
 _ROW = CYCLES * MOST_REPEATS * _DISPLACEMENTS
 DRAWS = NOISY_EVALUATIONS * _ROW
+_ALL = CYCLES * MOST_REPEATS
 
 
 def driving_grid(runs: int) -> tuple[int, int]:
@@ -61,10 +64,16 @@ def draw(luck, own, step, thread, threads):  # type: ignore[no-untyped-def]  # c
     """Noise of every cycle in ten evaluations, m: evaluation after evaluation, four numbers a cycle."""
     for at in range(thread, DRAWS // _DISPLACEMENTS, threads):
         evaluation, slot = at // (_ROW // _DISPLACEMENTS), at % (_ROW // _DISPLACEMENTS)
-        drawn = philox(np.uint32(slot), np.uint32(evaluation), step, _ROLLOUT_NOISE, own["key0"], own["key1"])
-        noise = normals_of(drawn)
-        for k in range(_DISPLACEMENTS):
-            luck[_DISPLACEMENTS * at + k] = noise[k] * NOISE_SD_M[k]
+        _draw_cycle(luck, _DISPLACEMENTS * at, own, step, evaluation, slot)
+
+
+@cuda.jit(device=True)
+def _draw_cycle(luck, at, own, step, evaluation, slot):  # type: ignore[no-untyped-def]  # compiled
+    """Noise of one cycle of an evaluation into luck[at : at + 4]."""
+    drawn = philox(np.uint32(slot), np.uint32(evaluation), step, _ROLLOUT_NOISE, own["key0"], own["key1"])
+    noise = normals_of(drawn)
+    for k in range(_DISPLACEMENTS):
+        luck[at + k] = noise[k] * NOISE_SD_M[k]
 
 
 @cuda.jit(device=True)
@@ -72,7 +81,7 @@ def bred(parents, lengths, order, cdf, children, child_lengths, pair, own, step)
     """Uniform crossover and mutation; all lists have one length, so none is cut."""
     longest = own["longest"]
     breed_pair(
-        parents[:, :longest], order, cdf, own["mutation_rate"], _LOW, _HIGH, _SPAN, pair, step, own["key0"], own["key1"],
+        parents[:, :longest], order, cdf, _SHARE, own["mutation_rate"], _LOW, _HIGH, _SPAN, pair, step, own["key0"], own["key1"],
         children[:, :longest],
     )  # fmt: skip
     for child in range(1 + 2 * pair, min(3 + 2 * pair, order.size)):
@@ -93,10 +102,10 @@ def _displacement(output):  # type: ignore[no-untyped-def]  # compiled
 
 
 @cuda.jit(device=True)
-def _along_path(seen, commands, length, goals, own, luck, first):  # type: ignore[no-untyped-def]  # compiled
+def _along_path(seen, commands, length, goals, own, luck, first, most):  # type: ignore[no-untyped-def]  # compiled
     """Sum of algorithm 3, goals reached, distinct cycles used and cycles driven, of networks that say ``seen`` (cycles, 5).
 
-    The noise of its first cycle is luck[first : first + 4]; there is none where first is negative.
+    The noise of its first cycle is luck[first : first + 4]; there is none where first is negative. At most ``most`` are driven.
     """
     yx, yy, gx, gy = _YX, _YY, _GX, _GY
     x, y = (yx + gx) / 2, (yy + gy) / 2
@@ -118,6 +127,8 @@ def _along_path(seen, commands, length, goals, own, luck, first):  # type: ignor
             total, goal = arrived(x, y, unstable, total, goal, goals, own["half_region"], own["half_x"], own["half_y"])
             if goal == goals.shape[0]:
                 return total, goal, used, step
+            if step == most:
+                return ended(x, y, total, goal, goals), goal, used, step
     return ended(x, y, total, goal, goals), goal, used, step
 
 
@@ -128,10 +139,10 @@ def scored(w, commands, length, goals, own, luck):  # type: ignore[no-untyped-de
     for j in range(length):
         for net in range(_NETWORKS):
             seen[j, net] = _foretold(w, commands[j], net)
-    total, goal, used, _ = _along_path(seen, commands, length, goals, own, luck, -1)
+    total, goal, used, _ = _along_path(seen, commands, length, goals, own, luck, -1, _ALL)
     mean = 0.0
     for evaluation in range(NOISY_EVALUATIONS):
-        total, _, _, _ = _along_path(seen, commands, length, goals, own, luck, evaluation * _ROW)
+        total, _, _, _ = _along_path(seen, commands, length, goals, own, luck, evaluation * _ROW, _ALL)
         mean += worth(total)
     mean /= NOISY_EVALUATIONS
     if math.isfinite(mean) and math.isfinite(total):
@@ -139,12 +150,26 @@ def scored(w, commands, length, goals, own, luck):  # type: ignore[no-untyped-de
     return 0.0, 0, used
 
 
+@cuda.jit(device=True)
+def _needed(seen, commands, length, goals, own, generation):  # type: ignore[no-untyped-def]  # compiled
+    """Cycles that are driven: as many as any of the noisy evaluations of this generation needed, as `Snake.plan`."""
+    luck, longest = cuda.local.array(_ROW, float64), 0
+    for evaluation in range(NOISY_EVALUATIONS):
+        for slot in range(_ALL):
+            _draw_cycle(luck, _DISPLACEMENTS * slot, own, generation, evaluation, slot)
+        _, goal, _, driven = _along_path(seen, commands, length, goals, own, luck, 0, _ALL)
+        if goal == goals.shape[0]:
+            longest = max(longest, driven)
+    return longest if longest > 0 else _ALL
+
+
 @cuda.jit
 def drive(  # type: ignore[no-untyped-def]  # compiled
     evaluation, settings, purpose, learning, static, noise_sd, weights, commands, lengths, order, cdf, goals,
     X, targets, counts, failures, rows,
 ):  # fmt: skip
-    """Drive a controller of each run in the substitute world, as far as simulation needs it to finish the task; a block a run.
+    """Drive a controller of each run in the substitute world, as far as simulation with noise needs it to finish the task; a
+    block a run.
 
     While ``learning`` it is the winner of the real-world tournament cdf (runs, n), and what it does joins the patterns X
     (2, runs, 5, capacity), targets (2, runs, 5, capacity), counts (2, runs): those to train on first, those to watch second.
@@ -168,7 +193,9 @@ def drive(  # type: ignore[no-untyped-def]  # compiled
     if thread > 0:
         return
 
-    total_snn, _, _, planned = _along_path(both[0], cycles, length, aims, own, noise_sd, -1)
+    generation = np.uint32(own["generations"] * (evaluation - 1 if learning else evaluation))
+    planned = _needed(both[0], cycles, length, aims, own, generation)
+    total_snn, _, _, _ = _along_path(both[0], cycles, length, aims, own, noise_sd, -1, planned)
     yx, yy, gx, gy = _YX, _YY, _GX, _GY
     x, y = (yx + gx) / 2, (yy + gy) / 2
     total, goal, driven, driven_ms = 0.0, 0, 0, 0.0

@@ -12,6 +12,7 @@ import pandas as pd
 
 from bns.diagnose.data.mapping import UNITS
 from bns.diagnose.data.merge_topics import held, merged, wheels_from_body
+from bns.diagnose.data.relative_motions import relative_motions
 from bns.diagnose.data.split_trials import split
 from bns.errors import DataError, unknown_name
 from bns.measurements import COLUMNS, COMMANDS, POSE
@@ -31,6 +32,8 @@ def applied(
         if folder is None or read is None:
             raise DataError(f"The mapping takes columns from {other['file']}, too; give the log as a file beside it.")
         out = merged(out, _renamed(read(folder / other["file"]), other["columns"], others=False))
+    if mapping.get("relative"):
+        out = relative_motions(out)
     out = wheels_from_body(out, mapping.get("wheelbase_m"))
     if "hold_commands_s" in mapping:
         out = held(out, float(mapping["hold_commands_s"]))

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from bns.diagnose.data.checks import Finding, check_columns, forward_in_time, to_numbers
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.robots.snake.table import COLUMNS, GAIT, MARKERS
 
-_LARGEST_RAD = 2 * np.pi + 1e-6
-_LONGEST_M = 5.0
-"""Markers further apart than this are in centimetres or millimetres."""
-_STRETCHED_M = 0.10
-"""A cycle ends in the posture in which it began: markers that drift apart by more have been mistaken, or the robot rolled."""
+_LARGEST_RAD = DEFAULTS.data.cycle_largest_rad
+_LONGEST_M = DEFAULTS.data.cycle_longest_m
+_STRETCHED_M = DEFAULTS.data.cycle_stretched_m
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +55,9 @@ def checked_cycles(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
             if row is not None:
                 found.append({"trial": trial, "cycle": number, **row})
     if not found:
-        raise DataError("There is no whole cycle in these measurements: each needs its markers at its begin and at its end.")
+        raise DataError(
+            "There is no whole cycle in these measurements: each needs its markers at its begin and at its end."
+        )
     return pd.DataFrame(found), findings
 
 
@@ -110,7 +111,11 @@ def _cycle(trial: str, number: int, rows: pd.DataFrame, findings: list[Finding])
     stretched = float(np.hypot(*(after[1] - after[0])) - np.hypot(*(before[1] - before[0])))
     if said.min() > 0 and abs(stretched) > _STRETCHED_M:
         findings.append(
-            Finding(trial, row, f"cycle {number}: the markers are {100 * stretched:+.0f} cm further apart at its end; mistaken?")
+            Finding(
+                trial,
+                row,
+                f"cycle {number}: the markers are {100 * stretched:+.0f} cm further apart at its end; mistaken?",
+            )
         )
     return {
         "begin_s": begin["t_s"],
@@ -143,4 +148,6 @@ def _units(table: pd.DataFrame) -> None:
     seen = table[list(MARKERS)].to_numpy(float)
     apart = float(np.nanmedian(np.hypot(seen[:, 2] - seen[:, 0], seen[:, 3] - seen[:, 1])))
     if apart > _LONGEST_M:
-        raise DataError(f"The markers are {apart:g} apart: their coordinates look like centimetres or millimetres, not metres.")
+        raise DataError(
+            f"The markers are {apart:g} apart: their coordinates look like centimetres or millimetres, not metres."
+        )

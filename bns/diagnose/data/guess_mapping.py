@@ -11,6 +11,7 @@ import pandas as pd
 import yaml
 
 from bns.diagnose.data.mapping import FORWARD, TURN, UNITS
+from bns.diagnose.settings import DEFAULTS
 
 _WORDS: dict[str, tuple[str, ...]] = {
     "trial": ("trial", "run", "episode", "experiment"),
@@ -25,10 +26,8 @@ _WORDS: dict[str, tuple[str, ...]] = {
 }
 """Column of the table -> words that its sources have in their names, the surer first."""
 _QUATERNION = (("qx", "qy", "qz", "qw"), tuple(f"orientation {axis}" for axis in "xyzw"))
-_STEPS = ((1e6, "ns"), (3e3, "us"), (3.0, "ms"))
-"""A typical step of time above so much was written in such a unit."""
-_LARGE_RAD = 90.0
-"""Radians that are not wrapped may be of any size, but rarely of this."""
+_STEPS = DEFAULTS.data.guess_units
+_LARGE_RAD = DEFAULTS.data.guess_degrees
 
 
 def drafted(table: pd.DataFrame) -> str:

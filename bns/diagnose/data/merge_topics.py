@@ -57,7 +57,9 @@ def wheels_from_body(table: pd.DataFrame, wheelbase_m: float | None) -> pd.DataF
         raise DataError(f"The mapping has {there[0]} but not {other}; both make the wheels' speeds.")
     twice = [name for name in COMMANDS if name in table.columns]
     if twice:
-        raise DataError(f"The mapping gives {' and '.join(twice)} and speeds of the body; leave out what was not commanded.")
+        raise DataError(
+            f"The mapping gives {' and '.join(twice)} and speeds of the body; leave out what was not commanded."
+        )
     if wheelbase_m is None:
         raise DataError(
             f"Speeds of the wheels follow from {FORWARD} and {TURN} with the distance of the wheels that the robot's own "

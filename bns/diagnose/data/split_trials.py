@@ -6,13 +6,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import BEFORE, COMMANDS, SESSION
 
-STILL_M_S = 1e-3
-"""Wheels told to be slower than this stand: encoders tremble."""
-KEPT_S = 1.0
-"""How much standing a trial keeps before and after its drive: late starts and slow stops are seen there."""
+STILL_M_S = DEFAULTS.data.still_m_s
+KEPT_S = DEFAULTS.data.kept_standing_s
 
 
 def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
@@ -26,11 +25,15 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
     if missing:
         raise DataError(f"A log can be cut into trials once it has {', '.join(missing)}; add entries for them.")
     if "trial" in table.columns:
-        raise DataError("The log has a column trial already; leave out trials from the mapping, or name the column otherwise.")
+        raise DataError(
+            "The log has a column trial already; leave out trials from the mapping, or name the column otherwise."
+        )
     t = table["t_s"].to_numpy(dtype=float)
     if not (np.diff(t) >= 0).all():
         row = int(np.flatnonzero(~(np.diff(t) >= 0))[0]) + 1
-        raise DataError(f"Row {row}: t_s runs backwards or is empty; a log that is cut into trials must be in the order of time.")
+        raise DataError(
+            f"Row {row}: t_s runs backwards or is empty; a log that is cut into trials must be in the order of time."
+        )
     trial = _CUTS[by](table, t, seconds)
     if trial.max() < 1:
         text = f"trials: {{{by}: {seconds:g}}} cuts this log of {t[-1] - t[0]:.0f} s into fewer than two trials. "

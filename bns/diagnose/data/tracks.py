@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bns.diagnose.data.checks import rows_by_trial
+from bns.diagnose.settings import DEFAULTS
 from bns.measurements import BEFORE, COMMANDS, POSE, SESSION
 
 Array = NDArray[np.float64]
 
-MOST_FRAMES = 16_000
-"""More frames than these are thinned out before a search: it takes time in proportion, and neighbours say the same."""
-RUN_UP_S = 5.0
-"""How long a robot that was in motion when its trial began is taken to have driven like that: any lag has settled."""
+MOST_FRAMES = DEFAULTS.data.most_frames
+RUN_UP_S = DEFAULTS.data.run_up_s
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ class Tracks:
     start_s: Array
     start_known: bool
     extra: Mapping[str, Array] = field(default_factory=dict)
+    jumped: NDArray[np.bool_] | None = None
+    """Frames (frames,) whose pose no drive leads to from the frame before (`tracker_faults`); None: there are none."""
 
     def __len__(self) -> int:
         return len(self.names)
@@ -55,16 +57,23 @@ class Tracks:
 
     @cached_property
     def is_first(self) -> NDArray[np.bool_]:
-        """Frames that begin a trial, (frames,)."""
+        """Frames that begin a trial, or go on elsewhere after a jump of the tracker; (frames,)."""
         found = np.zeros(len(self.t_s), dtype=bool)
         found[self.first[:-1]] = True
-        return found
+        return found if self.jumped is None else found | self.jumped
+
+    @cached_property
+    def relative(self) -> bool:
+        """Are these single relative motions: two poses a trial, the first exactly zero? (One, where the motion was a fault.)"""
+        frames = np.diff(self.first)
+        two = len(frames) and frames.max() == 2 and np.median(frames) == 2
+        return bool(two and not self.pose[self.first[:-1][frames > 0]].any())
 
     def only(self, chosen: NDArray[np.int64]) -> Tracks:
         """Some of the trials, in the order of ``chosen``."""
         selected = [np.arange(self.first[i], self.first[i + 1]) for i in chosen]
         return replace(
-            self._at(selected),
+            self.at_frames(selected),
             names=tuple(self.names[i] for i in chosen),
             left_m_s=self.left_m_s[chosen],
             right_m_s=self.right_m_s[chosen],
@@ -74,14 +83,14 @@ class Tracks:
 
     def thinned(self, every: int) -> Tracks:
         """Every so-manieth frame of each trial, its last one too; the commands stay as they are."""
-        return self._at(
+        return self.at_frames(
             [
                 np.unique(np.append(np.arange(a, b, every), b - 1)) if b > a else np.arange(a, b)
                 for a, b in pairwise(self.first)
             ]
         )
 
-    def _at(self, selected: Sequence[NDArray[np.int64]]) -> Tracks:
+    def at_frames(self, selected: Sequence[NDArray[np.int64]]) -> Tracks:
         """These frames, an array a trial."""
         frames = np.concatenate(selected)
         return replace(
@@ -90,7 +99,14 @@ class Tracks:
             t_s=self.t_s[frames],
             pose=self.pose[frames],
             extra={name: values[frames] for name, values in self.extra.items()},
+            jumped=None if self.jumped is None else self._jumped_since(selected),
         )
+
+    def _jumped_since(self, selected: Sequence[NDArray[np.int64]]) -> NDArray[np.bool_]:
+        """Is there a jump between a taken frame and the taken one before?"""
+        assert self.jumped is not None
+        count = np.cumsum(self.jumped)
+        return np.concatenate([np.diff(count[rows], prepend=count[rows[:1]]) > 0 for rows in selected])
 
 
 def slimmed(tracks: Tracks) -> Tracks:
@@ -101,44 +117,51 @@ def slimmed(tracks: Tracks) -> Tracks:
 
 def tracks_of(table: pd.DataFrame) -> Tracks:
     """The arrays of a table of measurements that has passed the checks; trials in the order in which they come."""
-    groups = [rows for _, rows in table.groupby("trial", sort=False)]
-    commands = [_commands(rows) for rows in groups]
-    seen = [rows[list(POSE)].notna().all(axis=1).to_numpy() for rows in groups]
+    trials = rows_by_trial(table)
+    rows = [at for _, at in trials]
+    t, pose = table["t_s"].to_numpy(dtype=float), table[list(POSE)].to_numpy(dtype=float)
+    tracked = np.isfinite(pose).all(axis=1)
+    seen = np.concatenate([at[tracked[at]] for at in rows])
     run_up = RUN_UP_S if set(BEFORE) <= set(table.columns) else 0.0
-    times = [(rows["t_s"] - rows["t_s"].iloc[0]).to_numpy(dtype=float) + run_up for rows in groups]
-    frames = [int(mask.sum()) for mask in seen]
-    start, known = _session(table, groups, times)
+    since = np.empty(len(t))
+    for at in rows:
+        since[at] = t[at] - t[at[0]] + run_up
+    commands = _commands(table, rows, t)
+    start, known = _session(table, rows, since)
     others = [name for name in table.columns if name not in {"trial", "t_s", *COMMANDS, *POSE, *BEFORE}]
     numeric = [name for name in others if pd.api.types.is_numeric_dtype(table[name])]
     return Tracks(
-        names=tuple(str(rows["trial"].iloc[0]) for rows in groups),
-        first=np.concatenate([[0], np.cumsum(frames)]).astype(np.int64),
-        t_s=np.concatenate([t[mask] for t, mask in zip(times, seen, strict=True)]),
-        pose=np.concatenate([g[list(POSE)].to_numpy(dtype=float)[m] for g, m in zip(groups, seen, strict=True)]),
+        names=tuple(name for name, _ in trials),
+        first=np.concatenate([[0], np.cumsum([int(tracked[at].sum()) for at in rows])]).astype(np.int64),
+        t_s=since[seen],
+        pose=pose[seen],
         left_m_s=_padded([c[0] for c in commands], "edge"),
         right_m_s=_padded([c[1] for c in commands], "edge"),
         duration_s=_padded([c[2] for c in commands], "constant"),
         start_s=start,
         start_known=known,
-        extra={
-            name: np.concatenate([g[name].to_numpy(dtype=float)[m] for g, m in zip(groups, seen, strict=True)])
-            for name in numeric
-        },
+        extra={name: table[name].to_numpy(dtype=float)[seen] for name in numeric},
     )
 
 
-def _commands(rows: pd.DataFrame) -> tuple[Array, Array, Array]:
-    """Runs of equal commands of one trial: left, right, duration."""
-    t = rows["t_s"].to_numpy(dtype=float)
-    given = np.nan_to_num(rows[list(COMMANDS)].to_numpy(dtype=float))
-    changes = np.flatnonzero(np.any(np.diff(given, axis=0) != 0, axis=1)) + 1
-    begins = np.concatenate([[0], changes])
-    ends = np.append(t[begins[1:]], t[-1])
-    left, right, lasted = given[begins, 0], given[begins, 1], ends - t[begins]
-    if not set(BEFORE) <= set(rows.columns):
-        return left, right, lasted
-    before = np.nan_to_num(rows[list(BEFORE)].to_numpy(dtype=float)[0])
-    return np.append(before[0], left), np.append(before[1], right), np.append(RUN_UP_S, lasted)
+def _commands(table: pd.DataFrame, rows: list[NDArray[np.int64]], t_s: Array) -> list[tuple[Array, Array, Array]]:
+    """Runs of equal commands of each trial: left, right, duration."""
+    told = np.nan_to_num(table[list(COMMANDS)].to_numpy(dtype=float))
+    before = None
+    if set(BEFORE) <= set(table.columns):
+        before = np.nan_to_num(table[list(BEFORE)].to_numpy(dtype=float))
+    found = []
+    for at in rows:
+        t, given = t_s[at], told[at]
+        changes = np.flatnonzero(np.any(np.diff(given, axis=0) != 0, axis=1)) + 1
+        begins = np.concatenate([[0], changes])
+        ends = np.append(t[begins[1:]], t[-1])
+        left, right, lasted = given[begins, 0], given[begins, 1], ends - t[begins]
+        if before is not None:
+            first = before[at[0]]
+            left, right, lasted = np.append(first[0], left), np.append(first[1], right), np.append(RUN_UP_S, lasted)
+        found.append((left, right, lasted))
+    return found
 
 
 def _padded(rows: list[Array], mode: Literal["edge", "constant"]) -> Array:
@@ -147,10 +170,11 @@ def _padded(rows: list[Array], mode: Literal["edge", "constant"]) -> Array:
     return np.stack([np.pad(row, (0, width - len(row)), mode=mode) for row in rows])
 
 
-def _session(table: pd.DataFrame, groups: list[pd.DataFrame], times: list[Array]) -> tuple[Array, bool]:
+def _session(table: pd.DataFrame, rows: list[NDArray[np.int64]], since: Array) -> tuple[Array, bool]:
     """When each trial began in its session: as logged, else one trial right after the other."""
     if SESSION in table.columns and table[SESSION].notna().any():
-        first = [float((rows[SESSION] - (rows["t_s"] - rows["t_s"].iloc[0])).median()) for rows in groups]
-        return np.nan_to_num(np.array(first)), True
-    lasted = np.array([t[-1] for t in times])
+        t, session = table["t_s"].to_numpy(dtype=float), table[SESSION].to_numpy(dtype=float)
+        first = [session[at] - (t[at] - t[at[0]]) for at in rows]
+        return np.array([float(np.median(known)) if len(known := one[np.isfinite(one)]) else 0.0 for one in first]), True
+    lasted = np.array([since[at[-1]] for at in rows])
     return np.concatenate([[0.0], np.cumsum(lasted)[:-1]]), False

@@ -12,12 +12,13 @@ from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.residuals.symbolic import NAME as FORMULA
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.stepwise import SelectionResult
+from bns.diagnose.select.result import SelectionResult
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
-MOST, MOST_TIED = 3, 5
-"""Explanations held against each other at most, after a clear verdict and after a tie: pairs grow with the square."""
+MOST = DEFAULTS.design.most_models
+MOST_TIED = DEFAULTS.design.most_tied_models
 
 
 @dataclass(frozen=True)

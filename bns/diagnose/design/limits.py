@@ -8,15 +8,16 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.design.sequences import MARGIN_M, Arena, Bounds
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.model import Model
 from bns.robots import load_robot, robot_names
 from bns.robots.base import TwoWheeled
 
-_TOGETHER_M = 0.15
-_TRIAL_S = (6.0, 25.0)
-_HEADING_RAD = np.pi / 2
-_LARGEST_M = 1000.0
+_TOGETHER_M = DEFAULTS.design.together_m
+_TRIAL_S = DEFAULTS.design.trial_s
+_HEADING_RAD = DEFAULTS.design.heading_rad
+_LARGEST_M = DEFAULTS.design.largest_m
 
 
 def arena_of(
@@ -62,7 +63,9 @@ def bounds_of(tracks: Tracks, model: Model, speeds: tuple[float, float] | None =
     name = str(model.provenance.get("begun_from", model.name)).removesuffix("-world")
     robot = load_robot(name) if name in robot_names() else None
     if robot is not None and robot.two_wheeled:
-        left, _, lasts = cast(TwoWheeled, robot).wheel_speeds_m_s(np.stack([robot.bounds.low, robot.bounds.high]).astype(float))
+        left, _, lasts = cast(TwoWheeled, robot).wheel_speeds_m_s(
+            np.stack([robot.bounds.low, robot.bounds.high]).astype(float)
+        )
         low, high = min(low, float(left[0])), max(high, float(left[1]))
         short, long = min(short, float(lasts[0])), max(long, float(lasts[1]))
     if speeds is not None:

@@ -10,10 +10,10 @@ from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.design.sequences import Sequences
 from bns.diagnose.predict.horizons import laid_paths
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
-_PLACE_ROUNDS = 3
-"""What the floor does depends on where the robot is, which depends on what the floor does: each round adds a power of it."""
+_PLACE_ROUNDS = DEFAULTS.design.place_rounds
 
 
 def planned_tracks(

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.select.indistinguishable import TIE_SHARE, TIE_Z, matters
+from bns.diagnose.settings import DEFAULTS
 
-DRAWS = 2000
+DRAWS = DEFAULTS.design.power_draws
 
 
 @dataclass(frozen=True)

@@ -28,16 +28,14 @@ from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.select.stepwise import FALSE_ALARM
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.effects import all_effects
 
-LONGEST_MINUTES = 24 * 60.0
-"""Robot time beyond which a pair counts as the same for every experiment with these sensors."""
-TARGET_POWER = 0.9
-MOST_FASTER = 100.0
-"""More times as long than this is not worth counting."""
-_DENSE = 3.0
-"""Poses a command from which on they count as a track at the camera's rate."""
+LONGEST_MINUTES = DEFAULTS.design.longest_minutes
+TARGET_POWER = DEFAULTS.design.target_power
+MOST_FASTER = DEFAULTS.design.most_faster
+_DENSE = DEFAULTS.design.dense
 
 
 @dataclass(frozen=True)

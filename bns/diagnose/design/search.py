@@ -21,16 +21,15 @@ from bns.diagnose.design.sequences import (
     short_durations,
     uniform,
 )
+from bns.diagnose.settings import DEFAULTS
 
-POOL = 200
-GENERATIONS = 4
-MOST_TIMES = 3
-"""A trial is driven this often at most: a world that is like neither model shows in many different trials, not in one."""
-PLACING_S = 10.0
-"""What placing the robot for a trial is reckoned at when trials of different lengths are weighed."""
-SCALE, ENOUGH, URGENT = 8.0, 20.0, 4.0
-"""Discrimination from which on more of it counts less and less; what nearly decides, and how much reaching it counts: a
-pair that is decided must not take the time of one that is not."""
+POOL = DEFAULTS.design.pool
+GENERATIONS = DEFAULTS.design.generations
+MOST_TIMES = DEFAULTS.design.most_times
+PLACING_S = DEFAULTS.design.placing_s
+SCALE = DEFAULTS.design.scale
+ENOUGH = DEFAULTS.design.enough
+URGENT = DEFAULTS.design.urgent
 
 
 @dataclass(frozen=True)

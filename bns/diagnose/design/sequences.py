@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.settings import DEFAULTS
 
-MARGIN_M = 0.05
-"""Sequences keep this far from the arena's edge: competing models disagree, and motors vary."""
-BRIEFEST = 1 / 3
-"""Trials that are searched for may be as short as this share of ``trial_s``: where each tells enough, their number counts."""
-_TRIES = 12
-_ALONG = 4
-"""Places on a command's arc that are looked at, its end among them."""
+MARGIN_M = DEFAULTS.design.margin_m
+BRIEFEST = DEFAULTS.design.briefest
+_TRIES = DEFAULTS.design.tries
+_ALONG = DEFAULTS.design.along
 
 
 @dataclass(frozen=True)

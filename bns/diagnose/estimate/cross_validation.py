@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Problem
 from bns.diagnose.estimate.noise import Filter
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.trial_clock_test import steps_of
 from bns.diagnose.predict.base import Predictor, Steps
-from bns.diagnose.predict.horizons import HORIZONS, Errors, errors_of
+from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
-FOLDS = 5
+FOLDS = DEFAULTS.estimate.folds
+AS_GIVEN = "as given"
+"""The name of the model that was handed in, in tables of errors."""
 
 
 def held_out_steps(predictor: Predictor, pose_filter: Filter, model: Model) -> Steps:
@@ -40,21 +43,28 @@ def held_out_steps(predictor: Predictor, pose_filter: Filter, model: Model) -> S
     return Steps(body, drift)
 
 
-def counted(position_m: Array) -> NDArray[np.bool_]:
-    """Windows that count: those beyond six times the median are marker faults, not the model's; (windows,)."""
-    kept: NDArray[np.bool_] = position_m <= 6 * max(float(np.median(position_m)), 1e-12)
-    return kept
+@dataclass(frozen=True)
+class Judged:
+    """A model whose numbers were fitted, by a name, and the filter of the problem that they were fitted to.
+
+    ``steps``: what `held_out_steps` gives of it, where that was worked out already.
+    """
+
+    name: str
+    model: Model
+    pose_filter: Filter
+    steps: Steps | None = None
+
+    def held_out(self, predictor: Predictor) -> Steps:
+        """What is predicted of every trial by a fit to others."""
+        return held_out_steps(predictor, self.pose_filter, self.model) if self.steps is None else self.steps
 
 
-def position_error(errors: Errors) -> float:
-    """Root mean square distance of the windows that count."""
-    position: Array = errors.position_m
-    if not len(position):
-        return float("nan")
-    kept = position[counted(position)]
-    return float(np.sqrt((kept * kept).mean()))
+def judged_errors(predictor: Predictor, pose_filter: Filter, given: Model, extended: Sequence[Judged]) -> PairedErrors:
+    """Errors of a model as given, and of models whose numbers were fitted, each on trials held out; all on the same windows.
 
-
-def errors_at_horizons(predictor: Predictor, steps: Steps) -> Mapping[str, float]:
-    """`position_error` at every horizon."""
-    return {h: position_error(errors_of(predictor, steps, h)) for h in HORIZONS}
+    The first one is `AS_GIVEN`: what `bns compare` shows of the same model and data.
+    """
+    steps = [(AS_GIVEN, steps_of(predictor, pose_filter, given))]
+    steps += [(one.name, one.held_out(predictor)) for one in extended]
+    return paired_errors(predictor, steps)

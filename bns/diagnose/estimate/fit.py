@@ -26,13 +26,12 @@ from bns.diagnose.estimate.parameters import FreeParameter, active_mask, increme
 from bns.diagnose.estimate.significance import PairedComparison, paired_elpd_diff, sign_flip_p
 from bns.diagnose.estimate.trial_clocks import ReducedJacobian, eliminate_clocks, with_initial_clocks
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
-_ROUNDS = 25
-_SETTLED = 1e-2
-"""A step that lowers the loss by less than this ends the search: numbers are then within a tenth of their standard error."""
-_TRUSTED = 0.75
-"""The Jacobian serves for another step if the last one earned this share of the predicted decrease."""
+_ROUNDS = DEFAULTS.estimate.fit_rounds
+_SETTLED = DEFAULTS.estimate.fit_settled
+_TRUSTED = DEFAULTS.estimate.fit_trusted
 
 
 @dataclass(frozen=True)

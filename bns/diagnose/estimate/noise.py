@@ -9,15 +9,15 @@ from scipy.optimize import minimize
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import filter_gains, innovations
 
-HUBER = 3.5
-"""Whitened residuals (three numbers a frame) beyond this length count linearly: outliers are normal."""
+HUBER = DEFAULTS.estimate.huber
 
-_ENOUGH = 24
-_GUESS = np.array([2e-3, 8e-3, 4e-3, 2e-3, 2e-2])
-_LOW = np.array([2e-5, 1e-4, 1e-5, 1e-5, 1e-4])
-_HIGH = np.array([0.3, 0.5, 0.5, 0.5, 3.0])
+_ENOUGH = DEFAULTS.estimate.noise_trials
+_GUESS = np.array(DEFAULTS.estimate.noise_guess)
+_LOW = np.array(DEFAULTS.estimate.noise_low)
+_HIGH = np.array(DEFAULTS.estimate.noise_high)
 
 
 def huber(whitened: Array) -> Array:

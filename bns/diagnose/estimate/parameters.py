@@ -37,7 +37,8 @@ def moved_by(model: Model, free: Sequence[FreeParameter], step: Array) -> Model:
 def increment(number: FreeParameter, value: float) -> float:
     """A step for differences, turned round at the upper bound."""
     p = number.parameter
-    scale = 1e-3 * abs(value) if np.isinf(p.neutral) else 1e-3 * (p.plausible[1] - p.plausible[0])
+    usual = 1e-3 * (abs(value) if np.isinf(p.neutral) else p.plausible[1] - p.plausible[0])
+    scale = p.resolution or usual
     return -scale if value + scale > p.high else scale
 
 

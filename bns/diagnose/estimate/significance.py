@@ -9,11 +9,11 @@ from itertools import count
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.settings import DEFAULTS
 
-FLIPS = 20_000
-_SEED = 20_250_101
-MIN_Z = 2.5
-"""Least gain that counts, in its standard errors: it must be earned in many trials, not in a few."""
+FLIPS = DEFAULTS.estimate.flips
+_SEED = DEFAULTS.estimate.flips_seed
+MIN_Z = DEFAULTS.estimate.min_z
 
 
 @dataclass(frozen=True)

@@ -2,30 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
+from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.fit import Fit, Problem, StartingPoint
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
 
-_SHARES = (0.01, 0.05, 0.2)
-"""Starts of an ordinary number: these shares of the way from neutral to either end of what is plausible."""
-NOTHING = 5e-3
-"""A gain of fewer trials' losses than this, over all trials, is not worth a fit: it would not count (`stepwise.MIN_GAIN`)."""
-_LIMITS = 30
-"""Starts of a number that is neutral at infinity: so many, evenly spaced on a logarithmic scale."""
+_SHARES = DEFAULTS.estimate.start_shares
+NOTHING = DEFAULTS.estimate.start_nothing
+_LIMITS = DEFAULTS.estimate.start_limits
 
 
-def listed(model: Model, extra: Mapping[str, Effect] | None = None) -> dict[str, Effect]:
-    """Name -> effect that the model does not have yet, from the catalogue and from ``extra``."""
-    present = {active.effect.name for active in model.effects}
-    everything = {**all_effects(), **(extra or {})}
-    return {name: effect for name, effect in everything.items() if name not in present}
+def listed(
+    model: Model,
+    extra: Mapping[str, Effect] | None = None,
+    tracks: Tracks | None = None,
+    without: Collection[str] = (),
+) -> dict[str, Effect]:
+    """Name -> effect that the model does not have yet, from the catalogue and from ``extra``; ranges fit the robot's size.
+
+    Of the catalogue only what ``tracks`` can speak of, and nothing that is named in ``without``.
+    """
+    barred = {active.effect.name for active in model.effects} | set(without)
+    unfit = ("track" if tracks.relative else "motions") if tracks is not None else None
+    catalogue = {name: fitting(e, model, tracks) for name, e in all_effects().items() if e.needs != unfit}
+    return {name: effect for name, effect in {**catalogue, **(extra or {})}.items() if name not in barred}
+
+
+def fitting(effect: Effect, model: Model, tracks: Tracks | None) -> Effect:
+    """The effect with ranges and starts for the model's size and the floor on which the robot was seen."""
+    scaled = effect.scaled(model.wheelbase_m)
+    if tracks is None or not len(tracks.pose):
+        return scaled
+    low, high = np.quantile(tracks.pose[:, :2], [0.02, 0.98], axis=0)
+    return scaled.within(float(np.hypot(*(high - low))))
 
 
 def fit_with(problem: Problem, base: Fit, effect: Effect) -> Fit:
@@ -40,14 +59,19 @@ def fit_with(problem: Problem, base: Fit, effect: Effect) -> Fit:
 
 def best_start(problem: Problem, base: Fit, effect: Effect) -> StartingPoint:
     """The fitted model with the effect at the most promising of its starts, one step of least squares taken."""
-    starts = [base.model.with_active(effect, values) for values in _starts(effect)]
+    lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
+    found = (tuple(np.clip(values, lows, highs).tolist()) for values in _starts(effect, problem.predictor, base.model))
+    starts = [base.model.with_active(effect, values) for values in found]
     losses = [problem.loss(start) for start in starts]
     best = int(np.argmin(losses))
     stepped = problem.gauss_newton_step(starts[best], base)
     return stepped if stepped.loss < losses[best] else replace(stepped, model=starts[best], loss=losses[best])
 
 
-def _starts(effect: Effect) -> Iterator[tuple[float, ...]]:
+def _starts(effect: Effect, predictor: Predictor, model: Model) -> Iterator[tuple[float, ...]]:
+    if effect.starts_from is not None and isinstance(predictor, WheelPredictor):
+        yield from predictor.starts_of(effect, model.wheelbase_m)
+        return
     if effect.starts:
         yield from effect.starts
         return

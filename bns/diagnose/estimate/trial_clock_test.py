@@ -17,16 +17,14 @@ from bns.diagnose.estimate.significance import PairedComparison, paired_elpd_dif
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.estimate.trial_clocks import with_fitted_clocks
 from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effects import all_effects
 from bns.physics.model import Model
 
-BLOCKS = 8
-"""Of a trial. An earlier and a later half would differ where the clock drifts too."""
-FEWEST_FRAMES = 3 * BLOCKS
-"""Trials with fewer (the median trial) say too little of their own clocks."""
-_FAR = 0.05
-LEAST_SCATTER_S = 0.02
-"""Clocks that differ by less (standard deviation) are left alike: motors that start a little late look the same."""
+BLOCKS = DEFAULTS.estimate.clock_blocks
+FEWEST_FRAMES = DEFAULTS.estimate.clock_fewest_frames
+_FAR = DEFAULTS.estimate.clock_far
+LEAST_SCATTER_S = DEFAULTS.estimate.clock_least_scatter_s
 
 
 @dataclass(frozen=True)

@@ -13,16 +13,15 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.noise import huber, weights
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
-REACH_S = 0.6
-"""Clocks are first sought this far on either side of where they are."""
-_SCAN = 25
-_SMALL_S = 1e-3
-_STIFFNESS = 4.0
-"""Curvature that every clock has by itself (1/s², one over half a second squared): a trial that says nothing keeps its own."""
-_ROUNDS = 8
-_SETTLED_S = 2e-4
+REACH_S = DEFAULTS.estimate.trial_clock_reach_s
+_SCAN = DEFAULTS.estimate.trial_clock_scan
+_SMALL_S = DEFAULTS.estimate.trial_clock_small_s
+_STIFFNESS = DEFAULTS.estimate.trial_clock_stiffness
+_ROUNDS = DEFAULTS.estimate.trial_clock_rounds
+_SETTLED_S = DEFAULTS.estimate.trial_clock_settled_s
 
 
 class Follower(Protocol):

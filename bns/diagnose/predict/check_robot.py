@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import windows
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.model import Model
 from bns.robots import robot_names
 
-_FACTOR = 1.8
-_EXPLAINED = 0.25
-"""Another robot it is if turns that are scaled leave less than this share of the deviation."""
-_FEWEST = 5
-_CLEAR_M, _ARC_RAD = 0.02, 1.2
-_TOGETHER, _TURNED_RAD = 0.8, 1.05
-"""Directions agree if their mean is longer than this; a camera that is askew by less is an effect (`camera-rotation`)."""
+_FACTOR = DEFAULTS.predict.robot_factor
+_EXPLAINED = DEFAULTS.predict.robot_explained
+_FEWEST = DEFAULTS.predict.robot_fewest
+_CLEAR_M = DEFAULTS.predict.robot_clear_m
+_ARC_RAD = DEFAULTS.predict.robot_arc_rad
+_TOGETHER = DEFAULTS.predict.robot_together
+_TURNED_RAD = DEFAULTS.predict.robot_turned_rad
 
 
 def check_named_robot(robot: str, model: Model) -> None:
@@ -100,6 +104,22 @@ def _check_directions(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.
             "Positions are mirrored against headings: x_m must run east, y_m north, heading_rad counter-clockwise from x. "
             "`scale: -1` in the entry y_m (or x_m) of the mapping of `bns import` turns one of them round."
         )
+
+
+def suggested_wheelbase_m(tracks: Tracks) -> float | None:
+    """The wheelbase (m) with which a plain drive turns as these tracks do, over windows of a second.
+
+    None where they tell nothing. Turns of more than half a round between two poses would mislead it.
+    """
+    start, end = windows(tracks, "1s")
+    told = np.cumsum(WheelPredictor(tracks).steps(Model(wheelbase_m=1.0)).body[:, 2])
+    heading = np.concatenate([np.unwrap(tracks.pose[a:b, 2]) for a, b in pairwise(tracks.first)])
+    commanded, seen = told[end] - told[start], heading[end] - heading[start]
+    clear = np.abs(commanded) > _CLEAR_M
+    if clear.sum() < _FEWEST:
+        return None
+    ratio = _scale(seen[clear], commanded[clear])
+    return float(1 / ratio) if ratio > 0 else None
 
 
 def _scale(seen: Array, predicted: Array) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.cycles import CycleTracks
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Steps
+from bns.diagnose.settings import DEFAULTS
 from bns.engine.snn import predict
 from bns.physics.model import Model
 from bns.physics.signals import Body
@@ -20,10 +21,9 @@ from bns.robots.snake.robot import Snake
 from bns.robots.snake.table import GAIT
 from bns.static_simulator.train_in_stages import accuracy
 
-SEVERAL = 3
-"""Cycles of the middle horizon."""
-_FEW = 3
-_LEAST_NOISE_M = 1e-4
+SEVERAL = DEFAULTS.predict.middle_cycles
+_FEW = DEFAULTS.predict.fewest_cycles
+_LEAST_NOISE_M = DEFAULTS.predict.marker_least_m
 
 
 class CyclePredictor:
@@ -96,7 +96,9 @@ class CyclePredictor:
     def at_frames(self, frames: NDArray[np.int64]) -> dict[str, Array]:
         """`variables` of the cycle or change that begins at some frames."""
         last = self._step_s.shape[1] - 1
-        return {n: v[self.tracks.trial[frames], np.minimum(self._at[frames], last)] for n, v in self.variables().items()}
+        return {
+            n: v[self.tracks.trial[frames], np.minimum(self._at[frames], last)] for n, v in self.variables().items()
+        }
 
     def scores(self) -> Mapping[str, Mapping[str, float]]:
         """R², regression, RMSE and bias (SI) of each network of displacements; of stability the shares it calls right."""

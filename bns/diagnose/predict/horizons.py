@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.settings import DEFAULTS
 
 HORIZONS = ("command", "1s", "5s", "trial")
-_SECONDS = {"1s": 1.0, "5s": 5.0}
+_SECONDS = dict(DEFAULTS.predict.horizons_s)
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,11 @@ class Errors:
     forward_m: Array
     left_m: Array
     heading_rad: Array
+
+    def only(self, kept: NDArray[np.bool_]) -> Errors:
+        """Some of the windows."""
+        frames = self.trial[kept], self.start[kept], self.end[kept]
+        return Errors(*frames, self.forward_m[kept], self.left_m[kept], self.heading_rad[kept])
 
     @property
     def position_m(self) -> Array:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements
 from bns.engine.snn import predict
 from bns.errors import DataError
@@ -20,8 +21,7 @@ from bns.physics.model import Model
 from bns.robots.base import Robot
 from bns.robots.simulator import StaticSimulator
 
-_NEAR_S = 0.06
-"""A pose tracked this near the end of a command stands for it."""
+_NEAR_S = DEFAULTS.predict.network_near_s
 
 
 class NetworkPredictor(WheelPredictor):
@@ -55,7 +55,9 @@ class NetworkPredictor(WheelPredictor):
         lasting = tracks.duration_s[trial] > 0
         speeds = np.column_stack([tracks.left_m_s[trial], tracks.right_m_s[trial]])[lasting]
         unit = self._robot.wheel_speeds_m_s(np.ones((1, 3)))  # type: ignore[attr-defined]  # of a differential drive
-        return np.column_stack([speeds[:, 0] / unit[0], speeds[:, 1] / unit[1], tracks.duration_s[trial][lasting] / unit[2]])
+        return np.column_stack(
+            [speeds[:, 0] / unit[0], speeds[:, 1] / unit[1], tracks.duration_s[trial][lasting] / unit[2]]
+        )
 
     def measured(self) -> Array:
         """As the networks' own steps: forward, left and turn since the frame before as tracked, (frames, 3)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -13,21 +13,21 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array, Tracks, slimmed
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import HORIZONS, windows
+from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
 from bns.physics.differential_drive import taken_at
 from bns.physics.effect import Effect
 from bns.physics.grid import Grid
 from bns.physics.model import ActiveEffect, Model
 from bns.physics.motion import flow_of, wheel_motion, with_body_effects
-from bns.physics.signals import Body, Conditions, View
+from bns.physics.signals import Body, Conditions, View, Wheels
 
-RECENT_S = 0.15
-"""How fast an event fades in the variables that say what has just happened: soon it does nothing any more."""
-_COARSE_S = 0.1
-_TAIL_S = 1.0
-"""What the last row says, a command or none, is in force this long: poses may be stamped early."""
+RECENT_S = DEFAULTS.predict.recent_s
+_COARSE_S = DEFAULTS.predict.coarse_s
+_TAIL_S = DEFAULTS.predict.tail_s
 _KEPT = 500_000
 """Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
+_UNDONE = DEFAULTS.predict.picture_rounds
 _MOVING = ("wheel", "body")
 
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
@@ -44,12 +44,15 @@ class WheelPredictor:
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
         self.tracks, self._dt_s = tracks, dt_s
         self.grid = _grid_of(tracks, dt_s)
-        self.conditions = _conditions(tracks, self.grid.node_s)
         self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
+        seen = np.where(_between_frames(tracks, self.grid)[..., None], self._place, np.nan)
+        self.conditions = replace(_conditions(tracks, self.grid.node_s), seen=seen)
         zero = np.zeros_like(self.grid.step_s)
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
         way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[0][:, 0]
         self.way_m = self._since_previous(way)
+        self._of_horizon = lru_cache(partial(windows, tracks))
+        self._starts: dict[tuple[str, float], tuple[tuple[float, ...], ...]] = {}
         # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
         kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
         self._wheels = lru_cache(kept)(self._turned)
@@ -61,10 +64,32 @@ class WheelPredictor:
     def steps(self, model: Model) -> Steps:
         """Displacement of the tracked point since the frame before, in the frame of the robot there."""
         poses, sums = self._at(model.wheelbase_m, _chain(model, (*_MOVING, "clock")))
-        view = View(poses)
+        view, placed = View(poses), [active for active in model.at("measure") if active.effect.needs_place]
         for active in model.at("measure"):
-            view = active.effect.apply(view, **active.by_name)
-        return Steps(displacements(view.poses, self.tracks.is_first), self._drift(model, poses, sums))
+            if not active.effect.needs_place:
+                view = active.effect.apply(view, **active.by_name)
+        body = displacements(view.poses, self.tracks.is_first)
+        return Steps(self._pictured(body, placed) if placed else body, self._drift(model, poses, sums))
+
+    def _pictured(self, body: Array, placed: Sequence[ActiveEffect]) -> Array:
+        """Displacements (frames, 3) as they look where the robot was seen: the picture is undone there, and made again."""
+
+        def picture(poses: Array) -> Array:
+            view = View(poses)
+            for active in placed:
+                view = active.effect.apply(view, **active.by_name)
+            return view.poses
+
+        before = np.roll(self.tracks.pose, 1, axis=0)
+        really = before
+        for _ in range(_UNDONE):
+            really = really - (picture(really) - before)
+        cos, sin = np.cos(really[:, 2]), np.sin(really[:, 2])
+        moved = [cos * body[:, 0] - sin * body[:, 1], sin * body[:, 0] + cos * body[:, 1], body[:, 2]]
+        from_, to = picture(really), picture(really + np.stack(moved, axis=1))
+        way, cos, sin = to - from_, np.cos(from_[:, 2]), np.sin(from_[:, 2])
+        ahead, left = cos * way[:, 0] + sin * way[:, 1], cos * way[:, 1] - sin * way[:, 0]
+        return np.where(self.tracks.is_first[:, None], 0.0, np.stack([ahead, left, way[:, 2]], axis=1))
 
     def _turned(self, wheelbase_m: float, chain: Chain) -> Body:
         return replace(wheel_motion(_model_of(wheelbase_m, chain), self.grid, self.conditions), place=self._place)
@@ -89,9 +114,18 @@ class WheelPredictor:
         poses.flags.writeable = sums.flags.writeable = False
         return poses, sums
 
+    def starts_of(self, effect: Effect, wheelbase_m: float) -> tuple[tuple[float, ...], ...]:
+        """What the effect's ``starts_from`` makes of these commands and poses, worked out once; its neutral values if nothing."""
+        known = (effect.name, wheelbase_m)
+        if known not in self._starts and effect.starts_from is not None:
+            grid = self.grid
+            given = Wheels(grid.step_s, grid.left_m_s, grid.right_m_s, wheelbase_m, self.conditions)
+            self._starts[known] = effect.starts_from(given) or (tuple(effect.neutral.values()),)
+        return self._starts[known]
+
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Back to back within each trial."""
-        return windows(self.tracks, horizon)
+        return self._of_horizon(horizon)
 
     def scores(self) -> Mapping[str, Mapping[str, float]]:
         """A model of wheels has but a path."""
@@ -105,6 +139,15 @@ class WheelPredictor:
         began = np.maximum.accumulate(np.where(changed, grid.node_s[:, :-1], 0.0), axis=1)
         speed, turn = (grid.left_m_s + grid.right_m_s) / 2, grid.right_m_s - grid.left_m_s
         way = np.cumsum((np.abs(grid.left_m_s) + np.abs(grid.right_m_s)) / 2 * grid.step_s, axis=1)
+        if tracks.relative:  # measured motions, each by itself: nothing began, and they have no place
+            return {
+                "left_m_s": grid.left_m_s,
+                "right_m_s": grid.right_m_s,
+                "speed_m_s": speed,
+                "wheel_difference_m_s": turn,
+                "session_s": tracks.start_s[:, None] + middle,
+                **{name: self._seen_on_grid(name) for name in self._seen() if name not in {"x_m", "y_m", "heading_rad"}},
+            }
         return {
             "left_m_s": grid.left_m_s,
             "right_m_s": grid.right_m_s,
@@ -131,7 +174,8 @@ class WheelPredictor:
             [
                 np.searchsorted(self.grid.node_s[r], t + 1e-9, side="right") - 1
                 for r, t in zip(rows, self.tracks.t_s[frames], strict=True)
-            ]
+            ],
+            dtype=np.int64,
         ).clip(0, self.grid.step_s.shape[1] - 1)
         return {name: values[rows, steps] for name, values in self.variables().items()}
 
@@ -255,6 +299,15 @@ def _conditions(tracks: Tracks, node_s: Array) -> Conditions:
         drop = np.stack([_held(tracks, volts, row, middle[row]) for row in range(len(tracks))]) - reference
         drop = -drop
     return Conditions(session_s=tracks.start_s[:, None] + middle, battery_drop_v=drop)
+
+
+def _between_frames(tracks: Tracks, grid: Grid) -> NDArray[np.bool_]:
+    """Steps that lie between the first and the last frame of their trial, (trials, steps)."""
+    lasting = np.diff(tracks.first) > 0
+    first, last = np.full(len(tracks), np.inf), np.full(len(tracks), -np.inf)
+    first[lasting], last[lasting] = tracks.t_s[tracks.first[:-1][lasting]], tracks.t_s[tracks.first[1:][lasting] - 1]
+    node = grid.node_s
+    return np.asarray((node[:, :-1] >= first[:, None] - 1e-9) & (node[:, 1:] <= last[:, None] + 1e-9))
 
 
 def _held(tracks: Tracks, values: Array, trial: int, t_s: Array) -> Array:

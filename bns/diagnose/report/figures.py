@@ -112,7 +112,7 @@ def ranking_axes(axes: Axes, d: Diagnosis, most: int = 12) -> None:
 
 @style()
 def error_by_step_figure(m: ExtendedModel, path: Path) -> Path:
-    """The error by step: nominal model, each effect added in turn, noise floor; one line a horizon."""
+    """Errors on the same held-out windows, as given and with each effect added in turn; one line a horizon, noise dotted."""
     figure = Figure(figsize=(PAGE_IN * 0.75, 3.0))
     error_by_step_axes(figure.subplots(), m)
     return save(figure, path)[0]
@@ -120,15 +120,26 @@ def error_by_step_figure(m: ExtendedModel, path: Path) -> Path:
 
 def error_by_step_axes(axes: Axes, m: ExtendedModel) -> None:
     """The same on axes that are there."""
-    names = [r.name if r.name == "nominal" else f"+ {r.name}" for r in m.error_by_step]
-    for colour, marker, horizon in zip(OKABE_ITO, "os^D", m.error_by_step[0].error, strict=False):
-        values = [1e3 * r.error[horizon] for r in m.error_by_step]
-        axes.plot(range(len(values)), values, marker=marker, color=colour, label=f"{ahead(horizon)}")
-        axes.plot([0, len(values) - 1], [1e3 * m.floor[horizon]] * 2, color=colour, linestyle=":", linewidth=1)
+    names = [name if index == 0 else f"+ {name}" for index, name in enumerate(m.names)]
+    horizons = [e for e in m.errors.horizons.values() if e.windows]
+    for colour, marker, e in zip(OKABE_ITO, "os^D", horizons, strict=False):
+        values = [1e3 * one.rms_m for one in e.models]
+        ends = np.array([[1e3 * (one.rms_m - one.low_m), 1e3 * (one.high_m - one.rms_m)] for one in e.models]).T
+        axes.errorbar(
+            range(len(values)),
+            values,
+            yerr=np.nan_to_num(ends).clip(min=0),
+            marker=marker,
+            color=colour,
+            label=ahead(e.horizon),
+            capsize=2,
+        )
+        if np.isfinite(e.noise_floor_m):
+            axes.plot([0, len(values) - 1], [1e3 * e.noise_floor_m] * 2, color=colour, linestyle=":", linewidth=1)
     axes.set_xticks(range(len(names)), names)
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("{x:g}")
-    axes.set_ylabel("position error on trials held out (mm)")
-    axes.legend(title="horizon (dotted: noise floor)", loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    axes.set_title("Error ladder")
+    axes.set_ylabel("position error on held-out trials (mm, RMS)")
+    axes.legend(title="horizon (dotted: tracking noise)", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes.set_title("Error, effect by effect (bars: 95 %)")

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.report.figures import LABELS
 from bns.diagnose.residuals.network_errors import FEWEST, FEWEST_TRIALS, MEMORY_S, NetworkErrors
+from bns.diagnose.settings import DEFAULTS
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, note, save, style
 
 _CAUSES = {
@@ -26,7 +27,7 @@ _VARIABLES = {
     "wheel_difference_kept_m_s": f"right − left kept from before the last command (m/s; memory of {MEMORY_S:g} s)",
     "heading_rad": "heading halfway through the command (rad)",
 }
-_BINS = 8
+_BINS = DEFAULTS.report.network_bins
 
 
 def network_errors_text(why: NetworkErrors) -> str:

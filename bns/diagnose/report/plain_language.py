@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from bns.diagnose.design.competing_models import without_last
-from bns.diagnose.diagnosis import Diagnosis, numbers_of
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.select.known_effects import known_effects
+from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.values import numbers_of
 
 _UNITS = {"s": (1e3, "ms"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "rad": (57.29578, "°"), "rad/s": (57.29578, "°/s")}
 """SI unit -> factor and unit for people."""
-_LARGE = 1.0
-_CAUSES = 3
+_LARGE = DEFAULTS.report.large
+_CAUSES = DEFAULTS.report.causes
 
 
 def figures_in_words(value: float, low: float | None, high: float | None, unit: str) -> tuple[str, str]:

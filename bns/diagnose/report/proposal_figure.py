@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
 from bns.diagnose.design.proposal import Proposal
+from bns.diagnose.settings import DEFAULTS
 from bns.plotting.style import GREY, OKABE_ITO, lettered, panels, save, style
 
-_FRAME_S = 0.1
-_SHOWN = 3
+_FRAME_S = DEFAULTS.report.frame_s
+_SHOWN = DEFAULTS.report.planned_trials
 
 
 @style()

@@ -13,11 +13,12 @@ from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import laid_paths
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
-MOST_TRIALS, MOST_POSES = 24, 160
-_STRANGE = 6.0
-"""Trials whose error is so many times the median's come last: their first pose was a mistaken marker, not the model's fault."""
+MOST_TRIALS = DEFAULTS.report.most_trials
+MOST_POSES = DEFAULTS.report.most_poses
+_STRANGE = DEFAULTS.report.strange
 
 
 def shown_paths(predictor: Predictor, model: Model, d: Diagnosis) -> list[dict[str, Any]]:

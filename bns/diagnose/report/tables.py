@@ -11,50 +11,78 @@ from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.load import Measured
 from bns.diagnose.design.proposal import Proposal
-from bns.diagnose.diagnosis import Diagnosis, numbers_of
-from bns.diagnose.predict.horizons import HORIZONS
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.predict.paired_errors import HorizonErrors, ModelError
 from bns.diagnose.report.plain_language import figures_in_words
+from bns.diagnose.values import numbers_of
 
 Table = dict[str, list[Any]]
 AHEAD = {"command": "one command", "1s": "1 second", "5s": "5 seconds", "trial": "the whole trial"}
 
 
 def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
-    """Error at every horizon, before and after, beside the noise floor."""
-    if d.error and d.effects:
-        rows = [[AHEAD[h], *(_mm(e[k]) for k in ("before", "after", "noise_floor"))] for h, e in d.error.items()]
-        return _table(["after", "as it was (mm)", "mended (mm)", "noise floor (mm)"], rows)
-    if d.error:
-        rows = [[AHEAD[h], _mm(e["before"]), _mm(e["noise_floor"])] for h, e in d.error.items()]
-        return _table(["after", "as it is (mm)", "noise floor (mm)"], rows)
-    if c is None:
+    """Error at every horizon, before and after, beside the noise of the tracking."""
+    errors = d.errors if d.errors is not None else c.judged if c is not None else None
+    if errors is None:
         return None
-    rows = [[AHEAD[h], _mm(c.errors[h]["position_m"]), _mm(c.floor[h])] for h in HORIZONS if c.errors[h]["windows"]]
-    return _table(["after", "as it is (mm)", "noise of the tracking (mm)"], rows)
+    shown = [e for e in errors.horizons.values() if e.windows]
+    if d.effects:
+        rows = [
+            [
+                AHEAD[e.horizon],
+                _both(e.models[0]),
+                _both(e.models[-1]),
+                _interval(e),
+                _mm(e.noise_floor_m),
+                str(e.windows),
+            ]
+            for e in shown
+        ]
+        columns = [
+            "after",
+            "as given (mm)",
+            "with the effects (mm)",
+            "change, 95 % (mm)",
+            "tracking noise (mm)",
+            "windows",
+        ]
+        return _table(columns, rows)
+    rows = [[AHEAD[e.horizon], _both(e.models[0]), _mm(e.noise_floor_m), str(e.windows)] for e in shown]
+    return _table(["after", "as given (mm)", "tracking noise (mm)", "windows"], rows)
+
+
+def _both(m: ModelError) -> str:
+    return f"{_mm(m.rms_m)} (median {_mm(m.median_m)})"
+
+
+def _interval(e: HorizonErrors) -> str:
+    change = e.total
+    if change is None or not np.isfinite(change.low_m):
+        return "too few trials"
+    return f"{1e3 * change.low_m:+.2f} to {1e3 * change.high_m:+.2f}"
 
 
 def improvement_text(d: Diagnosis) -> str:
     """What adding the effects does to the error, in a sentence; "" where nothing was added."""
-    if not d.error or not d.effects:
+    if d.errors is None or not d.effects:
         return ""
-    e = d.error["1s"] if np.isfinite(d.error["1s"]["before"]) else d.error["command"]
-    ahead = "a second" if e is d.error["1s"] else "a command"
+    e = d.errors.horizons["1s"] if d.errors.horizons["1s"].windows else d.errors.horizons["command"]
+    ahead = "a second" if e.horizon == "1s" else "a command"
     known = "With it" if d.verdict != "unlisted" else "With the known effects alone"
-    return (
-        f"{known}, predictions {ahead} ahead are {_mm(e['after'])} mm off instead of {_mm(e['before'])} mm "
-        f"(noise alone: {_mm(e['noise_floor'])} mm)."
-    )
+    noise = f" (tracking noise alone: {_mm(e.noise_floor_m)} mm)" if np.isfinite(e.noise_floor_m) else ""
+    before, after = _mm(e.models[0].rms_m), _mm(e.models[-1].rms_m)
+    return f"{known}, predictions {ahead} ahead are {after} mm off instead of {before} mm{noise}."
 
 
 def error_by_step_table(m: ExtendedModel) -> Table:
     """Every step at every horizon."""
-    horizons = list(m.error_by_step[0].error)
+    shown = [e for e in m.errors.horizons.values() if e.windows]
     rows = [
-        ["as it was" if r.name == "nominal" else f"+ {r.name}", *(_mm(r.error[h]) for h in horizons)]
-        for r in m.error_by_step
+        [name if index == 0 else f"+ {name}", *(_both(e.models[index]) for e in shown)]
+        for index, name in enumerate(m.names)
     ]
-    rows.append(["noise floor", *(_mm(m.floor[h]) for h in horizons)])
-    return _table(["model", *(f"{AHEAD[h]} (mm)" for h in horizons)], rows)
+    rows.append(["tracking noise", *(_mm(e.noise_floor_m) for e in shown)])
+    return _table(["model", *(f"{AHEAD[e.horizon]} (mm)" for e in shown)], rows)
 
 
 def curves_table(c: Comparison) -> Table:

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
 from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
-from bns.diagnose.diagnosis import Diagnosis, numbers_of, ties_of
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.predict.paired_errors import Change, PairedErrors
+from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.values import numbers_of, ties_of
 from bns.physics.decoys import DECOYS
 from bns.physics.effects import all_effects
 
@@ -18,7 +24,7 @@ _VERDICTS = {
     "unlisted": "Something is missing that no listed effect explains.",
     "insufficient-data": "These measurements do not suffice for a verdict.",
 }
-_SHOWN = 8
+_SHOWN = DEFAULTS.report.rows
 
 
 def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
@@ -41,8 +47,11 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
         yield from _numbers(d)
         for group in ties_of(d.selection):
             yield "cannot be told apart: " + ", ".join(group)
-        yield from _errors(d.error or {})
+        yield from _errors(d.errors)
         yield from _ranking(d)
+    if d.calibration is not None:
+        yield "\nrobot and sensor calibrated together, each number with all others free:"
+        yield from _intervals(d.calibration)
     if d.formula is not None:
         values = ", ".join(f"{name} = {value:.4g}" for name, value in d.formula.values.items())
         yield f"\ncandidate term: {d.formula.term}   added to {d.formula.on}; {values}"
@@ -54,19 +63,59 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
 
 def _numbers(d: Diagnosis) -> Iterator[str]:
     assert d.selection is not None
-    for effect, numbers in numbers_of(d.selection.fit).items():
+    yield from _intervals(d.selection.fit, equations=True)
+
+
+def _intervals(fit: Fit, *, equations: bool = False) -> Iterator[str]:
+    for effect, numbers in numbers_of(fit).items():
         for name, n in numbers.items():
             if n["low"] is not None and n["high"] is not None:
                 yield f"  {effect}: {name} = {n['value']:.5g} {n['unit']} (95 %: {n['low']:.5g} to {n['high']:.5g})"
-        if effect in all_effects():
+        if equations and effect in all_effects():
             yield f"    {all_effects()[effect].equation}"
 
 
-def _errors(error: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
-    yield "\nposition error on trials held out, mm (root mean square):"
-    yield f"  {'horizon':10}{'before':>10}{'after':>10}{'noise':>10}"
-    for horizon, e in error.items():
-        yield f"  {horizon:10}" + "".join(f"{1e3 * e[k]:10.2f}" for k in ("before", "after", "noise_floor"))
+def _errors(errors: PairedErrors | None) -> Iterator[str]:
+    if errors is None:
+        return
+    yield "\nposition error on held-out trials, mm: root mean square (median), all on the same windows:"
+    yield from error_lines(errors)
+
+
+def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
+    """A table of the errors of models in turn, one row a horizon and model, with the change from the one before.
+
+    ``before_added``: stands before the names of all models but the first.
+    """
+    yield f"  {'horizon':10}{'model':26}{'error':>16}{'change (95 %)':>30}{'noise':>8}{'windows':>9}"
+    for horizon, e in errors.horizons.items():
+        if not e.windows:
+            continue
+        for index, m in enumerate(e.models):
+            change = _change(e.changes[index - 1]) if index else ""
+            noise = f"{1e3 * e.noise_floor_m:8.2f}" if np.isfinite(e.noise_floor_m) else f"{'?':>8}"
+            ends = f"{noise}{e.windows:9d}" if index == 0 else ""
+            error, name = f"{_mm(m.rms_m):>8} ({_mm(m.median_m):>5})", (before_added if index else "") + m.name
+            yield f"  {horizon if index == 0 else '':10}{name:26}{error}{change:>30}{ends}".rstrip()
+    if any(e.left_out for e in errors.horizons.values()):
+        left_out = ", ".join(f"{e.left_out} at {h}" for h, e in errors.horizons.items() if e.left_out)
+        yield f"  (left out, since the tracker jumps within them: {left_out})"
+    if errors.noise is None:
+        yield "  (noise: these poses are too far apart in time to show it)"
+    else:
+        pose_mm = 1e3 * errors.noise.position_m
+        yield f"  (noise: of the tracking alone, from the poses {errors.noise.basis}: {pose_mm:.2f} mm a pose)"
+
+
+def _change(c: Change) -> str:
+    if not np.isfinite(c.low_m):
+        return f"{1e3 * c.change_m:+.2f} (too few trials)"
+    said = "" if c.fell else "  rises" if c.rose else "  undecided"
+    return f"{1e3 * c.change_m:+.2f} ({1e3 * c.low_m:+.2f} to {1e3 * c.high_m:+.2f}){said}"
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.2f}" if 1e3 * metres < 1000 else f"{1e3 * metres:.0f}"
 
 
 def _ranking(d: Diagnosis) -> Iterator[str]:
@@ -91,11 +140,12 @@ def _comparison(c: Comparison) -> Iterator[str]:
     yield f"  {'horizon':10}{'position mm':>14}{'forward':>10}{'left':>10}{'heading deg':>13}{'noise mm':>10}{'windows':>9}"
     for horizon, e in c.errors.items():
         if e["windows"]:
+            noise = f"{1e3 * c.noise_floor_m(horizon):10.2f}" if np.isfinite(c.noise_floor_m(horizon)) else f"{'?':>10}"
             yield (
                 f"  {horizon:10}{1e3 * e['position_m']:8.2f} ±{1e3 * e['position_se_m']:4.2f}{1e3 * e['forward_m']:10.2f}"
-                f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{1e3 * c.floor[horizon]:10.2f}{e['windows']:9.0f}"
+                f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{noise}{e['windows']:9.0f}"
             )
-    yield "  (noise: at most what tracking noise alone would show; the drive's own scatter comes on top)"
+    yield "  (noise: what tracking noise alone would show, from the tracks; the drive's own scatter comes on top)"
     yield "\nwhere it fails: what a free curve along each variable would explain, on trials held out:"
     yield f"  {'variable':30}{'velocity':16}{'share of loss':>14}{'p':>10}"
     for p in c.residual_dependence[:_SHOWN]:
@@ -128,15 +178,9 @@ def _scores(scores: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
 
 def extension_text(m: ExtendedModel) -> str:
     """The error by step on held-out trials, and the numbers."""
-    horizons = list(m.error_by_step[0].error)
-    lines = [
-        "position error on trials held out, mm (root mean square):",
-        f"  {'model':28}" + "".join(f"{h:>10}" for h in horizons),
-    ]
-    for step in m.error_by_step:
-        name = step.name if step.name == "nominal" else f"+ {step.name}"
-        lines.append(f"  {name:28}" + "".join(f"{1e3 * step.error[h]:10.2f}" for h in horizons))
-    lines.append(f"  {'noise floor':28}" + "".join(f"{1e3 * m.floor[h]:10.2f}" for h in horizons))
+    lines = ["position error on held-out trials, mm: root mean square (median), all on the same windows:"]
+    lines += error_lines(m.errors, "+ ")
     for effect, numbers in numbers_of(m.fit).items():
         lines += [f"  {effect}: {name} = {n['value']:.5g} ± {n['se']:.2g} {n['unit']}" for name, n in numbers.items()]
+    lines += [f"  warning: {text}" for text in m.warnings]
     return "\n".join(lines)

@@ -18,6 +18,7 @@ from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_after
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
 from bns.physics.order import FORMULAS
 from bns.physics.signals import Body
@@ -27,16 +28,11 @@ SHARE = "share_of_motion"
 CHANNELS = ("forward_m_s", "sideways_m_s", "yaw_rad_s", SHARE)
 WORLD = ("east_m_s", "north_m_s")
 """Velocities in the world's frame, for what a place does to the robot."""
-KNOTS = 5
-"""Bends of a free curve: at these many quantiles of the variable."""
-FIELD = 5
-"""A field over the floor has so many bumps a side."""
-PENALTIES = (1.0, 30.0)
-"""How strongly curves are drawn to zero, in expected squares of the standardised curve; the better one counts."""
-CHANCE = 0.02
-"""Chance of any false alarm over all variables and channels."""
-LEAST = 0.0015
-"""Least gain that counts, as a share of the loss."""
+KNOTS = DEFAULTS.residuals.knots
+FIELD = DEFAULTS.residuals.field_bumps
+PENALTIES = DEFAULTS.residuals.penalties
+CHANCE = DEFAULTS.residuals.chance
+LEAST = DEFAULTS.residuals.least
 
 
 @dataclass(frozen=True)
@@ -52,7 +48,7 @@ class ResidualDependence:
 def residual_dependence(problem: Problem, fit: Fit) -> list[ResidualDependence]:
     """Every variable with every velocity, the best first."""
     variables = problem.predictor.variables()
-    headings, usual = variables["heading_rad"], float(fit.losses.mean())
+    headings, usual = variables.get("heading_rad"), float(fit.losses.mean())
 
     def compare_clocks(tried: tuple[str, list[Array], str]) -> ResidualDependence:
         variable, basis, channel = tried
@@ -101,7 +97,7 @@ def _bumps(x: Array, y: Array, side: int) -> list[Array]:
     ]
 
 
-def probe_effect(channel: str, curve: Array, heading_rad: Array) -> Effect:
+def probe_effect(channel: str, curve: Array, heading_rad: Array | None) -> Effect:
     """An effect that adds ``size`` times a curve (trials, steps) to one velocity while the robot moves, or to all as a share."""
 
     def apply(body: Body, size: float) -> Body:
@@ -109,6 +105,7 @@ def probe_effect(channel: str, curve: Array, heading_rad: Array) -> Effect:
             return body.scaled(1 + size * curve)
         added = size * curve * body.moving
         if channel in WORLD:
+            assert heading_rad is not None  # a field over the floor comes of places
             return body.with_drift(channel.removesuffix("_m_s"), added, heading_rad)
         return body.with_added(channel, added)
 
@@ -124,7 +121,27 @@ def probe_effect(channel: str, curve: Array, heading_rad: Array) -> Effect:
     )
 
 
-def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array) -> Array:
+def flexible_columns(problem: Problem, fit: Fit, variable: str, channel: str, *, centred: bool = False) -> Array:
+    """Change of the whitened innovations a unit of each basis function of a free curve, (frames, 3, k).
+
+    ``centred``: every basis function has mean zero over the steps, so that the curve cannot stand for what acts everywhere.
+    """
+    variables = problem.predictor.variables()
+    basis = next(functions for name, functions in curves(variables) if name == variable)
+    if centred:
+        basis = [function - function.mean() for function in basis]
+    return _columns(problem, fit, channel, basis, variables.get("heading_rad"))
+
+
+def losses_with_columns(problem: Problem, fit: Fit, columns: Array) -> Array:
+    """Held-out losses (trials,) of a fitted model with these columns beside its own numbers, at the better penalty."""
+    joint = np.concatenate([fit.jacobian, columns], axis=2)
+    equations = problem.normal_equations(joint, fit.whitened)
+    tried = [_held_out_losses(problem, fit, joint, equations, penalty) for penalty in PENALTIES]
+    return min(tried, key=lambda losses: float(losses.sum()))
+
+
+def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array | None) -> Array:
     """Change of the whitened innovations a unit of each basis function, (frames, 3, k)."""
     small = 1e-3 if channel in {"yaw_rad_s", SHARE} else 1e-4
     out = np.empty((*fit.whitened.shape, len(basis)))
@@ -144,7 +161,12 @@ def _earned(problem: Problem, fit: Fit, columns: Array) -> PairedComparison:
 
 
 def _gain(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, penalty: float) -> tuple[float, float]:
-    """Held-out gain of a linear addition to a fitted model, each trial judged by a fit to the others.
+    """Held-out gain of a linear addition to a fitted model, each trial judged by a fit to the others."""
+    return paired_elpd_diff(fit.held_out, _held_out_losses(problem, fit, joint, equations, penalty))
+
+
+def _held_out_losses(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, penalty: float) -> Array:
+    """Losses (trials,) with a linear addition to a fitted model, each trial judged by a fit to the others.
 
     The model's own numbers move along with it. ``penalty``: how many typical trials speak for the addition being nothing.
     """
@@ -157,4 +179,4 @@ def _gain(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, 
     against = (gradients.sum(axis=0) - gradients) / scale
     steps = -np.linalg.solve(others, against[..., None])[..., 0] / scale
     moved = innovations_after(problem.predictor.tracks.first, joint, fit.whitened, steps)
-    return paired_elpd_diff(fit.held_out, problem.per_trial(huber(moved)))
+    return problem.per_trial(huber(moved))

@@ -15,14 +15,14 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.settings import DEFAULTS
 
-LAGS = (3, 5, 8, 12, 18)
-"""Frames. Not shorter: neighbours share errors of the camera and of its clock."""
-LEAST_ALIKE, LEAST_OPPOSED, LEAST_BETWEEN, LEAST_Z = 0.06, 0.10, 0.33, 4.5
-"""Smaller correlations, or less certain ones, are those of honest robots. Inside commands these reach +0.04 for a jitter of
-0.2 to 4 %, but -0.07 too: the filter takes what stays the same through a command for steps at random, and corrects too much. From
-one command to the next they reach +0.32 (a robot whose clock is 0.12 s late)."""
-_CLIP = 4.0
+LAGS = DEFAULTS.residuals.lags
+LEAST_ALIKE = DEFAULTS.residuals.least_alike
+LEAST_OPPOSED = DEFAULTS.residuals.least_opposed
+LEAST_BETWEEN = DEFAULTS.residuals.least_between
+LEAST_Z = DEFAULTS.residuals.correlation_z
+_CLIP = DEFAULTS.residuals.clip
 _DIRECTIONS = ("forward", "left", "heading")
 
 

@@ -16,13 +16,11 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.cross_validation import FOLDS
 from bns.diagnose.estimate.significance import sign_flip_p
 from bns.diagnose.residuals.along_variables import CHANCE, curves
+from bns.diagnose.settings import DEFAULTS
 
-LEAST = 0.02
-"""Least share of the squared error that a variable must explain to be named."""
-MOST = 3
-"""As many variables are named, one after the other; what comes later is mostly the first in other clothes."""
-_RIDGE = 1.0
-"""Pull of curves towards zero, in commands of typical size."""
+LEAST = DEFAULTS.residuals.input_least
+MOST = DEFAULTS.residuals.input_most
+_RIDGE = DEFAULTS.residuals.input_ridge
 
 
 @dataclass(frozen=True)

@@ -19,20 +19,17 @@ from bns.diagnose.estimate.cross_validation import FOLDS
 from bns.diagnose.estimate.significance import sign_flip_p
 from bns.diagnose.predict.networks import NetworkPredictor
 from bns.diagnose.residuals.missing_inputs import Commands, MissingInput, find_missing_inputs
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.model import Model
 
-NEIGHBOURS = 3
-"""How near the data are is the mean distance to so many training patterns, in inputs that run from -1 to 1."""
-USUAL = 0.95
-"""Among the patterns are commands that lie as near to them as this share of the patterns do to one another."""
-FEWEST, FEWEST_TRIALS = 30, 6
-"""Of fewer commands, or from fewer trials, among the patterns nothing is said."""
-DRAWS = 1000
-LEAST_SPARSE = 0.1
-"""Least share of the squared error for which thin data are named."""
-MEMORY_S = 0.5
-"""Time constant of the memory that is looked for: that of slow motors."""
+NEIGHBOURS = DEFAULTS.residuals.neighbours
+USUAL = DEFAULTS.residuals.usual_share
+FEWEST = DEFAULTS.residuals.fewest_commands
+FEWEST_TRIALS = DEFAULTS.residuals.fewest_trials
+DRAWS = DEFAULTS.residuals.sparse_draws
+LEAST_SPARSE = DEFAULTS.residuals.sparse_least
+MEMORY_S = DEFAULTS.residuals.memory_s
 _INPUTS = (
     "left_m_s",
     "right_m_s",
@@ -43,7 +40,7 @@ _INPUTS = (
 )
 _MEANINGLESS = ("time_in_command_s", "left_since_reversal_s", "right_since_reversal_s")
 """Where only ends of commands are seen, these are the same everywhere, or known from the inputs."""
-_CHANCE = 0.01
+_CHANCE = DEFAULTS.residuals.sparse_chance
 
 
 @dataclass(frozen=True)

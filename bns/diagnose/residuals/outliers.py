@@ -14,17 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.settings import DEFAULTS
 
-WIDTH = 12
-"""Frames a window: about half a second at camera rate. What a marker does for a single frame hardly counts in it."""
-FAR = 6.0
-"""A window stands out that is so many times as far off as most are (by the median, as standard deviations)."""
-TRIALS = 3
-"""So many trials at least must have such a window: a robot that was kicked once tells nothing of its model."""
-JUMP, WAYS, TURN = 20.0, 3.0, 100.0
-"""No robot does this within a frame: a position off by 20 standard deviations more than three times the way of the wheels,
-a heading by 100. A marker was mistaken, and what lies within `WIDTH` frames of it says nothing of the robot."""
-_CLIP = 4.0
+WIDTH = DEFAULTS.residuals.outlier_frames
+FAR = DEFAULTS.residuals.outlier_far
+TRIALS = DEFAULTS.residuals.outlier_trials
+JUMP = DEFAULTS.residuals.fault_jump
+WAYS = DEFAULTS.residuals.fault_ways
+TURN = DEFAULTS.residuals.fault_turn
+_CLIP = DEFAULTS.residuals.clip
 _NORMAL = 0.6745
 """Median of a standard normal number's size."""
 

@@ -19,6 +19,7 @@ from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.formula import formula_effect
@@ -45,7 +46,7 @@ _SHAPES = {
     "way_m": ("d", "exp(-d)", "d**2"),
     "place": ("x", "y", "x*y", "x**2", "y**2"),
 }
-_TERMS_AT_MOST = 3
+_TERMS_AT_MOST = DEFAULTS.residuals.formula_terms
 
 
 @dataclass(frozen=True)

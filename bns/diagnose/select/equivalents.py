@@ -18,17 +18,14 @@ from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.plausibility import implausible
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
-LEFT_OVER = 0.03
-"""A pair is tried if, to first order, it leaves this share of the replaced effect's work undone at most ..."""
-ALONE = 0.1
-"""... and neither of its effects alone leaves less than this: with that one alone, the other would have nothing to do."""
-TRIED = 2
-"""So many pairs are fitted for each effect that was accepted, the most promising first."""
-_SMALL = 1e-3
-"""Step of a number for a derivative, as a share of its plausible range."""
+LEFT_OVER = DEFAULTS.select.pair_left_over
+ALONE = DEFAULTS.select.pair_alone
+TRIED = DEFAULTS.select.pair_tried
+_SMALL = DEFAULTS.select.pair_small
 
 
 def equivalent_pairs(

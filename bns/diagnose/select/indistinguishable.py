@@ -8,15 +8,12 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.significance import paired_elpd_diff
+from bns.diagnose.settings import DEFAULTS
 
-TIE_Z = 2.0
-"""Two explanations whose held-out losses differ by fewer standard errors than this cannot be told apart ..."""
-SIGNS_Z = 4.0
-"""... unless nearly all trials are against one of them, by so many standard errors of a fair coin."""
-TIE_SHARE = 0.001
-"""Nor can those whose difference is a smaller share than this of what either earns: no model drives as exactly as that."""
-TIE_LOSS = 3.0
-"""Nor those that differ by less log-likelihood than this over all trials: odds of twenty to one. A spare number costs as much."""
+TIE_Z = DEFAULTS.select.tie_z
+SIGNS_Z = DEFAULTS.select.tie_signs_z
+TIE_SHARE = DEFAULTS.select.tie_share
+TIE_LOSS = DEFAULTS.select.tie_loss
 
 
 def indistinguishable(tried: Fit, fit: Fit, without: Fit) -> bool:

@@ -6,68 +6,33 @@ or beyond what is plausible is rejected with its reason.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from functools import cache, partial
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.significance import MIN_Z, PairedComparison
+from bns.diagnose.estimate.significance import MIN_Z
 from bns.diagnose.estimate.starts import best_start, fit_with, listed
 from bns.diagnose.estimate.trial_clock_test import TrialClocks, compare_clocks, fit_trial_clocks, with_shared_clock
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.plausibility import implausible
+from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
-FALSE_ALARM = 0.05
-"""Chance of any false alarm over the whole catalogue."""
-MIN_GAIN = 0.001
-"""Least gain that counts, as a share of the loss: honest robots vary by fractions of a percent from trial to trial."""
-SCREEN = 0.15
-"""An effect is tried in another one's place if its best start alone does this share of the other's work ..."""
-BEHIND, BEHIND_LOSS = 0.5, 20.0
-"""... and no longer if, fitted, it leaves more than this share of that work undone, and more than this loss: three
-standard errors, were it noise alone."""
-CLOCKS_CHANCE = 0.01
-"""Chance of a false alarm about clocks that differ from trial to trial."""
-MOST = 6
-"""Effects that a search accepts at most."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One effect added to a model: its fit, what it earned on held-out trials, and why it may not be taken."""
-
-    name: str
-    fit: Fit
-    paired_comparison: PairedComparison
-    rejected_because: str = ""
-
-
-@dataclass(frozen=True)
-class SelectionStep:
-    """One round: all candidates, best first, the threshold that the decoys set, and what was selected ("" for nothing)."""
-
-    ranking: tuple[Candidate, ...]
-    decoy_threshold: float
-    selected: str
-
-
-@dataclass(frozen=True)
-class SelectionResult:
-    """The end of a search: accepted names in order, their fit, the rounds, and explanations of the same size that fit as well."""
-
-    problem: Problem
-    nominal: Fit
-    fit: Fit
-    accepted: tuple[str, ...]
-    steps: tuple[SelectionStep, ...]
-    competing_models: tuple[tuple[str, ...], ...] = ()
+FALSE_ALARM = DEFAULTS.select.false_alarm
+MIN_GAIN = DEFAULTS.select.min_gain
+SCREEN = DEFAULTS.select.screen
+BEHIND = DEFAULTS.select.behind
+BEHIND_LOSS = DEFAULTS.select.behind_loss
+CLOCKS_CHANCE = DEFAULTS.select.clocks_chance
+MOST = DEFAULTS.select.most_effects
 
 
 class StepwiseSelection:
@@ -79,18 +44,32 @@ class StepwiseSelection:
         model: Model,
         extra: Mapping[str, Effect] | None = None,
         tick: Callable[[str], None] = lambda _: None,
+        barred: Collection[str] = (),
     ) -> None:
         self.predictor, self.model, self.tick = predictor, model.arranged(), tick
-        self._extra = extra
-        self.catalogue = listed(self.model, extra)
+        self._extra, self._barred = extra, barred
+        self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
+        self._all_believed = False
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 
     def run(self) -> SelectionResult:
+        """The search; again with implausible numbers allowed where one was passed over, if that predicts better for certain."""
+        result = self._run()
+        if not any(step.passed_over for step in result.steps):
+            return result
+        believed, self._all_believed, self._exchanged = result, True, None
+        bold = self._run()
+        self._all_believed = False
+        return bold if bold.accepted and predicts_better(believed, bold) else believed
+
+    def _run(self) -> SelectionResult:
         """The search; again with a clock for each trial where these differ, since that hides what else is wrong."""
         plain = self._select()
         clocks = fit_trial_clocks(plain.problem, plain.fit)
-        if clocks is None or not self._clocks_earned(clocks, plain.fit):
+        if clocks is None or _per_trial_effect(clocks.fit.model) in self._barred:
+            return plain
+        if not self._clocks_earned(clocks, plain.fit):
             return plain
         given = self.model
         self.model = self._bare_with_clocks(clocks.fit.model, given)
@@ -171,20 +150,33 @@ class StepwiseSelection:
         tried = each(partial(self._tried, problem, fit), [*DECOYS, *left])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
         ranking = sorted(tried[len(DECOYS) :], key=lambda c: -c.paired_comparison.elpd_diff)
+        passed_over: list[Candidate] = []
         for index, candidate in enumerate(ranking):
-            if candidate.rejected_because or not self._earned(candidate, fit, decoy_threshold):
+            if not self._earned(candidate, fit, decoy_threshold):
+                continue
+            if candidate.rejected_because:
+                passed_over += [candidate] if implausible(candidate.fit, candidate.name, bounds=False) else []
                 continue
             settled = self._refit_with_noise(candidate.fit.model, problem.pose_filter.noise)
-            rejected_because = implausible(settled[1], candidate.name, bounds=False)
+            rejected_because = self._rejected(settled[1], candidate.name, bounds=False)
             if not rejected_because:
-                return SelectionStep(tuple(ranking), decoy_threshold, candidate.name), *settled
+                better = next((p.name for p in passed_over if not indistinguishable(candidate.fit, p.fit, fit)), "")
+                return SelectionStep(tuple(ranking), decoy_threshold, candidate.name, better), *settled
             ranking[index] = replace(candidate, rejected_because=rejected_because)
-        return SelectionStep(tuple(ranking), decoy_threshold, ""), problem, fit
+            passed_over.append(ranking[index])
+        best = passed_over[0].name if passed_over else ""
+        return SelectionStep(tuple(ranking), decoy_threshold, "", best), problem, fit
+
+    def _rejected(self, fit: Fit, name: str, bounds: bool = True) -> str:
+        """Why an effect may not be taken; where all numbers are believed, only for one at a bound."""
+        if self._all_believed and implausible(fit, name, bounds=False):
+            return ""
+        return implausible(fit, name, bounds)
 
     def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
         self.tick(effect.name)
         added = fit_with(problem, fit, effect)
-        return Candidate(effect.name, added, problem.paired_comparison(fit, added), implausible(added, effect.name))
+        return Candidate(effect.name, added, problem.paired_comparison(fit, added), self._rejected(added, effect.name))
 
     def _earned(self, candidate: Candidate, before: Fit, decoy_threshold: float) -> bool:
         e = candidate.paired_comparison
@@ -205,7 +197,7 @@ class StepwiseSelection:
             if new == accepted:
                 break
             exchanged, settled = self._refit_with_noise(best.model, problem.pose_filter.noise)
-            if any(implausible(settled, name, bounds=False) for name in new):  # under its own noise it asks for more
+            if any(self._rejected(settled, name, bounds=False) for name in new):  # under its own noise it asks for more
                 barred.add(comes)
             else:
                 problem, fit, accepted = exchanged, settled, new
@@ -217,9 +209,9 @@ class StepwiseSelection:
         """Drop what no longer earns its place, and what can no longer be believed beside what came in."""
         newest = accepted[-1]
         for name in accepted:
-            believed = not implausible(
+            believed = not self._rejected(
                 fit, name, bounds=False
-            )  # at a bound it may be: what does nothing there earns nothing
+            )  # at a bound it may be: there it does, and earns, nothing
             if believed and name == newest:
                 continue
             lacking = without(problem, fit, name)
@@ -230,7 +222,7 @@ class StepwiseSelection:
 
     def _may_stay(self, problem: Problem, fit: Fit, name: str) -> bool:
         """Whether that effect of a fit would be taken as a newcomer: few trials that gain much do not bring one in."""
-        return not implausible(fit, name) and self._earned_over(problem, without(problem, fit, name), fit, name)
+        return not self._rejected(fit, name) and self._earned_over(problem, without(problem, fit, name), fit, name)
 
     def _earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:
         return self._earned(Candidate(name, fit, problem.paired_comparison(lacking, fit)), lacking, 0.0)
@@ -278,7 +270,7 @@ class StepwiseSelection:
         lacking = cache(partial(without, problem, fit))
         for name, other, tried in self._exchanges(problem, fit, accepted):
             # at a bound it may be: a tether from ever farther away is a slope
-            may = not implausible(tried, other, bounds=False) and self._earned_over(
+            may = not self._rejected(tried, other, bounds=False) and self._earned_over(
                 problem, lacking(name), tried, other
             )
             if may and indistinguishable(tried, fit, lacking(name)):

@@ -7,7 +7,7 @@
 
 const uint8_t DIRECTION = 2;
 const uint8_t MOST_SERVOS = 16;
-const uint8_t VERSION = 2;
+const uint8_t VERSION = 3;
 const uint32_t WATCHDOG_MS = 500, TORN_MS = 50, RAMP_MS = 50, ANSWER_US = 3000;
 
 const uint8_t START = 0xA5, HELLO = 1, ARM = 2, MOVE = 3, STATE = 4, STOP = 5, ANSWER = 0x80, REFUSED = 0xFF;
@@ -15,9 +15,11 @@ const uint8_t NO_ANSWER = 0x80;  // in a servo's error byte
 
 // Control table of the AX-12.
 const uint8_t ANGLE_LIMITS = 6, TORQUE_ENABLE = 24, GOAL = 30, TORQUE_LIMIT = 34, POSITION = 36;
-const uint8_t PING = 1, READ = 2, WRITE = 3, BROADCAST = 254, RAMP_STEPS = 4, TRIES = 3;
+// Instructions of its protocol. Beware of short names: those of the chip's registers (PING is port G's) are macros.
+const uint8_t READ = 2, WRITE = 3, BROADCAST = 254;
+const uint8_t RAMP_STEPS = 4, TRIES = 3, LONGEST_STATUS = 6 + 16;
 
-uint8_t frame[4 + 255 + 2], back[7 * MOST_SERVOS], servos = 0, ramp = RAMP_STEPS;
+uint8_t frame[4 + 255 + 2], back[7 * MOST_SERVOS], servos = 0, ramp = RAMP_STEPS, grown = 0;
 uint16_t held = 0, low[MOST_SERVOS], high[MOST_SERVOS], torque = 0;
 uint32_t heardMs = 0, byteMs = 0, rampMs = 0;
 bool armed = false;
@@ -32,6 +34,14 @@ uint16_t crc16(const uint8_t *data, uint16_t count) {
 }
 
 uint16_t word16(const uint8_t *bytes) { return bytes[0] | (uint16_t)bytes[1] << 8; }
+
+// Takes what the computer has sent. The core keeps 63 bytes only, so this is done while servos are waited for, too.
+void collect() {
+  while (Serial.available() && held < sizeof frame) {
+    frame[held++] = Serial.read();
+    byteMs = millis();
+  }
+}
 
 // ---- servos -------------------------------------------------------------------------------------------------------------
 
@@ -48,20 +58,29 @@ void say(uint8_t id, uint8_t instruction, const uint8_t *parameters, uint8_t cou
   digitalWrite(DIRECTION, LOW);
 }
 
-// A status packet with so many parameters; its error byte, or -1 if none came.
-int hear(uint8_t id, uint8_t *parameters, uint8_t count) {
-  uint8_t packet[6 + 16], got = 0;
-  for (uint32_t began = micros(); got < count + 6 && micros() - began < ANSWER_US;) {
-    if (!Serial1.available()) continue;
-    packet[got++] = Serial1.read();
-    if (got <= 2 && packet[got - 1] != 0xFF) got = 0;
-  }
-  if (got < count + 6 || packet[2] != id || packet[3] != count + 2) return -1;
+// Whether these bytes are a whole, good status packet of that servo.
+bool isStatus(const uint8_t *packet, uint8_t size, uint8_t id) {
+  if (packet[0] != 0xFF || packet[1] != 0xFF || packet[2] != id || packet[3] != size - 4) return false;
   uint8_t sum = 0;
-  for (uint8_t i = 2; i < got; i++) sum += packet[i];
-  if (sum != 0xFF) return -1;
-  for (uint8_t i = 0; i < count; i++) parameters[i] = packet[5 + i];
-  return packet[4];
+  for (uint8_t i = 2; i < size; i++) sum += packet[i];
+  return sum == 0xFF;
+}
+
+// A status packet with so many parameters; its error byte, or -1 if none came. Bytes before it are passed over: when the bus
+// is turned round, its line may jump, and a stray byte, an FF as well as any other, stands before the packet.
+int hear(uint8_t id, uint8_t *parameters, uint8_t count) {
+  uint8_t packet[LONGEST_STATUS], got = 0;
+  const uint8_t size = count + 6;
+  for (uint32_t began = micros(); micros() - began < ANSWER_US;) {
+    collect();
+    if (!Serial1.available()) continue;
+    if (got == size) memmove(packet, packet + 1, --got);
+    packet[got++] = Serial1.read();
+    if (got < size || !isStatus(packet, size, id)) continue;
+    for (uint8_t i = 0; i < count; i++) parameters[i] = packet[5 + i];
+    return packet[4];
+  }
+  return -1;
 }
 
 int asked(uint8_t id, uint8_t instruction, const uint8_t *sent, uint8_t sentCount, uint8_t *back, uint8_t backCount) {
@@ -127,19 +146,26 @@ bool arm(uint8_t percent) {
     if (!good || !writeGoal(i + 1, word16(here), 1)) return false;
   }
   torque = (uint32_t)1023 * percent / 100;
-  ramp = 0;
+  ramp = grown = 0;
   armed = true;
   return true;
 }
 
+// One servo each time, so that an order to stop waits for no more than that.
 void grow() {
-  if (!armed || ramp >= RAMP_STEPS || (ramp && millis() - rampMs < RAMP_MS)) return;
-  rampMs = millis();
-  ramp++;
-  for (uint8_t i = 0; i < servos; i++) {
-    write16(i + 1, TORQUE_LIMIT, (uint32_t)torque * ramp / RAMP_STEPS);
-    write8(i + 1, TORQUE_ENABLE, 1);
+  if (!armed || ramp >= RAMP_STEPS) return;
+  if (grown == 0) {
+    if (ramp && millis() - rampMs < RAMP_MS) return;
+    rampMs = millis();
   }
+  if (grown < servos) {
+    write16(grown + 1, TORQUE_LIMIT, (uint32_t)torque * (ramp + 1) / RAMP_STEPS);
+    write8(grown + 1, TORQUE_ENABLE, 1);
+    grown++;
+  }
+  if (grown < servos) return;
+  grown = 0;
+  ramp++;
 }
 
 // ---- frames -------------------------------------------------------------------------------------------------------------
@@ -157,12 +183,16 @@ void answer(uint8_t kind, uint8_t sequence, const uint8_t *payload, uint8_t coun
   Serial.write(out, 6 + count);
 }
 
+void hello(uint8_t sequence) {
+  const uint8_t who[] = {VERSION, servos};
+  answer(HELLO | ANSWER, sequence, who, sizeof who);
+}
+
 // Answers a question; false if it makes no sense or a servo did not take it.
 bool understood(uint8_t kind, uint8_t sequence, uint8_t *payload, uint8_t count) {
   if (kind == HELLO && count == 0) {
     if (!armed) scan();
-    const uint8_t who[] = {VERSION, servos};
-    answer(kind | ANSWER, sequence, who, 2);
+    hello(sequence);
   } else if (kind == ARM && count == 1 && payload[0] <= 100) {
     if (!arm(payload[0])) return false;
     answer(kind | ANSWER, sequence, back, 0);
@@ -199,10 +229,7 @@ void drop(uint16_t count) {
 
 // Takes whole, good frames out of what has come; bytes before a start byte and starts with a wrong checksum are passed over.
 void listen() {
-  while (Serial.available() && held < sizeof frame) {
-    frame[held++] = Serial.read();
-    byteMs = millis();
-  }
+  collect();
   if (held && millis() - byteMs > TORN_MS) drop(1);  // its rest does not come any more
   while (held) {
     const uint16_t whole = held > 1 ? 6 + frame[1] : 6;
@@ -227,6 +254,7 @@ void setup() {
   Serial1.begin(1000000);
   scan();
   stopAll();  // whatever was on before this start
+  hello(0);   // unasked: the computer keeps silent until then, because a byte would hold up the boot loader
 }
 
 void loop() {

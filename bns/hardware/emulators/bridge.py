@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Sequence
 
@@ -31,32 +32,68 @@ from bns.hardware.emulators.servo import Servo
 
 _LATENCY_S = 0.002
 _BYTE_S = 10 / 115_200
+BOOT_S = 0.84
+"""From the opening of its port to its hello: measured with the boot loader of a Mega 2560 in simavr."""
+_HELD_UP_S = 5.0
+"""A byte that comes while the boot loader listens makes it wait for more, for so long."""
 _SERVO_S = 0.001
 """To ask one of the servos something: some twenty bytes at 1 Mbaud, and the time after which a servo answers by default."""
 
 
 class BridgeEmulator:
-    """The device at the far end of a line."""
+    """The device at the far end of a line. Opening its port starts it anew (`opened`): deaf for `boot_s`, it then says hello."""
 
-    def __init__(self, servos: Sequence[Servo], clock: EmulatedClock, faults: Faults | None = None) -> None:
+    def __init__(
+        self, servos: Sequence[Servo], clock: EmulatedClock, faults: Faults | None = None, boot_s: float = BOOT_S
+    ) -> None:
         self.servos, self._clock, self._faults = list(servos), clock, faults or Faults()
+        self._boot_s, self._awake_s = boot_s, -math.inf
+        self.send: Callable[[bytes], None] = lambda _data: None
+        """What it says unasked goes there: to its line."""
+        self.boot_loader_heard = False
+        """Whether something was said to it while it was starting."""
         self._buffer, self._heard_s, self._byte_s = b"", clock.now_s(), clock.now_s()
-        self._armed = False
+        self._armed = self._starting = False
         self._lock = threading.Lock()
         self._answers: dict[int, Callable[[bytes], bytes | None]] = {
-            HELLO: lambda _p: bytes([VERSION, len(self.servos)]),
+            HELLO: lambda _p: self._hello(),
             ARM: self._arm,
             MOVE: self._move,
             STATE: lambda _p: b"".join(self._state(s) for s in self.servos),
             STOP: lambda _p: self._stop(),
         }
         self.cut_line: Callable[[float], None] = lambda _seconds: None
+        self.opened()
         clock.listeners.append(self.moved_on)
 
+    def opened(self) -> None:
+        """Somebody opens its port."""
+        if self._boot_s > 0:
+            self._awake_s, self._starting = self._clock.now_s() + self._boot_s, True
+
     def moved_on(self, now_s: float) -> None:
-        """Called by the clock: the watchdog."""
-        if now_s - self._heard_s > WATCHDOG_S and any(s.get("torque_enable") for s in self.servos):
-            self._stop()
+        """Called by the clock: the end of its start, a frame that is torn, the watchdog."""
+        if not self._lock.acquire(blocking=False):  # it is at work on a question
+            return
+        try:
+            if self._starting and now_s >= self._awake_s:
+                self._starting = False
+                self._stop()
+                self.send(encoded(Frame(HELLO | ANSWER, 0, self._hello())))
+            if self._buffer and now_s - self._byte_s > TORN_S:
+                self.send(self._after_torn())
+            if not self._starting and now_s - self._heard_s > WATCHDOG_S and any(s.get("torque_enable") for s in self.servos):
+                self._stop()
+        finally:
+            self._lock.release()
+
+    def _after_torn(self) -> bytes:
+        """Answers to what stands behind a frame whose rest does not come."""
+        answers, frame = b"", None
+        while self._buffer:
+            frame, self._buffer = decoded(self._buffer[1:] if frame is None else self._buffer)
+            answers += b"" if frame is None else self._answered(frame)
+        return answers
 
     def close(self) -> None:
         """Take it away."""
@@ -69,8 +106,9 @@ class BridgeEmulator:
         """Bytes in, bytes out."""
         with self._lock:
             now_s = self._clock.now_s()
-            if now_s - self._byte_s > TORN_S:
-                self._buffer = b""
+            if self._starting:
+                self._awake_s, self.boot_loader_heard = now_s + _HELD_UP_S, True
+                return self._nothing()
             frame, self._buffer, self._byte_s = *decoded(self._buffer + data), now_s
             if frame is None:
                 return self._nothing()
@@ -80,13 +118,19 @@ class BridgeEmulator:
                 return self._nothing()
             if self._faults.strikes("lost-request", now_s):
                 return self._nothing()
-            for servo in self.servos:
-                servo.update()
-            payload = self._answers.get(frame.kind, lambda _p: None)(frame.payload)
-            kind = REFUSED if payload is None else frame.kind
-            answer = encoded(Frame(kind | ANSWER, frame.sequence, payload or b""))
+            answer = self._answered(frame)
             self._clock.sleep(_LATENCY_S + (len(data) + len(answer)) * _BYTE_S + len(self.servos) * _SERVO_S)
             return self._nothing() if self._faults.strikes("lost-reply", now_s) else answer
+
+    def _answered(self, frame: Frame) -> bytes:
+        for servo in self.servos:
+            servo.update()
+        payload = self._answers.get(frame.kind, lambda _p: None)(frame.payload)
+        kind = REFUSED if payload is None else frame.kind
+        return encoded(Frame(kind | ANSWER, frame.sequence, payload or b""))
+
+    def _hello(self) -> bytes:
+        return bytes([VERSION, len(self.servos)])
 
     def _nothing(self) -> bytes:
         self._clock.fell_silent()

@@ -45,9 +45,11 @@ class EmulatedSnakeRig:
         self.body.servos = self.servos
         device = BridgeEmulator(self.servos, clock, faults) if settings.wiring == "bridge" else Bus(self.servos, clock, faults)
         self._line = PseudoTerminal(device, folder, "snake")
-        self._hang_up = HangUp(self._line, clock)
-        device.cut_line = self._hang_up.cut
         self._bridge = device if isinstance(device, BridgeEmulator) else None
+        self._hang_up = HangUp(self._line, clock, self._bridge.opened if self._bridge is not None else lambda: None)
+        device.cut_line = self._hang_up.cut
+        if self._bridge is not None:
+            self._bridge.send = self._line.send
         tracker, self._camera = emulated_camera(
             rig.tracker, folder, lambda now_s: self._worn(rig.tracker, now_s), clock, plan.of("tracker"), seed, lens(), _RATE_HZ
         )

@@ -5,11 +5,16 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import sys
 import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol, Self
 
 from bns.hardware.clock import EmulatedClock
+
+_LONGEST_WAY_S = 1.0  # by the computer's clock; somebody reads meanwhile, or nobody can
 
 
 class Device(Protocol):
@@ -20,6 +25,21 @@ class Device(Protocol):
 
     def written(self) -> None:
         """The answer is on the line."""
+
+
+def put_through(master: int, slave: int, data: bytes) -> None:
+    """Write, and wait until it is at the other end: the kernel takes its time for that, emulated time would not wait."""
+    end_s, wanted = time.monotonic() + _LONGEST_WAY_S, _waiting(slave) + len(data)
+    os.write(master, data)
+    while _waiting(slave) < wanted and time.monotonic() < end_s:
+        time.sleep(0)
+
+
+def _waiting(slave: int) -> int:
+    import fcntl  # noqa: PLC0415  # Windows has neither
+    import termios  # noqa: PLC0415
+
+    return int.from_bytes(fcntl.ioctl(slave, termios.FIONREAD, bytes(4)), sys.byteorder)
 
 
 class PseudoTerminal:
@@ -52,6 +72,12 @@ class PseudoTerminal:
             self.path.unlink(missing_ok=True)
             self.path.symlink_to(os.ttyname(self._slave))
         self._wake()
+
+    def send(self, data: bytes) -> None:
+        """What the device says unasked; it can be read at the near end when this returns."""
+        with self._lock, contextlib.suppress(OSError):
+            if self._master >= 0:
+                put_through(self._master, self._slave, data)
 
     def cut(self) -> None:
         """The line goes dead, as when a Bluetooth link breaks; the device knows nothing of it."""
@@ -113,8 +139,10 @@ class PseudoTerminal:
 class HangUp:
     """Cuts a line, and plugs it in again when the time has come."""
 
-    def __init__(self, line: PseudoTerminal, clock: EmulatedClock) -> None:
-        self._line, self._clock = line, clock
+    def __init__(
+        self, line: PseudoTerminal, clock: EmulatedClock, plugged_in: Callable[[], None] = lambda: None
+    ) -> None:
+        self._line, self._clock, self._plugged_in = line, clock, plugged_in
         self._until_s: float | None = None
         clock.listeners.append(self._moved_on)
 
@@ -130,4 +158,5 @@ class HangUp:
     def _moved_on(self, now_s: float) -> None:
         if self._until_s is not None and now_s >= self._until_s:
             self._until_s = None
+            self._plugged_in()
             self._line.plug_in()

@@ -15,6 +15,7 @@ from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Camera, Frame, FrameTracker, open_camera
 from bns.hardware.tracking.kinds import Device, Pose, Settings
 from bns.hardware.tracking.lens import Lens
+from bns.hardware.tracking.picture import SETTINGS as PICTURE
 from bns.hardware.tracking.rigid import fit
 from bns.hardware.tracking.sight import Sight
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 with extra("robot"):
     import cv2
 
-SETTINGS = Settings(("camera", "calibration", "side_m", "height_m"), ("number",), ("side_m", "height_m"))
+SETTINGS = Settings(("camera", "calibration", "side_m", "height_m"), ("number", *PICTURE), ("side_m", "height_m"))
 _WORST_SHARE = 0.1
 """A marker whose corners do not form a square of its size, to this share of its side, is none."""
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from bns.errors import HardwareError
 from bns.extras import extra
+from bns.hardware.tracking.floor_pose import Corners, floor_pose
 from bns.hardware.tracking.lens import Lens
 
 with extra("robot"):
@@ -20,6 +22,8 @@ with extra("robot"):
 
 FEWEST_VIEWS, FEWEST_CORNERS = 8, 8
 WORST_RMS_PX = 1.0
+_FINE_PX = (1280, 720)
+_WRONG_SCALE = 0.005
 
 
 @dataclass(frozen=True)
@@ -50,12 +54,20 @@ class Board:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a calibration found: the lens over its floor, the RMS of reprojection in pixels, how many views, whose camera."""
+    """What a calibration found: the lens over its floor, the RMS of reprojection in pixels, how many views, whose camera.
+
+    Of the floor: in how many places the board lay, and how far corners that were kept back are off (RMS and worst, m; NaN if not
+    known). `picture`: exposure, focus and white balance that were set, as the camera read them back; they are set again.
+    """
 
     lens: Lens
     rms_px: float
     views: int
     camera: str
+    floor_views: int = 0
+    floor_rms_m: float = math.nan
+    floor_worst_m: float = math.nan
+    picture: Mapping[str, float] = field(default_factory=dict)
 
     def save(self, path: Path) -> None:
         """Write it as JSON; nobody meets half a file."""
@@ -63,7 +75,9 @@ class Calibration:
         content = {
             "camera": self.camera, "size_px": list(lens.size), "rms_px": self.rms_px, "views": self.views,
             "matrix": lens.matrix.tolist(), "distortion": lens.distortion.tolist(),
-            "rotation": lens.rotation.tolist(), "shift_m": lens.shift_m.tolist(),
+            "rotation": lens.rotation.tolist(), "shift_m": lens.shift_m.tolist(), "picture": dict(self.picture),
+            "floor_views": self.floor_views, "floor_rms_m": _or_none(self.floor_rms_m),
+            "floor_worst_m": _or_none(self.floor_worst_m),
         }  # fmt: skip
         unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
         unfinished.write_text(json.dumps(content, indent=1), encoding="utf-8")
@@ -77,13 +91,24 @@ def load_calibration(path: Path) -> Calibration:
         arrays = {name: np.array(content[name], np.float64) for name in ("matrix", "distortion", "rotation", "shift_m")}
         width, height = (int(n) for n in content["size_px"])
         lens = Lens(size=(width, height), **arrays)
-        return Calibration(lens, float(content["rms_px"]), int(content["views"]), str(content["camera"]))
+        rms_m, worst_m = (_or_nan(content.get(name)) for name in ("floor_rms_m", "floor_worst_m"))
+        picture = {str(name): float(value) for name, value in dict(content.get("picture", {})).items()}
+        views, laid = int(content["views"]), int(content.get("floor_views", 0))
+        return Calibration(lens, float(content["rms_px"]), views, str(content["camera"]), laid, rms_m, worst_m, picture)
     except OSError as error:
         raise HardwareError(
             f"the camera has no calibration: cannot read {path} ({error.strerror}). Make one with: bns calibrate"
         ) from error
     except (ValueError, KeyError, TypeError) as error:
         raise HardwareError(f"{path} is no calibration ({error!r}); make it anew with: bns calibrate") from error
+
+
+def _or_none(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else float(value)
 
 
 def check_size(calibration: Calibration, frame: np.ndarray) -> None:
@@ -97,6 +122,16 @@ def check_size(calibration: Calibration, frame: np.ndarray) -> None:
         )
 
 
+def check_scale(board: Board, measured_m: float) -> None:
+    """HardwareError if the printed board is not as wide as it is taken to be: printers like to scale to the page."""
+    width_m = board.size_m[0]
+    if abs(measured_m / width_m - 1.0) > _WRONG_SCALE:
+        raise HardwareError(
+            f"the board is {1000 * measured_m:g} mm wide, not {1000 * width_m:g}: printed at {measured_m / width_m:.1%}. "
+            f"Print it without scaling, or go on with --square-mm {1000 * measured_m / board.across:.2f}."
+        )
+
+
 def corners(frame: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray] | None:
     """Corners of the board in a frame: points on the board (n, 1, 3), m, and pixels (n, 1, 2); None if too few are seen."""
     found, ids, _, _ = cv2.aruco.CharucoDetector(board.made).detectBoard(frame)
@@ -106,10 +141,17 @@ def corners(frame: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray] | 
     return on_board, px
 
 
-def calibrate(frames: Sequence[np.ndarray], floor: np.ndarray, board: Board, camera: str) -> Calibration:
-    """Calibrate from views of the board, and from one frame with the board flat on the floor.
+def calibrate(
+    frames: Sequence[np.ndarray],
+    floors: Sequence[np.ndarray],
+    board: Board,
+    camera: str,
+    picture: Mapping[str, float] | None = None,
+) -> Calibration:
+    """Calibrate from views of the board, and from frames with the board flat on the floor.
 
-    On the floor the board's middle lies on the task's origin, its long side east to west, its first corner in the north west.
+    On the first of those the board's middle lies on the task's origin, its long side east to west, its first corner in the
+    north west; on the others it lies elsewhere. `picture`: how the camera was set.
     HardwareError if too few views show it or the fit is bad.
     """
     seen = [pair for pair in (corners(frame, board) for frame in frames) if pair is not None]
@@ -117,7 +159,8 @@ def calibrate(frames: Sequence[np.ndarray], floor: np.ndarray, board: Board, cam
         raise HardwareError(
             f"the board was seen in {len(seen)} of {len(frames)} frames; at least {FEWEST_VIEWS} are "
             f"needed. Hold it closer, tilt it, light it evenly; it must have {board.across} x {board.down} squares of "
-            f"{1000 * board.square_m:g} mm."
+            f"{1000 * board.square_m:g} mm. The pictures have {frames[0].shape[1]} x {frames[0].shape[0]} pixels: larger ones "
+            "(--size) show it from further away."
         )
     height, width = frames[0].shape[:2]
     rms, matrix, distortion, _, _ = cv2.calibrateCamera(
@@ -125,19 +168,21 @@ def calibrate(frames: Sequence[np.ndarray], floor: np.ndarray, board: Board, cam
     )
     if not rms <= WORST_RMS_PX:
         raise HardwareError(f"the calibration fits badly (RMS {rms:.2f} pixels); is the board flat, the focus fixed?")
-    rotation, shift_m = _floor_pose(floor, board, matrix, distortion)
-    lens = Lens(matrix, np.asarray(distortion, np.float64).ravel()[:5], (width, height), rotation, shift_m)
-    return Calibration(lens, float(rms), len(seen), camera)
+    flat = np.asarray(distortion, np.float64).ravel()[:5]
+    pose = floor_pose([_laid(frame, board) for frame in floors], np.asarray(matrix), flat, (width, height))
+    return Calibration(pose.lens, float(rms), len(seen), camera, len(floors), pose.rms_m, pose.worst_m, picture or {})
 
 
-def _floor_pose(floor: np.ndarray, board: Board, matrix: np.ndarray, distortion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    found = corners(floor, board)
+def _laid(frame: np.ndarray, board: Board) -> Corners:
+    """The board as it lies on the floor in a frame."""
+    found = corners(frame, board)
     if found is None:
-        raise HardwareError("the board is not seen in the picture of the floor; lay it flat on the origin, fully in view.")
+        height, width = frame.shape[:2]
+        raise HardwareError(
+            "the board is not seen in the picture of the floor; lay it flat, fully in view, evenly lit. The picture has "
+            f"{width} x {height} pixels: at {_FINE_PX[0]} x {_FINE_PX[1]} (--size) it is seen from further away."
+        )
     on_board, px = found
-    width, height = board.size_m
-    # The board's frame has y down and z into the table; the floor's has y north and z up.
-    on_floor = (on_board.reshape(-1, 3) - [width / 2, height / 2, 0.0]) * [1.0, -1.0, -1.0]
-    _, turn, shift = cv2.solvePnP(on_floor, px, matrix, distortion)
-    rotation, _ = cv2.Rodrigues(turn)
-    return np.asarray(rotation), np.asarray(shift, np.float64).ravel()
+    width_m, height_m = board.size_m
+    # The board's frame has its origin in its upper left corner and y down.
+    return Corners((on_board.reshape(-1, 3)[:, :2] - [width_m / 2, height_m / 2]) * [1.0, -1.0], px.reshape(-1, 2))

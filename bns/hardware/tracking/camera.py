@@ -14,6 +14,8 @@ from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.tracking.calibration import check_size, load_calibration
+from bns.hardware.tracking.picture import SETTINGS as PICTURE
+from bns.hardware.tracking.picture import given, is_local, set_up
 from bns.hardware.tracking.sight import Sight
 
 with extra("robot"):
@@ -43,10 +45,19 @@ class Camera(Protocol):
 class StreamCamera:
     """Any camera or stream that `cv2.VideoCapture` opens: a number, a device file, an address.
 
-    A picture that is the one before to the last bit is none: sensors are never that still, but a camera that hangs is.
+    `size` (width, height) and `values` (exposure, focus, white balance) are set if it is at this computer; `picture` is what it
+    reads back. Unless `insist`, another size than asked for is taken. A picture that is the one before to the last bit is none:
+    sensors are never that still, but a camera that hangs is.
     """
 
-    def __init__(self, source: str, clock: Clock) -> None:
+    def __init__(
+        self,
+        source: str,
+        clock: Clock,
+        size: tuple[int, int] | None = None,
+        values: Mapping[str, float] | None = None,
+        insist: bool = True,
+    ) -> None:
         self._clock, self._source = clock, source
         self._capture = cv2.VideoCapture(int(source)) if source.isdecimal() else cv2.VideoCapture(source)
         if not self._capture.isOpened():
@@ -54,6 +65,11 @@ class StreamCamera:
                 f"the camera {source} cannot be opened. Is it plugged in, used by another program, are you in the group video? "
                 "Try: bns doctor"
             )
+        try:
+            self.picture = set_up(self._capture, source, size if is_local(source) else None, values or {}, insist)
+        except HardwareError:
+            self._capture.release()
+            raise
         self._frame: Frame | None = None
         self._arrived, self._open = threading.Event(), True
         self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
@@ -89,6 +105,7 @@ class FrameTracker:
 
     def __init__(self, camera: Camera, find: Callable[[Frame], Sight | None]) -> None:
         self.camera, self._find = camera, find
+        self.facts: Mapping[str, Any] = {"picture": getattr(camera, "picture", {})}
         self._last: tuple[float, Sight | None] = (-1.0, None)
 
     def look(self) -> Sight | None:
@@ -108,7 +125,10 @@ class FrameTracker:
 def open_camera(settings: Mapping[str, Any], clock: Clock) -> StreamCamera:
     """The camera of a rig, if its frames are those that the rig's calibration was made for."""
     calibration = load_calibration(Path(str(settings["calibration"])))
-    camera = StreamCamera(str(settings["camera"]), clock)
+    taken = {name: value for name, value in calibration.picture.items() if name in PICTURE}
+    source = str(settings["camera"])
+    values = taken | given(settings) if is_local(source) else {}
+    camera = StreamCamera(source, clock, calibration.lens.size, values)
     frame = camera.newest()
     try:
         if frame is not None:

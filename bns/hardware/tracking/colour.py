@@ -16,6 +16,7 @@ from bns.hardware.tracking.calibration import load_calibration
 from bns.hardware.tracking.camera import Frame, FrameTracker, open_camera
 from bns.hardware.tracking.kinds import Device, Pose, Settings
 from bns.hardware.tracking.lens import Lens
+from bns.hardware.tracking.picture import SETTINGS as PICTURE
 from bns.hardware.tracking.sight import Sight
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ with extra("robot"):
 
 SETTINGS = Settings(
     ("camera", "calibration", "diameter_m", "height_m"),
-    ("distance_m", "yellow", "green"),
+    ("distance_m", "yellow", "green", *PICTURE),
     ("diameter_m", "height_m", "distance_m"),
 )
 YELLOW, GREEN = (20, 38), (50, 85)

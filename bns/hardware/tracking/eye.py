@@ -19,6 +19,8 @@ class Eye:
     def __init__(self, tracker: Tracker, clock: Clock, journal: HardwareLog, heading_rad: float) -> None:
         self._tracker, self._clock, self._journal = tracker, clock, journal
         self._heading_rad, self._newest_s = heading_rad, -1.0
+        if facts := getattr(tracker, "facts", None):  # of a camera: how it takes its pictures
+            journal.note("tracker", **facts)
 
     def look(self) -> Sight | None:
         """A sight newer than the last; None if there is none. TrialPausedError if the tracker's device is gone."""

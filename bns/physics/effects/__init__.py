@@ -45,5 +45,7 @@ def effect_in_file(path: Path) -> Effect:
         raise ModelError(f"The effect file {path} does not run: {type(fault).__name__}: {fault}.") from fault
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):
-        raise ModelError(f"The effect file {path} has no EFFECT; see any file of bns/physics/effects for how one is made.")
+        raise ModelError(
+            f"The effect file {path} has no EFFECT; see any file of bns/physics/effects for how one is made."
+        )
     return effect

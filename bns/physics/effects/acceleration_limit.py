@@ -36,4 +36,5 @@ EFFECT = Effect(
     sentence="the wheels' speed can change only so fast",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
     apply=apply,
+    needs="track",
 )

@@ -1,6 +1,8 @@
-"""The tracker's x axis and the zero of its headings do not agree."""
+"""The tracker's x axis and the zero of its headings do not agree, or the marker is put on the robot turned."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -21,7 +23,16 @@ EFFECT = Effect(
     name="camera-rotation",
     stage="measure",
     parameters=(
-        Parameter("angle_rad", "rad", -3.15, 3.15, (-1.0, 1.0), 0.0, "positions turned against headings, left positive"),
+        Parameter(
+            "angle_rad",
+            "rad",
+            -3.2,
+            3.2,
+            (-3.15, 3.15),
+            0.0,
+            "positions turned against headings, left positive",
+            resolution=2e-3,
+        ),
     ),
     equation="x' = x·cos(phi) - y·sin(phi), y' = x·sin(phi) + y·cos(phi)",
     residuals="The robot seems to drive at an angle to its heading, the same one always, also in reverse.",
@@ -29,4 +40,10 @@ EFFECT = Effect(
     sentence="the camera's positions are turned against the robot's headings",
     measurement="track a straight edge laid along the direction that the headings call north",
     apply=apply,
+    starts=tuple(
+        (sign * a,)
+        for a in (0.01, 0.05, 0.2, 0.5, math.pi / 4, math.pi / 2, 3 * math.pi / 4, math.pi)
+        for sign in (1, -1)
+    ),
+    needs="track",
 )

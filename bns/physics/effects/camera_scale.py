@@ -23,4 +23,5 @@ EFFECT = Effect(
     sentence="the camera's positions are too large or too small",
     measurement="lay a tape measure on the floor in the camera's view and compare its length with the tracked one",
     apply=apply,
+    needs="track",
 )

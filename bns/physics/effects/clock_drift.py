@@ -24,4 +24,5 @@ EFFECT = Effect(
     lookalikes=("clock-offset", "speed-gain"),
     sentence="the camera's clock runs faster or slower than the commands' clock",
     apply=apply,
+    needs="track",
 )

@@ -28,5 +28,6 @@ EFFECT = Effect(
         "command-delay": "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
     },
     apply=apply,
+    needs="track",
     per_trial_allowed=True,
 )

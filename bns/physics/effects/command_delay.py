@@ -30,4 +30,5 @@ EFFECT = Effect(
     sentence="commands reach the motors late",
     measurement="film an LED on the robot that lights when a command arrives, with the tracker's camera",
     apply=apply,
+    needs="track",
 )

@@ -22,7 +22,9 @@ def _shrunk(speed: Array, width: float) -> Array:
 EFFECT = Effect(
     name="dead-zone",
     stage="wheel",
-    parameters=(Parameter("width_m_s", "m/s", 0.0, 1.0, (0.0, 0.1), 0.0, "speed lost by a wheel to friction"),),
+    parameters=(
+        Parameter("width_m_s", "m/s", 0.0, 1.0, (0.0, 0.1), 0.0, "speed lost by a wheel to friction", size_power=1.0),
+    ),
     equation="w = sign(u)·max(|u| - d, 0) for each wheel",
     residuals="Slow commands fall short by a larger share than fast ones, in proportion to their "
     "duration; a very slow wheel stands still.",

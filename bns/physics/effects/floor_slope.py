@@ -17,8 +17,8 @@ EFFECT = Effect(
     name="floor-slope",
     stage="world",
     parameters=(
-        Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift to the east"),
-        Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift to the north"),
+        Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift to the east", size_power=1.0),
+        Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift to the north", size_power=1.0),
     ),
     equation="dx/dt += sx, dy/dt += sy while moving",
     residuals="Positions are off in one direction of the room, whatever the heading, in proportion to the time driven.",
@@ -30,4 +30,5 @@ EFFECT = Effect(
         "apart."
     },
     apply=apply,
+    needs="track",
 )

@@ -1,4 +1,8 @@
-"""The tracked point is not above the middle of the axle."""
+"""The tracked point is not above the middle of the axle.
+
+A robot that turns about a point ahead of its axle or behind it (skid-steer: the instantaneous centre of rotation) looks the
+same from outside: a turning centre x ahead of the tracked point is a marker at forward -x.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +25,15 @@ EFFECT = Effect(
     name="marker-offset",
     stage="measure",
     parameters=(
-        Parameter("forward_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker ahead of the axle's middle"),
-        Parameter("left_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker to the left of the axle's middle"),
+        Parameter("forward_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker ahead of the axle's middle", size_power=1.0),
+        Parameter(
+            "left_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker to the left of the axle's middle", size_power=1.0
+        ),
     ),
     equation="x' = x + f·cos(theta) - s·sin(theta), y' = y + f·sin(theta) + s·cos(theta)",
     residuals="Turns on the spot move the robot on a circle; straight commands fit.",
     lookalikes=("side-slip", "turn-slip"),
-    sentence="the tracked marker does not sit over the middle of the axle",
+    sentence="the tracked marker does not sit over the point about which the robot turns, the middle of the axle",
     measurement="measure with a ruler where the marker sits, from the middle of the axle",
     apply=apply,
 )

@@ -29,4 +29,5 @@ EFFECT = Effect(
     sentence="the motors follow their commands with a lag",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
     apply=apply,
+    needs="track",
 )

@@ -43,5 +43,6 @@ EFFECT = Effect(
     sentence="something pulls the robot towards one place, as a cable does",
     measurement="repeat some trials with the cable unplugged or held up",
     apply=apply,
+    needs="track",
     starts=_starts(),
 )

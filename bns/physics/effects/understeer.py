@@ -20,7 +20,9 @@ EFFECT = Effect(
     name="understeer",
     stage="body",
     parameters=(
-        Parameter("loss_s_m", "s/m", -2.0, 2.0, (-0.4, 0.4), 0.0, "share of the turn rate lost per m/s (negative: oversteer)"),
+        Parameter(
+            "loss_s_m", "s/m", -2.0, 2.0, (-0.4, 0.4), 0.0, "share of the turn rate lost per m/s (negative: oversteer)"
+        ),
     ),
     equation="omega' = omega·max(1 - k·|v|, 0)",
     residuals="Turns on the spot fit; curves come out too straight, the more so the faster they are driven.",

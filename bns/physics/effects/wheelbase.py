@@ -22,7 +22,7 @@ EFFECT = Effect(
             "1",
             0.2,
             5.0,
-            (0.7, 1.5),
+            (0.7, 2.2),  # skid-steered robots turn as if their wheels stood up to twice as far apart
             1.0,
             "effective over nominal distance of the wheels; soft tyres lie above 1",
         ),

@@ -13,13 +13,13 @@ COMMANDS_A_CYCLE = 13
 PARAMETERS = ("a_lat_rad", "a_vert_rad", "omega_rad", "alpha_rad")
 
 
-def cycle_angles(parameters: ArrayLike, joints: int = 12) -> np.ndarray:
+def cycle_angles(parameters: ArrayLike, joints: int = 12, switched: bool = False) -> np.ndarray:
     """Angles (13, joints), rad, of every servo at every command of one cycle.
 
     ``parameters`` (4,): A_lateral, A_vertical, ω, α, as in `joint_angles`. ModelError unless 0 <= A_vert < A_lat <= π/2 (A_lat
     = 0 is a robot that lies still) and all are finite.
     """
-    return joint_angles(_checked(parameters), np.arange(COMMANDS_A_CYCLE), joints)
+    return joint_angles(_checked(parameters), np.arange(COMMANDS_A_CYCLE), joints, switched)
 
 
 def _checked(parameters: ArrayLike) -> np.ndarray:

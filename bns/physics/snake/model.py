@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from bns.extras import extra
 from bns.physics.snake.parameters import SnakeParameters
+from bns.physics.snake.servo import actuator_xml, joint_xml, servo_of
 
 with extra("snake"):
     import mujoco
 
 YELLOW, GREEN = "yellow", "green"
-"""Names of the marker sites; green is at the end with the Arduino and the tether."""
+"""Names of the marker sites."""
+_LESS_THAN_ANY = 1e-4
+"""Friction of the floor itself: of two that touch the larger friction counts, so that each link's own decides."""
 
 
 def build_model(parameters: SnakeParameters) -> mujoco.MjModel:
@@ -19,18 +22,15 @@ def build_model(parameters: SnakeParameters) -> mujoco.MjModel:
 
 def model_xml(p: SnakeParameters) -> str:
     """The model in MuJoCo's own language: links are capsules along x, y to the left, z up."""
-    motors = "".join(
-        f'<position joint="joint{n}" kp="{p.stiffness_n_m_rad}" '
-        f'forcerange="{-p.torque_limit_n_m} {p.torque_limit_n_m}"/>'
-        for n in range(p.joints)
-    )
+    servo = servo_of(p)
+    motors = "".join(actuator_xml(servo, f"joint{n}") for n in range(p.joints))
     return f"""
 <mujoco model="snake">
   <compiler angle="radian"/>
   <option timestep="{p.dt_s}" integrator="implicitfast" cone="elliptic" impratio="10"/>
   <visual><global offwidth="960" offheight="544"/><headlight ambient="0.4 0.4 0.4"/><quality shadowsize="0"/></visual>
   <default>
-    <joint damping="{p.damping_n_m_s_rad}" armature="{p.armature_kg_m2}" frictionloss="{p.friction_loss_n_m}"
+    <joint {joint_xml(servo)}
       range="-1.745 1.745" limited="true"/>
     <geom friction="{p.floor_friction} 0.005 0.0001" condim="3"/>
   </default>
@@ -40,7 +40,7 @@ def model_xml(p: SnakeParameters) -> str:
   </asset>
   <worldbody>
     <light pos="0 0 4" dir="0 0 -1" diffuse="0.5 0.5 0.5"/>
-    <geom name="floor" type="plane" size="10 10 0.1" material="floor"/>
+    <geom name="floor" type="plane" size="10 10 0.1" material="floor" friction="{_LESS_THAN_ANY} 0.005 0.0001"/>
     {_link(p, 0)}
   </worldbody>
   <actuator>{motors}</actuator>
@@ -51,7 +51,7 @@ def _link(p: SnakeParameters, n: int) -> str:
     """Link ``n`` and, inside it, all that follow: its frame is at the joint that carries it."""
     last = int(p.links) - 1
     half, end = p.pitch_m / 2, p.pitch_m - p.radius_m
-    mass = p.body_mass_kg / p.links + (p.tail_mass_kg if n == last else 0.0)
+    mass = p.body_mass_kg / p.links + (p.tail_mass_kg if n == p.heavy_link else 0.0)
     place = f'pos="0 0 {p.radius_m}"' if n == 0 else f'pos="{p.pitch_m} 0 0"'
     axis = "0 0 1" if (n - 1) % 2 == 0 else "0 1 0"
     joint = '<freejoint name="root"/>' if n == 0 else f'<joint name="joint{n - 1}" axis="{axis}"/>'

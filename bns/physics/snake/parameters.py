@@ -11,13 +11,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import number
+from bns.safe_yaml import read_yaml, shown
 
-BASIS = ("measured", "published", "guess")
+BASIS = ("measured", "published", "fitted", "guess")
 """How a value came to be known."""
+READINGS = ("tether_at_yellow", "tipped_on_the_way_fails", "tipped_on_the_way_ends", "roles_switch_on_side")
+"""Parameters that are 1 or 0: where the source can be read in two ways."""
 
 
 def _within(low: float, high: float) -> Any:
@@ -34,6 +35,7 @@ class SnakeParameters:
     body_mass_kg: float = _within(0.01, 50.0)
     tail_mass_kg: float = _within(0.0, 10.0)
     tether_drag_n: float = _within(0.0, 10.0)
+    tether_at_yellow: float = _within(0.0, 1.0)
     marker_gap_m: float = _within(0.01, 10.0)
     torque_limit_n_m: float = _within(0.01, 100.0)
     stiffness_n_m_rad: float = _within(0.01, 1000.0)
@@ -47,8 +49,13 @@ class SnakeParameters:
     settle_s: float = _within(0.0, 10.0)
     floor_friction: float = _within(0.01, 3.0)
     friction_spread: float = _within(0.0, 0.3)
+    link_friction_spread: float = _within(0.0, 1.0)
+    floor_tilt_rad: float = _within(0.0, 0.2)
     marker_noise_m: float = _within(0.0, 0.1)
     tipped_rad: float = _within(0.1, 3.2)
+    tipped_on_the_way_fails: float = _within(0.0, 1.0)
+    tipped_on_the_way_ends: float = _within(0.0, 1.0)
+    roles_switch_on_side: float = _within(0.0, 1.0)
     stalled_s: float = _within(0.0, 10.0)
     collision_n: float = _within(0.0, 100.0)
     dt_s: float = _within(1e-5, 0.02)
@@ -63,6 +70,9 @@ class SnakeParameters:
         """ModelError for numbers that are allowed each by itself, but are no body together."""
         if self.links != int(self.links):
             raise ModelError(f"snake: links is {self.links:g}; it must be a whole number.")
+        for name in READINGS:
+            if getattr(self, name) not in (0.0, 1.0):
+                raise ModelError(f"snake: {name} is {getattr(self, name):g}; it is a reading: give 1 (yes) or 0 (no).")
         if self.pitch_m <= 2 * self.radius_m:
             raise ModelError(
                 f"snake: pitch_m is {self.pitch_m:g} and radius_m {self.radius_m:g}; a link must be longer than it is wide: "
@@ -80,6 +90,11 @@ class SnakeParameters:
         return int(self.links) - 1
 
     @property
+    def heavy_link(self) -> int:
+        """The link that carries the Arduino and drags the tether: the first is at yellow's end, the last at green's."""
+        return 0 if self.tether_at_yellow else int(self.links) - 1
+
+    @property
     def length_m(self) -> float:
         """Length of the straight body."""
         return int(self.links) * self.pitch_m
@@ -92,10 +107,7 @@ class SnakeParameters:
 
 def read_parameters(text: str) -> SnakeParameters:
     """Parameters of a YAML text; ModelError names an entry that is missing, unknown or without its basis and reason."""
-    try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as fault:
-        raise ModelError(f"the snake's parameters are no valid YAML: {fault}. Correct the place it names.") from fault
+    content, _ = read_yaml(text, "the snake's parameters", ModelError)
     names = [field.name for field in dataclasses.fields(SnakeParameters)]
     if not isinstance(content, dict):
         raise ModelError(f"the snake's parameters are no mapping; give {', '.join(names)}.")
@@ -103,7 +115,7 @@ def read_parameters(text: str) -> SnakeParameters:
         if name not in names:
             raise ModelError(unknown_name("parameter of the snake", name, names))
         if not isinstance(entry, dict) or set(entry) != {"value", "basis", "reason"}:
-            raise ModelError(f"the snake's {name} is {entry!r}; it needs value, basis and reason.")
+            raise ModelError(f"the snake's {name} is {shown(entry)}; it needs value, basis and reason.")
         if entry["basis"] not in BASIS:
             raise ModelError(unknown_name(f"basis of the snake's {name}", entry["basis"], BASIS))
     if missing := [name for name in names if name not in content]:
@@ -114,4 +126,9 @@ def read_parameters(text: str) -> SnakeParameters:
 @cache
 def shipped_parameters() -> SnakeParameters:
     """The parameters that ship in the package."""
-    return read_parameters((Path(str(resources.files(__package__))) / "parameters.yaml").read_text())
+    return read_parameters(shipped_text())
+
+
+def shipped_text() -> str:
+    """The file that they stand in, each with its basis and reason."""
+    return (Path(str(resources.files(__package__))) / "parameters.yaml").read_text(encoding="utf-8")

@@ -13,48 +13,56 @@ from bns.robots.snake.rules import BOUNDS, LARGEST_AMPLITUDE_RAD, LARGEST_RATIO,
 
 CYCLES = 10
 """Distinct cycles of a controller."""
-PARENT_SHARE = 0.5
-"""Share of a child's components that come from either parent."""
 COLUMNS = ("a_lat_rad", "a_vert_rad", "omega_rad", "alpha_rad", "repeats")
 _MUTATION, _PROBE = np.uint32(Purpose.MUTATION), np.uint32(Purpose.PROBE)
 
 
-def random_cycles(key: Key, purpose: Purpose, step: int, n: int, length: int) -> Population:
-    """Uniform in all that is allowed: of two draws of an amplitude the larger is lateral."""
+def random_cycles(
+    key: Key, purpose: Purpose, step: int, n: int, length: int, sorted_amplitudes: bool = False
+) -> Population:
+    """Uniform in all that is allowed: A_lat in its range, A_vert below it; or the larger of two draws is lateral, if sorted."""
     u = component_draws(key, purpose, step, (n, length, len(COLUMNS)))
     commands = np.empty(u.shape, np.float32)
-    amplitudes = np.sort(u[..., :2], axis=-1)[..., ::-1] * LARGEST_AMPLITUDE_RAD
-    commands[..., :2] = amplitudes * (1.0, LARGEST_RATIO)
+    amplitudes = np.sort(u[..., :2], axis=-1)[..., ::-1] if sorted_amplitudes else np.cumprod(u[..., :2], axis=-1)
+    commands[..., :2] = amplitudes * (LARGEST_AMPLITUDE_RAD, LARGEST_AMPLITUDE_RAD * LARGEST_RATIO)
     commands[..., 2:4] = u[..., 2:4] * TURN_RAD
     commands[..., REPEATS] = 1 + np.floor(u[..., REPEATS] * MOST_REPEATS)
     return Population(np.clip(commands, BOUNDS.low, BOUNDS.high), np.full(n, length, np.int32))
 
 
 @inline
-def breed_pair(commands, order, cdf, rate, low, high, span, pair, step, k0, k1, children):  # type: ignore[no-untyped-def]  # compiled
+def breed_pair(commands, order, cdf, share, rate, low, high, span, pair, step, k0, k1, children):  # type: ignore[no-untyped-def]  # compiled
     """Both children of a pair, as far as there is room for them among children (n, cycles, 5); the first child is the elite."""
     a, b = couple(order, cdf, pair, step, k0, k1)
     for child in range(1 + 2 * pair, min(3 + 2 * pair, children.shape[0])):
         for j in range(children.shape[1]):
             command = children[child, j]
-            cross(commands[a, j], commands[b, j], PARENT_SHARE, j, pair, step, k0, k1, command)
+            cross(commands[a, j], commands[b, j], share, j, pair, step, k0, k1, command)
             mutate(command, rate, low, high, span, j, child, step, _MUTATION, k0, k1)
         a, b = b, a
 
 
 @exact
-def _breed_into(commands, order, cdf, rate, low, high, span, step, k0, k1, children):  # type: ignore[no-untyped-def]  # compiled
+def _breed_into(commands, order, cdf, share, rate, low, high, span, step, k0, k1, children):  # type: ignore[no-untyped-def]  # compiled
     children[0] = commands[order[0]]
     for pair in range(children.shape[0] // 2):
-        breed_pair(commands, order, cdf, rate, low, high, span, pair, step, k0, k1, children)
+        breed_pair(commands, order, cdf, share, rate, low, high, span, pair, step, k0, k1, children)
 
 
 def breed(
-    key: Key, parents: np.ndarray, order: np.ndarray, cdf: np.ndarray, rate: float, generation: int, children: np.ndarray
+    key: Key,
+    parents: np.ndarray,
+    order: np.ndarray,
+    cdf: np.ndarray,
+    share: float,
+    rate: float,
+    generation: int,
+    children: np.ndarray,
 ) -> None:
-    """One generation into children, as parents (n, cycles, 5): the best one as it is, uniform crossover, mutation (table 5.3)."""
+    """One generation into children, as parents (n, cycles, 5): the best one as it is, uniform crossover with that share of the
+    first parent, mutation (table 5.3)."""
     bounds = BOUNDS.low, BOUNDS.high, BOUNDS.mutation_span
-    _breed_into(parents, order, cdf, rate, *bounds, np.uint32(generation), *key.words, children)
+    _breed_into(parents, order, cdf, share, rate, *bounds, np.uint32(generation), *key.words, children)
 
 
 @exact

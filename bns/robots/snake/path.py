@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bns.tasks import Task
 
 START_M = ((-0.025, 0.0), (0.625, 0.0))
 """Yellow and green at the start of every task: 65 cm apart, facing east, their middle at (30, 0)."""
+YELLOW_ON_ORIGIN_M = ((0.0, 0.0), (0.65, 0.0))
+"""The other reading of section 5.3.3: yellow on the origin, so that their middle is at (32.5, 0)."""
 PENALTY_M = 10.0
 """For a position outside the surface, for one reached by an unstable cycle and for a goal missed after the current one:
 metres of distance, more than the surface is wide. The source says "a large constant"."""
@@ -22,15 +25,21 @@ STABLE = 8
 """Column of an observation that says whether the cycle was stable."""
 
 
-def walk(displacements: np.ndarray, changes: np.ndarray | None = None, rigid: bool = False) -> np.ndarray:
+def walk(
+    displacements: np.ndarray,
+    changes: np.ndarray | None = None,
+    rigid: bool = False,
+    start_m: ArrayLike = START_M,
+) -> np.ndarray:
     """Observations (n, 9) that displacements (n, 5) add up to.
 
     Columns: yellow x, y, green x, y at the begin of the cycle, the same at its end (m), and 1 for stable or 0. Both markers'
     frames have y from yellow to green and x to its right, as both stand at the begin of the cycle. A cycle begins where the one
     before ended, or where ``changes`` (n, 5), as of `posture.changes`, moved the markers. ``rigid``: both are on one body, so a
-    cycle leaves them as far apart as it found them, and a change as far as the posture puts them.
+    cycle leaves them as far apart as it found them, and a change as far as the posture puts them. ``start_m`` (2, 2): where the
+    markers are at first.
     """
-    markers, rows = np.array(START_M), []
+    markers, rows = np.array(start_m), []
     for i, moved in enumerate(displacements):
         before = markers if changes is None else moved_on(markers, changes[i], changes[i, 4] if rigid else None)
         markers = moved_on(before, moved, math.hypot(*(before[1] - before[0])) if rigid else None)
@@ -72,11 +81,11 @@ def middles(observations: np.ndarray) -> np.ndarray:
     return (observations[:, 4:6] + observations[:, 6:8]) / 2
 
 
-def evaluate_path(observations: np.ndarray, task: Task) -> tuple[float, int, int]:
+def evaluate_path(observations: np.ndarray, task: Task, start_m: ArrayLike = START_M) -> tuple[float, int, int]:
     """Algorithm 3 over one path: fitness per metre (0 if not finite), goals reached, cycles until the last goal or to the end."""
     total, goal, used = 0.0, 0, len(observations)
     half_x, half_y = task.surface_m[0] / 2, task.surface_m[1] / 2
-    position = np.mean(START_M, axis=0)
+    position = np.asarray(start_m, np.float64).mean(axis=0)
     for i, position in enumerate(middles(observations)):  # the last one counts below
         if abs(position[0]) > half_x or abs(position[1]) > half_y:
             total += PENALTY_M

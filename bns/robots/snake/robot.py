@@ -13,6 +13,7 @@ from bns.engine.snn import predict
 from bns.errors import SpecError
 from bns.robots.base import RandomStream, Scores, StagedTraining, rotate
 from bns.robots.snake import cycles, path, posture, table
+from bns.robots.snake.options import BEYOND, READINGS, Options
 from bns.robots.snake.rollout import evaluate
 from bns.robots.snake.rules import (
     BOUNDS,
@@ -26,6 +27,7 @@ from bns.robots.snake.rules import (
     REPEATS,
     SETTLE_S,
     STEP_RAD,
+    SUBSTITUTE_SD_M,
 )
 from bns.tasks import Task
 
@@ -34,11 +36,11 @@ class Snake:
     """Implements `bns.robots.base.Robot`: poses are observations (n, 9) as in `path.walk`.
 
     What the source leaves out can be switched on: ``changes`` (from one cycle to the next the markers move as `posture` says) and
-    ``rigid`` (the markers, which are on one body, cannot drift apart).
+    ``rigid`` (the markers, which are on one body, cannot drift apart); and other readings of it (`bns.robots.snake.options`).
     """
 
     name = "snake"
-    options = ("changes", "rigid")
+    options = tuple(sorted(BEYOND + READINGS))
     physics = "bns.physics.snake_drive"
     simulators = "bns.robots"
     two_wheeled = False
@@ -48,8 +50,8 @@ class Snake:
     input_count = 4
     sigmoid_output = True
     repeats_inputs = True
-    recipe: StagedTraining | None = StagedTraining(400, 20, 3, 20, 4, 12_000, (0.08, 0.08, 0.08, 0.08, 0.0))
-    """Section 5.4.1; the noise of the substitute world is 8 cm on every displacement (section 5.8)."""
+    recipe: StagedTraining | None = StagedTraining(400, 20, 3, 20, 4, 12_000, (*[SUBSTITUTE_SD_M] * 4, 0.0), ("crossover-80",))
+    """Section 5.4.1; crossover there is 80/20 (section 5.4.2)."""
     radii_m: tuple[float, ...] = ()
     bounds = BOUNDS
     command_columns = cycles.COLUMNS
@@ -59,7 +61,11 @@ class Snake:
     }
 
     def __init__(self, switched_on: tuple[str, ...] = ()) -> None:
+        self.switched_on, self._options = switched_on, Options(switched_on)
         self.with_changes, self.rigid = "changes" in switched_on, "rigid" in switched_on
+        self.parent_share = self._options.parent_share
+        self.nguyen_widrow, self.flat_spot = "nguyen-widrow" in switched_on, self._options.flat_spot
+        self.start_m, self.substitute_sd_m = self._options.start_m, self._options.noise_sd_m
 
     def with_options(self, names: tuple[str, ...]) -> Snake:
         """The snake with some of `options` switched on."""
@@ -67,11 +73,14 @@ class Snake:
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """Random cycles, as many as ``capacity`` allows up to ten; all controllers have the same number."""
-        return cycles.random_cycles(key, Purpose.INITIAL_COMMAND, 0, size, min(cycles.CYCLES, capacity))
+        return self._random(key, Purpose.INITIAL_COMMAND, size, min(cycles.CYCLES, capacity))
 
     def random_controllers(self, key: Key, count: int, length: int) -> Population:
         """Controllers of `length` random cycles, apart from every population's draws."""
-        return cycles.random_cycles(key, Purpose.PROBE, 0, count, length)
+        return self._random(key, Purpose.PROBE, count, length)
+
+    def _random(self, key: Key, purpose: Purpose, count: int, length: int) -> Population:
+        return cycles.random_cycles(key, purpose, 0, count, length, "sorted-amplitudes" in self._options)
 
     def perturb(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
         """Cycles (n, 5), each component moved within its mutation span."""
@@ -102,7 +111,7 @@ class Snake:
 
     def poses(self, displacements: np.ndarray, commands: np.ndarray | None = None) -> np.ndarray:
         """Observations (n, 9) from the start of every task, every repeat a row; changes are asked of the commands."""
-        return path.walk(displacements, self.changes(commands) if self.with_changes else None, self.rigid)
+        return path.walk(displacements, self.changes(commands) if self.with_changes else None, self.rigid, self.start_m)
 
     def changes(self, commands: np.ndarray | None) -> np.ndarray:
         """What the change into each of these cycles (n, 5) does, (n, 5) as of `posture.changes`."""
@@ -116,7 +125,7 @@ class Snake:
 
     def start_pose(self) -> np.ndarray:
         """Observation (1, 9) of a robot that has not moved yet."""
-        markers = np.ravel(path.START_M)
+        markers = np.ravel(self.start_m)
         return np.concatenate([markers, markers, [1.0]])[None]
 
     def pose_columns(self, poses: np.ndarray) -> dict[str, np.ndarray]:
@@ -137,11 +146,31 @@ class Snake:
         marked[[number - 1 for number in commands], path.STABLE] = 0.0
         return marked
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task) -> np.ndarray:
-        """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2)."""
+    def plan(
+        self, controller: np.ndarray, weights: np.ndarray | None, task: Task, stream: RandomStream | None = None
+    ) -> np.ndarray:
+        """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2).
+
+        With a stream these are as many as any of the noisy evaluations that decide on its fitness needed (figure 5.18); those
+        that did not finish do not count; where none did, all are driven.
+        """
         in_full = cycles.in_full(controller)
-        outputs = predict(weights, self.inputs(in_full), self.sigmoid_output)
-        return in_full[: path.evaluate_path(self.poses(self.displacements(outputs), in_full), task)[2]]
+        if weights is None:
+            return in_full
+        moved = self.displacements(predict(weights, self.inputs(in_full), self.sigmoid_output))
+        if stream is None or "cut-without-noise" in self._options:
+            return in_full[: self._needed(moved, in_full, task)[1]]
+        needed = []
+        for noise in self._noise(stream, len(in_full)):
+            noisy = moved.copy()
+            noisy[:, :4] += noise
+            needed.append(self._needed(noisy, in_full, task))
+        return in_full[: max((used for done, used in needed if done), default=len(in_full))]
+
+    def _needed(self, moved: np.ndarray, in_full: np.ndarray, task: Task) -> tuple[bool, int]:
+        """Whether a simulated path finishes the task, and after how many cycles."""
+        _, goals, used = path.evaluate_path(self.poses(moved, in_full), task, self.start_m)
+        return goals == len(task.goals_m), used
 
     def score(
         self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
@@ -149,16 +178,22 @@ class Snake:
     ) -> Scores:
         """Mean fitness over ten noisy evaluations, all controllers under the same noise; without a stream there is none."""
         commands = population.commands
+        outputs = predict(weights, self.inputs(commands.reshape(-1, commands.shape[2])), self.sigmoid_output)
+        return self.walk(population, self.displacements(outputs), task, stream)
+
+    def walk(
+        self, population: Population, displacements: np.ndarray, task: Task, stream: RandomStream | None = None
+    ) -> Scores:
+        """As `score`, from displacements (cycles, 5)."""
+        commands = population.commands
         n, length, _ = commands.shape
-        moves = np.ascontiguousarray(
-            self.displacements(predict(weights, self.inputs(commands.reshape(n * length, -1)), self.sigmoid_output)).T
-        )
+        moves = np.ascontiguousarray(displacements.T)
         fitness, reached, used = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int32)
         half = (task.region_m / 2, task.surface_m[0] / 2, task.surface_m[1] / 2)
         noise = self._noise(stream, length * MOST_REPEATS)
         repeats = np.ascontiguousarray(commands[..., REPEATS])
         moved = self._population_changes(commands)
-        failures = evaluate(moves, moved, self.rigid, repeats, noise, task.goals_m, *half, fitness, reached, used)
+        failures = evaluate(self.start_m, moves, moved, self.rigid, repeats, noise, task.goals_m, *half, fitness, reached, used)
         return Scores(fitness, reached, int(failures), used)
 
     def _population_changes(self, commands: np.ndarray) -> np.ndarray:
@@ -188,7 +223,7 @@ class Snake:
         children: Population,
     ) -> int:
         """Uniform crossover and mutation; the number of cycles does not change, so none is cut."""
-        cycles.breed(key, parents.commands, order, cdf, rate, generation, children.commands)
+        cycles.breed(key, parents.commands, order, cdf, self.parent_share, rate, generation, children.commands)
         children.lengths[:] = parents.lengths
         return 0
 
@@ -199,11 +234,11 @@ class Snake:
 
     def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
         """Algorithm 3: fitness per metre, goals reached."""
-        return path.evaluate_path(poses, task)[:2]
+        return path.evaluate_path(poses, task, self.start_m)[:2]
 
     def succeeded(self, poses: np.ndarray, task: Task) -> bool:
         """Whether all regions are reached in order."""
-        return path.evaluate_path(poses, task)[1] == len(task.goals_m)
+        return path.evaluate_path(poses, task, self.start_m)[1] == len(task.goals_m)
 
     def successes(self, poses: np.ndarray, task: Task) -> tuple[bool, ...]:
         """Empty: regions have no radius."""

@@ -7,16 +7,14 @@ import math
 import numpy as np
 
 from bns.engine.jit import exact
-from bns.robots.snake.path import LEAST_STABLE, START_M
+from bns.robots.snake.path import LEAST_STABLE
 from bns.robots.snake.rules import arrived, ended, moved_on, worth
-
-(_YX, _YY), (_GX, _GY) = START_M
 
 
 @exact
-def _along_path(moves, changes, rigid, first, repeats, noise, goals, half_region, half_x, half_y):  # type: ignore[no-untyped-def]  # compiled
+def _along_path(start, moves, changes, rigid, first, repeats, noise, goals, half_region, half_x, half_y):  # type: ignore[no-untyped-def]  # compiled
     """Sum of algorithm 3, goals reached and distinct cycles used by one controller under one row of noise (steps, 4)."""
-    yx, yy, gx, gy = _YX, _YY, _GX, _GY
+    yx, yy, gx, gy = start[0, 0], start[0, 1], start[1, 0], start[1, 1]
     total, goal, step, used = 0.0, 0, 0, 0
     x, y = (yx + gx) / 2, (yy + gy) / 2
     for j in range(repeats.size):
@@ -41,24 +39,25 @@ def _along_path(moves, changes, rigid, first, repeats, noise, goals, half_region
 
 
 @exact
-def evaluate(moves, changes, rigid, repeats, noise, goals, half_region, half_x, half_y, fitness, reached, used):  # type: ignore[no-untyped-def]  # compiled
+def evaluate(start, moves, changes, rigid, repeats, noise, goals, half_region, half_x, half_y, fitness, reached, used):  # type: ignore[no-untyped-def]  # compiled
     """Fitness (mean over the rows of noise, if there are any), goals and cycles without noise; how many could not be computed.
 
-    moves (5, controllers * cycles): displacements m and stability; changes (5, controllers * cycles) as of `posture.changes`, or
-    (5, 0) where they are ignored; rigid: the markers cannot drift apart; repeats (controllers, cycles); noise (rows, steps, 4) m.
+    start (2, 2): the markers, m; moves (5, controllers * cycles): displacements m and stability; changes (5, controllers *
+    cycles) as of `posture.changes`, or (5, 0) where they are ignored; rigid: the markers cannot drift apart; repeats
+    (controllers, cycles); noise (rows, steps, 4) m.
     """
     failures, nothing = 0, np.zeros((noise.shape[1], 4))
     for i in range(repeats.shape[0]):
         first = i * repeats.shape[1]
         total, reached[i], used[i] = _along_path(
-            moves, changes, rigid, first, repeats[i], nothing, goals, half_region, half_x, half_y
+            start, moves, changes, rigid, first, repeats[i], nothing, goals, half_region, half_x, half_y
         )
         mean = worth(total)
         if noise.shape[0] > 0:
             mean = 0.0
             for row in range(noise.shape[0]):
                 total, _, _ = _along_path(
-                    moves, changes, rigid, first, repeats[i], noise[row], goals, half_region, half_x, half_y
+                    start, moves, changes, rigid, first, repeats[i], noise[row], goals, half_region, half_x, half_y
                 )
                 mean += worth(total)
             mean /= noise.shape[0]

@@ -34,11 +34,14 @@ MIDDLE, HALF = (BOUNDS.low + BOUNDS.high) / 2, (BOUNDS.high - BOUNDS.low) / 2
 NOISE_SD_M = np.array([0.10, 0.05, 0.10, 0.05])
 """Noise in evolution on Δx and Δy of yellow, then of green (section 5.4.1)."""
 NOISY_EVALUATIONS = 10
+SUBSTITUTE_SD_M = math.sqrt(8) / 100
+"""Noise of the substitute world on every displacement: "a variance of 8 cm" (section 5.8), in cm²."""
 REACH_M = 2.0
 """Displacements from -1 to 1 m lie between outputs 0 and 1: the order of the largest that cycles make."""
 STEP_RAD = 2 * math.sin(math.pi / 12)
 """The longest of a cycle's twelve steps, a radian of its lateral amplitude."""
-JOINT_SPEED_RAD_S, SETTLE_S = 1.5, 0.05
+JOINT_SPEED_RAD_S, SETTLE_S = 2.944, 0.05
+"""As in `bns/physics/snake/parameters.yaml`."""
 
 
 @inline

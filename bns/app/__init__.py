@@ -1,0 +1,1 @@
+"""`bns explore`: the same functions as the command line's, with switches and pictures, in a browser on this machine."""

@@ -1,0 +1,86 @@
+"""`bns.explore`: the page in a browser on this machine."""
+
+from __future__ import annotations
+
+import threading
+from os import PathLike
+from typing import Any
+
+from bns.api.diagnose import DiagnoseResult
+from bns.api.measurements import Log
+from bns.api.model import Given
+from bns.app.background import Background
+from bns.app.tab import FIRST_MODEL, Tab, Tabs
+from bns.extras import require
+
+
+class Explorer:
+    """A page that is being served; ``address`` opens it in a browser on this machine."""
+
+    def __init__(self, tabs: Tabs, port: int = 0) -> None:
+        require("app", "panel", "bokeh")
+        from bns.app.page import page  # noqa: PLC0415  # needs Panel
+        from bns.app.server import PageServer  # noqa: PLC0415
+
+        self._server = PageServer(lambda: page(tabs), port)  # Panel would show a partial, not call it
+        self.address = self._server.address
+        self._thread: threading.Thread | None = None
+
+    def serve(self, browser: bool = True) -> None:
+        """Answer until Ctrl-C or SIGTERM."""
+        self._server.serve(browser)
+
+    def start(self, browser: bool = True) -> Explorer:
+        """Answer in the background, as notebooks need it."""
+        self._thread = threading.Thread(target=self._server.serve, args=(browser,), name="bns-explore", daemon=True)
+        self._thread.start()
+        return self
+
+    def stop(self) -> None:
+        """End it."""
+        self._server.stop()
+        if self._thread is not None:
+            self._thread.join(10)
+
+    def __repr__(self) -> str:
+        return f"<Explorer: {self.address}>"
+
+    def _repr_html_(self) -> str:
+        return f'<a href="{self.address}" target="_blank">bns explore</a>'
+
+
+def explore(
+    log: Log | DiagnoseResult | None = None, model: Given = FIRST_MODEL, *, port: int = 0, browser: bool = True
+) -> Explorer:
+    """Open the page and go on; ``.stop()`` ends it.
+
+    Args:
+        log: measurements, or what `bns.diagnose` found; without any, the page offers sample logs.
+        model: `bns.Model`, or the name or file of one; a diagnosis brings its own.
+        port: of this machine, by default any that is free.
+        browser: open it in the user's browser.
+
+    Raises:
+        DataError, ModelError: measurements or a model that cannot be used.
+        MissingExtraError: the extra ``app`` is not installed.
+    """
+    return Explorer(tabs_of(log, model), port).start(browser)
+
+
+def tabs_of(
+    log: Log | DiagnoseResult | None, model: Given, data_words: str = "", model_words: tuple[str, ...] = ()
+) -> Tabs:
+    """What every tab begins with."""
+    first, kept = Tab(), None
+    if isinstance(log, DiagnoseResult):
+        kept, model, log = Background(log), log.ready.model, log.ready.log
+    first.take(model, model_words or (_words(model),))
+    if log is not None:
+        first.open(log, data_words or _words(log))
+    if kept is not None:
+        first.diagnosis = kept
+    return Tabs(first)
+
+
+def _words(given: Any) -> str:
+    return str(given) if isinstance(given, str | PathLike) else str(getattr(given, "name", "log.csv"))

@@ -1,0 +1,92 @@
+"""Pieces of the page as HTML: every text that comes from a log, a file or a user is escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from bns.diagnose.predict.paired_errors import Change, HorizonErrors
+from bns.diagnose.report.plain_language import figures_in_words
+from bns.diagnose.report.tables import AHEAD
+from bns.physics.effect import Effect
+
+BADGE = '<span class="bns-badge">{}</span>'
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = "", identifier: str = "") -> str:
+    """A table that scrolls sideways by itself; the first cell of a row is its heading."""
+    head = "".join(f'<th scope="col">{escape(str(c))}</th>' for c in columns)
+    body = "".join(
+        f'<tr><th scope="row">{escape(str(row[0]))}</th>'
+        + "".join(f"<td>{escape(str(v))}</td>" for v in row[1:])
+        + "</tr>"
+        for row in rows
+    )
+    title = f"<caption>{escape(caption)}</caption>" if caption else ""
+    return (
+        f'<div class="bns-scroll" tabindex="0"><table class="bns-table" id="{escape(identifier)}">{title}'
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+    )
+
+
+def error_list(e: HorizonErrors) -> str:
+    """The models one after the other at a horizon, mm, with the change from the one before."""
+    rows = []
+    for index, m in enumerate(e.models):
+        change = e.changes[index - 1] if index else None
+        rows.append(
+            [
+                m.name if index == 0 or m.name == "by hand" else f"+ {m.name}",
+                mm(m.rms_m),
+                f"{mm(m.low_m)} to {mm(m.high_m)}" if np.isfinite(m.low_m) else "too few trials",
+                mm(m.median_m),
+                change_text(change) if change else "",
+            ]
+        )
+    rows.append(["noise of the tracking", mm(e.noise_floor_m), "", "", ""])
+    caption = f"Position error {AHEAD[e.horizon]} ahead, on {e.windows} windows of trials held out, the same for all"
+    left_out = f" ({e.left_out} left out: the tracker jumps within them)" if e.left_out else ""
+    columns = ["model", "error, mm", "95 %", "median, mm", "change, mm (95 %)"]
+    return table(columns, rows, caption + left_out, "bns-errors")
+
+
+def change_text(c: Change) -> str:
+    """A change with its interval, and whether it is one."""
+    if not np.isfinite(c.low_m):
+        return f"{1e3 * c.change_m:+.2f}"
+    said = "falls" if c.fell else "rises" if c.rose else "undecided"
+    return f"{1e3 * c.change_m:+.2f} ({1e3 * c.low_m:+.2f} to {1e3 * c.high_m:+.2f}) {said}"
+
+
+def mm(metres: float) -> str:
+    """Millimetres, two decimals; a question mark where nobody knows."""
+    return f"{1e3 * metres:.2f}" if np.isfinite(metres) else "?"
+
+
+def effect_text(effect: Effect, badges: Sequence[str], numbers: Mapping[str, Mapping[str, Any]], alone: str) -> str:
+    """What an effect is, what it looks like, its fitted numbers, what it earns alone, and what to beware of."""
+    fitted = "".join(
+        f"<br><b>{escape(name)}</b> = {n['value']:.5g} {escape(n['unit'])} ({_in_words(n)})"
+        for name, n in numbers.items()
+        if n["value"] is not None
+    )
+    like = f"<br>Looks like: {escape(', '.join(effect.lookalikes))}." if effect.lookalikes else ""
+    return (
+        f'<div class="bns-effect"><code>{escape(effect.equation)}</code> {"".join(BADGE.format(escape(b)) for b in badges)}'
+        f"{fitted}{f'<br>{escape(alone)}' if alone else ''}"
+        f"<details><summary>what it looks like</summary>{escape(effect.residuals)}{like}</details></div>"
+    )
+
+
+def _in_words(n: Mapping[str, Any]) -> str:
+    """A number with its 95 % interval, in units for people."""
+    value, interval = figures_in_words(n["value"], n["low"], n["high"], n["unit"])
+    return escape(f"{value}; 95 %: {interval}" if interval else value)
+
+
+def message(text: str) -> str:
+    """The library's own message, beside the field that it is about."""
+    return f'<p class="bns-error" role="alert">{escape(text)}</p>' if text else ""

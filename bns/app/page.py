@@ -1,0 +1,76 @@
+"""One page: five screens, of which one is shown, and a line that says what is at work."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import panel as pn
+
+from bns.app.jobs import Jobs
+from bns.app.parts import CSS, WIDE, html
+from bns.app.screens.data import DataScreen
+from bns.app.screens.effects import EffectsScreen
+from bns.app.screens.model import ModelScreen
+from bns.app.screens.next import NextScreen
+from bns.app.screens.where import WhereScreen
+from bns.app.tab import Tab, Tabs
+
+TITLE = "bns explore"
+
+
+def page(tabs: Tabs) -> Any:
+    """The page of the tab that the address names; a reload shows the same tab, a new address a new one."""
+    asked = pn.state.session_args.get("tab", [b""])[0].decode("ascii", "replace")
+    name, tab = tabs.get(asked)
+    template = pn.template.BootstrapTemplate(title=TITLE, header_background="#23395d", favicon=_ICON, raw_css=[CSS])
+    template.main.append(Screens(tab, name).view)
+    return template
+
+
+_ICON = (
+    "data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 8 8'><circle cx='4' cy='4' r='3' "
+    "fill='%230072B2'/></svg>#.svg"
+)
+"""Panel wants to see an ending."""
+
+
+class Screens:
+    """The screens of a tab; what is shown is made anew when it is entered."""
+
+    def __init__(self, tab: Tab, name: str) -> None:
+        self._said = html('<p class="bns-say" role="status"></p>')
+        self._jobs = Jobs(pn.state.curdoc, self._say)
+        self._screens: dict[str, Any] = {
+            "Data": DataScreen(tab, self._jobs),
+            "Model": ModelScreen(tab, self._jobs),
+            "Where it fails": WhereScreen(tab, self._jobs),
+            "Effects": EffectsScreen(tab, self._jobs),
+            "Next": NextScreen(tab, self._jobs),
+        }
+        names = list(self._screens)
+        self._chosen = pn.widgets.RadioButtonGroup(
+            name="Screen",
+            options=names,
+            value="Effects" if tab.bench else names[0],
+            button_type="primary",
+            button_style="outline",
+            **WIDE,
+        )
+        self._chosen.param.watch(lambda event: self._enter(event.new), "value")
+        self._shown = pn.Column(**WIDE)
+        self.view = pn.Column(self._chosen, self._said, self._shown, **WIDE)
+        pn.state.onload(lambda: self._loaded(name))
+        pn.state.on_session_destroyed(lambda _context: self._jobs.end())
+
+    def _loaded(self, name: str) -> None:
+        pn.state.location.update_query(tab=name)
+        self._enter(self._chosen.value)
+
+    def _enter(self, name: str) -> None:
+        screen = self._screens[name]
+        self._shown.objects = [screen.view]
+        screen.enter()
+
+    def _say(self, text: str) -> None:
+        self._said.object = f'<p class="bns-say" role="status">{escape(text)}{" …" if text else ""}</p>'

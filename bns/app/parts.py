@@ -1,0 +1,72 @@
+"""Widgets that every screen has: panes with the page's style, messages beside fields, buttons."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from html import escape
+from importlib import resources
+from typing import Any
+
+import panel as pn
+
+from bns.app.html import message
+
+CSS = (resources.files("bns.app") / "style.css").read_text(encoding="utf-8")
+NO_WIDER = {"max-width": "calc(100vw - 28px)"}
+"""What is wider than the window (a table) scrolls by itself; without this it would push everything beside it out of sight."""
+WIDE: dict[str, Any] = {"sizing_mode": "stretch_width", "styles": NO_WIDER}
+_ON_TOP = "@media (max-width: 720px) { :host { order: -1; } }"
+
+
+def html(text: str = "", **more: Any) -> Any:
+    """A pane of HTML that was put together by `bns.app.html`, which escapes."""
+    return pn.pane.HTML(text, stylesheets=[CSS], **{**WIDE, "margin": (4, 8), **more})
+
+
+def heading(text: str) -> Any:
+    """Of a part of a screen."""
+    return html(f"<h2 style='font-size:17px;margin:4px 0'>{text}</h2>")
+
+
+def button(name: str, clicked: Callable[[], object], kind: str = "default", **more: Any) -> Any:
+    """A button that does something."""
+    made = pn.widgets.Button(name=name, button_type=kind, width=None, **more)
+    made.on_click(lambda _event: clicked())
+    return made
+
+
+def drawn(figure: Any) -> Any:
+    """A Bokeh figure that takes the width there is."""
+    return pn.pane.Bokeh(figure, **WIDE)
+
+
+def row(*parts: Any, **more: Any) -> Any:
+    """Small parts in a line, which is broken where there is no room."""
+    return pn.FlexBox(*parts, **{**WIDE, **more})
+
+
+def beside(*parts: Any, least: int = 300, first: Any = None) -> Any:
+    """Parts next to each other where there is room, below each other where there is none, ``first`` on top then."""
+    styles = {"flex": f"1 1 {least}px", "min-width": f"min({least}px, calc(100vw - 28px))", **NO_WIDER}
+    cells = [
+        pn.Column(part, stylesheets=[_ON_TOP] if part is first else [], **{**WIDE, "styles": styles}) for part in parts
+    ]
+    return pn.Row(*cells, **{**WIDE, "styles": {"flex-wrap": "wrap", "gap": "8px", **NO_WIDER}})
+
+
+def download(name: str, filename: str, content: bytes, kind: str) -> str:
+    """A link, as HTML, that saves ``content``: a real one, which the keyboard reaches as well."""
+    data = base64.b64encode(content).decode()
+    return f'<a class="bns-download" download="{escape(filename)}" href="data:{kind};base64,{data}">{escape(name)}</a>'
+
+
+class Problem:
+    """Where the library's message stands, beside the field that it is about."""
+
+    def __init__(self) -> None:
+        self.view = html()
+
+    def show(self, text: str) -> None:
+        """The message; "" takes it away."""
+        self.view.object = message(text)

@@ -1,0 +1,244 @@
+"""Switch effects on and watch the error fall: the heart of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import panel as pn
+
+from bns.app.figures import LadderFigure, PathFigure
+from bns.app.html import error_list, message
+from bns.app.jobs import Jobs
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
+from bns.app.screens.diagnosis import DiagnosisPart
+from bns.app.screens.one_effect import OneEffect
+from bns.app.switches import Switches, Term
+from bns.app.tab import Tab
+from bns.app.workbench import Shown
+from bns.errors import ModelError
+from bns.physics.formula import ON, VARIABLES, formula_effect
+
+GROUPS = {"wheel": "Wheels", "body": "Body", "world": "Floor", "clock": "Clock", "measure": "Camera"}
+"""Stage of an effect -> what it is about, for people."""
+
+
+class EffectsScreen:
+    """Switches to the left, the list of errors and the paths to the right."""
+
+    def __init__(self, tab: Tab, jobs: Jobs) -> None:
+        self._tab, self._jobs = tab, jobs
+        self._shown: Shown | None = None
+        self._problem, self._formula_problem = Problem(), Problem()
+        self._effects: dict[str, OneEffect] = {}
+        self._switches = pn.Column(**WIDE)
+        self._errors, self._warnings = html(), html()
+        self._ladder = LadderFigure()
+        self._before = PathFigure("as given")
+        self._after = PathFigure("now", self._before)
+        self._horizon = pn.widgets.Select(name="Error how far ahead", options=["1s"], width=160)
+        self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
+        self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
+        self._diagnosis = DiagnosisPart(tab, self._refresh_effects, self._switch_to)
+        self._name = pn.widgets.TextInput(name="Name", value="mine", width=110)
+        self._term = pn.widgets.TextInput(name="Formula", placeholder="k * v * abs(w)", width=220)
+        self._on = pn.widgets.Select(name="Added to", options=list(ON), width=90)
+        self._add_term = button("Add the formula", self._take_term)
+        self._undo, self._redo = button("Undo", self._go_back), button("Redo", self._go_forward)
+        self._fit = button("Fit all numbers", self._fit_all)
+        self._watch()
+        self.view = self._laid_out()
+        self._bench: object = None
+
+    def enter(self) -> None:
+        """Shown anew: another log or model brings other effects."""
+        bench = self._tab.bench
+        if bench is None:
+            self._problem.show(self._tab.why_no_bench or "Open a log first: the screen Data.")
+            return
+        if bench is not self._bench:
+            self._bench = bench
+            self._effects.clear()
+            self._list_effects()
+            names = list(bench.ready.predictor.tracks.names)
+            self._trial.options = dict(zip(names, range(len(names)), strict=True))
+            self._horizon.options = list(bench.horizons)
+            self._horizon.value = bench.ready.predictor.near
+        self._problem.show("")
+        self.update()
+        self._diagnosis.enter()
+
+    def update(self) -> None:
+        """What is on is fitted, beside the page, and shown."""
+        bench, state = self._tab.bench, self._tab.now
+        if bench is None:
+            return
+        self._sync_switches(state)
+        if state.by_hand:  # nothing is fitted: quick enough to be done at once
+            self._show(bench.shown(state))
+            return
+        text = f"fitting {', '.join(state.on)}" if state.on else "judging the model as given"
+        self._jobs.run(text, lambda: bench.shown(state), self._show_if_current, self._failed)
+
+    def move(self, effect: str, parameter: str, value: float) -> None:
+        """A number was moved by hand."""
+        self._tab.history.to(self._tab.now.moved(effect, parameter, value))
+        self.update()
+
+    def switch(self, name: str, on: bool) -> None:
+        """An effect was switched on or off."""
+        if on != (name in self._tab.now.on):
+            self._tab.history.to(self._tab.now.switched(name, on))
+            self.update()
+
+    def _switch_to(self, names: tuple[str, ...]) -> None:
+        state = self._tab.now
+        for name in names:
+            state = state if name in state.on else state.switched(name, True)
+        self._tab.history.to(state)
+        self.update()
+
+    def _show_if_current(self, shown: Shown) -> None:
+        if shown.switches.on == self._tab.now.on and not self._tab.now.by_hand:
+            self._show(shown)
+
+    def _failed(self, text: str) -> None:
+        self._problem.show(text)
+        self._go_back()
+
+    def _show(self, shown: Shown) -> None:
+        self._shown = shown
+        self._problem.show("")
+        horizon = shown.errors.horizons[self._horizon.value]
+        self._errors.object = error_list(horizon)
+        self._warnings.object = "".join(message(w) for w in shown.warnings)
+        self._ladder.fill(horizon)
+        self._show_paths()
+        self._refresh_effects()
+        self._sync_switches(self._tab.now)
+
+    def _show_paths(self) -> None:
+        bench, shown = self._tab.bench, self._shown
+        if bench is None or shown is None or self._trial.value is None:
+            return
+        number = self._trial.value
+        t_s, measured = bench.measured(number)
+        trial = f"Trial {bench.ready.predictor.tracks.names[number]}"
+        for picture, steps, name in (
+            (self._before, shown.steps[0], "as given"),
+            (self._after, shown.steps[-1], shown.names[-1] if len(shown.names) > 1 else "now: nothing added"),
+        ):
+            picture.fill(f"{trial}: {name}", t_s, measured, bench.path(steps, number))
+        if len(t_s) and t_s[-1] > 0:
+            self._time.end = float(t_s[-1])
+        self._show_time()
+
+    def _show_time(self) -> None:
+        for picture in (self._before, self._after):
+            picture.at(min(self._time.value, self._time.end))
+
+    def _list_effects(self) -> None:
+        bench = self._tab.bench
+        assert bench is not None
+        named = {**bench.catalogue, **{t.name: bench.effect(self._tab.now, t.name)[0] for t in self._tab.now.terms}}
+        for name, effect in named.items():
+            if name not in self._effects or self._effects[name].effect is not effect:
+                self._effects[name] = OneEffect(effect, self.switch, self.move)
+        groups = []
+        for stage, title in GROUPS.items():
+            inside = [self._effects[n].view for n, e in named.items() if e.stage == stage]
+            if inside:
+                groups += [heading(title), *inside]
+        present = ", ".join(a.effect.name for a in bench.ready.model.effects)
+        there = [html(f"<p>In the model already: {present}.</p>")] if present else []
+        self._switches.objects = [*there, *groups]
+
+    def _refresh_effects(self) -> None:
+        if self._shown is not None:
+            for each in self._effects.values():
+                each.refresh(
+                    self._shown, self._diagnosis.alone(each.effect.name), self._diagnosis.ties(each.effect.name)
+                )
+
+    def _sync_switches(self, state: Switches) -> None:
+        for name, each in self._effects.items():
+            each.set_on(name in state.on)
+        history = self._tab.history
+        self._undo.disabled, self._redo.disabled = history.at == 0, history.at == len(history.states) - 1
+        self._fit.disabled = not state.by_hand
+
+    def _go_back(self) -> None:
+        self._tab.history.undo()
+        self._after_walk()
+
+    def _go_forward(self) -> None:
+        self._tab.history.redo()
+        self._after_walk()
+
+    def _after_walk(self) -> None:
+        if self._tab.now.terms:
+            self._list_effects()
+        self.update()
+
+    def _fit_all(self) -> None:
+        self._tab.history.to(self._tab.now.fitted())
+        self.update()
+
+    def _take_term(self) -> None:
+        bench, name = self._tab.bench, self._name.value_input or self._name.value
+        if bench is None or not self._check_term():
+            return
+        if name in bench.catalogue or any(a.effect.name == name for a in bench.ready.model.effects):
+            self._formula_problem.show(f"{name} is the name of a listed effect; give the formula another one.")
+            return
+        self._tab.history.to(self._tab.now.with_term(Term(name, self._term.value_input, self._on.value)))
+        self._list_effects()
+        self.update()
+
+    def _check_term(self) -> bool:
+        """Live: the library's own message, or nothing."""
+        text = self._term.value_input
+        try:
+            if text:
+                formula_effect(self._name.value_input or "mine", text, self._on.value)
+        except ModelError as fault:
+            self._formula_problem.show(str(fault))
+            return False
+        self._formula_problem.show("")
+        return bool(text)
+
+    def _watch(self) -> None:
+        for widget, act in (
+            (self._horizon, lambda: self._show(self._shown) if self._shown else None),
+            (self._trial, self._show_paths),
+            (self._time, self._show_time),
+            (self._on, self._check_term),
+        ):
+            _on_change(widget, "value", act)
+        _on_change(self._term, "value_input", self._check_term)
+
+    def _laid_out(self) -> Any:
+        variables = "; ".join(f"{name}: {text}" for name, text in VARIABLES.items())
+        formula = pn.Column(
+            heading("A formula of your own"),
+            row(self._name, self._term, self._on, self._add_term, align_items="end"),
+            self._formula_problem.view,
+            html(f"<details><summary>what may stand in it</summary>{variables}</details>"),
+            **WIDE,
+        )
+        left = pn.Column(self._diagnosis.view, self._switches, formula, **WIDE)
+        right = pn.Column(
+            row(self._undo, self._redo, self._fit),
+            row(self._horizon, self._trial),
+            self._errors,
+            drawn(self._ladder.figure),
+            self._warnings,
+            beside(drawn(self._before.figure), drawn(self._after.figure), least=280),
+            self._time,
+            **WIDE,
+        )
+        return pn.Column(self._problem.view, beside(left, right, least=330, first=right), **WIDE)
+
+
+def _on_change(widget: Any, what: str, act: Callable[[], object]) -> None:
+    widget.param.watch(lambda _event: act(), what)

@@ -1,0 +1,173 @@
+"""Where the model fails: the error of every window four ways, brushed together, and the worst moments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pandas as pd
+import panel as pn
+
+from bns.api.compare import CompareResult
+from bns.app.figures import PathFigure, WindowFigures
+from bns.app.html import mm, table
+from bns.app.jobs import Jobs
+from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, row
+from bns.app.tab import Tab
+from bns.app.workbench import Shown, Workbench
+from bns.diagnose.report.tables import AHEAD
+
+GIVEN, NOW = "as given", "as it is now"
+
+
+class WhereScreen:
+    """Numbers are those of `bns compare` of the chosen model."""
+
+    def __init__(self, tab: Tab, jobs: Jobs) -> None:
+        self._tab, self._jobs = tab, jobs
+        self._problem, self._pictures, self._path = Problem(), WindowFigures(), PathFigure("path")
+        self._which = pn.widgets.RadioButtonGroup(name="Model", options=[GIVEN, NOW], value=GIVEN)
+        self._horizon = pn.widgets.Select(name="Error how far ahead", options=["1s"], width=160)
+        self._variable = pn.widgets.Select(name="Along", options=["time_in_trial_s"], width=260)
+        self._worst = pn.widgets.Select(name="Worst moments", options=[], size=6, width=320)
+        self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
+        self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
+        self._errors, self._explained, self._brushed = html(), html(), html()
+        self._shown: Shown | None = None
+        self._windows = pd.DataFrame()
+        self._bench: Workbench | None = None
+        self._to_choose = True  # the variable that explains most is shown, until the user wants another
+        for widget, act in (
+            (self._which, self._begin),
+            (self._horizon, self._fill),
+            (self._variable, self._fill),
+            (self._trial, self._show_path),
+            (self._time, self._show_time),
+            (self._worst, self._go_to),
+        ):
+            _on_change(widget, act)
+        self._pictures.source.selected.on_change("indices", lambda _attr, _old, new: self._say_brushed(new))
+        self.view = self._laid_out()
+
+    def enter(self) -> None:
+        """The tab's log and model, compared."""
+        bench = self._tab.bench
+        if bench is None:
+            self._problem.show(self._tab.why_no_bench or "Open a log first: the screen Data.")
+            return
+        self._problem.show("")
+        if bench is not self._bench:
+            self._bench = bench
+            self._shown = None
+            names = list(bench.ready.predictor.tracks.names)
+            self._trial.options = dict(zip(names, range(len(names)), strict=True))
+            self._horizon.options, self._horizon.value = list(bench.horizons), bench.ready.predictor.near
+            self._variable.options, self._to_choose = list(bench.ready.predictor.variables()), True
+        self._begin()
+
+    def _begin(self) -> None:
+        bench = self._bench
+        if bench is None:
+            return
+        state, given = self._tab.now, self._which.value == GIVEN
+
+        def work() -> tuple[Shown, CompareResult]:
+            shown = bench.as_given if given else bench.shown(state)
+            return shown, self._tab.compared(shown.model)
+
+        self._jobs.run("comparing", work, lambda both: self._compared(*both), self._problem.show)
+
+    def _compared(self, shown: Shown, result: CompareResult) -> None:
+        self._shown, comparison = shown, result.comparison
+        rows = [
+            [AHEAD[h], mm(e["position_m"]), mm(e["position_se_m"]), mm(comparison.noise_floor_m(h)), int(e["windows"])]
+            for h, e in comparison.errors.items()
+            if e["windows"]
+        ]
+        columns = ["after", "error, mm", "± se", "noise, mm", "windows"]
+        self._errors.object = table(
+            columns, rows, f"Position error of the model {self._which.value}, nothing held out", "bns-compared"
+        )
+        explained = [
+            [p.variable, p.channel, f"{p.share:.2%}", f"{p.paired_comparison.p_value:.2g}"]
+            for p in comparison.residual_dependence[:8]
+        ]
+        columns = ["variable", "velocity", "share of loss", "p"]
+        self._explained.object = table(columns, explained, "What a free curve along each variable would explain")
+        best = [p.variable for p in comparison.residual_dependence if p.variable in self._variable.options]
+        if best and self._to_choose:
+            self._to_choose, self._variable.value = False, best[0]
+        self._worst.options = {
+            f"trial {w.trial}, from {w.t_s:.2f} s: {1e3 * w.position_m:.1f} mm": (w.trial, w.t_s)
+            for w in comparison.worst
+        }
+        self._fill()
+        if comparison.worst:
+            self._worst.value = next(iter(self._worst.options.values()))
+        self._show_path()
+
+    def _fill(self) -> None:
+        if self._shown is None or self._bench is None:
+            return
+        predictor, model = self._bench.ready.predictor, self._shown.model
+        self._windows = self._bench.windows(predictor.steps(model), self._horizon.value)
+        floor = self._shown.errors.horizons[self._horizon.value].noise_floor_m
+        self._pictures.fill(self._windows, self._variable.value, floor)
+        self._say_brushed([])
+
+    def _say_brushed(self, rows: list[int]) -> None:
+        chosen = self._windows.iloc[rows] if rows else self._windows
+        if not len(chosen):
+            return
+        rms = float((chosen["error_mm"] ** 2).mean() ** 0.5)
+        what = (
+            f"{len(rows)} windows brushed, of {chosen['trial'].nunique()} trials"
+            if rows
+            else f"All {len(chosen)} windows"
+        )
+        self._brushed.object = f"<p id='bns-brushed'>{what}: {rms:.2f} mm (root mean square)</p>"
+        if rows:
+            worst = chosen.iloc[int(chosen["error_mm"].to_numpy().argmax())]
+            self._trial.value = int(worst["number"])
+            self._time.value = min(float(worst["t_s"]), self._time.end)
+
+    def _go_to(self) -> None:
+        if self._bench is None or self._worst.value is None:
+            return
+        trial, t_s = self._worst.value
+        self._trial.value = self._trial.options[trial]
+        self._show_path()
+        self._time.value = min(t_s, self._time.end)
+
+    def _show_path(self) -> None:
+        if self._bench is None or self._shown is None or self._trial.value is None:
+            return
+        number = self._trial.value
+        t_s, measured = self._bench.measured(number)
+        path = self._bench.path(self._bench.ready.predictor.steps(self._shown.model), number)
+        self._path.fill(f"Trial {self._bench.ready.predictor.tracks.names[number]}", t_s, measured, path)
+        if len(t_s) and t_s[-1] > 0:
+            self._time.end = float(t_s[-1])
+        self._show_time()
+
+    def _show_time(self) -> None:
+        self._path.at(min(self._time.value, self._time.end))
+
+    def _laid_out(self) -> Any:
+        p = self._pictures
+        path = pn.Column(row(self._trial, self._worst), drawn(self._path.figure), self._time, **WIDE)
+        return pn.Column(
+            self._problem.view,
+            row(self._which, self._horizon, self._variable, align_items="end"),
+            beside(self._errors, self._explained),
+            heading("Every window: brush in one picture, see it in all"),
+            self._brushed,
+            beside(drawn(p.time), drawn(p.along), drawn(p.trial), drawn(p.floor), least=420),
+            heading("Measured and predicted"),
+            path,
+            **WIDE,
+        )
+
+
+def _on_change(widget: Any, act: Callable[[], object]) -> None:
+    widget.param.watch(lambda _event: act(), "value")

@@ -1,0 +1,60 @@
+"""What `bns servos` was asked for."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping
+
+from bns.hardware.clock import RealClock
+from bns.hardware.servo_chain import ServoLimits
+from bns.hardware.servo_setup import BAUDS, ServoBus, adapter
+
+
+def served(options: argparse.Namespace) -> int:
+    """Carry out one of them; 0 if all is fine, else 2."""
+    bus = ServoBus(options.port, RealClock())
+    try:
+        return _PARTS[options.part](bus, options)
+    finally:
+        bus.close()
+
+
+def scan(bus: ServoBus, options: argparse.Namespace) -> int:
+    """Print who answers."""
+    found = []
+    for servo in bus.scan(BAUDS if options.all_bauds else BAUDS[:1]):
+        found.append(servo)
+        print(servo, flush=True)
+    more = "" if options.all_bauds else " (1 Mbaud; --all-bauds tries others)"
+    print(f"{len(found)} ids answer{more}" if found else f"nobody answers{more}; is the supply on, the cable right?")
+    return 0 if found and all(servo.model for servo in found) else 2
+
+
+def set_id(bus: ServoBus, options: argparse.Namespace) -> int:
+    """Number a servo."""
+    print(bus.set_id(options.id, options.old))
+    return 0
+
+
+def check(bus: ServoBus, options: argparse.Namespace) -> int:
+    """Print the findings of the adapter and of each servo."""
+    there = list(bus.scan())
+    bad = sum(not servo.model for servo in there) + (not there)
+    for servo in there:
+        if not servo.model:
+            print(f"BAD  {servo}")
+            continue
+        if options.mend and (changed := bus.mend(servo.number)):
+            print(f"bns: servo {servo.number}: {', '.join(changed)} written", file=sys.stderr)
+        for finding in bus.check(servo.number, ServoLimits()):
+            bad += not finding.fine
+            print(finding)
+    for finding in adapter(options.port):
+        bad += not finding.fine
+        print(finding)
+    print("nobody answers" if not there else f"{bad} to be mended" if bad else "all fine")
+    return 2 if bad else 0
+
+
+_PARTS: Mapping[str, Callable[[ServoBus, argparse.Namespace], int]] = {"scan": scan, "set-id": set_id, "check": check}

@@ -1,0 +1,98 @@
+"""Which poses a tracker got wrong, judged from the tracks and commands alone: no model has a say in it.
+
+A pose that jumps away and back is taken as lost when a table is read (`checks`). What remains are jumps that last: the
+tracker took another marker, or somebody moved the robot. A window that spans one says nothing of any model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.settings import DEFAULTS
+
+LEAST_M = DEFAULTS.data.jump_m
+LEAST_RAD = DEFAULTS.data.jump_rad
+WAYS = DEFAULTS.data.fault_ways
+USUAL = DEFAULTS.data.fault_usual
+MOST_CUT = DEFAULTS.data.fault_most_cut
+FEWEST_FRAMES = DEFAULTS.data.fault_fewest_frames
+AROUND_S = DEFAULTS.data.fault_around_s
+
+
+def without_faults(tracks: Tracks) -> Tracks:
+    """The tracks without what comes after a jump in its trial: where the marker is wrong, its heading is wrong as well.
+
+    Where that would take more than `MOST_CUT` of all poses, jumps are the tracker's habit: they are marked (`Tracks.jumped`),
+    and everything goes on from where the tracker sees the robot.
+    """
+    found = jumps(tracks)
+    if not found.any():
+        return tracks
+    count = np.cumsum(found)
+    since_start: NDArray[np.int64] = count - np.repeat(count[tracks.first[:-1]], np.diff(tracks.first))
+    seen_before: NDArray[np.bool_] = np.asarray(since_start > 0)
+    if seen_before.mean() > MOST_CUT:
+        return replace(tracks, jumped=found)
+    return tracks.at_frames([np.flatnonzero(~seen_before[a:b]) + a for a, b in pairwise(tracks.first)])
+
+
+def jumps(tracks: Tracks) -> NDArray[np.bool_]:
+    """Frames (frames,) whose pose no drive leads to from the frame before."""
+    found = np.zeros(len(tracks.t_s), dtype=bool)
+    moved, turned = _changes(tracks.pose)
+    inner = np.ones(len(moved), dtype=bool)
+    inner[tracks.first[1:-1] - 1] = False
+    usual = _usual(moved[inner], turned[inner])
+    for trial, (a, b) in enumerate(pairwise(tracks.first)):
+        if b - a > 1:
+            found[a + 1 : b] = _of_trial(tracks, trial, slice(int(a), int(b)), usual)
+    return found
+
+
+def spans_jump(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Windows (windows,) from frame ``start`` to frame ``end`` with a jump on the way."""
+    if tracks.jumped is None:
+        return np.zeros(len(start), dtype=bool)
+    count = np.concatenate([[0], np.cumsum(tracks.jumped)])
+    return np.asarray(count[end + 1] > count[start + 1])
+
+
+def _of_trial(tracks: Tracks, trial: int, frames: slice, usual: tuple[float, float]) -> NDArray[np.bool_]:
+    """For the second frame of a trial and all after it; ``usual``: typical changes of trials too short to have their own."""
+    t_s = tracks.t_s[frames]
+    moved, turned = _changes(tracks.pose[frames])
+    fresh = (moved > 0) | (turned > 0)
+    fresh_at = np.maximum.accumulate(np.where(np.append(True, fresh), np.arange(len(t_s)), 0))
+    lasted = t_s[1:] - t_s[fresh_at[:-1]]  # since the pose last changed: slow trackers repeat theirs
+    way = _fastest(tracks, trial, t_s)[1:] * lasted
+    if len(t_s) >= FEWEST_FRAMES:
+        usual = _usual(moved, turned)
+    frames_long = np.maximum(lasted / np.median(lasted), 1.0)  # after a gap, the robot has gone on
+    far = moved > np.maximum(np.maximum(LEAST_M, WAYS * way), USUAL * usual[0] * frames_long)
+    return np.asarray(far | (turned > np.maximum(LEAST_RAD, USUAL * usual[1]) * frames_long))
+
+
+def _changes(pose: Array) -> tuple[Array, Array]:
+    """Distance (m) and turn (rad, the short way round) from each pose to the next, (n - 1,) each."""
+    turned = np.abs((np.diff(pose[:, 2]) + np.pi) % (2 * np.pi) - np.pi)
+    return np.hypot(*np.diff(pose[:, :2], axis=0).T), turned
+
+
+def _usual(moved: Array, turned: Array) -> tuple[float, float]:
+    """Medians of the changes where there is one."""
+    fresh = (moved > 0) | (turned > 0)
+    return (float(np.median(moved[fresh])), float(np.median(turned[fresh]))) if fresh.any() else (0.0, 0.0)
+
+
+def _fastest(tracks: Tracks, trial: int, t_s: Array) -> Array:
+    """The fastest wheel's commanded speed within `AROUND_S` of each time, m/s, (n,)."""
+    ends = np.cumsum(tracks.duration_s[trial])
+    speed = np.maximum(np.abs(tracks.left_m_s[trial]), np.abs(tracks.right_m_s[trial]))
+    first = np.searchsorted(ends, t_s - AROUND_S).clip(max=len(ends) - 1)
+    last = np.searchsorted(ends, t_s + AROUND_S).clip(max=len(ends) - 1)
+    return np.array([speed[i : j + 1].max() for i, j in zip(first, last, strict=True)])

@@ -1,0 +1,104 @@
+"""How much a tracked pose scatters, from the tracks alone: at rest, and at high frequency. No model has a say in it.
+
+Poses of a robot that stands, after commands of zero, scatter by the tracker's noise alone, slow wander of the picture
+included. While it drives under one command, a parabola through a few frames follows it and the rest is noise, white noise at
+least: slow noise follows the parabola, so this is a lower bound where the robot never stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.settings import DEFAULTS
+
+SETTLED_S = DEFAULTS.data.settled_s
+FEWEST_AT_REST = DEFAULTS.data.fewest_at_rest
+WIDTH = DEFAULTS.data.parabola_frames
+ORDER = DEFAULTS.data.parabola_order
+SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
+_NORMAL = 0.6745
+
+
+@dataclass(frozen=True)
+class TrackingNoise:
+    """Standard deviation of one tracked pose: each of x and y (m), and the heading (rad). ``basis``: at rest, high frequency."""
+
+    position_m: float
+    heading_rad: float
+    basis: str
+
+    def error_m(self, distance_m: Array) -> float:
+        """Root mean square position error of a perfect model, from noise at both ends of windows.
+
+        ``distance_m`` (windows,): how far the robot got; the heading's noise at the start turns the prediction.
+        """
+        square = 4 * self.position_m**2 + (self.heading_rad * distance_m) ** 2
+        return float(np.sqrt(square.mean())) if len(distance_m) else float("nan")
+
+
+def tracking_noise(tracks: Tracks) -> TrackingNoise | None:
+    """The noise of these tracks; None where they cannot tell (poses at the ends of commands alone, say)."""
+    if not (tracks.left_m_s.any() or tracks.right_m_s.any()):
+        return None  # no wheels, or a robot that was never told to move
+    rest = list(_at_rest(tracks))
+    if sum(map(len, rest)) >= FEWEST_AT_REST:
+        return _pooled(rest, "at rest")
+    return _high_frequency(tracks)
+
+
+def _at_rest(tracks: Tracks) -> Iterator[Array]:
+    """Deviations (n, 3) of the poses of each rest from their mean, as far as they tell of noise."""
+    for trial, (a, b) in enumerate(pairwise(tracks.first)):
+        t_s, ends = tracks.t_s[a:b], np.cumsum(tracks.duration_s[trial])
+        still = (tracks.left_m_s[trial] == 0) & (tracks.right_m_s[trial] == 0)
+        for k in np.flatnonzero(still):
+            begin = ends[k] - tracks.duration_s[trial][k] + SETTLED_S
+            inside = (t_s >= begin) & (t_s <= ends[k])
+            if inside.sum() >= 5:  # fewer share their mean with their noise
+                yield _centred(tracks.pose[a:b][inside])
+
+
+def _centred(pose: Array) -> Array:
+    values = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
+    spare = np.sqrt(len(values) / (len(values) - 1))
+    out: Array = (values - values.mean(axis=0)) * spare
+    return out
+
+
+def _pooled(parts: list[Array], basis: str) -> TrackingNoise:
+    off = np.concatenate(parts)
+    position = float(np.median(np.abs(off[:, :2]))) / _NORMAL  # of single marker faults the median takes no notice
+    return TrackingNoise(position, float(np.median(np.abs(off[:, 2]))) / _NORMAL, basis)
+
+
+def _high_frequency(tracks: Tracks) -> TrackingNoise | None:
+    """From what is left of a parabola through `WIDTH` frames of one command."""
+    projection = _residual_maker(WIDTH, ORDER)
+    middle, spare = projection[WIDTH // 2], float(np.sqrt(projection[WIDTH // 2, WIDTH // 2]))
+    parts = []
+    for trial, (a, b) in enumerate(pairwise(tracks.first)):
+        t_s = tracks.t_s[a:b]
+        if b - a < WIDTH or np.median(np.diff(t_s)) > 1 / SLOWEST_HZ:
+            continue
+        command = np.searchsorted(np.cumsum(tracks.duration_s[trial]), t_s - 1e-9)
+        values = np.column_stack([tracks.pose[a:b, :2], np.unwrap(tracks.pose[a:b, 2])])
+        held = np.append(False, (np.diff(values, axis=0) == 0).all(axis=1))
+        windows = np.lib.stride_tricks.sliding_window_view(values, WIDTH, axis=0)
+        one = command[WIDTH - 1 :] == command[: len(command) - WIDTH + 1]
+        repeats = np.convolve(held, np.ones(WIDTH), "valid") > 0
+        parts.append((windows @ middle)[one & ~repeats] / spare)
+    if sum(map(len, parts)) < FEWEST_AT_REST:
+        return None
+    return _pooled(parts, "high frequency")
+
+
+def _residual_maker(width: int, order: int) -> Array:
+    """What is left of values at equal distances after the best polynomial, (width, width)."""
+    powers = np.vander(np.linspace(-1, 1, width), order + 1)
+    out: Array = np.eye(width) - powers @ np.linalg.pinv(powers)
+    return out

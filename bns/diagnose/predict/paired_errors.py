@@ -1,0 +1,262 @@
+"""The one error that is shown: all models of a table, a verdict or a page, judged on the same windows.
+
+Windows are left out by the data's own evidence alone (a jump of the tracker, `tracker_faults`), before any model is asked, and
+counted. The change from one model to the next is paired by trial: a bootstrap draws whole trials, the same for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.data.tracker_faults import spans_jump
+from bns.diagnose.data.tracking_noise import TrackingNoise, tracking_noise
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.predict.horizons import Errors, errors_of
+from bns.diagnose.settings import DEFAULTS
+
+DRAWS = DEFAULTS.predict.interval_draws
+FEWEST_TRIALS = DEFAULTS.predict.interval_fewest_trials
+_SEED = DEFAULTS.predict.interval_seed
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """Errors of one model over the windows of a horizon.
+
+    Root mean square of the position with its 95 % interval, its median (m), and the root mean square of the heading (rad).
+    """
+
+    name: str
+    rms_m: float
+    low_m: float
+    high_m: float
+    median_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """Root mean square error of a model minus that of the one before it (m), with its 95 % interval; NaN where unknown."""
+
+    change_m: float
+    low_m: float
+    high_m: float
+
+    @property
+    def certainty(self) -> float:
+        """Size of the change in widths of its interval; 0 where there is no interval."""
+        width = self.high_m - self.low_m
+        return abs(self.change_m) / width if width > 0 else 0.0
+
+    @property
+    def fell(self) -> bool:
+        """The error is lower, whatever the luck of the trials."""
+        return self.change_m < 0 and not self.high_m >= 0
+
+    @property
+    def rose(self) -> bool:
+        """The error is higher, whatever the luck of the trials."""
+        return self.change_m > 0 and not self.low_m <= 0
+
+
+_UNKNOWN = Change(float("nan"), float("nan"), float("nan"))
+
+
+def _falls(changes: Sequence[Change]) -> bool:
+    known = [c for c in changes if np.isfinite(c.change_m)]
+    return bool(known) and max(known, key=lambda c: c.certainty).change_m < 0 and not any(c.rose for c in known)
+
+
+@dataclass(frozen=True)
+class HorizonErrors:
+    """All models at one horizon. ``windows`` were judged, ``left_out`` span a jump of the tracker.
+
+    ``changes[i]`` leads from model i to model i + 1; ``total`` from the first to the last.
+    """
+
+    horizon: str
+    windows: int
+    left_out: int
+    models: tuple[ModelError, ...]
+    changes: tuple[Change, ...]
+    total: Change | None
+    noise_floor_m: float
+
+    def change_between(self, before: str, after: str) -> Change:
+        """Of two models next to each other."""
+        names = [m.name for m in self.models]
+        return self.changes[names.index(before)] if names.index(after) == names.index(before) + 1 else _UNKNOWN
+
+
+@dataclass(frozen=True)
+class PairedErrors:
+    """`HorizonErrors` at every horizon, the noise that the tracks show (None: they cannot tell), the number of trials."""
+
+    horizons: Mapping[str, HorizonErrors]
+    noise: TrackingNoise | None
+    trials: int
+
+    def of(self, name: str) -> dict[str, ModelError]:
+        """One model's errors at every horizon."""
+        return {h: next(m for m in e.models if m.name == name) for h, e in self.horizons.items()}
+
+    @property
+    def falls(self) -> bool:
+        """Does the error fall from the first model to the last?
+
+        The horizon at which the change is surest decides; at none may it rise for certain.
+        """
+        return _falls([e.total for e in self.horizons.values() if e.total is not None])
+
+    def between(self, before: str, after: str) -> bool:
+        """Does the error fall from one model to the one that follows it? As `falls`."""
+        return _falls([c for e in self.horizons.values() for c in [e.change_between(before, after)]])
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values; metres and radians."""
+        return {h: _horizon_json(e) for h, e in self.horizons.items()}
+
+
+def paired_errors(predictor: Predictor, models: Sequence[tuple[str, Steps]]) -> PairedErrors:
+    """Judge what several models predict, in their order, on the same windows.
+
+    ``predictor`` holds all poses of the tracks; each model's steps are of its frames.
+    """
+    noise = _noise_of(predictor)
+    horizons = {h: _at_horizon(predictor, h, models, noise) for h in predictor.horizons}
+    return PairedErrors(horizons, noise, len(predictor.tracks))
+
+
+def judged_windows(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
+    """One model's errors over the windows that are judged, one row each."""
+    errors = errors_of(predictor, steps, horizon)
+    return errors.only(~spans_jump(predictor.tracks, errors.start, errors.end))
+
+
+def noise_json(errors: PairedErrors) -> dict[str, float | str] | None:
+    """What the tracks themselves say of their noise; None where they cannot."""
+    return None if errors.noise is None else dict(vars(errors.noise))
+
+
+def _noise_of(predictor: Predictor) -> TrackingNoise | None:
+    if predictor.tracking is not None:
+        return TrackingNoise(*predictor.tracking, "as the tracks tell")
+    return tracking_noise(predictor.tracks)
+
+
+def _at_horizon(
+    predictor: Predictor,
+    horizon: str,
+    models: Sequence[tuple[str, Steps]],
+    noise: TrackingNoise | None,
+) -> HorizonErrors:
+    tracks, trials = predictor.tracks, len(predictor.tracks)
+    start, end = predictor.windows(horizon)
+    kept = ~spans_jump(tracks, start, end)
+    errors = [(name, errors_of(predictor, steps, horizon)) for name, steps in models]
+    of_trial = tracks.trial[start[kept]]
+    squares: list[Array] = [
+        np.bincount(of_trial, e.position_m[kept] ** 2, minlength=trials).astype(np.float64) for _, e in errors
+    ]
+    counts = np.bincount(of_trial, minlength=trials)
+    draws = _Draws.over(counts)
+    summaries = tuple(
+        ModelError(
+            name,
+            _rms(e.position_m[kept]),
+            *draws.interval(draws.rms(square)),
+            _median(e.position_m[kept]),
+            _rms(e.heading_rad[kept]),
+        )
+        for (name, e), square in zip(errors, squares, strict=True)
+    )
+    changes = tuple(_change(a, b, draws) for a, b in pairwise(squares))
+    total = _change(squares[0], squares[-1], draws) if len(squares) > 1 else None
+    pose = tracks.pose
+    distance = np.hypot(*(pose[end[kept], :2] - pose[start[kept], :2]).T)
+    floor = noise.error_m(distance) if noise is not None else float("nan")
+    return HorizonErrors(horizon, int(kept.sum()), int((~kept).sum()), summaries, changes, total, floor)
+
+
+@dataclass(frozen=True)
+class _Draws:
+    """Bootstrap samples of the trials that have windows: how often each was drawn (draws, trials), and of how many windows."""
+
+    used: NDArray[np.bool_]
+    windows: Array
+    drawn: NDArray[np.int64] | None
+
+    @classmethod
+    def over(cls, counts: NDArray[np.int64]) -> _Draws:
+        used = counts > 0
+        n = int(used.sum())
+        enough = n >= FEWEST_TRIALS
+        drawn = np.random.default_rng(_SEED).multinomial(n, np.full(n, 1 / n), size=DRAWS) if enough else None
+        return cls(used, counts[used].astype(float), drawn)
+
+    def rms(self, squares: Array) -> Array:
+        """Root mean square of every sample, (draws,); ``squares`` (trials,): sums of squares. Empty where trials are few."""
+        if self.drawn is None:
+            return np.zeros(0)
+        out: Array = np.sqrt(self.drawn @ squares[self.used] / (self.drawn @ self.windows))
+        return out
+
+    @staticmethod
+    def interval(values: Array) -> tuple[float, float]:
+        """The middle 95 %; NaN of nothing."""
+        low, high = np.quantile(values, [0.025, 0.975]) if len(values) else (np.nan, np.nan)
+        return float(low), float(high)
+
+
+def _change(before: Array, after: Array, draws: _Draws) -> Change:
+    """``before``, ``after`` (trials,): sums of squares."""
+    windows = draws.windows.sum()
+    if not windows:
+        return _UNKNOWN
+    change = float(np.sqrt(after.sum() / windows) - np.sqrt(before.sum() / windows))
+    return Change(change, *draws.interval(draws.rms(after) - draws.rms(before)))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt((values * values).mean())) if len(values) else float("nan")
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values)) if len(values) else float("nan")
+
+
+def _horizon_json(e: HorizonErrors) -> dict[str, Any]:
+    return {
+        "windows": e.windows,
+        "windows_left_out": e.left_out,
+        "noise_floor_m": plain(e.noise_floor_m),
+        "models": [
+            {
+                "name": m.name,
+                "position_rms_m": plain(m.rms_m),
+                "position_rms_low_m": plain(m.low_m),
+                "position_rms_high_m": plain(m.high_m),
+                "position_median_m": plain(m.median_m),
+                "heading_rms_rad": plain(m.heading_rad),
+            }
+            for m in e.models
+        ],
+        "changes": [_change_json(c) for c in e.changes],
+        "total_change": None if e.total is None else _change_json(e.total),
+    }
+
+
+def _change_json(c: Change) -> dict[str, Any]:
+    return {"change_m": plain(c.change_m), "low_m": plain(c.low_m), "high_m": plain(c.high_m)}
+
+
+def plain(value: float) -> float | None:
+    """A float that JSON knows."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,77 @@
+"""What a stepwise selection comes to: candidates, steps, and the result with its implausible numbers named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from bns.diagnose.estimate.cross_validation import held_out_steps
+from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.significance import PairedComparison
+from bns.diagnose.predict.paired_errors import paired_errors
+from bns.diagnose.select.plausibility import implausible
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect added to a model: its fit, what it earned on held-out trials, and why it may not be taken."""
+
+    name: str
+    fit: Fit
+    paired_comparison: PairedComparison
+    rejected_because: str = ""
+
+
+@dataclass(frozen=True)
+class SelectionStep:
+    """One round: all candidates, best first, the threshold that the decoys set, and what was selected ("" for nothing)."""
+
+    ranking: tuple[Candidate, ...]
+    decoy_threshold: float
+    selected: str
+    passed_over: str = ""
+    """An implausible candidate that did clearly better than what was taken; "" if there was none."""
+
+
+@dataclass(frozen=True)
+class SelectionResult:
+    """The end of a search: accepted names in order, their fit, the rounds, and explanations of the same size that fit as well."""
+
+    problem: Problem
+    nominal: Fit
+    fit: Fit
+    accepted: tuple[str, ...]
+    steps: tuple[SelectionStep, ...]
+    competing_models: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def implausible(self) -> dict[str, str]:
+        """Accepted effects whose numbers are beyond what is plausible: name -> why. They predict better than any other set."""
+        why = {name: implausible(self.fit, name, bounds=False) for name in self.accepted}
+        return {name: text for name, text in why.items() if text}
+
+    def only(self, names: tuple[str, ...]) -> SelectionResult:
+        """The result with some of its effects, refitted."""
+        if not names:
+            return self.withdrawn()
+        model = self.fit.model
+        for name in self.accepted:
+            model = model if name in names else model.without(name)
+        problem = problem_for(self.problem.predictor, model, self.problem.pose_filter.noise)
+        return replace(self, problem=problem, fit=problem.fit(model), accepted=names, competing_models=())
+
+    def withdrawn(self) -> SelectionResult:
+        """The result without its effects: the model as it was, its numbers refitted."""
+        problem = problem_for(self.problem.predictor, self.nominal.model)
+        fit = problem.fit(self.nominal.model)
+        return replace(self, problem=problem, nominal=fit, fit=fit, accepted=(), competing_models=())
+
+
+def predicts_better(one: SelectionResult, other: SelectionResult) -> bool:
+    """Does the held-out error fall for certain from one result to the other, at one horizon at least, and rise at none?"""
+    predictor = one.problem.predictor
+    steps = [
+        (name, held_out_steps(predictor, r.problem.pose_filter, r.fit.model)) for name, r in (("a", one), ("b", other))
+    ]
+    errors = paired_errors(predictor, steps)
+    return errors.falls and any(e.total is not None and e.total.fell for e in errors.horizons.values())

@@ -1,0 +1,77 @@
+"""Settings of predictions, of the errors shown, and of the check that the model is one of this robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bns.diagnose.settings.setting import BY_HAND, setting
+
+
+@dataclass(frozen=True)
+class Predict:
+    """``predict/``: wheels, networks, horizons, paired errors, the check of the robot."""
+
+    horizons_s: tuple[tuple[str, float], ...] = setting(
+        (("1s", 1.0), ("5s", 5.0)),
+        "name, s",
+        f"Horizons between one command and the whole trial: a convention of the tables; {BY_HAND}.",
+    )
+    recent_s: float = setting(
+        0.15,
+        "s",
+        "How fast an event fades in the variables that say what has just happened: soon it does nothing any more; "
+        f"{BY_HAND}.",
+    )
+    coarse_s: float = setting(
+        0.1, "s", f"Longest step of the grid in a search over many poses that were thinned out, for speed; {BY_HAND}."
+    )
+    picture_rounds: int = setting(
+        3,
+        "rounds",
+        "Rounds in which a place in the picture is traced back to the floor: each leaves a power of the distortion.",
+    )
+    tail_s: float = setting(
+        1.0, "s", "What the last row says, a command or none, is in force this long: poses may be stamped early."
+    )
+    network_near_s: float = setting(
+        0.06, "s", f"A pose tracked this near the end of a command stands for it; {BY_HAND}."
+    )
+    middle_cycles: int = setting(3, "cycles", f"Cycles of the middle horizon; {BY_HAND}.")
+    fewest_cycles: int = setting(3, "cycles", f"Of fewer cycles no accuracy and no tracking noise is told; {BY_HAND}.")
+    marker_least_m: float = setting(
+        1e-4, "m", f"No camera is taken to see a marker better than to a tenth of a millimetre; {BY_HAND}."
+    )
+    interval_draws: int = setting(
+        1000, "samples", "Bootstrap samples: the ends of a 95 % interval are then known to 10 % of its width."
+    )
+    interval_fewest_trials: int = setting(
+        5, "trials", "Fewer trials give no interval: a bootstrap of four has 35 different samples."
+    )
+    interval_seed: int = setting(
+        20_260_101, "1", "A fixed key: the same data have the same interval. Any number would do."
+    )
+    robot_factor: float = setting(
+        3.0,
+        "1",
+        "Skid-steered robots turn as if their wheels stood up to twice as far apart; beyond that it is another robot, or units.",
+    )
+    robot_explained: float = setting(
+        0.25,
+        "1",
+        f"Another robot it is if turns that are scaled leave less than this share of the deviation; {BY_HAND}.",
+    )
+    robot_fewest: int = setting(5, "windows", f"Fewer windows of one second say nothing of the robot; {BY_HAND}.")
+    robot_clear_m: float = setting(
+        0.02, "m", f"Windows in which it was driven less far say nothing of its direction; {BY_HAND}."
+    )
+    robot_arc_rad: float = setting(
+        1.2, "rad", f"Turns that a model says are smaller can be told from one more round; {BY_HAND}."
+    )
+    robot_together: float = setting(
+        0.8, "1", f"Directions agree if the length of their mean is larger (1: all the same); {BY_HAND}."
+    )
+    robot_turned_rad: float = setting(
+        1.05,
+        "rad",
+        "A camera that is askew by less (60 degrees) is an effect, `camera-rotation`, and no mistaken frame.",
+    )

@@ -1,0 +1,47 @@
+"""Commands act on the ticks of a controller's clock, not when they are given.
+
+The clock is taken to start with the trial, as a program that is started for it does. Where it runs on freely each command
+is late by another part of the period: on average that is a `command-delay` of half of it, and the rest is scatter.
+"""
+
+from __future__ import annotations
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.scans import sampled
+from bns.physics.signals import Wheels
+
+
+def apply(wheels: Wheels, period_s: float) -> Wheels:
+    """Each wheel keeps the speed that it was told at the last multiple of ``period_s``."""
+    if period_s == 0.0:
+        return wheels
+    return wheels.turning(
+        sampled(wheels.left_m_s, wheels.step_s, period_s), sampled(wheels.right_m_s, wheels.step_s, period_s)
+    )
+
+
+EFFECT = Effect(
+    name="command-rate",
+    stage="wheel",
+    parameters=(
+        Parameter(
+            "period_s",
+            "s",
+            0.0,
+            5.0,
+            (0.0, 1.5),
+            0.0,
+            "time between two commands that the robot heeds",
+            resolution=1e-4,
+        ),
+    ),
+    equation="u'(t) = u(period·floor(t/period))",
+    residuals="Commands act late by anything from nothing to one period, by what is missing to the next tick of a clock.",
+    lookalikes=("command-delay", "motor-lag"),
+    sentence="the robot heeds new commands only so many times a second",
+    measurement="log on the robot when each command was carried out",
+    apply=apply,
+    needs="track",
+    # ticks late in a trial must fall into the right frame, so a period is found near these alone: makers choose round ones
+    starts=tuple((period,) for period in (0.04, 0.05, 0.08, 0.1, 0.125, 0.2, 0.25, 0.3, 0.4, 0.5, 0.75, 1.0)),
+)

@@ -1,0 +1,87 @@
+"""A round patch of floor on which the robot is slower: a carpet's edge, oil, a wet spot.
+
+Its rim is a tenth of its radius wide.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Array, Body, Wheels
+
+_RIM = 0.1
+_PIECE_S, _FEWEST = 0.4, 50
+"""Long enough that a pose's noise is small against the way, short enough to lie at one place."""
+_SIDE, _RADII, _TRIED = 13, (0.06, 0.1, 0.15, 0.22, 0.3), 4
+"""Discs that are looked at: centres a side, radii in diagonals of the floor; and how many of them begin a fit."""
+
+
+def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float) -> Body:
+    """All velocities times 1 - ``loss`` within ``radius_m`` of the place."""
+    if body.place is None:
+        return body  # first round of a simulation: nobody knows yet where the robot goes
+    away = np.hypot(body.place[..., 0] - x_m, body.place[..., 1] - y_m)
+    inside = np.clip((radius_m - away) / (_RIM * radius_m) + 0.5, 0.0, 1.0)
+    return body.scaled(1.0 - loss * inside)
+
+
+def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
+    """The discs in which the way that was seen differs most from the way that was told, per way told, from all around."""
+    middle, told, seen = _ways(wheels)
+    if len(told) < _FEWEST:
+        return ()
+    low, high = (np.quantile(middle, q, axis=0) for q in (0.03, 0.97))
+    east, north = (np.linspace(low[i], high[i], _SIDE) for i in (0, 1))
+    centres = np.stack(np.meshgrid(east, north), axis=-1).reshape(-1, 2)
+    away = np.hypot(*(middle[None] - centres[:, None]).transpose(2, 0, 1))
+    found = []
+    for radius in np.array(_RADII) * float(np.hypot(*(high - low))):
+        inside = (away < radius).astype(float)
+        way, got = inside @ told, inside @ seen
+        rest, kept = told.sum() - way, seen.sum() - got
+        with np.errstate(divide="ignore", invalid="ignore"):
+            loss = 1.0 - (got / way) / (kept / rest)
+            score = np.nan_to_num(loss**2 * way * rest / told.sum(), posinf=0.0)
+        found += [
+            (score[i], (*centres[i].tolist(), float(radius), float(np.clip(loss[i], -0.9, 0.9))))
+            for i in [int(score.argmax())]
+        ]
+    return tuple(start for _, start in sorted(found, reverse=True)[:_TRIED])
+
+
+def _ways(wheels: Wheels) -> tuple[Array, Array, Array]:
+    """Pieces of about `_PIECE_S`: where they lie (n, 2), the way of the robot's middle as told and as seen (n,)."""
+    if wheels.conditions.seen is None:
+        return np.zeros((0, 2)), np.zeros(0), np.zeros(0)
+    typical = float(np.median(wheels.step_s[wheels.step_s > 0]))
+    k = max(round(_PIECE_S / typical), 1)
+    driven = np.abs(wheels.left_m_s + wheels.right_m_s) / 2.0 * wheels.step_s
+    way = np.cumsum(driven, axis=1) - driven / 2.0
+    places, known = wheels.conditions.seen[..., :2], wheels.trial_s
+    told, seen = way[:, k::k] - way[:, :-k:k], np.hypot(*np.diff(places[:, ::k], axis=1).transpose(2, 0, 1))
+    lasted = known[:, k::k] - known[:, :-k:k]
+    middle = (places[:, :-k:k] + places[:, k::k]) / 2.0
+    good = np.isfinite(seen) & (told > 0.02 * np.quantile(told, 0.9)) & (lasted < 3 * _PIECE_S)
+    return middle[good], told[good], seen[good]
+
+
+EFFECT = Effect(
+    name="floor-patch",
+    stage="body",
+    parameters=(
+        Parameter("x_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "middle of the patch, east", resolution=2e-3),
+        Parameter("y_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "middle of the patch, north", resolution=2e-3),
+        Parameter("radius_m", "m", 5e-3, 1e3, (0.02, 100.0), 0.2, "of the patch", floor_share=0.33, resolution=2e-3),
+        Parameter("loss", "1", -1.0, 0.99, (-0.5, 0.95), 0.0, "share of speed lost on it (negative: faster)"),
+    ),
+    equation="v, s, omega times 1 - k where (x - px)^2 + (y - py)^2 < r^2",
+    residuals="All velocities are too small by one share at one place of the floor, whatever the heading; elsewhere all fits.",
+    lookalikes=("tether-pull", "lens-distortion"),
+    sentence="there is a patch of floor on which the robot is slower",
+    measurement="look at the floor there, or repeat trials with the start moved by twice the patch",
+    apply=apply,
+    needs="track",
+    needs_place=True,
+    starts_from=starts_from,
+)

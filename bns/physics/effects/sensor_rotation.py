@@ -1,0 +1,47 @@
+"""A sensor that rides on the robot, and measures motions in its own frame, is turned against the robot.
+
+For single relative motions only (scan matching). A tracker that sees poses in one frame shows the same as `camera-rotation`.
+The sensor's place is `marker-offset`, in the robot's frame: it acts before the turn.
+"""
+
+from __future__ import annotations
+
+import math
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import View
+
+
+def apply(view: View, angle_rad: float) -> View:
+    """Headings as the sensor has them: ``angle_rad`` to the left of the robot's; displacements in its frame follow."""
+    poses = view.poses.copy()
+    poses[..., 2] += angle_rad
+    return View(poses)
+
+
+EFFECT = Effect(
+    name="sensor-rotation",
+    stage="measure",
+    parameters=(
+        Parameter(
+            "angle_rad",
+            "rad",
+            -3.2,
+            3.2,
+            (-3.15, 3.15),
+            0.0,
+            "sensor's x axis against the robot's, left positive",
+            resolution=1e-3,
+        ),
+    ),
+    equation="theta' = theta + a: the displacement in the sensor's frame is the robot's, turned by -a",
+    residuals="Every displacement points away from straight ahead by one angle, the same one always, also in reverse.",
+    lookalikes=("side-slip", "marker-offset"),
+    sentence="the sensor is mounted turned against the robot",
+    measurement="drive straight along a wall and compare the wall's direction in the sensor's picture",
+    apply=apply,
+    needs="motions",
+    starts=tuple(
+        (sign * a,) for a in (0.01, 0.1, math.pi / 4, math.pi / 2, 3 * math.pi / 4, math.pi) for sign in (1, -1)
+    ),
+)

@@ -1,0 +1,221 @@
+"""The page in a browser, from a log with a hidden effect to the saved model. Skipped where there is no Chromium to drive."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import bns
+from bns.app.switches import Switches
+from bns.app.workbench import Workbench
+from bns.examples import FOLDER
+
+pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+
+LOG = FOLDER / "khepera-log.csv"
+CHROMIUM = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
+SLOW_MS = 30_000
+
+
+class Visit:
+    """A server of its own, and pages on it; everything odd that a page did is kept."""
+
+    def __init__(self, browser, *arguments):
+        command = [sys.executable, "-m", "bns", "explore", "--no-browser", *map(str, arguments)]
+        self.server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.address = self.server.stdout.readline().strip()
+        self.browser, self.outside, self.odd = browser, [], []
+
+    def open(self, width=1280, address=None):
+        page = self.browser.new_page(viewport={"width": width, "height": 1400})
+        page.set_default_timeout(SLOW_MS)
+        page.on("request", self._requested)
+        page.on("console", lambda said: self.odd.append(said.text) if said.type in {"error", "warning"} else None)
+        page.on("pageerror", lambda error: self.odd.append(str(error)))
+        page.goto(address or self.address)
+        return page
+
+    def _requested(self, request):
+        if not request.url.startswith((self.address, "data:", "blob:", self.address.replace("http", "ws", 1))):
+            self.outside.append(request.url)
+
+    def end(self):
+        self.server.send_signal(signal.SIGTERM)
+        said = self.server.communicate(timeout=30)
+        return self.server.returncode, said[1]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_api.sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="module")
+def visit(browser):
+    made = Visit(browser)
+    yield made
+    if made.server.poll() is None:
+        made.end()
+
+
+@pytest.fixture(scope="module")
+def page(visit):
+    made = visit.open()
+    made.get_by_role("button", name="Open the sample").click()
+    made.locator("#bns-log").wait_for()
+    return made
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return Workbench(LOG, "khepera")
+
+
+def go(page, screen, sign):
+    page.get_by_role("button", name=screen, exact=True).click()
+    page.locator(sign).wait_for()
+
+
+def error_of(page, model):
+    row = page.locator("#bns-errors tbody tr").filter(has=page.get_by_role("rowheader", name=model, exact=True))
+    row.wait_for()
+    return float(row.locator("td").first.inner_text())
+
+
+def shown(page, name):
+    """A screenshot, kept where the environment says so: pictures are looked at, not compared."""
+    folder = os.environ.get("BNS_SCREENSHOTS")
+    if folder:
+        page.wait_for_timeout(800)
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        page.screenshot(path=str(Path(folder) / f"{name}.png"))
+
+
+def test_what_is_odd_is_listed_beside_the_paths(page):
+    shown(page, "data")
+    assert "14 trials" in page.locator("#bns-log").inner_text()
+    assert page.locator("#bns-findings tbody tr").count() == len(bns.Measurements(LOG).findings)
+
+
+def test_the_error_falls_when_the_hidden_effect_is_switched_on(page, bench):
+    go(page, "Effects", "#bns-errors")
+    before = error_of(page, "as given")
+    page.get_by_role("checkbox", name="motor-lag:").check()
+    after = error_of(page, "+ motor-lag")
+    state = Switches().switched("motor-lag", True)
+    models = bench.shown(state).errors.horizons["1s"].models
+    assert [before, after] == [round(1e3 * m.rms_m, 2) for m in models]
+    assert after < before / 3
+    shown(page, "effects")
+
+
+def test_a_number_is_moved_with_the_keyboard_and_fitted_again(page):
+    page.get_by_role("slider").first.focus()
+    fitted = error_of(page, "+ motor-lag")
+    page.keyboard.press("ArrowRight")
+    assert error_of(page, "by hand") > 0
+    assert error_of(page, "+ motor-lag") == fitted
+    page.get_by_role("button", name="Fit all numbers").click()
+    page.get_by_role("rowheader", name="by hand").wait_for(state="detached")
+
+
+def test_undo_and_redo_walk_through_the_switches(page):
+    page.get_by_role("checkbox", name="turn-slip:").check()
+    error_of(page, "+ turn-slip")
+    page.get_by_text("does nothing that these data show", exact=True).first.wait_for()
+    page.get_by_role("button", name="Undo").click()
+    page.get_by_role("rowheader", name="+ turn-slip").wait_for(state="detached")
+    assert not page.get_by_role("checkbox", name="turn-slip:").is_checked()
+    page.get_by_role("button", name="Redo").click()
+    error_of(page, "+ turn-slip")
+    page.get_by_role("checkbox", name="turn-slip:").uncheck()
+    page.get_by_role("rowheader", name="+ turn-slip").wait_for(state="detached")
+
+
+def test_a_formula_with_a_mistake_is_answered_beside_its_field(page):
+    box = page.get_by_label("Formula")
+    box.press_sequentially("k * v *")
+    page.get_by_role("alert").filter(has_text="is no formula").wait_for()
+    box.press_sequentially(" abs(w)")
+    page.get_by_role("alert").filter(has_text="is no formula").wait_for(state="detached")
+
+
+def test_brushing_one_picture_counts_the_windows_in_it(page):
+    go(page, "Where it fails", "#bns-compared")
+    page.get_by_text("All 200 windows").wait_for()
+    shown(page, "where")
+    picture = page.locator(".bk-Figure").first
+    picture.scroll_into_view_if_needed()
+    box = picture.bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 150, steps=6)
+    page.mouse.up()
+    page.get_by_text(re.compile(r"\d+ windows brushed, of \d+ trials")).wait_for()
+
+
+def test_a_reload_in_mid_diagnosis_loses_nothing_and_another_tab_is_another(page, visit):
+    go(page, "Effects", "#bns-errors")
+    page.get_by_role("button", name="Diagnose in the background").click()
+    page.reload()
+    page.locator("#bns-errors").wait_for()
+    assert page.get_by_role("checkbox", name="motor-lag:").is_checked()
+    error_of(page, "+ motor-lag")
+    other = visit.open(400)
+    other.get_by_text("Nothing is open yet").wait_for()
+    other.close()
+    page.locator("#bns-verdict").wait_for()
+    assert "the motors follow their commands with a lag" in page.locator("#bns-verdict").inner_text()
+
+
+def test_the_model_is_saved_as_it_is_shown(page, tmp_path, bench):
+    go(page, "Next", "#bns-commands")
+    with page.expect_download() as got:
+        page.get_by_role("link", name="Save the model").click()
+    got.value.save_as(tmp_path / got.value.suggested_filename)
+    saved = bns.Model(tmp_path / "extended.yaml")
+    assert saved.sha256 == bench.shown(Switches().switched("motor-lag", True)).model.sha256
+    assert "motor-lag --model khepera -o extended.yaml" in page.locator("#bns-commands").inner_text()
+    shown(page, "next")
+
+
+def test_everything_can_be_read_on_a_narrow_screen(page, visit):
+    page = visit.open(400, page.url)
+    page.locator("#bns-errors").wait_for()
+    for screen, sign in (
+        ("Data", "#bns-log"),
+        ("Model", "#bns-model"),
+        ("Where it fails", "#bns-compared"),
+        ("Effects", "#bns-errors"),
+    ):
+        go(page, screen, sign)
+        page.wait_for_timeout(500)
+        shown(page, f"narrow-{screen.split()[0].lower()}")
+        wide = page.locator(".bk-Figure, .bns-scroll, input, button").evaluate_all(
+            "all => Math.max(...all.map(e => e.getBoundingClientRect().right))"
+        )
+        assert wide <= 400, screen
+    page.close()
+
+
+def test_nothing_was_asked_of_anybody_else_and_nothing_went_wrong(page, visit):
+    assert visit.outside == []
+    assert visit.odd == []
+    page.close()
+    code, said = visit.end()
+    assert code == 0
+    assert "bns/app" not in said, (
+        said
+    )  # no traceback of ours; Tornado may complain of a tab that closed while it was spoken to

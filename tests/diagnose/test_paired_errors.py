@@ -1,0 +1,161 @@
+"""The one error: the same number for the same thing in every command, on windows chosen without a model."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from bns.cli.main import main
+from bns.diagnose.data.checks import checked
+from bns.diagnose.data.tracker_faults import jumps, without_faults
+from bns.diagnose.data.tracking_noise import tracking_noise
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.predict.paired_errors import paired_errors
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.measurements import write_measurements
+from bns.physics.model import Model
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+@pytest.fixture(scope="module")
+def table():
+    return measured(hidden(turn_slip={"slip_s": 0.12}), trials=12, seed=4)
+
+
+def tracks(table):
+    return tracks_of(checked(table)[0])
+
+
+def moved(table, trials, by_m=0.14, turn_rad=0.2):
+    """The table with a jump that lasts in the middle of these trials."""
+    out = table.copy()
+    for trial in trials:
+        rows = out.index[out["trial"] == trial]
+        late = rows[len(rows) // 2 :]
+        out.loc[late, "x_m"] += by_m
+        out.loc[late, "heading_rad"] += turn_rad
+    return out
+
+
+def test_every_command_shows_the_same_error(table, tmp_path, capsys):
+    data = tmp_path / "log.parquet"
+    write_measurements(table, data)
+    ask = [str(data), "--model", "khepera", "--json"]
+    assert main(["compare", *ask]) == 0
+    compared = json.loads(capsys.readouterr().out)["error"]
+    assert main(["diagnose", *ask]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["effects"] == ["turn-slip"]
+    new = tmp_path / "new.yaml"
+    assert main(["add", "turn-slip", "--model", "khepera", "--data", str(data), "-o", str(new)]) == 0
+    told = capsys.readouterr().out
+    written = yaml.safe_load(new.read_text())
+    by_name = written["provenance"]["held_out_position_error_m"]
+    number = found["parameters"]["turn-slip"]["slip_s"]
+    assert written["effects"][0]["values"]["slip_s"] == pytest.approx(number["value"], rel=1e-9)
+    for horizon, error in found["error"].items():
+        assert error["before"] == pytest.approx(compared[horizon]["position_m"], rel=1e-12)
+        assert error["noise_floor"] == compared[horizon]["noise_floor_m"]
+        assert by_name["as given"][horizon] == pytest.approx(error["before"], abs=1e-6)
+        assert by_name["turn-slip"][horizon] == pytest.approx(error["after"], abs=1e-6)
+        assert f"{1e3 * error['after']:.2f}" in told
+
+
+def test_the_floor_is_the_same_under_every_model(table):
+    predictor = WheelPredictor(tracks(table))
+    floors = {
+        factor: paired_errors(predictor, [("m", predictor.steps(NOMINAL.with_effect("wheelbase", factor=factor)))])
+        for factor in (1.0, 1.6)
+    }
+    assert floors[1.0].horizons["1s"].noise_floor_m == floors[1.6].horizons["1s"].noise_floor_m
+    assert floors[1.0].noise.position_m == pytest.approx(0.0015, rel=0.15)
+    assert floors[1.0].noise.heading_rad == pytest.approx(0.005, rel=0.15)
+
+
+def test_noise_at_rest_includes_what_wanders_slowly():
+    """Correlated from frame to frame (0.9), of 2 mm: a parabola follows it, a robot at rest shows all of it."""
+    table = measured(NOMINAL, trials=8, seed=1, noise=(0.0, 0.0))
+    rng, rho = np.random.default_rng(0), 0.9
+    walk = np.zeros((len(table), 2))
+    for i in range(1, len(table)):
+        walk[i] = rho * walk[i - 1] + np.sqrt(1 - rho**2) * rng.normal(size=2)
+    table[["x_m", "y_m"]] += 0.002 * walk
+    quick = tracking_noise(tracks(table))
+    assert quick.basis == "high frequency"
+    assert quick.position_m < 0.0015
+    still = table.copy()
+    still[["left_m_s", "right_m_s"]] = 0.0
+    still["x_m"], still["y_m"] = 0.002 * walk[:, 0], 0.002 * walk[:, 1]
+    still["heading_rad"] = 0.0
+    still["trial"] = still["trial"] + 100
+    rest = tracking_noise(tracks(pd.concat([table, still], ignore_index=True)))
+    assert rest.basis == "at rest"
+    assert rest.position_m == pytest.approx(0.002, rel=0.3)
+
+
+def test_a_window_is_left_out_for_a_jump_and_never_for_a_bad_model(table):
+    wrong, seen = Model(wheelbase_m=0.3), tracks(moved(table, [3, 7]))
+    jumpy = replace(seen, jumped=jumps(seen))
+    predictor = WheelPredictor(jumpy)
+    errors = paired_errors(predictor, [("right", predictor.steps(NOMINAL)), ("wrong", predictor.steps(wrong))])
+    trial = errors.horizons["trial"]
+    assert (trial.windows, trial.left_out) == (10, 2)
+    assert trial.models[0].rms_m < trial.models[1].rms_m
+    assert trial.total.rose
+    assert not errors.falls
+    clean = WheelPredictor(tracks(table))
+    assert paired_errors(clean, [("wrong", clean.steps(wrong))]).horizons["trial"].left_out == 0
+
+
+def test_jumps_are_found_and_honest_gaps_are_not(table):
+    assert not jumps(tracks(table)).any()
+    gap = table.drop(index=table.index[10:18]).reset_index(drop=True)
+    assert not jumps(tracks(gap)).any()
+    found = tracks(moved(table, [2, 5, 9]))
+    found = replace(found, jumped=jumps(found))
+    assert sorted({found.names[found.trial[k]] for k in np.flatnonzero(found.jumped)}) == ["2", "5", "9"]
+    assert found.thinned(3).jumped.sum() == 3
+
+
+def test_what_follows_a_jump_is_left_out_unless_jumps_are_the_rule(table):
+    few, many = tracks(moved(table, [2, 5])), tracks(moved(table, range(12)))
+    cut = without_faults(few)
+    assert cut.jumped is None
+    half = int((few.trial == 2).sum()) // 2
+    assert (cut.trial == 2).sum() == half
+    assert (cut.trial == 3).sum() == (few.trial == 3).sum()
+    marked = without_faults(many)
+    assert len(marked.t_s) == len(many.t_s)
+    assert marked.jumped.sum() == 12
+
+
+def test_a_jump_is_listed_with_its_trial_and_time(table, tmp_path, capsys):
+    data = tmp_path / "jumpy.csv"
+    write_measurements(moved(table, [3]), data)
+    assert main(["compare", str(data), "--model", "khepera", "--findings"]) == 0
+    said = capsys.readouterr().err
+    assert "trial 3" in said
+    assert "jumps by" in said
+    assert "stays there" in said
+
+
+def test_jumps_do_not_bend_the_numbers(table, tmp_path, capsys):
+    numbers = {}
+    for name, rows in {"clean": table, "jumpy": moved(table, [3, 8])}.items():
+        data = tmp_path / f"{name}.parquet"
+        write_measurements(rows, data)
+        assert main(["diagnose", str(data), "--model", "khepera", "--json"]) == 0
+        answer = json.loads(capsys.readouterr().out)
+        assert answer["effects"] == ["turn-slip"]
+        numbers[name] = answer["parameters"]["turn-slip"]["slip_s"]
+    assert numbers["jumpy"]["value"] == pytest.approx(numbers["clean"]["value"], abs=2 * numbers["clean"]["se"])
+
+
+def test_what_lowers_nothing_is_said_so(table, tmp_path, capsys):
+    data = tmp_path / "log.parquet"
+    write_measurements(measured(NOMINAL, trials=12, seed=9), data)
+    assert main(["add", "wheelbase", "--model", "khepera", "--data", str(data), "-o", str(tmp_path / "n.yaml")]) == 0
+    assert "warning: " in capsys.readouterr().out

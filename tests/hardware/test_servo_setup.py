@@ -1,0 +1,136 @@
+"""New servos: who answers, an id each, settings that a drive needs."""
+
+import re
+
+import numpy as np
+import pytest
+
+from bns.cli.main import main
+from bns.errors import HardwareError
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.emulators.ax12 import Bus
+from bns.hardware.emulators.faults import Faults
+from bns.hardware.emulators.servo import Servo
+from bns.hardware.emulators.terminal import PseudoTerminal
+from bns.hardware.servo_setup import ServoBus, adapter
+from bns.hardware.snake_settings import snake_settings
+
+
+@pytest.fixture
+def bus(tmp_path, monkeypatch):
+    """bus(*ids, **registers) -> servos, path of the port; the command line runs on its clock."""
+    clock, opened = EmulatedClock(np.inf), []
+    monkeypatch.setattr("bns.cli.servos.RealClock", lambda: clock)
+    monkeypatch.setattr("bns.hardware.servo_setup._LAST_ID", 12)
+
+    def build(*ids, **registers):
+        servos = [Servo(number, clock, Faults(), **registers) for number in ids]
+        opened.append(PseudoTerminal(Bus(servos, clock), tmp_path, f"servos{len(opened)}"))
+        return servos, str(opened[-1].path)
+
+    build.clock = clock
+    yield build
+    for line in opened:
+        line.close()
+
+
+def call(capsys, *asked):
+    code = main(["servos", *(str(a) for a in asked)])
+    return code, capsys.readouterr()
+
+
+def test_scan_lists_who_answers(bus, capsys):
+    _, port = bus(1, 3, 7)
+    code, said = call(capsys, "scan", "--port", port)
+    assert code == 0
+    listed = [f"id {n} at 1000000 baud: AX-12" for n in (1, 3, 7)]
+    assert said.out.splitlines() == [*listed, "3 ids answer (1 Mbaud; --all-bauds tries others)"]
+
+
+def test_two_servos_of_one_id_are_noticed(bus, capsys):
+    _, port = bus(1, 1, 2)
+    code, said = call(capsys, "scan", "--port", port)
+    assert code == 2
+    assert "id 1 at 1000000 baud: garbled; more than one servo has this id. Connect them one at a time" in said.out
+    code, said = call(capsys, "set-id", 5, "--port", port)
+    assert code == 2
+    assert "Connect one servo alone: id 1 at 1000000 baud: garbled" in said.err
+
+
+def test_a_new_servo_gets_its_id(bus, capsys):
+    (servo,), port = bus(1)
+    code, said = call(capsys, "set-id", 7, "--port", port)
+    assert (code, servo.get("id")) == (0, 7)
+    assert said.out == "id 7 at 1000000 baud: AX-12\n"
+
+
+def test_ids_that_cannot_be_given(bus, capsys):
+    servos, port = bus(1, 2)
+    for asked, message in (
+        ((5,), "Connect one servo alone: id 1 .*; id 2 .*--from ID"),
+        ((2, "--from", 1), "another servo on this bus has the id 2"),
+        ((5, "--from", 4), "No single servo has the id 4"),
+        ((300, "--from", 1), "the id 300 is none; ids go from 0 to"),
+    ):
+        code, said = call(capsys, "set-id", *asked, "--port", port)
+        assert code == 2
+        assert [s.get("id") for s in servos] == [1, 2]
+        assert re.search(message, said.err)
+    assert call(capsys, "set-id", 5, "--from", 1, "--port", port)[0] == 0
+    assert [s.get("id") for s in servos] == [5, 2]
+
+
+def test_check_names_what_is_not_fit_and_mends_it(bus, capsys):
+    servos, port = bus(1, 2, status_return=1, cw_angle_limit=300)
+    code, said = call(capsys, "check", "--port", port)
+    assert code == 2
+    for what in ("return delay 500 µs", "status return level 1", "angle limits 300 to 1023"):
+        assert f"BAD  servo 2: {what}" in said.out
+    assert f"bns servos check --mend --port {port}" in said.out
+    assert servos[0].get("status_return") == 1  # nothing was written
+    code, said = call(capsys, "check", "--mend", "--port", port)
+    assert (code, said.out.splitlines()[-1]) == (0, "all fine")
+    assert [s.get("return_delay") for s in servos] == [0, 0]
+    assert "servo 1: status_return, return_delay, cw_angle_limit written" in said.err
+
+
+def test_thirteen_volts_are_refused(bus, capsys):
+    servos, port = bus(1, return_delay=0)
+    assert call(capsys, "check", "--port", port)[0] == 0
+    servos[0].put("present_voltage", 130)
+    code, said = call(capsys, "check", "--port", port)
+    assert code == 2
+    assert "BAD  servo 1: 13.0 V\n     try: a supply of 9 to 12.5 V; the makers allow 12 V" in said.out
+    with pytest.raises(HardwareError, match=r"high_v is 13; the servos' makers allow 12 V"):
+        snake_settings({"high_v": 13})
+
+
+def test_nobody_and_no_port(bus, capsys):
+    _, port = bus()
+    assert call(capsys, "check", "--port", port)[0] == 2
+    code, said = call(capsys, "scan", "--port", port)
+    assert code == 2
+    assert said.out.startswith("nobody answers")
+    code, said = call(capsys, "scan", "--port", "/dev/none")
+    assert code == 2
+    assert "/dev/none cannot be opened" in said.err
+
+
+def test_one_process_a_bus(bus):
+    _, port = bus(1)
+    first = ServoBus(port, bus.clock)
+    with pytest.raises(HardwareError, match=r"cannot be opened.*used by another program"):
+        ServoBus(port, bus.clock)
+    first.close()
+    ServoBus(port, bus.clock).close()
+
+
+def test_the_adapter_s_latency_timer(tmp_path):
+    timer = tmp_path / "ttyUSB0" / "device" / "latency_timer"
+    timer.parent.mkdir(parents=True)
+    timer.write_text("16\n")
+    (found,) = adapter("/dev/ttyUSB0", tmp_path)
+    assert str(found) == (
+        "BAD  /dev/ttyUSB0: latency timer 16 ms\n     try: echo 1 | sudo tee /sys/class/tty/ttyUSB0/device/latency_timer"
+    )
+    assert list(adapter("/dev/ttyACM0", tmp_path)) == []

@@ -1,0 +1,99 @@
+"""Listed effects of floors, casters and cameras, written a second time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.hidden_effects.cause import Body, Cause, Moment
+
+NEAR_M = 1e-4
+"""Two points of the robot, so far apart, show where a picture says that it heads."""
+
+
+@dataclass
+class FloorPatch(Cause):
+    """A round patch of floor, its rim sharp, on which the robot is slower."""
+
+    x_m: float
+    y_m: float
+    radius_m: float
+    loss: float
+    depends_on_pose = True
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        share = 1 - self.loss * (np.hypot(x - self.x_m, y - self.y_m) < self.radius_m)
+        return body._replace(forward=body.forward * share, turn=body.turn * share)
+
+
+@dataclass
+class QuadraticTurnSlip(Cause):
+    """Turning costs forward speed, with the square of the turn rate."""
+
+    slip_s2: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        return body._replace(forward=body.forward * np.maximum(1 - self.slip_s2 * body.turn * body.turn, 0.0))
+
+
+@dataclass
+class CasterSwing(Cause):
+    """A caster half a wheelbase ahead drags while it points another way than its pivot moves; it turns with the way."""
+
+    loss: float
+    trail_m: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        pivot = wheels.mean(axis=2) + 0.5j * (wheels[..., 1] - wheels[..., 0])
+        caster, out = np.zeros(len(wheels)), np.empty_like(wheels)
+        for i in range(wheels.shape[1]):
+            speed = np.abs(pivot[:, i])
+            off = np.angle(pivot[:, i] * np.exp(-1j * caster))
+            off = np.where(speed > 1e-3, off, 0.0)
+            out[:, i] = wheels[:, i] * (1 - self.loss * np.sin(off / 2) ** 2)[:, None]
+            caster = caster + off * np.minimum(speed * moment.step_s / self.trail_m, 1.0)
+        return out
+
+
+class Picture(Cause):
+    """A camera's picture of the floor: places and, by a second point a little ahead, headings."""
+
+    def pictured(self, places: np.ndarray) -> np.ndarray:
+        """Places (..., 2) as the picture shows them."""
+        raise NotImplementedError
+
+    def seen(self, poses: np.ndarray) -> np.ndarray:
+        heading = poses[..., 2]
+        ahead = poses[..., :2] + NEAR_M * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+        here, there = self.pictured(poses[..., :2]), self.pictured(ahead)
+        shown = np.arctan2(there[..., 1] - here[..., 1], there[..., 0] - here[..., 0])
+        nearest = heading + np.angle(np.exp(1j * (shown - heading)))
+        return np.concatenate([here, nearest[..., None]], axis=-1)
+
+
+@dataclass
+class TiltedCamera(Picture):
+    """A plane seen at a slant: homogeneous coordinates whose third is no longer one."""
+
+    x_per_m: float
+    y_per_m: float
+
+    def pictured(self, places: np.ndarray) -> np.ndarray:
+        homography = np.array([[1, 0, 0], [0, 1, 0], [self.x_per_m, self.y_per_m, 1]])
+        shown = np.concatenate([places, np.ones_like(places[..., :1])], axis=-1) @ homography.T
+        return shown[..., :2] / shown[..., 2:]
+
+
+@dataclass
+class LensDistortion(Picture):
+    """Radial, of third order, about a centre."""
+
+    per_m2: float
+    x_m: float
+    y_m: float
+
+    def pictured(self, places: np.ndarray) -> np.ndarray:
+        centre = np.array([self.x_m, self.y_m])
+        radius = np.linalg.norm(places - centre, axis=-1, keepdims=True)
+        return centre + (places - centre) * (1 + self.per_m2 * radius**2)

@@ -1,0 +1,108 @@
+"""Listed effects of controllers, gears and wheels, written a second time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from tests.hidden_effects.cause import Cause, Moment
+
+
+@dataclass
+class CommandQuantisation(Cause):
+    """The controller knows multiples of a step."""
+
+    step_m_s: float
+    share: float = 1.0
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        known = np.floor(wheels / self.step_m_s + 0.5) * self.step_m_s
+        return (1 - self.share) * wheels + self.share * known
+
+
+@dataclass
+class CommandRate(Cause):
+    """A command waits for the next tick of a clock that starts with the trial."""
+
+    period_s: float
+
+    def edges(self, edges_s: np.ndarray) -> np.ndarray:
+        return np.ceil(edges_s / self.period_s - 1e-6) * self.period_s
+
+
+@dataclass
+class WarmUp(Cause):
+    """Slow at the beginning of each trial."""
+
+    loss: float
+    time_s: float
+
+    def demand(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        return wheels * (1 - self.loss * np.exp(-np.maximum(moment.trial_s, 0.0) / self.time_s))[:, None]
+
+
+@dataclass
+class Stribeck(Cause):
+    """Friction that fades as a wheel turns faster."""
+
+    width_m_s: float
+    fade_m_s: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        size = np.abs(wheels)
+        braked = np.clip(size - self.width_m_s / np.exp(size / self.fade_m_s), 0.0, None)
+        return np.copysign(braked, wheels)
+
+
+@dataclass
+class Heating(Cause):
+    """Each motor's warmth: metres driven, forgotten with time, through the whole session."""
+
+    loss_per_m: float
+    cool_s: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        decay = np.exp(-moment.step_s / self.cool_s)
+        out, warm, left_at = np.empty_like(wheels), np.zeros(2), None
+        for trial in np.argsort(moment.session_s[:, 0], kind="stable"):
+            begin = moment.session_s[trial, 0] + moment.trial_s[0]
+            if left_at is not None:
+                warm = warm * np.exp(-(begin - left_at) / self.cool_s)
+            gained = np.abs(wheels[trial]) * moment.step_s
+            heat, _ = lfilter([1.0], [1.0, -decay], gained, axis=0, zi=(decay * warm)[None])
+            out[trial] = wheels[trial] * np.maximum(1 - self.loss_per_m * heat, 0.0)
+            # after its last command the robot only cools: what is left then may be reckoned back to the next trial's begin
+            warm, left_at = heat[-1], moment.session_s[trial, 0] + moment.trial_s[-1]
+        return out
+
+
+@dataclass
+class WheelEccentricity(Cause):
+    """The wheels' axles are not in their middles; each trial begins somewhere in a turn."""
+
+    left_share: float
+    right_share: float
+    turn_m: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        begun = moment.rng.uniform(0, 1, (len(wheels), 1, 2))
+        turns = begun + np.cumsum(wheels, axis=1) * (moment.step_s / self.turn_m)
+        return wheels * (1 + np.array([self.left_share, self.right_share]) * np.cos(2 * np.pi * turns))
+
+
+@dataclass
+class Backlash(Cause):
+    """A wheel that reverses has to take up a gap before it drives."""
+
+    gap_m: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        out = np.zeros_like(wheels)
+        tooth = np.full_like(wheels[:, 0], self.gap_m)  # where in the gap the motor's tooth is: 0 or gap_m drives
+        for i in range(wheels.shape[1]):
+            motor = tooth + wheels[:, i] * moment.step_s
+            tooth = np.clip(motor, 0.0, self.gap_m)
+            out[:, i] = (motor - tooth) / moment.step_s
+        return out

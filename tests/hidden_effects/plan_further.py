@@ -1,0 +1,114 @@
+"""Worlds of the longer list: each effect listed and taken out of it; three at once; other robots and trackers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from tests.hidden_effects.camera import Camera, Layout
+from tests.hidden_effects.world import Parameters, World
+
+LONGER: dict[str, tuple[Parameters, Parameters]] = {
+    "wheel-eccentricity": (
+        {"left_share": 0.12, "right_share": 0.0, "turn_m": 0.1288},
+        {"left_share": 0.15, "right_share": 0.2, "turn_m": 0.1288},
+    ),
+    "backlash": ({"gap_m": 0.004}, {"gap_m": 0.01}),
+    "caster-swing": ({"loss": 0.3, "trail_m": 0.03}, {"loss": 0.6, "trail_m": 0.05}),
+    "heating": ({"loss_per_m": 0.03, "cool_s": 60.0}, {"loss_per_m": 0.05, "cool_s": 90.0}),
+    "warm-up": ({"loss": 0.08, "time_s": 4.0}, {"loss": 0.25, "time_s": 3.0}),
+    "stribeck": ({"width_m_s": 0.02, "fade_m_s": 0.04}, {"width_m_s": 0.04, "fade_m_s": 0.05}),
+    "turn-slip-quadratic": ({"slip_s2": 0.03}, {"slip_s2": 0.07}),
+    "floor-patch": (
+        {"x_m": 0.8, "y_m": 0.5, "radius_m": 0.35, "loss": 0.12},
+        {"x_m": 0.6, "y_m": 0.6, "radius_m": 0.3, "loss": 0.35},
+    ),
+    "command-rate": ({"period_s": 0.2}, {"period_s": 0.5}),
+    "command-quantisation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
+    "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06}),
+    "lens-distortion": (
+        {"per_m2": -0.04, "x_m": 0.8, "y_m": 0.5},
+        {"per_m2": 0.08, "x_m": 0.7, "y_m": 0.4},
+    ),
+}
+"""Medium and strong, of the Khepera."""
+TURNING = {"backlash", "caster-swing", "stribeck"}
+"""Effects that show only where wheels reverse or turn slowly."""
+
+TRIPLES: tuple[dict[str, Parameters], ...] = (
+    {"speed-gain": {"gain": 0.94}, "wheel-mismatch": {"ratio": 0.975}, "motor-lag": {"tau_s": 0.12}},
+    {"wheelbase": {"factor": 1.08}, "side-slip": {"slip_s": 0.08}, "yaw-bias": {"rate_rad_s": -0.03}},
+    {
+        "dead-zone": {"width_m_s": 0.008},
+        "wheelbase": {"factor": 0.94},
+        "marker-offset": {"forward_m": 0.02, "left_m": 0.01},
+    },
+    {
+        "turn-slip": {"slip_s": 0.08},
+        "wheel-mismatch": {"ratio": 1.03},
+        "floor-slope": {"x_m_s": 0.006, "y_m_s": -0.003},
+    },
+    {"warm-up": LONGER["warm-up"][1], "wheelbase": {"factor": 1.06}, "camera-rotation": {"angle_rad": -0.06}},
+    {"floor-patch": LONGER["floor-patch"][1], "speed-gain": {"gain": 1.05}, "wheel-mismatch": {"ratio": 1.02}},
+    {"backlash": LONGER["backlash"][0], "motor-lag": {"tau_s": 0.1}, "wheel-mismatch": {"ratio": 0.98}},
+    {
+        "wheel-eccentricity": LONGER["wheel-eccentricity"][1],
+        "wheelbase": {"factor": 0.95},
+        "speed-limit": {"max_m_s": 0.16},
+    },
+)
+
+SIZED = ("tiny", "large", "vehicle")
+OF_SIZE: dict[str, Parameters] = {
+    "wheelbase": {"factor": 1.08},
+    "motor-lag": {"tau_s": 0.12},
+    "marker-offset": {"forward_m": 0.02, "left_m": -0.015},
+    "dead-zone": {"width_m_s": 0.01},
+    "turn-slip": {"slip_s": 0.06},
+}
+LENGTHS = {"forward_m", "left_m", "width_m_s"}
+REFERENCE_M = 0.0884
+
+NOISE = {
+    "5-hz": {"layout": Layout(frame_s=0.2)},
+    "100-hz": {"layout": Layout(frame_s=0.01)},
+    "8-mm": {"camera": Camera(0.008, 0.015, 0.001, 0.002)},
+    "ar1": {"camera": Camera(0.0015, 0.007, memory=0.9)},
+    "3-percent-lost": {"camera": Camera(0.0015, 0.007, lost=0.03, outliers=0.01)},
+}
+UNDER_NOISE: dict[str, Parameters] = {
+    "wheelbase": {"factor": 1.08},
+    "motor-lag": {"tau_s": 0.12},
+    "wheel-mismatch": {"ratio": 0.96},
+    "camera-rotation": {"angle_rad": -0.1},
+}
+
+
+def further() -> Iterator[World]:
+    """All of these families."""
+    yield from _longer()
+    for number, hidden in enumerate(TRIPLES):
+        plan = "mixed" if number % 2 or TURNING & set(hidden) else "forward"
+        yield World(f"triple-{'-'.join(hidden)}", "triple", hidden, plan=plan)
+    for robot in SIZED:
+        yield World(f"size-{robot}-none", "size", robot=robot)
+        for name, parameters in OF_SIZE.items():
+            yield World(f"size-{robot}-{name}", "size", {name: _sized(parameters, robot)}, robot=robot, plan="mixed")
+    for condition, changes in NOISE.items():
+        yield replace(World(f"size-{condition}-none", "size"), **changes)
+        for name, parameters in UNDER_NOISE.items():
+            yield replace(World(f"size-{condition}-{name}", "size", {name: parameters}), **changes)
+
+
+def _longer() -> Iterator[World]:
+    for number, (name, strengths) in enumerate(LONGER.items()):
+        for level, parameters in zip(("medium", "strong"), strengths, strict=True):
+            plan = "mixed" if name in TURNING or (number + (level == "strong")) % 2 else "forward"
+            yield World(f"new-{name}-{level}", "new", {name: parameters}, plan=plan)
+            out = World(f"removed-{name}-{level}", "removed", unlisted={name: parameters}, plan=plan)
+            yield replace(out, barred=(name,))
+
+
+def _sized(parameters: Parameters, robot: str) -> Parameters:
+    wide = {"tiny": 0.05, "large": 0.4, "vehicle": 1.5}[robot] / REFERENCE_M
+    return {name: value * wide if name in LENGTHS else value for name, value in parameters.items()}

@@ -1,0 +1,151 @@
+"""Gears, casters, controllers, patches, pictures: each effect against a calculation by hand and against a second code."""
+
+import numpy as np
+import pytest
+
+from bns.physics.differential_drive import observe, simulate
+from bns.physics.effect import REFERENCE_WHEELBASE_M
+from bns.physics.effects import all_effects, effect_named
+from bns.physics.effects.wheel_eccentricity import starts_from
+from bns.physics.model import Model
+from bns.physics.signals import Conditions, Wheels
+from tests.hidden_effects.driving import Driving
+from tests.hidden_effects.listed import cause
+from tests.hidden_effects.motion import move
+from tests.hidden_effects.plan_further import LONGER
+
+B = 0.0884
+IDEAL = Model(wheelbase_m=B)
+STRAIGHT = np.array([[0.1, -0.1, 0.1]])
+LEFT = np.array([[0.11, -0.15, 0.17, 0.045, 0.125]])
+RIGHT = np.array([[0.165, -0.05, 0.105, -0.09, 0.19]])
+LASTS = np.array([[1.1, 0.7, 0.9, 0.6, 1.3]])
+
+
+class NoLot:
+    """Wheels that begin where they are fastest."""
+
+    def uniform(self, low, high, shape):
+        return np.zeros(shape)
+
+
+def way(name, **values):
+    """Metres driven north-east by forward, backward, forward at 0.1 m/s, one second each."""
+    poses = simulate(IDEAL.with_effect(name, **values), STRAIGHT, STRAIGHT, np.ones((1, 3)))[0]
+    return np.diff(np.concatenate([[0.0], poses[:, 0]]))
+
+
+def test_backlash_takes_its_gap_at_every_reversal_and_none_at_the_start():
+    np.testing.assert_allclose(way("backlash", gap_m=0.01), [0.1, -0.09, 0.09], atol=1e-12)
+
+
+def test_a_caster_drags_after_reversals_for_its_trail():
+    driven = way("caster-swing", loss=0.5, trail_m=0.02)
+    assert driven[0] == pytest.approx(0.1)
+    assert -0.1 < driven[1] < -0.08
+    slower = way("caster-swing", loss=0.5, trail_m=0.05)
+    assert abs(slower[1]) < abs(driven[1])
+
+
+def test_warm_up_and_heating_lose_what_their_equations_say():
+    loss = 0.2 * 0.1 * 2.0 * (1 - np.exp(-1 / 2.0))  # 20 % of 0.1 m/s, fading within 2 s, over the first second
+    assert way("warm-up", loss=0.2, time_s=2.0)[0] == pytest.approx(0.1 - loss, rel=1e-4)
+    # warmth 0.1·t without cooling: half the last metre's loss on average
+    assert way("heating", loss_per_m=0.5, cool_s=1e5)[0] == pytest.approx(0.1 * (1 - 0.5 * 0.05), rel=1e-3)
+
+
+def test_motors_cool_between_trials_where_the_session_is_known():
+    step = np.full((2, 10), 0.1)
+    speed = np.full((2, 10), 0.2)
+    middle = np.cumsum(step, axis=1) - 0.05
+
+    def warmth(pause_s):
+        session = middle + np.array([[0.0], [1.0 + pause_s]])
+        wheels = Wheels(step, speed, speed, B, Conditions(session_s=session))
+        return effect_named("heating").apply(wheels, loss_per_m=0.5, cool_s=10.0).left_m_s
+
+    np.testing.assert_allclose(warmth(1e6)[1], warmth(1e6)[0], rtol=1e-9)
+    assert (warmth(0.0)[1] < warmth(5.0)[1]).all()
+    assert (warmth(5.0)[1] < warmth(1e6)[1]).all()
+
+
+def test_commands_wait_for_ticks_and_are_rounded():
+    late = simulate(IDEAL.with_effect("command-rate", period_s=0.4), [[0.1, 0.0]], [[0.1, 0.0]], [[0.6, 0.6]])[0]
+    assert late[1, 0] == pytest.approx(0.08)  # the stop at 0.6 s is heeded at 0.8 s
+    assert way("command-quantisation", step_m_s=0.03, share=1.0)[0] == pytest.approx(0.09)
+
+
+def test_a_patch_slows_where_it_lies():
+    model = IDEAL.with_effect("floor-patch", x_m=0.15, y_m=0.0, radius_m=0.05, loss=0.5)
+    assert simulate(model, [[0.1]], [[0.1]], [[2.0]])[0, 0, 0] == pytest.approx(0.15, abs=1e-3)
+    away = simulate(model, [[0.1]], [[0.1]], [[2.0]], start=(0.0, 1.0, 0.0))
+    assert away[0, 0, 0] == pytest.approx(0.2)
+
+
+def test_a_turned_sensor_turns_displacements_and_keeps_its_lever_arm_in_the_robots_frame():
+    model = IDEAL.with_effect("marker-offset", forward_m=0.02, left_m=0.0).with_effect(
+        "sensor-rotation", angle_rad=np.pi / 2
+    )
+    one, two = observe([[0.0, 0.0, 0.0], [0.1, 0.0, np.pi / 2]], None, model)
+    np.testing.assert_allclose(two[:2] - one[:2], [0.08, 0.02], atol=1e-12)
+    assert one[2] == pytest.approx(np.pi / 2)
+
+
+@pytest.mark.parametrize("name", LONGER)
+def test_the_judges_second_equations_agree(name):
+    values = LONGER[name][1]
+    if name == "floor-patch":
+        values = {"x_m": 0.9, "y_m": 0.45, "radius_m": 0.08, "loss": 0.3}
+    full = values | ({"share": 1.0} if name == "command-quantisation" else {})
+    start = np.array([[0.8, 0.4, 0.3]])
+    model = IDEAL.with_effect(name, **full)
+    ours = observe(simulate(model, LEFT, RIGHT, LASTS, start=start), None, model)[0]
+    edges = np.concatenate([[[0.0]], np.cumsum(LASTS, axis=1)], axis=1)
+    driving = Driving(np.stack([LEFT, RIGHT], axis=-1), edges, np.array([5]), start, np.zeros(1))
+    hidden = [cause(name, values)]
+    paths = move(driving, B, hidden, np.zeros((1, 5, 2)), NoLot())
+    theirs = hidden[0].seen(paths.at(0, edges[0, 1:]))
+    np.testing.assert_allclose(ours[:, :2], theirs[:, :2], atol=1e-3)
+    np.testing.assert_allclose(ours[:, 2], theirs[:, 2], atol=5e-3)
+    plain = simulate(IDEAL, LEFT, RIGHT, LASTS, start=start)[0]
+    assert np.abs(ours - plain).max() > 5e-3
+
+
+def test_where_a_wheel_stood_is_read_from_the_other_half_of_the_trial():
+    rng = np.random.default_rng(3)
+    step = np.full((8, 200), 0.04)
+    left, right = (np.repeat(rng.uniform(0.05, 0.2, (8, 8)), 25, axis=1) for _ in range(2))
+    phase = rng.uniform(0, 2 * np.pi, (8, 1))
+    angle = phase + 2 * np.pi * (np.cumsum(left * step, axis=1) - left * step / 2) / 0.13
+    really = left * (1 + 0.2 * np.cos(angle))
+    rate = (right - really) / B * step
+    heading = np.cumsum(rate, axis=1) - rate / 2 + rng.normal(0, 0.004, (8, 200))
+    seen = np.stack([np.zeros_like(heading), np.zeros_like(heading), heading], axis=2)
+    wheels = Wheels(step, left, right, B, Conditions(seen=seen))
+    turned = effect_named("wheel-eccentricity").apply(wheels, left_share=0.2, right_share=0.0, turn_m=0.13)
+    assert np.std(turned.left_m_s - really) < 0.2 * np.std(left - really)
+    assert any(share > 0 and abs(turn - 0.13) < 0.004 for share, _, turn in starts_from(wheels))
+    early = np.arange(200) < 100
+    other = heading + rng.normal(0, 0.5, heading.shape) * early  # what the early half shows must not matter to itself
+    noisy = Wheels(step, left, right, B, Conditions(seen=np.stack([0 * other, 0 * other, other], axis=2)))
+    again = effect_named("wheel-eccentricity").apply(noisy, left_share=0.2, right_share=0.0, turn_m=0.13)
+    np.testing.assert_array_equal(again.left_m_s[:, early], turned.left_m_s[:, early])
+
+
+def test_ranges_grow_with_the_robot():
+    gap = effect_named("backlash")
+    assert gap.scaled(REFERENCE_WHEELBASE_M) is gap
+    large = gap.scaled(10 * REFERENCE_WHEELBASE_M)
+    assert large.parameters[0].plausible[1] == pytest.approx(10 * gap.parameters[0].plausible[1])
+    assert large.starts[0][0] == pytest.approx(10 * gap.starts[0][0])
+    for effect in all_effects().values():
+        for wheelbase in (0.05, 0.4, 1.5):
+            for p in effect.scaled(wheelbase).parameters:
+                assert p.low <= p.plausible[0] < p.plausible[1] <= p.high
+
+
+def test_a_patch_covers_no_whole_floor():
+    patch = effect_named("floor-patch").within(1.5)
+    radius = patch.parameters[2]
+    assert radius.high == radius.plausible[1] == pytest.approx(0.33 * 1.5)
+    assert effect_named("backlash").within(1.5) is effect_named("backlash")
