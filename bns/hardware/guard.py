@@ -20,6 +20,7 @@ import numpy as np
 from bns.errors import HardwareError, StopNotConfirmedError
 from bns.hardware.clock import RealClock
 from bns.hardware.platform import Driven, Platform
+from bns.hardware.safety import Stopping
 from bns.hardware.serial_link import no_port, why_not_opened
 from bns.hardware.stop import Stop
 from bns.hardware.stop_recipe import StopRecipe
@@ -64,8 +65,14 @@ class Guard:
         answer = self._first_answer()
         self._control.setblocking(False)
         if answer["kind"] == "refused":
-            self._process.wait(_READY_S)
+            self._gone(folder)
             raise HardwareError(why_not_opened(self._port, OSError(answer["errno"], answer["what"])))
+
+    def _gone(self, folder: Path) -> None:
+        self._control.close()
+        self._process.wait(_READY_S)
+        with suppress(OSError):
+            folder.rmdir()
 
     def _first_answer(self) -> dict[str, Any]:
         self._control.settimeout(_READY_S)
@@ -76,7 +83,7 @@ class Guard:
                 if said:
                     continue
             self._process.kill()
-            self._process.wait(_READY_S)
+            self._gone(Path(self.path).parent)
             raise HardwareError(f"the guard of {self._port} did not start within {_READY_S:g} s; is the computer overloaded?")
         line, self._said = self._said.split(b"\n", 1)
         return dict(json.loads(line))
@@ -103,6 +110,11 @@ class Guard:
         """It was confirmed to stand."""
         self._armed = False
         self._tell(b"s")
+
+    def stop_now(self) -> None:
+        """Have the robot stopped at once, if it may move; the driver's own stop follows. For signal handlers."""
+        with suppress(OSError):
+            self._control.send(b"t")
 
     def tripped(self) -> str | None:
         """Why the guard has stopped the robot, if it has."""
@@ -187,8 +199,10 @@ class GuardedClock(RealClock):
 class GuardedPlatform:
     """Implements `bns.hardware.platform.Platform`: another one, whose guard is told when its robot may move."""
 
-    def __init__(self, platform: Platform, guard: Guard) -> None:
-        self._platform, self._guard = platform, guard
+    def __init__(self, platform: Platform, guard: Guard, stopping: Stopping) -> None:
+        self._platform, self._guard, self._stopping = platform, guard, stopping
+        stopping.causes.append(guard.tripped)
+        stopping.alarms.append(guard.stop_now)
 
     @property
     def retries(self) -> int:
@@ -204,17 +218,26 @@ class GuardedPlatform:
         return self._platform.readings()
 
     def drive(self, commands: np.ndarray) -> Driven:
-        """Carry out a controller, guarded until the robot was confirmed to stand."""
+        """Carry out a controller, guarded until the robot was confirmed to stand.
+
+        Where the guard has stopped the robot, nothing that the drive left counts, and what its driver missed is not the cause.
+        """
+        self._stopping.check()
         self._guard.arm()
         try:
             driven = self._platform.drive(commands)
         except StopNotConfirmedError:
             raise
         except BaseException:
-            self._guard.still()
+            self._stands()
             raise
-        self._guard.still()
+        self._stands()
         return driven
+
+    def _stands(self) -> None:
+        self._guard.still()
+        if self._guard.tripped():
+            self._stopping.check()
 
     def stop(self) -> Stop:
         """Stop and confirm."""

@@ -2,7 +2,8 @@
 
 `bns.hardware.guard` starts it as a script, without site packages: it needs the standard library alone, stands at once and
 shares no fault with the trial. Standard input is the control socket: first a line of JSON (the set-up), then single bytes:
-`.` a heartbeat, `a` the robot may move from now on, `s` it was confirmed to stand, `g` goodbye. Answers are lines of JSON.
+`.` a heartbeat, `a` the robot may move from now on, `s` it was confirmed to stand, `t` stop it now, `g` goodbye. Answers are
+lines of JSON.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ class Guard:
         self._armed = self._gone = self._still = self._terminated = False
         self.why = ""
         """What made it stop the robot; empty while it forwards."""
-        self._tripped_s = self._beat_s = self._tried_s = 0.0
+        self._tripped_s = self._beat_s = self._tried_s = self._plugged_s = 0.0
         self._slept_s, self._wait_s = slept_s(), stop["wait_s"]
         self._good = 0
         self._before: list[int] | None = None
@@ -95,7 +96,7 @@ class Guard:
             self._judge()
             if self._port < 0:
                 self._reopen()
-            elif self.why and not self._still:
+            elif self.why and not self._still and self._listens():
                 self._round()
                 self._give_up()
 
@@ -141,7 +142,7 @@ class Guard:
         if not self.why:
             self.why, self._tripped_s, self._still, self._wait_s = why, time.monotonic(), False, self._setup["stop"]["wait_s"]
             self._good, self._before = 0, None
-            self._tell("tripped", why=why)
+            self._tell("tripped", why=why, guard=os.getpid())
 
     def _tell(self, kind: str, **what: Any) -> None:
         line = (json.dumps({"kind": kind, "wall_s": round(time.time(), 3), **what}) + "\n").encode()
@@ -172,6 +173,8 @@ class Guard:
         for letter in said:
             if letter in b"as":
                 self._armed = letter == b"a"[0]
+            elif letter in b"t" and self._armed:
+                self._trip("the trial was asked to stop")
         if said and b"g" not in said:
             return
         self._gone = True
@@ -235,9 +238,13 @@ class Guard:
         if self._gone and not self._armed and time.monotonic() - self._tripped_s > _STANDS_S:
             self._still = True
 
+    def _listens(self) -> bool:
+        """Whether the robot may be spoken to: a board that starts when its port is opened must not be disturbed."""
+        return bool(self._heard) or time.monotonic() - self._plugged_s >= self._setup["stop"]["quiet_s"]
+
     def _plug(self, port: int) -> None:
         """Take a port, and make the line that the driver opens instead of it."""
-        self._port = port
+        self._port, self._plugged_s, self._heard = port, time.monotonic(), b""
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
         os.set_blocking(self._near, False)

@@ -103,6 +103,8 @@ class Stopping:
         self.reason: str | None = None
         self.causes: list[Callable[[], str | None]] = []
         """Further reasons to stop, asked for at every look."""
+        self.alarms: list[Callable[[], None]] = []
+        """Called at once when a signal comes."""
         self._asking = self._suspended = False
         self._former: dict[signal.Signals, Any] = {}
 
@@ -140,6 +142,8 @@ class Stopping:
     def _handle(self, number: int, _frame: FrameType | None) -> None:
         self.request(_SIGNALS[signal.Signals(number)])
         self._suspended |= _SIGNALS[signal.Signals(number)] == "suspended"
+        for alarm in self.alarms:
+            alarm()
         if self._asking:
             raise KeyboardInterrupt
 

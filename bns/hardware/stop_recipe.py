@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bns.hardware.ax12_table import BROADCAST, READ, REGISTERS, WRITE
-from bns.hardware.bridge_frames import ANSWER, POSITION, START, STOP, STOPPED, Frame, encoded
+from bns.hardware.bridge_frames import ANSWER, POSITION, START, STARTED_S, STOP, STOPPED, Frame, encoded
 from bns.hardware.servo_chain import STILL_STEPS
 
 
@@ -18,6 +18,7 @@ class StopRecipe:
     The groups of the patterns are numbers: with `text` in digits, speeds of at most `within`; without, places in two bytes, low
     one first, that change by at most `within` from one round to the next. An answer is waited for `wait_s`, twice as long
     after every round without one, up to `longest_s`. `own_stop` finds the order to stop in what the robot's driver writes.
+    Nothing is written for `quiet_s` after the port was opened, unless something comes from there.
     """
 
     baud: int
@@ -27,6 +28,7 @@ class StopRecipe:
     text: bool
     wait_s: float
     longest_s: float
+    quiet_s: float = 0.0
 
     def as_json(self) -> dict[str, object]:
         """For the guard; bytes become text, one letter each."""
@@ -37,6 +39,7 @@ class StopRecipe:
             "text": self.text,
             "wait_s": self.wait_s,
             "longest_s": self.longest_s,
+            "quiet_s": self.quiet_s,
         }
 
 
@@ -61,7 +64,7 @@ def bridge_recipe(baud: int, count: int) -> StopRecipe:
     head = re.escape(bytes([START, size, STOP | ANSWER])) + b"."
     answer = head + b"\x00" * STOPPED + b"(..)" * count + b".."
     own = re.escape(bytes([START, 0, STOP]))
-    return StopRecipe(baud, ((encoded(Frame(STOP, 0, b"")), answer),), own, STILL_STEPS, False, 0.08, 0.5)
+    return StopRecipe(baud, ((encoded(Frame(STOP, 0, b"")), answer),), own, STILL_STEPS, False, 0.08, 0.5, STARTED_S)
 
 
 def _packet(number: int, kind: int, parameters: bytes) -> bytes:

@@ -87,7 +87,7 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         module = platform_module(rig.robot)
         clock: Clock = EmulatedClock(how.speed)
         if not how.emulated:
-            guard = _guard(rig, module, journal, stopping, stack)
+            guard = _guard(rig, module, journal, stack)
             clock = RealClock() if guard is None else GuardedClock(guard)
         log = stack.enter_context(HardwareLog(journal, clock))
         if isinstance(clock, EmulatedClock):
@@ -98,7 +98,7 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         elif guard is not None:
             rig = replace(rig, port=guard.path)
         opened: Platform = module.open_platform(rig, clock, log, stopping)
-        platform = opened if guard is None else GuardedPlatform(opened, guard)
+        platform = opened if guard is None else GuardedPlatform(opened, guard, stopping)
         stack.callback(platform.close)
         stack.enter_context(StopsAtTheEnd(platform.stop))
         yield OpenedRig(
@@ -106,9 +106,7 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         )
 
 
-def _guard(
-    rig: Rig, module: PlatformModule, journal: Path | None, stopping: Stopping, stack: ExitStack
-) -> Guard | None:
+def _guard(rig: Rig, module: PlatformModule, journal: Path | None, stack: ExitStack) -> Guard | None:
     """The guard of a real robot's port, where the robot's module says how it is stopped."""
     recipe_of = getattr(module, "stop_recipe", None)
     if recipe_of is None or os.name != "posix":  # Windows has no pseudo-terminals
@@ -116,7 +114,6 @@ def _guard(
     log = None if journal is None else journal.with_name(GUARD_LOG)
     guard = Guard(rig.port, recipe_of(rig), rig.limits.silent_s, log)
     stack.callback(_let_go, guard)
-    stopping.causes.append(guard.tripped)
     return guard
 
 

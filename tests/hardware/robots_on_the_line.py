@@ -1,0 +1,116 @@
+"""Emulated robots in this process at real time, for a trial in another one: what is there when the trial is gone."""
+
+import fcntl
+import os
+import termios
+import threading
+import time
+
+import numpy as np
+
+from bns.engine.philox import Key
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.emulators.ax12 import Bus
+from bns.hardware.emulators.body import DifferentialBody
+from bns.hardware.emulators.bridge import BridgeEmulator
+from bns.hardware.emulators.faults import Faults
+from bns.hardware.emulators.khepera import KheperaEmulator
+from bns.hardware.emulators.servo import Servo
+from bns.hardware.emulators.terminal import PseudoTerminal
+from bns.hardware.khepera import firmware
+from bns.physics.model import load_model
+from bns.robots.khepera import START
+
+LINKS = ("serial", "bus", "bridge")
+STILL_M_S = 0.005
+
+
+class WorldsClock(EmulatedClock):
+    """The computer's clock for emulated devices: they act by themselves while somebody else waits."""
+
+    def __init__(self):
+        super().__init__()
+        self._began_s = time.monotonic()
+        self._ends = threading.Event()
+        self._thread = threading.Thread(target=self._tick, daemon=True)
+        self._thread.start()
+
+    def now_s(self):
+        return time.monotonic() - self._began_s
+
+    def sleep(self, seconds):
+        time.sleep(max(seconds, 0.0))
+
+    def waited(self, seconds):
+        pass
+
+    def _tick(self):
+        while not self._ends.wait(0.01):
+            self._tell()
+
+    def close(self):
+        self._ends.set()
+        self._thread.join()
+
+
+class Robot:
+    """A robot at the end of a link; `path` is its port. All that was written to it is in `heard`, with times."""
+
+    def __init__(self, link, folder):
+        self.link, self.clock, self.heard = link, WorldsClock(), []
+        self._bridge = None
+        if link == "serial":
+            self.body = DifferentialBody(load_model("khepera-world"), Key.of_run(1, 0, "khepera", "circle"), START)
+            self.body.put_down(START, self.clock.now_s())
+            self._device = KheperaEmulator(self.body, self.clock, firmware(2, 4), latency_s=0.02)
+        else:
+            self.servos = [Servo(n, self.clock, Faults()) for n in range(1, 13)]
+            if link == "bridge":
+                self._device = self._bridge = BridgeEmulator(self.servos, self.clock)
+            else:
+                self._device = Bus(self.servos, self.clock)
+        self.line = PseudoTerminal(self, folder, link)
+        self.path = self.line.path
+        if self._bridge is not None:
+            self._bridge.send = lambda data: os.write(self.line._master, data)  # the guard reads at once: nothing to wait for
+
+    def plug_in(self):
+        """After `line.cut`; a bridge begins anew."""
+        if self._bridge is not None:
+            self._bridge.opened()
+        self.line.plug_in()
+
+    def receive(self, data):
+        self.heard.append((time.monotonic(), data))
+        return self._device.receive(data)
+
+    def written(self):
+        self._device.written()
+
+    def moves(self):
+        """Whether it goes, or has the power to."""
+        if self.link == "serial":
+            return max(np.abs(self.body.wheel_speeds_m_s(self.clock.now_s()))) > STILL_M_S
+        return any(servo.get("torque_enable") for servo in self.servos)
+
+    def until(self, moving, patience_s=60.0):
+        """Wait until it moves or stands; when that was. AssertionError after a time that only a hang can take."""
+        end_s = time.monotonic() + patience_s
+        while self.moves() != moving:
+            assert time.monotonic() < end_s, f"the robot {'never moved' if moving else 'never stood'}"
+            time.sleep(0.002)
+        return time.monotonic()
+
+    def close(self):
+        if self._bridge is not None:
+            self._bridge.close()
+        self.line.close()
+        self.clock.close()
+
+
+def hold_terminal(slave):
+    """Make the terminal that of this process: for a child, after fork."""
+    os.setsid()
+    fcntl.ioctl(slave, termios.TIOCSCTTY, 0)
+    for number in (0, 1, 2):
+        os.dup2(slave, number)

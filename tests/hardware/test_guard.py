@@ -1,0 +1,263 @@
+"""A robot does not outlive its supervisor, on any link; `python -m tests.hardware.outlive 20` measures."""
+
+import fcntl
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from bns.errors import HardwareError
+from bns.hardware import guard_process
+from bns.hardware.bridge import BridgeChain
+from bns.hardware.clock import RealClock
+from bns.hardware.dynamixel import Ax12Chain
+from bns.hardware.emulators.terminal import PseudoTerminal
+from bns.hardware.guard import Guard, GuardedClock
+from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.khepera import BAUD, KheperaIII
+from bns.hardware.serial_link import NoReplyError, SerialLink
+from bns.hardware.stop_recipe import ax12_recipe, bridge_recipe, khepera_recipe
+
+from . import outlive
+from .robots_on_the_line import LINKS, Robot
+
+HANGS_S = 30.0
+RECIPES = {
+    "serial": khepera_recipe(BAUD, 720),
+    "bus": ax12_recipe(1_000_000, range(1, 13)),
+    "bridge": bridge_recipe(115200, 12),
+}
+
+
+@pytest.fixture(scope="module")
+def nursery():
+    found = outlive.Nursery()
+    yield found
+    found.close()
+
+
+@pytest.fixture
+def held(tmp_path):
+    """held(link) -> a robot and its guard, in this process."""
+    opened = []
+
+    def build(link, silent_s=HANGS_S):
+        robot = Robot(link, tmp_path)
+        guard = Guard(str(robot.path), RECIPES[link], silent_s, tmp_path / "guard.jsonl")
+        opened.append((robot, guard))
+        return robot, guard
+
+    yield build
+    for robot, guard in opened:
+        guard.still()
+        guard.close()
+        robot.close()
+
+
+def driver_of(link, guard, clock):
+    journal = HardwareLog(None, clock)
+    if link == "serial":
+        return KheperaIII(SerialLink(guard.path, BAUD, clock, journal), clock, journal)
+    if link == "bus":
+        return Ax12Chain(guard.path, range(1, 13), clock, journal)
+    return BridgeChain(guard.path, 12, clock, journal)
+
+
+def set_off(link, driver):
+    if link == "serial":
+        driver.set_speed_m_s(0.1, 0.08)
+    else:
+        driver.arm()
+        driver.move([0.5] * 12, [1.0] * 12)
+
+
+def until(true):
+    end_s = time.monotonic() + HANGS_S
+    while not true():
+        assert time.monotonic() < end_s
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_a_robot_stands_when_its_trial_is_killed(tmp_path, nursery, link):
+    seen = outlive.outlived(nursery, link, "SIGKILL", tmp_path)
+    assert seen.ended == -signal.SIGKILL
+    assert [e["kind"] for e in seen.events] == ["tripped", "stopped"]
+    assert seen.events[0]["why"] == "the trial's process is gone"
+
+
+@pytest.mark.parametrize(
+    ("cause", "link", "why"),
+    [
+        ("SIGSTOP", "bus", "the trial's process was stopped"),
+        ("hang", "serial", "the trial gave no sign of life for 0.3"),
+    ],
+)
+def test_a_robot_stands_when_its_trial_is_there_and_does_nothing(tmp_path, nursery, cause, link, why):
+    seen = outlive.outlived(nursery, link, cause, tmp_path)
+    assert seen.events[0]["why"].startswith(why)
+    assert "stopped" in [e["kind"] for e in seen.events]
+
+
+@pytest.mark.parametrize(
+    ("cause", "link", "said"),
+    [("Ctrl-Z", "bridge", "suspended"), ("Ctrl-\\", "bus", "quit"), ("terminal closed", "serial", "the terminal was closed")],
+)
+def test_what_the_terminal_does_stops_the_robot_first(tmp_path, nursery, cause, link, said):
+    """Ctrl-Z suspends the process once the robot stands (the helper sees to it); gone on with, the trial is paused."""
+    seen = outlive.outlived(nursery, link, cause, tmp_path)
+    assert (seen.ended, seen.said) == (3, said)
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_a_link_that_comes_back_after_the_trial_has_gone_carries_the_stop(tmp_path, nursery, link):
+    seen = outlive.outlived(nursery, link, "link gone, then SIGKILL", tmp_path)
+    assert [e["kind"] for e in seen.events][-2:] == ["port-back", "stopped"]
+
+
+def test_a_driver_that_does_not_know_cannot_go_on(held):
+    """What it orders does not reach the robot, until it orders a stop."""
+    robot, guard = held("serial")
+    clock = RealClock()
+    driver = driver_of("serial", guard, clock)
+    guard.arm()
+    set_off("serial", driver)
+    robot.until(True)
+    guard.stop_now()
+    robot.until(False)
+    until(guard.tripped)
+    with pytest.raises(NoReplyError):
+        driver._link.exchange(b"D,l20000,l20000\n")
+    assert not robot.moves()
+    assert driver.stop(HANGS_S).confirmed
+    assert driver.battery_v() > 7
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_a_driver_can_stop_what_the_guard_has_stopped(held, link):
+    robot, guard = held(link)
+    driver = driver_of(link, guard, RealClock())
+    guard.arm()
+    set_off(link, driver)
+    guard.stop_now()
+    robot.until(False)
+    assert driver.stop(HANGS_S).confirmed
+    if link != "serial":
+        driver.close()
+
+
+def test_a_guard_that_is_killed_is_started_again_and_the_drive_ends(held):
+    robot, guard = held("serial")
+    clock = GuardedClock(guard)
+    driver = driver_of("serial", guard, clock)
+    guard.arm()
+    set_off("serial", driver)
+    robot.until(True)
+    first = guard.process
+    os.kill(first, signal.SIGKILL)
+    until(guard.tripped)
+    assert guard.tripped() == "the guard of the robot's port was gone"
+    assert guard.process != first
+    assert driver.stop(HANGS_S).confirmed
+    assert not robot.moves()
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP])
+def test_a_guard_is_deaf_to_the_terminal(held, number):
+    _, guard = held("serial")
+    os.kill(guard.process, number)
+    assert driver_of("serial", guard, RealClock()).battery_v() > 7
+    assert os.getsid(guard.process) != os.getsid(0)
+
+
+def test_a_guard_that_is_terminated_stops_the_robot_first(held):
+    robot, guard = held("serial")
+    guard.arm()
+    set_off("serial", driver_of("serial", guard, RealClock()))
+    robot.until(True)
+    os.kill(guard.process, signal.SIGTERM)
+    assert guard._process.wait(HANGS_S) == 0
+    assert not robot.moves()
+
+
+def test_a_computer_that_slept_stops_the_robot_when_it_wakes(tmp_path, monkeypatch):
+    slept = iter([0.0, 0.0, 0.05, 31.0, 31.0])
+    monkeypatch.setattr(guard_process, "slept_s", lambda: next(slept))
+    near, far = socket.socketpair()
+    setup = {"process": os.getpid(), "silent_s": HANGS_S, "log": None, "link": str(tmp_path / "x" / "y")}
+    guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far)
+    near.send(b"a")
+    guard._turn(1.0)
+    for why in ("", "", "the computer slept for 30.9 s"):  # the clocks differ by a little at all times
+        guard._judge()
+        assert guard.why.startswith(why[:25])
+    assert guard.why.startswith("the computer slept for 3")
+    near.close()
+    far.close()
+
+
+def test_a_robot_is_stopped_over_a_slow_link(tmp_path):
+    """Answers that take 0.3 s: the guard waits longer each time."""
+    robot = Robot("serial", tmp_path)
+    robot._device._latency_s = 0.3
+    guard = Guard(str(robot.path), RECIPES["serial"], HANGS_S)
+    line = os.open(guard.path, os.O_RDWR | os.O_NOCTTY)
+    os.write(line, b"D,l20000,l20000\n")
+    robot.until(True)
+    guard.arm()
+    guard._control.close()
+    robot.until(False)
+    assert guard._process.wait(HANGS_S) == 0
+    os.close(line)
+    robot.close()
+
+
+def test_a_trial_that_ends_leaves_no_guard(held):
+    _, guard = held("serial")
+    assert guard.close()
+    assert not os.path.lexists(guard.path)
+
+
+def test_a_port_in_use_is_named(tmp_path):
+    robot = Robot("serial", tmp_path)
+    holder = os.open(robot.path, os.O_RDWR | os.O_NOCTTY)
+    fcntl.flock(holder, fcntl.LOCK_EX)
+    with pytest.raises(HardwareError, match="is in use by another program"):
+        Guard(str(robot.path), RECIPES["serial"], HANGS_S)
+    os.close(holder)
+    robot.close()
+    with pytest.raises(HardwareError, match="there is no port"):
+        Guard(str(tmp_path / "nowhere"), RECIPES["serial"], HANGS_S)
+
+
+def test_a_guard_needs_no_package(tmp_path):
+    """It starts with the standard library alone, in a process that has nothing to import from."""
+    code = f"import runpy; runpy.run_path({guard_process.__file__!r})"
+    subprocess.run([sys.executable, "-I", "-S", "-c", code], check=True, cwd=tmp_path)
+
+
+def test_a_bus_is_stopped_by_the_same_bytes_as_its_driver_writes(held):
+    """Else the guard would not know that the driver stops it."""
+    robot, guard = held("bus")
+    driver = driver_of("bus", guard, RealClock())
+    before = len(robot.heard)
+    driver.stop(HANGS_S)
+    assert robot.heard[before][1].startswith(RECIPES["bus"].steps[0][0])
+    driver.close()
+
+
+def test_bytes_pass_unchanged(tmp_path):
+    with PseudoTerminal(outlive.Echo(), tmp_path, "echo") as line:
+        guard = Guard(str(line.path), RECIPES["serial"], HANGS_S)
+        near = os.open(guard.path, os.O_RDWR | os.O_NOCTTY)
+        sent, heard = bytes(range(256)) * 3, b""
+        os.write(near, sent)
+        while len(heard) < len(sent):
+            heard += os.read(near, 4096)
+        os.close(near)
+        guard.close()
+    assert heard == sent
