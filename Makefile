@@ -13,7 +13,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint dist sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask clean sweep-snake soak real-robots propose-benchmark closing-the-gap
+.PHONY: help setup test lint dist sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -91,6 +91,10 @@ real-robots: setup ## what a plain model lacks on logs of real robots: numbers a
 soak: setup ## 200 emulated trials of each robot with faults at random: how they end
 	$(BIN)/python -m tests.hardware.soak khepera 200
 	$(BIN)/python -m tests.hardware.soak snake 200
+
+fuzz: setup ## files that nobody would write, for every reader of users' files, and damages to result files: five minutes
+	BNS_FUZZ_EXAMPLES=1500 $(BIN)/python -m pytest -q tests/fuzz
+	$(BIN)/python -m tests.store.damages 60
 
 soak-dask: setup ## twenty minutes of a sweep on Dask whose workers are killed: what it costs, and that no run is lost
 	$(BIN)/python tests/sweep/soak_dask.py

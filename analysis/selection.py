@@ -15,7 +15,7 @@ from bns.sweep.confirm import confirmed_name
 CONFIRMING = confirmed_name("")
 """Ending of the sweeps that rerun the best combinations of another on fresh seeds: they confirm, and compare nothing."""
 SETTING = (
-    *("world", "world_digest", "training_algorithm", "evaluations", "min_commands", "max_commands"),
+    *("approach", "world", "world_digest", "training_algorithm", "evaluations", "min_commands", "max_commands"),
     *("generations_per_evaluation", "training_iterations_per_evaluation", "engine"),
 )
 """What must agree before runs of a robot and task are counted together: columns of `RUNS`."""

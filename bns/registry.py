@@ -147,4 +147,6 @@ PLATFORMS = Registry(
     HardwareError,
 )  # fmt: skip
 FIGURES = Registry("figure", "figures", "analysis", r'NAME = "([^"]+)"', "", ("NAME", "PAPER", "draw"), SpecError)
-APPROACHES = Registry("approach", "approaches", "bns.approaches", r"def run\(", "", ("run",), SpecError)
+APPROACHES = Registry(
+    "approach", "approaches", "bns.approaches", "APPROACH = ", "APPROACH", ("options", "networked", "start"), SpecError
+)  # fmt: skip

@@ -15,15 +15,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from bns.errors import SpecError, unknown_name
-from bns.registry import WORLDS, Registry
+from bns.options import OPTION_MARK, parsed_options
+from bns.registry import APPROACHES, WORLDS, Registry
 
 ENGINE_VERSION = 3
 """Raised whenever the same spec would give other numbers; part of every run's name."""
 
 RADII_CM = (7, 10, 14, 20)
 """Radii of the goals, cm, at which success is recorded."""
-
-OPTION_MARK = "+"
 
 
 def robot_and_options(name: str) -> tuple[str, tuple[str, ...]]:
@@ -41,9 +40,13 @@ def _field(
     choices: tuple[str, ...] | None = None,
     or_file: tuple[str, ...] = (),
     parts: Registry | None = None,
+    later: bool = False,
 ) -> Any:
-    """``or_file``: endings of file names that may stand instead of one of the choices; ``parts``: so may a package's part."""
-    bounds = {"low": low, "high": high, "choices": choices, "or_file": or_file, "parts": parts}
+    """``or_file``: endings of file names that may stand instead of one of the choices; ``parts``: so may a package's part.
+
+    ``later``: the parameter came after runs had been named without it, so that its default is left out of their names.
+    """
+    bounds = {"low": low, "high": high, "choices": choices, "or_file": or_file, "parts": parts, "later": later}
     return dataclasses.field(default=default, metadata={"help": text, **bounds})
 
 
@@ -85,6 +88,16 @@ class RunSpec:
         "what is kept: one row an evaluation, or paths too, or with generations and probes, which are driven for it",
         choices=("evals", "paths", "full"),
     )
+    approach: str = _field(
+        "bns",
+        "what learns from the drives and picks the next one; its options follow its name: precomputed+data=0.5",
+        parts=APPROACHES,
+        later=True,
+    )
+    overhead_s: int = _field(
+        30, "seconds of robot time that an evaluation takes beside driving: putting the robot back, starting it",
+        low=0, high=86_400, later=True,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -97,9 +110,8 @@ class RunSpec:
 
     def canonical_json(self) -> str:
         """The spec and the engine's version as JSON with sorted keys: what the run's name is the hash of."""
-        return json.dumps(
-            dataclasses.asdict(self) | {"engine_version": ENGINE_VERSION}, sort_keys=True, separators=(",", ":")
-        )
+        given = {name: value for name, value in dataclasses.asdict(self).items() if not _left_out(name, value)}
+        return json.dumps(given | {"engine_version": ENGINE_VERSION}, sort_keys=True, separators=(",", ":"))
 
     @property
     def run_id(self) -> str:
@@ -108,6 +120,11 @@ class RunSpec:
 
 
 FIELDS: Mapping[str, dataclasses.Field[Any]] = {f.name: f for f in dataclasses.fields(RunSpec)}
+
+
+def _left_out(name: str, value: Any) -> bool:
+    """Is the parameter younger than the names of runs, and at its default?"""
+    return bool(FIELDS[name].metadata["later"]) and value == FIELDS[name].default
 
 
 def field_type(name: str) -> type:
@@ -128,6 +145,8 @@ def checked(name: str, value: Any) -> Any:
     if not fits:
         raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.")
     if wanted is str:
+        if meta["parts"] and not meta["choices"] and value != FIELDS[name].default:
+            _check_part(meta["parts"], value)
         if meta["choices"] and value not in meta["choices"] and not value.endswith(meta["or_file"] or ("\0",)):
             valid = (*meta["choices"], *(meta["parts"].announced if meta["parts"] else ()))
             if value not in valid:
@@ -137,6 +156,14 @@ def checked(name: str, value: Any) -> Any:
     if not math.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):
         raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.{_percent_hint(name, value)}")
     return value
+
+
+def _check_part(parts: Registry, value: str) -> None:
+    """SpecError for a part that there is none of, or an option that it has not. Without options no part is imported."""
+    name, *options = value.split(OPTION_MARK)
+    parts.part(name)
+    if options:
+        parsed_options(value, parts.load(name).options)
 
 
 def _allowed(name: str) -> str:

@@ -161,7 +161,7 @@ def _tables(results: Path) -> Items:
     """Evaluations and runs of every sweep; what runs are called apart."""
     items: Items = {}
     for table in ("evals", "runs"):
-        said = called("bns", "query", "--csv", f"SELECT to_json(t) FROM {table} t", "--results", results)
+        said = called("bns", "query", "--csv", "--no-header", f"SELECT to_json(t) FROM {table} t", "--results", results)
         rows = sorted((json.loads(line) for [line] in csv.reader(said.splitlines())), key=_place)
         timed = {name for row in rows for name in row if name.endswith("_s")}
         for sweep in dict.fromkeys(row["sweep"] for row in rows):

@@ -11,14 +11,14 @@ import bns
 
 PACKAGE = Path(bns.__file__).parent
 FLOORS = (
-    {"errors", "examples", "extras", "registry", "shipped", "spec", "measurements", "__init__"},
+    {"errors", "examples", "extras", "options", "registry", "safe_yaml", "shipped", "spec", "measurements", "__init__"},
     {"engine"},
     {"tasks"},
     {"robots"},
     {"physics"},
     {"hardware"},
     {"worlds"},
-    {"bootstrap", "cuda", "static_simulator"},
+    {"approaches", "bootstrap", "cuda", "static_simulator"},
     {"store"},
     {"sweep"},
     {"diagnose", "plotting", "console"},

@@ -14,6 +14,7 @@ def test_equal_specs_have_equal_names_and_every_field_changes_the_name():
     assert base.run_id == RunSpec(mutation_rate=0.10).run_id
     others = {
         "robot": "snake", "task": "infinity", "world": "physics", "training_algorithm": "irprop-", "record": "full",
+        "approach": "on-robot",
     }  # fmt: skip
     names = {base.run_id}
     for name, field in FIELDS.items():

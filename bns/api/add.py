@@ -111,6 +111,10 @@ def add(
         names = ", ".join(map(_name, wanted))
         raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
     chosen = [_effect(each, term, on) for each in wanted]
+    given = [effect.name for effect, _ in chosen]
+    twice = next((name for name in given if given.count(name) > 1), None)
+    if twice is not None:
+        raise ModelError(f"{twice} is given {given.count(twice)} times; a model has each effect once: leave the others out.")
     ready = prepared(log, model)
     ticks(progress)("fitting")
     return added(ready, chosen, per_trial)

@@ -150,7 +150,7 @@ def diagnose(
     """Find what a model lacks.
 
     Args:
-        log: a file, a table, or `bns.Measurements`; ten trials are the fewest that say anything.
+        log: a file, a table, or `bns.Measurements`; eleven trials are the fewest that say anything.
         model: `bns.Model`, or the name or file of one.
         also: effects of your own, tried beside the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
         without_effects: names of listed effects that are not to be tried.

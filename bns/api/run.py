@@ -16,6 +16,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from bns.api.common.shown import Progress, Shown, drawn, silent
+from bns.approaches import check_networked
 from bns.bootstrap import loop
 from bns.errors import ModelError, SpecError, unknown_name
 from bns.measurements import check_table_name
@@ -51,6 +52,8 @@ class Parameters(TypedDict, total=False):
     min_commands: int
     max_commands: int
     record: str
+    approach: str
+    overhead_s: int
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,6 +102,7 @@ class RunResult(Shown):
     def save_networks(self, path: _Path) -> Path:
         """Write the final networks with what they learned from (.safetensors); `bns.compare` takes them as a model."""
         target = Path(path)
+        check_networked(self.spec)
         check_writable(target)
         origin = {"run_id": self.spec.run_id, "spec": self.spec.canonical_json()}
         kept = self.result
@@ -110,7 +114,7 @@ class RunResult(Shown):
         robot, task = load_robot(self.spec.robot), load_task(self.spec.robot, self.spec.task)
         world = build_world(self.spec.world, robot)
         check_renderable(self.spec, world, Path(path))
-        plan = robot.plan(self.result.fittest, self.result.weights, task)
+        plan = robot.plan(self.result.fittest, self.result.weights if self.result.networks else None, task)
         cast(RenderableWorld, world).render(plan, Path(path))  # checked above
         return Path(path)
 
@@ -199,6 +203,7 @@ def run_spec(
     if film is not None:
         check_renderable(spec, build_world(spec.world, robot), film)
     if networks is not None:
+        check_networked(spec)
         check_writable(networks)
     if table is not None:
         check_table_name(table)

@@ -1,11 +1,13 @@
-"""The population of one run and how it evolves on the current simulator networks."""
+"""The population of one run and how it evolves on the current simulator."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
+from bns.bootstrap.simulators import Simulator
 from bns.engine.evolution import Population, pick, rank, tournament_cdf
 from bns.engine.philox import Key, Purpose
 from bns.robots.base import RandomStream, Robot, Scores
@@ -25,7 +27,7 @@ class Generation:
 
 @dataclass
 class Evolver:
-    """Population, its fitness on the networks it was last scored on, and counters of what went wrong."""
+    """Population, its fitness on the simulator it was last scored on, and counters of what went wrong."""
 
     robot: Robot
     task: Task
@@ -39,10 +41,10 @@ class Evolver:
     history: list[Generation] = field(default_factory=list)
 
     @classmethod
-    def start(cls, robot: Robot, task: Task, key: Key, spec: RunSpec, weights: np.ndarray) -> Evolver:
-        """A random population, scored on untrained networks."""
+    def start(cls, robot: Robot, task: Task, key: Key, spec: RunSpec, simulator: Simulator) -> Self:
+        """A random population, scored on a first simulator."""
         population = robot.initial_population(key, spec.population_size, spec.min_commands, spec.max_commands)
-        return cls(robot, task, key, spec, population, robot.score(population, weights, task, RandomStream(key, 0)))
+        return cls(robot, task, key, spec, population, simulator.score(population, RandomStream(key, 0)))
 
     def __post_init__(self) -> None:
         self.order = rank(self.scores.fitness)
@@ -58,15 +60,14 @@ class Evolver:
         """The best controller in simulation."""
         return self.population.controller(int(self.order[0]))
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, generation: int | None = None) -> np.ndarray:
+    def plan(self, controller: np.ndarray, simulator: Simulator, generation: int | None = None) -> np.ndarray:
         """What is driven of a controller of this generation, or of an earlier one: cut under the draws it was scored with."""
-        stream = RandomStream(self.key, self.generations if generation is None else generation)
-        return self.robot.plan(controller, weights, self.task, stream)
+        return simulator.plan(controller, RandomStream(self.key, self.generations if generation is None else generation))
 
-    def evolve(self, weights: np.ndarray) -> None:
-        """Score the population on new networks, then breed and score generation after generation."""
+    def evolve(self, simulator: Simulator) -> None:
+        """Score the population on a new simulator, then breed and score generation after generation."""
         self.history.clear()
-        self._score(weights)
+        self._score(simulator)
         for _ in range(self.spec.generations_per_evaluation):
             self.generations += 1
             self.bound_hits += self.robot.breed(
@@ -80,13 +81,18 @@ class Evolver:
                 self._spare,
             )
             self.population, self._spare = self._spare, self.population
-            self._score(weights, self.scores)
+            self._score(simulator, self.scores)
             if self.spec.record == "full":
                 self.history.append(Generation(self.generations, self.fittest(), self.best_fitness, self.mean_fitness))
 
-    def _score(self, weights: np.ndarray, parents: Scores | None = None) -> None:
+    def replace(self, who: np.ndarray, others: Population) -> None:
+        """Put others, as many as there are controllers, in the places of some; they are scored when evolution goes on."""
+        self.population.commands[who], self.population.lengths[who] = others.commands[who], others.lengths[who]
+        self.population.origin[who] = -1
+
+    def _score(self, simulator: Simulator, parents: Scores | None = None) -> None:
         stream = RandomStream(self.key, self.generations)
-        self.scores = self.robot.score(self.population, weights, self.task, stream, parents)
+        self.scores = simulator.score(self.population, stream, parents)
         self.order = rank(self.scores.fitness)
         self.failures += self.scores.failures
 

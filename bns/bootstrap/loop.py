@@ -1,4 +1,6 @@
-"""Bootstrapped Neuro-Simulation: the four steps of the source's figure 3.1.
+"""Bootstrapped Neuro-Simulation, and its neighbours: the four steps of the source's figure 3.1.
+
+What learns from a drive, and picks the next, is the spec's approach (`bns.approaches`); all else is the same for all of them.
 
 The original trains, evolves and drives at the same time. In a simulated world each evaluation is followed by one round of
 a stated number of training iterations and generations, both in the spec, so that the same spec gives the same numbers
@@ -14,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from bns.approaches import start_approach
 from bns.bootstrap.driver import Driver, WorldDriver
-from bns.bootstrap.neuro_simulation import NeuroSimulation
 from bns.bootstrap.recorder import Recorder
 from bns.engine.philox import Key
 from bns.robots import load_robot
@@ -29,9 +31,9 @@ Progress = Callable[[Mapping[str, Any]], None]
 
 @dataclass(frozen=True)
 class RunResult:
-    """Tables of one run (name -> columns of equal length), the world's digest, the final networks (networks, W), the
-    fittest controller (n, components) and its last path (n, columns), in the world and as its networks saw it, and the inputs
-    (inputs, patterns) of what the networks were trained on."""
+    """Tables of one run (name -> columns of equal length), the world's digest, the final networks (networks, W), none
+    where the approach has none, the fittest controller (n, components) and its last path (n, columns), in the world and as its
+    simulator saw it (NaN without one), and the inputs (inputs, patterns) of what the networks were trained on."""
 
     tables: dict[str, dict[str, np.ndarray]]
     world_digest: str
@@ -55,21 +57,21 @@ def run(
     task = load_task(spec.robot, spec.task)
     world = world or build_world(spec.world, robot)
     driver = driver or WorldDriver(world, key)
-    simulation = NeuroSimulation.start(robot, task, key, spec)
+    approach = start_approach(robot, task, key, spec)
     recorder = Recorder(robot, task, world, key, spec)
 
     for evaluation in range(1, spec.evaluations + 1):
-        # 1. A controller is picked from the population and driven in the world.
-        foreseen_by, controller = simulation.weights, simulation.pick(evaluation)
-        drive = driver.drive(evaluation, controller, simulation.advance)
-        recorder.add_evaluated(evaluation, drive, foreseen_by)
-        # 2. What it did joins the training set, and the training networks go on training.
-        simulation.learn(drive.commands, drive.poses, evaluation)
-        # 3. The training networks are copied over the evolution networks, and the population evolves on those.
-        if not drive.rounds:  # else rounds of training and evolution went on while it drove
-            simulation.advance()
-        # 4. Until the evaluations are used up. What is kept is measured apart and teaches the networks nothing.
-        row = recorder.record(evaluation, simulation)
+        # 1. A controller is picked and driven in the world.
+        foretold_by, controller = approach.simulator, approach.pick(evaluation)
+        drive = driver.drive(evaluation, controller, approach.advance)
+        recorder.add_evaluated(evaluation, drive, foretold_by)
+        # 2. The approach takes in what it did.
+        approach.learn(drive.commands, drive.poses, evaluation)
+        # 3. Its simulator is brought up to date, and the population evolves on that.
+        if not drive.rounds:  # else such rounds went on while it drove
+            approach.advance()
+        # 4. Until the evaluations are used up. What is kept is measured apart and teaches the approach nothing.
+        row = recorder.record(evaluation, approach)
         driver.evaluated(evaluation, drive, row)
         if progress is not None:
             progress(row)
@@ -78,10 +80,10 @@ def run(
     return RunResult(
         recorder.tables(),
         world.digest,
-        robot.networks,
-        simulation.weights,
-        simulation.evolver.fittest(),
+        robot.networks if approach.networked else (),
+        approach.weights,
+        approach.fittest(),
         recorder.last_poses,
         recorder.last_simulated,
-        simulation.trainer.data.training.in_use(),
+        approach.learned_from,
     )

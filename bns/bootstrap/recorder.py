@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from bns.approaches.base import Approach
 from bns.bootstrap.driver import Drive
-from bns.bootstrap.evolver import Evolver
-from bns.bootstrap.neuro_simulation import NeuroSimulation
+from bns.bootstrap.simulators import Simulator
 from bns.engine.evolution import Population
 from bns.engine.philox import Key, Purpose
-from bns.engine.snn import predict
 from bns.robots.base import Robot
 from bns.spec import RADII_CM, RunSpec
 from bns.tasks import Task
@@ -19,6 +18,11 @@ from bns.worlds.base import World
 
 PROBES, PROBE_COMMANDS = 10, 5
 """Figure 4.17b: ten random controllers of five commands."""
+
+
+def robot_time_s(driven_ms: float, overhead_s: float) -> float:
+    """Robot time that an evaluation costs, s: what was driven, and putting the robot back."""
+    return driven_ms / 1000.0 + overhead_s
 
 
 class _Columns:
@@ -44,7 +48,7 @@ class Recorder:
 
     def __init__(self, robot: Robot, task: Task, world: World, key: Key, spec: RunSpec) -> None:
         self._robot, self._task, self._world, self._key = robot, task, world, key
-        self._once = not world.repeatable
+        self._once, self._overhead_s, self._robot_s = not world.repeatable, spec.overhead_s, 0.0
         self._full, self._with_paths = spec.record == "full", spec.record in {"paths", "full"}
         self._evals, self._paths, self._generations, self._probe_rows = (_Columns() for _ in range(4))
         self.last_poses = self.last_simulated = robot.start_pose()[:0]
@@ -58,61 +62,52 @@ class Recorder:
             ]
             self._probe_before: list[np.ndarray] | None = None
 
-    def add_evaluated(self, evaluation: int, drive: Drive, weights: np.ndarray) -> None:
-        """Keep the drive of the controller picked for this evaluation, and what networks (networks, W) predict for it."""
+    def add_evaluated(self, evaluation: int, drive: Drive, simulator: Simulator) -> None:
+        """Keep the drive of the controller picked for this evaluation, and what a simulator foretells of it."""
         controller, poses = drive.commands, drive.poses
         in_world, goals = self._robot.evaluate_path(poses, self._task)
-        simulated = self._simulated(controller, weights)
-        in_simulation, _ = self._robot.evaluate_path(simulated, self._task)
+        simulated = simulator.poses(controller)
+        in_simulation = self._robot.evaluate_path(simulated, self._task)[0] if simulator.foretells else float("nan")
+        driven_ms = self._robot.driven_ms(controller[: len(poses)])
+        self._robot_s += robot_time_s(driven_ms, self._overhead_s)
         self._evaluated = {
             "evaluated_fitness_simulation": in_simulation,
             "evaluated_fitness_world": in_world,
             "evaluated_fitness_error": abs(in_simulation - in_world),
             "evaluated_goals_reached": goals,
             "commands": len(poses),
-            "driven_ms": self._robot.driven_ms(controller[: len(poses)]),
+            "driven_ms": driven_ms,
+            "robot_s": self._robot_s,
         } | self._successes("evaluated_success", poses)
         self._path = (controller, poses, simulated)
         if self._with_paths:
             self._add_path(evaluation, "evaluated", *self._path)
 
-    def record(self, evaluation: int, simulation: NeuroSimulation) -> dict[str, Any]:
+    def record(self, evaluation: int, approach: Approach) -> dict[str, Any]:
         """Measure the fittest controller in the world and add this evaluation's row."""
-        trainer, evolver, weights = simulation.trainer, simulation.evolver, simulation.weights
-        training_cpu_s, evolution_cpu_s = simulation.take_cpu_s()
-        fittest, poses, simulated = self._fittest(evaluation, evolver, weights)
+        known = approach.measures()
+        fittest, poses, simulated = self._fittest(evaluation, approach)
         in_world, goals = self._robot.evaluate_path(poses, self._task)
-        in_simulation = self._evaluated["evaluated_fitness_simulation"] if self._once else evolver.best_fitness
+        in_simulation = known["best_fitness"] if approach.simulator.foretells else float("nan")
+        if self._once:
+            in_simulation = self._evaluated["evaluated_fitness_simulation"]
         self.last_poses, self.last_simulated = poses, simulated
         successes = self._successes("success", poses)
         for name, value in successes.items():
             # None stays None: where there is no distance to a goal, nothing has ever come within one.
             self._ever["ever_" + name] = value if value is None else self._ever.get("ever_" + name, False) or value
-        training_error, validation_error = trainer.errors()
         if self._with_paths:
             self._add_path(evaluation, "fittest", fittest, poses, self.last_simulated)
         if self._full:
-            self._record_full(evaluation, evolver, weights)
+            self._record_full(evaluation, approach)
         return self._evals.add(
             evaluation=evaluation,
-            diversity=evolver.diversity(),
             fitness_error=abs(in_simulation - in_world),
             fitness_simulation=in_simulation,
             fitness_world=in_world,
-            best_fitness=evolver.best_fitness,
-            mean_fitness=evolver.mean_fitness,
             goals_reached=goals,
-            training_error=training_error,
-            validation_error=validation_error,
-            training_patterns=trainer.data.training.count,
-            validation_patterns=trainer.data.validation.count,
             fittest_commands=len(fittest),
-            mean_commands=float(evolver.population.lengths.mean()),
-            generations=evolver.generations,
-            bound_hits=evolver.bound_hits,
-            arithmetic_failures=evolver.failures + trainer.failures,
-            training_cpu_s=training_cpu_s,
-            evolution_cpu_s=evolution_cpu_s,
+            **known,
             **successes,
             **self._ever,
             **self._evaluated,
@@ -131,28 +126,22 @@ class Recorder:
     def _drive(self, controller: np.ndarray, purpose: Purpose, step: int) -> np.ndarray:
         return self._world.drive(controller, self._key, purpose, step)
 
-    def _simulated(self, controller: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        outputs = predict(weights, self._robot.inputs(controller), self._robot.sigmoid_output)
-        return self._robot.poses(self._robot.displacements(outputs), controller)
-
     def _successes(self, prefix: str, poses: np.ndarray) -> dict[str, bool | None]:
         within = self._robot.successes(poses, self._task) or (None,) * len(RADII_CM)
         by_radius = {f"{prefix}_{cm}cm": ok for cm, ok in zip(RADII_CM, within, strict=True)}
         return {prefix: self._robot.succeeded(poses, self._task)} | by_radius
 
-    def _fittest(
-        self, evaluation: int, evolver: Evolver, weights: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _fittest(self, evaluation: int, approach: Approach) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Controller, path in the world and in simulation. A robot drives only what was picked: that one stands in."""
         if self._once:
             return self._path
-        fittest = evolver.plan(evolver.fittest(), weights)
+        fittest = approach.plan(approach.fittest())
         poses = self._drive(fittest, Purpose.WORLD_FITTEST, evaluation)
-        return fittest, poses, self._simulated(fittest, weights)
+        return fittest, poses, approach.simulator.poses(fittest)
 
-    def _record_full(self, evaluation: int, evolver: Evolver, weights: np.ndarray) -> None:
-        for generation in evolver.history:
-            best = evolver.plan(generation.best, weights, generation.number)
+    def _record_full(self, evaluation: int, approach: Approach) -> None:
+        for generation in approach.history:
+            best = approach.plan(generation.best, generation.number)
             driven = self._drive(best, Purpose.WORLD_GENERATION, generation.number)
             self._generations.add(
                 evaluation=evaluation,
@@ -161,7 +150,7 @@ class Recorder:
                 best_fitness_world=self._robot.evaluate_path(driven, self._task)[0],
                 mean_fitness=generation.mean_fitness,
             )
-        self._add_probes(evaluation, self._probes, weights)
+        self._add_probes(evaluation, self._probes, approach.simulator)
 
     def _add_path(
         self, evaluation: int, who: str, controller: np.ndarray, poses: np.ndarray, simulated: np.ndarray
@@ -176,8 +165,8 @@ class Recorder:
             row = {name: values[step].item() for name, values in columns.items()}
             self._paths.add(evaluation=evaluation, who=who, step=step, **row)
 
-    def _add_probes(self, evaluation: int, probes: Population, weights: np.ndarray) -> None:
-        now = [self._final(self._simulated(probes.controller(i), weights)) for i in range(len(probes))]
+    def _add_probes(self, evaluation: int, probes: Population, simulator: Simulator) -> None:
+        now = [self._final(simulator.poses(probes.controller(i))) for i in range(len(probes))]
         before = self._probe_before or [np.full(2, np.nan)] * len(now)
         for i, position in enumerate(now):
             self._probe_rows.add(

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bns.cli.parser import Parser, data_first
+from bns.cli.parser import Parser, add_trust, data_first
 from bns.errors import DataError
 
 if TYPE_CHECKING:
@@ -62,6 +62,8 @@ def add_commands(command: Adder) -> None:
         add_model_options(one)
         one.add_argument("--figures", type=Path, metavar="DIR", help="also draw figures into this folder")
     add_effect_options(found)
+    for one in (held, more):
+        add_trust(one, also=True)
 
 
 def add_model_options(parser: argparse.ArgumentParser) -> None:
@@ -102,6 +104,7 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="a listed effect that is not to be tried, say because it was measured apart",
     )
+    add_trust(parser)
 
 
 def import_(options: argparse.Namespace) -> int:
@@ -111,7 +114,7 @@ def import_(options: argparse.Namespace) -> int:
     from bns.diagnose.data.apply_mapping import applied
     from bns.diagnose.data.checks import checked
     from bns.diagnose.data.guess_mapping import drafted
-    from bns.diagnose.data.load import read_table
+    from bns.diagnose.data.load import naming, read_table
     from bns.diagnose.data.mapping import load_mapping, mapping_beside
     from bns.diagnose.report.text import findings_text
     from bns.measurements import write_measurements
@@ -124,8 +127,9 @@ def import_(options: argparse.Namespace) -> int:
             f"{options.data.name}.import.yaml, or give such a file with --map; docs/logs.md has all that may stand in it. "
             f"A beginning, guessed from the names, to be checked line by line:\n\n{drafted(table)}"
         )
-    table = applied(table, mapping, options.data.parent, read_table)
-    checked_table, findings = checked(table)
+    with naming(options.data):
+        table = applied(table, mapping, options.data.parent, read_table)
+        checked_table, findings = checked(table)
     write_measurements(table, options.output)
     if options.map:
         beside = options.data.with_name(options.data.name + ".import.yaml")

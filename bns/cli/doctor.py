@@ -7,10 +7,12 @@ import argparse
 from bns.hardware.clock import RealClock
 from bns.hardware.doctor import examine
 from bns.hardware.rig import load_rig
+from bns.registry import PLATFORMS
 
 
 def checked_up(options: argparse.Namespace) -> int:
     """Print the findings; 0 if all is fine, else 2."""
+    PLATFORMS.part(options.robot)  # there is no robot without: a misspelled name must not be "all fine"
     rig = None if options.rig is None else load_rig(options.rig, options.robot)
     bad = 0
     for finding in examine(rig, RealClock()):

@@ -21,7 +21,7 @@ from bns.cli import simulators as simulating
 from bns.cli import sweep as sweeping
 from bns.cli.compiling import say_if_compiling
 from bns.cli.option_types import add_spec_options, duration, positive
-from bns.cli.parser import SHELLS, Completion, Parser, add_results
+from bns.cli.parser import SHELLS, Completion, Parser, add_results, add_trust, take_trust
 from bns.cli.sweep_options import DEVICES
 from bns.cli.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.errors import BnsError
@@ -39,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     options = _parser().parse_args(arguments)
     try:
+        take_trust(options)
         return _flushed(int(options.command(options)))
     except BnsError as error:
         print(f"bns: {error}", file=sys.stderr)
@@ -115,6 +116,7 @@ def _add_single_runs(command: measuring.Adder) -> None:
     one.add_argument(
         "--measurements", type=Path, metavar="FILE", help="also write what was driven as a table (.csv, .parquet)"
     )
+    add_trust(one)
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
     one.add_argument("--device", choices=DEVICES, default="cpu", help="what computes: cpu (default), or a GPU: cuda")
     one.add_argument(

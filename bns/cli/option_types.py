@@ -29,6 +29,14 @@ def duration(text: str) -> float:
     return 3600 * hours + 60 * minutes + seconds
 
 
+def interval(text: str) -> float:
+    """A `duration` of a second or more: how often to look."""
+    seconds = duration(text)
+    if seconds < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is too short; look every 1s or less often")
+    return seconds
+
+
 def add_spec_options(parser: argparse.ArgumentParser, without: tuple[str, ...] = ()) -> None:
     """One option a parameter, named and explained as in `RunSpec`."""
     for name, field in FIELDS.items():

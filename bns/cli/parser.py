@@ -126,3 +126,26 @@ def add_results(parser: argparse.ArgumentParser, *, once_positional: bool = Fals
         parser.add_argument(
             "results", nargs="?", default=argparse.SUPPRESS, action=OldFolder, metavar="--results", help=argparse.SUPPRESS
         )  # fmt: skip
+
+
+def add_trust(parser: argparse.ArgumentParser, *, also: bool = False) -> None:
+    """``--trust``, and ``also`` ``--also``: which Python files that a model names may run."""
+    parser.add_argument(
+        "--trust", action="store_true", help="let the Python files run that a model names: they are programs"
+    )
+    if also:
+        parser.add_argument(
+            "--also", action="append", default=[], metavar="FILE.py", help="a Python file that the model names and that may run"
+        )
+
+
+def take_trust(options: argparse.Namespace) -> None:
+    """Let those Python files run that the command line names, or all."""
+    named = [name for name in [*getattr(options, "also", []), *getattr(options, "effects", [])] if name.endswith(".py")]
+    everything = getattr(options, "trust", False)
+    if everything or named:
+        from bns.physics.trust import trust, trust_all
+
+        trust(named)
+        if everything:
+            trust_all()

@@ -7,7 +7,7 @@ import sys
 from dataclasses import asdict
 
 from bns.cli.diagnose import Adder
-from bns.cli.option_types import as_json, duration
+from bns.cli.option_types import as_json, interval
 from bns.cli.parser import add_results
 
 
@@ -24,7 +24,7 @@ def add_commands(command: Adder) -> None:
     drawn = command("figures", figures, "draw whatever the results allow onto one page, DIR/figures/index.html")
     drawn.add_argument("--only", metavar="NAME", help="one figure: success-by-mutation, …")
     look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
-    look.add_argument("--every", type=duration, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
+    look.add_argument("--every", type=interval, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
     for one in (far, ask, small):
         add_results(one)
     for one in (drawn, look):

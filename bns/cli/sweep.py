@@ -9,7 +9,7 @@ from dataclasses import asdict
 from bns.cli.compiling import say_if_compiling
 from bns.cli.diagnose import Adder
 from bns.cli.option_types import as_json, duration, positive
-from bns.cli.parser import add_results
+from bns.cli.parser import add_results, add_trust
 from bns.cli.sweep_options import add_cluster_options, backend_name, request_of
 from bns.spec import RunSpec
 
@@ -43,6 +43,7 @@ def add_commands(command: Adder) -> None:
     costs.add_argument("--json", action="store_true", help="one JSON object on stdout")
     for one in (many, costs):
         add_results(one)
+        add_trust(one)
 
 
 def sweep(options: argparse.Namespace) -> int:

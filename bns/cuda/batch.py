@@ -85,7 +85,7 @@ class Batch:
             upto = min(spec.evaluations, self.evaluation)
             own, seconds = [table[run, :upto] for table in rows], self._seconds[:, :upto]
             try:
-                found.append(self._kernels.evals_of(self._kernels.driven, *own, *seconds))
+                found.append(self._kernels.evals_of(self._kernels.driven, *own, *seconds, spec.overhead_s))
             except ArithmeticError as error:
                 found.append(error)
         return found

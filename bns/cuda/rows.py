@@ -22,9 +22,10 @@ def evals_of(
     measured: np.ndarray,
     training_s: np.ndarray,
     evolution_s: np.ndarray,
+    overhead_s: float,
 ) -> dict[str, np.ndarray]:
     """Columns of one run, (evaluations,) each; evaluated and fittest (evaluations, n) with the columns ``driven``, measured
-    (evaluations, 11), and the seconds of its share of the GPU.
+    (evaluations, 11), the seconds of its share of the GPU, and the robot time of an evaluation beside driving.
 
     Raises:
         ArithmeticError: a column is not finite that is finite in every run that went well.
@@ -49,6 +50,7 @@ def evals_of(
         "evaluated_goals_reached": picked["goals_reached"],
         "commands": picked["commands"],
         "driven_ms": picked["driven_ms"],
+        "robot_s": np.cumsum(picked["driven_ms"] / 1000.0 + overhead_s),
     } | _successes("evaluated_success", picked)
     for name in _ALWAYS_FINITE:
         if not np.isfinite(columns[name]).all():

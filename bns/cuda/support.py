@@ -23,6 +23,8 @@ def check_supported(specs: Iterable[RunSpec]) -> None:
 def _reason(spec: RunSpec) -> str:
     if find_spec(f"bns.cuda.robots.{spec.robot}") is None:
         return f"there are no kernels for the robot {spec.robot}"
+    if spec.approach != "bns":
+        return f"approach is {spec.approach!r}, and a GPU has only 'bns'"
     if spec.world != "substitute":
         return f"world is {spec.world!r}, and a GPU has only 'substitute'"
     if spec.record != "evals":

@@ -18,6 +18,7 @@ from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.estimate.trial_clock_test import steps_of, with_trial_clocks
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
@@ -85,7 +86,7 @@ def add_effects(
             raise ModelError(
                 f"The model {model.name} has {effect.name} already; it is refitted whenever something is added."
             )
-    effects = [(effect.scaled(model.wheelbase_m), written) for effect, written in effects]
+    effects = [(fitting(effect, model, predictor.tracks), written) for effect, written in effects]
     memory = {} if memory is None else memory
     judged = [_judged(predictor, model, effects[: k + 1], per_trial, memory) for k in range(len(effects))]
     first = steps_of(predictor, problem_for(predictor, model).pose_filter, model)

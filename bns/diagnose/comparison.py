@@ -155,7 +155,9 @@ def _worst(predictor: Predictor, errors: Errors, most: int = 5) -> list[Moment]:
 def _curves(
     predictor: Predictor, errors: Errors, dependence: list[ResidualDependence], rng: np.random.Generator
 ) -> list[Curve]:
-    """Residuals along the variables that explain most, and bands from a bootstrap over trials."""
+    """Residuals along the variables that explain most, and bands from a bootstrap over trials; none of trials too short."""
+    if not len(errors.start):
+        return []
     at = predictor.at_frames(errors.start)
     names = [
         name for name in dict.fromkeys(p.variable for p in dependence if p.variable in at) if np.ptp(at[name]) > 0

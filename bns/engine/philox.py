@@ -37,6 +37,7 @@ class Purpose(IntEnum):
     PROBE = 11
     PRECOMPUTE = 12
     ROLLOUT_NOISE = 13
+    APPROACH = 14
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """The hardware log: everything sent, received and observed in a trial, one JSON line each, with time stamps.
 
-A trial is resumed from it, or replayed. Its file is `journal.jsonl` in the folder of the trial.
+A trial is resumed from it, or replayed. Its file is `journal.jsonl` in the folder of the trial. Each line has a number and a
+checksum (`bns.hardware.sealed_lines`).
 
 `t_s` is the trial's clock, `wall_s` the computer's (seconds since 1970). A line that a kill cut in two is dropped when the
 file is opened again; evaluations are synced to the disk before the next one begins.
@@ -17,6 +18,7 @@ from typing import Any, Self, TextIO
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
+from bns.hardware.sealed_lines import Seals, checked_lines
 
 
 class HardwareLog:
@@ -27,14 +29,14 @@ class HardwareLog:
         self._file: TextIO | None = None
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
-            _drop_torn_line(path)
+            self._seals = Seals(_drop_torn_line(path))
             self._file = path.open("a", encoding="utf-8")
 
     def note(self, kind: str, **what: Any) -> None:
         """Append one event."""
         if self._file is not None:
             event = {"t_s": round(self._clock.now_s(), 6), "wall_s": round(time.time(), 6), "kind": kind, **what}
-            self._file.write(json.dumps(event, separators=(",", ":"), allow_nan=False) + "\n")
+            self._file.write(self._seals.line(json.dumps(event, separators=(",", ":"), allow_nan=False)))
 
     def sync(self) -> None:
         """What was noted so far survives a loss of power."""
@@ -57,16 +59,15 @@ class HardwareLog:
 
 
 def events(path: Path, *kinds: str) -> Iterator[dict[str, Any]]:
-    """Events of a journal, all or of some kinds, in order; HardwareError if it is none.
+    """Events of a journal, all or of some kinds, in order; HardwareError if it is none, or not as it was written.
 
     A last line without an end is passed over: it was being written when the computer stopped.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        data = path.read_bytes()
+    except OSError as error:
         raise HardwareError(f"cannot read the journal {path}: {error}. Name the journal.jsonl of a trial.") from error
-    whole = text[: text.rfind("\n") + 1]
-    for number, line in enumerate(whole.splitlines(), 1):
+    for number, line in enumerate(checked_lines(path, data), 1):
         event = _parsed(path, number, line)
         if not kinds or event["kind"] in kinds:
             yield event
@@ -83,10 +84,12 @@ def _parsed(path: Path, number: int, line: str) -> dict[str, Any]:
     return dict(event)
 
 
-def _drop_torn_line(path: Path) -> None:
+def _drop_torn_line(path: Path) -> bytes:
+    """Cut off a line that has no end; what is left."""
     if not path.exists():
-        return
+        return b""
     data = path.read_bytes()
     end = data.rfind(b"\n") + 1
     if end < len(data):
         os.truncate(path, end)
+    return data[:end]

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from bns.errors import HardwareError, unknown_name
 from bns.hardware.safety import Limits, Surface
 from bns.registry import PLATFORMS, TRACKERS
+from bns.safe_yaml import Lines, read_yaml, shown, text_of
 
 _KEYS = ("robot", "port", "surface_m", "tracker", "lost_s", "late_s", "placed_within_m", "placed_within_rad", "driver")
 _NEEDED = ("robot", "port", "surface_m", "tracker")
@@ -56,11 +56,7 @@ def shipped_rig(robot: str) -> Rig:
 
 def load_rig(path: Path, robot: str) -> Rig:
     """A rig from a file; HardwareError names what is wrong, or that it is another robot's."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise HardwareError(f"cannot read the rig {path}: {error}. docs/trials.md shows how to write one.") from error
-    rig = parse_rig(text, str(path))
+    rig = parse_rig(text_of(path, "the rig", HardwareError), str(path))
     if rig.robot != robot:
         raise HardwareError(f"{path} is a rig for {rig.robot}, and the trial is for {robot}; name the other with --robot.")
     return rig
@@ -68,32 +64,34 @@ def load_rig(path: Path, robot: str) -> Rig:
 
 def parse_rig(text: str, where: str) -> Rig:
     """The rig in a YAML text; `where` is for messages."""
-    try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise HardwareError(f"{where} is not YAML: {error}") from error
+    content, lines = read_yaml(text, where, HardwareError)
     if not isinstance(content, dict):
         raise HardwareError(f"{where} is no rig; it needs {', '.join(_NEEDED)}.")
     unknown = [key for key in content if key not in _KEYS]
     if unknown:
-        raise HardwareError(f"{where}: {unknown_name('key', unknown[0], _KEYS)}")
+        raise HardwareError(f"{where}, line {lines.of(unknown[0])}: {unknown_name('key', unknown[0], _KEYS)}")
     missing = [key for key in _NEEDED if key not in content]
     if missing:
         raise HardwareError(f"{where} lacks {', '.join(missing)}; it needs {', '.join(_NEEDED)}.")
-    return _rig(content, where)
+    return _rig(content, where, lines)
 
 
-def _rig(content: Mapping[str, Any], where: str) -> Rig:
+def _rig(content: Mapping[str, Any], where: str, lines: Lines) -> Rig:
+    at = {key: f"{where}, line {lines.of(key)}" for key in content}
     tracker = content["tracker"]
-    if not isinstance(tracker, dict) or "kind" not in tracker:
-        raise HardwareError(f"{where}: tracker is {tracker!r}; it needs a kind ({', '.join(TRACKERS.names())}) and its settings.")
-    numbers = {name: _positive(where, name, content[name]) for name in ("lost_s", "late_s") if name in content}
-    limits = Limits(_surface(where, content["surface_m"]), **numbers)
-    near_m = _positive(where, "placed_within_m", content.get("placed_within_m", 0.1))
-    near_rad = _positive(where, "placed_within_rad", content.get("placed_within_rad", math.pi))
+    if not isinstance(tracker, dict) or not isinstance(tracker.get("kind"), str):
+        raise HardwareError(
+            f"{at['tracker']}: tracker is {shown(tracker)}; it needs a kind ({', '.join(TRACKERS.names())}) and its settings."
+        )
+    numbers = {name: _positive(at[name], name, content[name]) for name in ("lost_s", "late_s") if name in content}
+    limits = Limits(_surface(at["surface_m"], content["surface_m"]), **numbers)
+    near_m = _positive(at.get("placed_within_m", where), "placed_within_m", content.get("placed_within_m", 0.1))
+    near_rad = _positive(at.get("placed_within_rad", where), "placed_within_rad", content.get("placed_within_rad", math.pi))
     driver = content.get("driver") or {}
     if not isinstance(driver, dict):
-        raise HardwareError(f"{where}: driver is {driver!r}; it holds the settings of the robot's driver, name: value.")
+        raise HardwareError(
+            f"{at['driver']}: driver is {shown(driver)}; it holds the settings of the robot's driver, name: value."
+        )
     return Rig(str(content["robot"]), str(content["port"]), tracker, limits, near_m, driver, near_rad)
 
 
@@ -101,14 +99,15 @@ def _surface(where: str, given: Any) -> Surface:
     try:
         (x_low, x_high), (y_low, y_high) = given["x"], given["y"]
         surface = Surface(*(float(v) for v in (x_low, x_high, y_low, y_high)))
-    except (TypeError, KeyError, ValueError) as error:
-        raise HardwareError(f"{where}: surface_m is {given!r}; write {{x: [-0.9, 0.9], y: [-0.7, 0.7]}}, metres.") from error
-    if not (surface.x_low_m < surface.x_high_m and surface.y_low_m < surface.y_high_m):
-        raise HardwareError(f"{where}: surface_m is {given!r}; the first number of x and of y must be the smaller one.")
+    except (TypeError, KeyError, ValueError, OverflowError) as error:
+        raise HardwareError(f"{where}: surface_m is {shown(given)}; write {{x: [-0.9, 0.9], y: [-0.7, 0.7]}}, metres.") from error
+    ordered = surface.x_low_m < surface.x_high_m and surface.y_low_m < surface.y_high_m
+    if not ordered or not all(map(math.isfinite, (x_low, x_high, y_low, y_high))):
+        raise HardwareError(f"{where}: surface_m is {shown(given)}; the first number of x and of y must be the smaller one.")
     return surface
 
 
 def _positive(where: str, name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
-        raise HardwareError(f"{where}: {name} is {value!r}; it must be a number above 0.")
+        raise HardwareError(f"{where}: {name} is {shown(value)}; it must be a number above 0.")
     return float(value)

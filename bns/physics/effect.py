@@ -42,8 +42,17 @@ class Parameter:
     """It stands back where this column was logged."""
     size_power: float = 0.0
     """What is plausible, and where a fit begins, grows with this power of the wheelbase: 1 for lengths and speeds."""
+    floor_share: float = 0.0
+    """A length that is no more than this share of the diagonal of where the robot was seen; 0: as large as it likes."""
     resolution: float = 0.0
     """A change that shows and is still small; 0: a thousandth of the plausible range."""
+
+    def within(self, diagonal_m: float) -> Parameter:
+        """The number held to its `floor_share` of a floor."""
+        if not self.floor_share:
+            return self
+        high = max(self.floor_share * diagonal_m, 4.0 * self.low)
+        return replace(self, high=high, plausible=(min(self.plausible[0], high / 2.0), high))
 
     def scaled(self, ratio: float) -> Parameter:
         """The number of a robot whose wheelbase is ``ratio`` times that of the reference; held within its bounds."""
@@ -113,6 +122,12 @@ class Effect:
             parameters=tuple(p.scaled(ratio) for p in self.parameters),
             starts=tuple(tuple(v * f for v, f in zip(start, factors, strict=True)) for start in self.starts),
         )
+
+    def within(self, diagonal_m: float) -> Effect:
+        """The effect on a floor of this size; itself where nothing depends on it."""
+        if not any(p.floor_share for p in self.parameters):
+            return self
+        return replace(self, parameters=tuple(p.within(diagonal_m) for p in self.parameters))
 
     @property
     def in_words(self) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, Parameter
+from bns.physics.formula_check import checked_formula
 from bns.physics.order import FORMULAS
 from bns.physics.signals import Array, Body
 
@@ -42,24 +43,6 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "max": np.maximum,
 }
 _PLACE = {"x", "y", "heading"}
-_ALLOWED = (
-    ast.Expression,
-    ast.BinOp,
-    ast.UnaryOp,
-    ast.Call,
-    ast.Name,
-    ast.Constant,
-    ast.Load,
-    ast.Add,
-    ast.Sub,
-    ast.Mult,
-    ast.Div,
-    ast.Pow,
-    ast.USub,
-    ast.UAdd,
-)
-
-
 def formula_effect(name: str, term: str, on: str) -> Effect:
     """The effect that adds ``term`` to the velocity ``on``; names that are no variable are its parameters.
 
@@ -88,21 +71,8 @@ def formula_effect(name: str, term: str, on: str) -> Effect:
 
 
 def _parsed(name: str, term: str) -> tuple[set[str], Any]:
-    try:
-        tree = ast.parse(term.strip(), mode="eval")
-    except (SyntaxError, ValueError) as fault:
-        raise ModelError(f"formula {name}: {term!r} is no formula: {fault}. Write it as in k * v * abs(w).") from fault
+    tree = checked_formula(f"formula {name}", term, FUNCTIONS)
     called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
-    for node in ast.walk(tree):
-        if not isinstance(node, _ALLOWED) or (
-            isinstance(node, ast.Constant) and not isinstance(node.value, int | float)
-        ):
-            raise ModelError(
-                f"formula {name}: {ast.unparse(node)!r} is not allowed; use + - * / **, numbers, names and "
-                f"{', '.join(FUNCTIONS)}."
-            )
-        if isinstance(node, ast.Call) and (not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS):
-            raise ModelError(f"formula {name}: " + unknown_name("function", ast.unparse(node.func), FUNCTIONS))
     names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - called
     return names, compile(tree, name, "eval")
 
@@ -111,8 +81,13 @@ def _apply(name: str, code: Any, on: str, body: Body, **numbers: float) -> Body:
     if body.place is None and _needs(code, on):
         return body  # first round of a simulation: nobody knows yet where the robot goes
     values = {**_values(body), **numbers}
-    with np.errstate(all="ignore"):
-        added = np.asarray(eval(code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
+    try:
+        with np.errstate(all="ignore"):
+            added = np.asarray(eval(code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
+    except (ArithmeticError, TypeError, ValueError) as fault:  # of numbers that are fitted: k / (k - k), (-k)**0.5
+        raise ModelError(f"formula {name} cannot be calculated with {numbers}: {fault}. Write it in another way.") from fault
+    if added.dtype.kind == "c":
+        raise ModelError(f"formula {name} is no real number with {numbers}: a root of what is below 0. Write it in another way.")
     added = np.broadcast_to(added, body.forward_m_s.shape) * (body.moving if on in {"east", "north"} else 1.0)
     if not np.isfinite(added).all():
         raise ModelError(

@@ -13,17 +13,15 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, number
-from bns.physics.effects import all_effects, chain_key, effect_in_file, effect_named, effect_names
+from bns.physics.effects import all_effects, chain_key, effect_named, effect_names
 from bns.physics.formula import formula_effect
+from bns.physics.model_checks import flag, interval, join, keys, why
+from bns.physics.trust import trusted_effect
+from bns.safe_yaml import Lines, read_yaml, shown, text_of
 
 BASES = ("differential-drive",)
-BASIS = ("measured", "published", "fitted", "guess")
-"""How a value came to be known."""
-
 _TOP = ("base", "wheelbase_m", "dt_s", "jitter", "noise", "effects", "provenance")
 _GROUPS: Mapping[str, tuple[str, ...]] = {"jitter": ("wheel_speed_relative",), "noise": ("position_m", "heading_rad")}
 _WHY = ("basis", "reason")
@@ -98,7 +96,7 @@ class Model:
             if active.per_trial and not active.effect.per_trial_allowed:
                 raise ModelError(
                     f"model {self.name}: {active.effect.name} has one value for all trials; per_trial goes with "
-                    f"{_join([e.name for e in all_effects().values() if e.per_trial_allowed])} alone."
+                    f"{join([e.name for e in all_effects().values() if e.per_trial_allowed])} alone."
                 )
 
     def at(self, stage: str) -> Iterator[ActiveEffect]:
@@ -187,7 +185,7 @@ def load_model(name_or_path: str | Path) -> Model:
             raise ModelError(
                 f"There is no model file {path}. Give the path of a YAML file or one of: {', '.join(model_names())}."
             )
-        return parse_model(path.read_text(encoding="utf-8"), path.stem, path.parent)
+        return parse_model(text_of(path, "the model", ModelError), path.stem, path.parent)
     if str(name_or_path) not in model_names():
         known = unknown_name("robot model", str(name_or_path), model_names())
         raise ModelError(f"{known} Or give the path of a YAML file, with .yaml at its end.")
@@ -196,16 +194,22 @@ def load_model(name_or_path: str | Path) -> Model:
 
 
 def parse_model(text: str, name: str, folder: Path | None = None) -> Model:
-    """The model in a YAML text; ``name`` is for messages, effects in Python files are sought from ``folder``."""
-    try:
-        tree = yaml.safe_load(text)
-    except yaml.YAMLError as fault:
-        raise ModelError(f"model {name} is no valid YAML: {fault}. Correct the place it names.") from fault
-    top = _keys(f"model {name}", tree, _TOP, required=("base", "wheelbase_m"))
-    jitter, noise = (_group(name, top, key) for key in _GROUPS)
+    """The model in a YAML text; ``name`` is for messages, effects in Python files are sought from ``folder``.
+
+    No Python file is run but those that are trusted (`bns.physics.trust`).
+    """
+    tree, lines = read_yaml(text, f"model {name}", ModelError)
+    top = keys(f"model {name}", tree, _TOP, required=("base", "wheelbase_m"))
+    for key in ("wheelbase_m", "dt_s"):
+        with lines.at(key):
+            number(f"model {name}: {key}", top.get(key, Model.dt_s), *LIMITS[key])
+    jitter, noise = (_group(name, top, key, lines) for key in _GROUPS)
     listed = top.get("effects") or []
     if not isinstance(listed, list):
-        raise ModelError(f"model {name}: effects is {listed!r}; it must be a list of {_join(_EFFECT_KEYS)}.")
+        raise ModelError(f"model {name}: effects is {shown(listed)}; it must be a list of {join(_EFFECT_KEYS)}.")
+    provenance = top.get("provenance") or {}
+    if not isinstance(provenance, dict):
+        raise ModelError(f"provenance of model {name} is {shown(provenance)}; it must be a mapping (lines of key: value).")
     return Model(
         name=name,
         base=top["base"],
@@ -214,39 +218,41 @@ def parse_model(text: str, name: str, folder: Path | None = None) -> Model:
         jitter_relative=jitter["wheel_speed_relative"],
         noise_position_m=noise["position_m"],
         noise_heading_rad=noise["heading_rad"],
-        effects=tuple(_effect(name, entry, folder or Path()) for entry in listed),
-        provenance=top.get("provenance") or {},
+        effects=tuple(_located_effect(name, listed, at, folder or Path(), lines) for at in range(len(listed))),
+        provenance=provenance,
     )
+
+
+def _located_effect(model: str, listed: list[Any], at: int, folder: Path, lines: Lines) -> ActiveEffect:
+    with lines.at("effects", at):
+        return _effect(model, listed[at], folder)
 
 
 def _effect(model: str, entry: Any, folder: Path) -> ActiveEffect:
     where = f"an effect of model {model}"
-    keys = _keys(where, entry, (*_EFFECT_KEYS, *_EFFECT_MAY), required=_EFFECT_KEYS)
-    written: dict[str, str] = {str(key): str(keys[key]) for key in ("term", "on", "file") if key in keys}
-    effect = _written_effect(where, str(keys["name"]), written, folder)
+    given = keys(where, entry, (*_EFFECT_KEYS, *_EFFECT_MAY), required=_EFFECT_KEYS)
+    written: dict[str, str] = {str(key): str(given[key]) for key in ("term", "on", "file") if key in given}
+    effect = _written_effect(where, str(given["name"]), written, folder)
     names = tuple(p.name for p in effect.parameters)
-    values = _keys(f"values of {effect.name} in model {model}", keys["values"], names)
-    intervals = _keys(f"intervals of {effect.name} in model {model}", keys.get("intervals") or {}, names)
+    values = keys(f"values of {effect.name} in model {model}", given["values"], names)
+    intervals = keys(f"intervals of {effect.name} in model {model}", given.get("intervals") or {}, names)
     return ActiveEffect(
         effect,
         effect.checked(values),
-        *_why(f"{effect.name} in model {model}", keys),
-        intervals={name: (float(low), float(high)) for name, (low, high) in intervals.items()},
+        *why(f"{effect.name} in model {model}", given),
+        intervals={
+            name: interval(f"the interval of {name}, {effect.name} in model {model},", ends)
+            for name, ends in intervals.items()
+        },
         written=written,
-        per_trial=_flag(f"per_trial of {effect.name} in model {model}", keys.get("per_trial", False)),
+        per_trial=flag(f"per_trial of {effect.name} in model {model}", given.get("per_trial", False)),
     )
-
-
-def _flag(where: str, value: object) -> bool:
-    if not isinstance(value, bool):
-        raise ModelError(f"{where} is {value!r}; it must be true or false.")
-    return value
 
 
 def _written_effect(where: str, name: str, written: Mapping[str, str], folder: Path) -> Effect:
     """The effect of that name: from the catalogue, a formula, or a Python file with an ``EFFECT``."""
     if "file" in written:
-        return effect_in_file(folder / written["file"])
+        return trusted_effect(folder / written["file"], f"{where}, {name},")
     if not written:
         return effect_named(name)
     if set(written) != {"term", "on"}:
@@ -256,35 +262,14 @@ def _written_effect(where: str, name: str, written: Mapping[str, str], folder: P
     return formula_effect(name, written["term"], written["on"])
 
 
-def _group(model: str, top: Mapping[str, Any], key: str) -> dict[str, Any]:
+def _group(model: str, top: Mapping[str, Any], key: str, lines: Lines) -> dict[str, Any]:
     """The numbers of jitter or noise; all 0 where the file says nothing."""
     if key not in top:
         return dict.fromkeys(_GROUPS[key], 0.0)
     where = f"{key} of model {model}"
-    group = _keys(where, top[key], (*_GROUPS[key], *_WHY), required=(*_GROUPS[key], *_WHY))
-    _why(where, group)
+    with lines.at(key):
+        group = keys(where, top[key], (*_GROUPS[key], *_WHY), required=(*_GROUPS[key], *_WHY))
+        why(where, group)
     return group
 
 
-def _why(where: str, keys: Mapping[str, Any]) -> tuple[str, str]:
-    if keys["basis"] not in BASIS:
-        raise ModelError(f"{where}: " + unknown_name("basis", keys["basis"], BASIS))
-    if not isinstance(keys["reason"], str) or not keys["reason"].strip():
-        raise ModelError(f"{where}: reason is {keys['reason']!r}; write down why the value is what it is.")
-    return keys["basis"], keys["reason"].strip()
-
-
-def _keys(where: str, tree: Any, allowed: tuple[str, ...], required: tuple[str, ...] = ()) -> dict[str, Any]:
-    if not isinstance(tree, dict):
-        raise ModelError(f"{where} is {tree!r}; it must be a mapping with the keys {_join(allowed)}.")
-    for key in tree:
-        if key not in allowed:
-            raise ModelError(f"{where}: " + unknown_name("key", key, allowed))
-    missing = [key for key in required if key not in tree]
-    if missing:
-        raise ModelError(f"{where} lacks {_join(missing)}; write each of {_join(required)}.")
-    return tree
-
-
-def _join(names: tuple[str, ...] | list[str]) -> str:
-    return ", ".join(names)

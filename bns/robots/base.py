@@ -68,6 +68,12 @@ class Commands(Protocol):
     def perturb(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
         """Allowed commands (n, components) as far from these as a mutation can go."""
 
+    def plan(
+        self, controller: np.ndarray, weights: np.ndarray | None, task: Task, stream: RandomStream | None = None
+    ) -> np.ndarray:
+        """The commands (m, components) that are driven when this controller is picked; stream: the draws it was scored with.
+        All of them where no networks (None) say how many the task needs."""
+
     def driven_ms(self, commands: np.ndarray) -> float:
         """How long these commands drive, in milliseconds."""
 
@@ -154,9 +160,6 @@ class Fitness(Protocol):
 
     radii_m: tuple[float, ...]
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, stream: RandomStream | None = None) -> np.ndarray:
-        """The commands (m, components) that are driven when this controller is picked; stream: the draws it was scored with."""
-
     def score(
         self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
         parents: Scores | None = None,
@@ -166,6 +169,12 @@ class Fitness(Protocol):
         parents: scores of the generation that this one was bred from, on the same networks: a robot may take over from them
         what cannot have changed. The scores are the same with them and without.
         """
+
+    def walk(
+        self, population: Population, displacements: np.ndarray, task: Task, stream: RandomStream | None = None
+    ) -> Scores:
+        """Fitness of every controller from the displacements (commands, networks) of all their commands, list after list,
+        whatever simulator foretold them: `score` without its networks."""
 
     def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
         """Fitness and goals reached of one driven path (n, columns)."""

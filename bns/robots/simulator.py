@@ -131,17 +131,31 @@ def load_simulator(path: Path | str) -> StaticSimulator:
         with safe_open(str(path), framework="numpy") as file:
             header = file.metadata() or {}
             named = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # not a dict
-    except SafetensorError as error:
-        raise ModelError(f"{path} is no safetensors file: {error}.") from error
+    except (SafetensorError, OSError, TypeError, ValueError, MemoryError) as error:
+        raise ModelError(f"{path} is no safetensors file that bns reads: {error}.") from error
     if "bns" not in header:
         raise ModelError(f"{path} does not say which networks it holds; write it with bns (`bns run --save-snn FILE`).")
-    about = json.loads(header["bns"])
-    networks = tuple(about["networks"])
-    noise_sd = np.asarray(about["noise_sd"], np.float64)
+    networks, noise_sd, provenance = _about(path, header["bns"])
     learned_from = _part(named, _TRAINING) if _TRAINING in named else np.empty((0, INPUTS), np.float32)
     if learned_from.ndim != 2 or learned_from.shape[1] != INPUTS:
         raise ModelError(f"{path} has {_TRAINING} of shape {learned_from.shape}; expected (patterns, {INPUTS}).")
-    return StaticSimulator(networks, from_tensors(networks, named), noise_sd, about["provenance"], learned_from.T)
+    weights = from_tensors(networks, named)
+    if not (np.isfinite(weights).all() and np.isfinite(learned_from).all()):
+        raise ModelError(f"{path} holds weights or patterns that are no finite numbers; write it anew.")
+    return StaticSimulator(networks, weights, noise_sd, provenance, learned_from.T)
+
+
+def _about(path: Path, text: str) -> tuple[tuple[str, ...], np.ndarray, dict[str, Any]]:
+    """Names of the networks, standard deviations of their noise, and provenance, as a file's header has them."""
+    try:
+        about = json.loads(text)
+        names, noise_sd = tuple(about["networks"]), np.asarray(about["noise_sd"], np.float64)
+        provenance = dict(about["provenance"])
+    except (ValueError, TypeError, LookupError, RecursionError) as error:
+        raise ModelError(f"{path} does not say which networks it holds ({error}); write it anew with bns.") from error
+    if not names or not all(isinstance(name, str) for name in names) or not np.isfinite(noise_sd).all() or noise_sd.ndim != 1:
+        raise ModelError(f"{path} names no networks, or noise that is no number, in its header; write it anew with bns.")
+    return names, noise_sd, provenance
 
 
 def static_path(robot: str) -> Path:

@@ -13,6 +13,7 @@ import numpy as np
 
 from bns import __version__
 from bns.bootstrap.evolver import Evolver
+from bns.bootstrap.simulators import NetworkSimulator
 from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.rprop import Rprop
 from bns.engine.snn import initial_weights, predict
@@ -162,10 +163,11 @@ def evolved_commands(robot: Robot, key: Key, weights: np.ndarray) -> np.ndarray:
         generations_per_evaluation=GENERATIONS,
         max_commands=CYCLES,
     )
-    found = []
+    own, found = evolving(robot), []
+    simulator = NetworkSimulator(own, task, weights)
     for trial in range(CONTROLLERS):
-        evolver = Evolver.start(evolving(robot), task, Key(1 + trial, key.study), spec, weights)
-        evolver.evolve(weights)
+        evolver = Evolver.start(own, task, Key(1 + trial, key.study), spec, simulator)
+        evolver.evolve(simulator)
         found.append(evolver.fittest())
     return np.concatenate(found)
 

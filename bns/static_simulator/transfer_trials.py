@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from bns.bootstrap.evolver import Evolver
+from bns.bootstrap.simulators import NetworkSimulator
 from bns.engine.philox import Key, Purpose
 from bns.engine.snn import predict
 from bns.errors import StoreError
@@ -40,7 +41,7 @@ def validate(
     for trial in range(TRIALS):
         progress(trial, TRIALS)
         evolver = _evolved(robot, task, trial, simulator.weights)
-        planned = evolver.plan(evolver.fittest(), simulator.weights)
+        planned = evolver.plan(evolver.fittest(), NetworkSimulator(evolver.robot, task, simulator.weights))
         outputs = predict(simulator.weights, robot.inputs(planned), robot.sigmoid_output)
         simulated = robot.poses(robot.displacements(outputs), planned)
         about = {"trial": trial + 1, "commands": len(planned), "generations": evolver.generations}
@@ -62,9 +63,10 @@ def _evolved(robot: Robot, task: Task, trial: int, weights: np.ndarray) -> Evolv
         generations_per_evaluation=ROUND,
     )
     robot = evolving(robot)
-    evolver = Evolver.start(robot, task, Key.of_run(trial, 0, robot.name, f"validate {task.name}"), spec, weights)
+    simulator = NetworkSimulator(robot, task, weights)
+    evolver = Evolver.start(robot, task, Key.of_run(trial, 0, robot.name, f"validate {task.name}"), spec, simulator)
     for _ in range(MOST_ROUNDS):
-        evolver.evolve(weights)
+        evolver.evolve(simulator)
         if evolver.scores.goals_reached[evolver.order[0]] == len(task.goals_m):
             break
     return evolver

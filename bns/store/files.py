@@ -16,6 +16,7 @@ from bns.errors import StoreError
 
 JOURNAL, STAGING, SET_ASIDE = "journal", "staging", "set-aside"
 
+_COPY = ".copy"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _NO_FOLDER = {errno.ENOTDIR, errno.EEXIST}
@@ -121,7 +122,7 @@ def publish(data: bytes, staged: Path, place: Path) -> None:
         with explained("write", staged):
             _write_synced(staged, data)
         with explained("publish", place):
-            os.replace(staged, place)  # noqa: PTH105 - the tests stop a writer at this very call
+            _replace(staged, place)
             _sync_folder(place.parent)
     except StoreError:
         # What is half written would take the space that the user now has to find.
@@ -146,12 +147,30 @@ def set_aside(results: Path, path: Path, data: bytes | None = None) -> Path:
     make_folder(place.parent)
     with explained("set aside", path):
         if data is None:
-            os.replace(path, place)  # noqa: PTH105
+            _replace(path, place)
             _sync_folder(path.parent)
         else:
             _write_synced(place, data)
         _sync_folder(place.parent)
     return place
+
+
+def on_the_way(results: Path, sweep: str) -> list[Path]:
+    """What a killed writer of ``sweep`` left half copied beside its place, in tables that lie on another disk."""
+    return sorted(results.glob(f"*/sweep={sweep}/**/.*{_COPY}"))
+
+
+def _replace(path: Path, place: Path) -> None:
+    """``os.replace``, also where a folder of ``place`` is a link to another disk."""
+    try:
+        os.replace(path, place)  # noqa: PTH105 - the tests stop a writer at this very call
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        near = place.with_name(f".{place.name}{_COPY}")
+        _write_synced(near, path.read_bytes())
+        os.replace(near, place)  # noqa: PTH105
+        path.unlink()
 
 
 def _write_synced(path: Path, data: bytes) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import pyarrow as pa
 
-from bns.store.files import STAGING, StoreWarning, partition, publish, remove, set_aside
+from bns.store.digest import digest_in
+from bns.store.files import STAGING, StoreWarning, on_the_way, partition, publish, remove, set_aside
 from bns.store.journal import Frame, JournalFile, Scan, best_frames, read_journal
 from bns.store.parquet import part_bytes
 from bns.store.schema import RECORDED
@@ -30,15 +32,33 @@ def fold_journal(results: Path, file: JournalFile) -> int:
 
 
 def publish_part(results: Path, sweep: str, task: str, part: str, frames: list[Frame]) -> None:
-    """Publish one part a table. "runs" comes last: a run is there when its rows are."""
+    """Publish one part a table of what is in ``frames``."""
     tables = {name: [frame.tables[name] for frame in frames if name in frame.tables] for name in (*RECORDED, "runs")}
-    runs = pa.concat_tables(tables["runs"])
-    hashes = {frame.spec_hash for frame in frames}
-    for name, parts in tables.items():
-        if parts:
+    given = {name: pa.concat_tables(parts) for name, parts in tables.items() if parts}
+    publish_fold(results, sweep, task, part, given, {frame.spec_hash for frame in frames})
+
+
+def publish_fold(
+    results: Path,
+    sweep: str,
+    task: str,
+    part: str,
+    tables: Mapping[str, pa.Table],
+    spec_hashes: Iterable[str],
+    lost: Iterable[str] = (),
+) -> None:
+    """Publish one part a table. "runs" comes last: a run is there when its rows are, and it vouches for their digests.
+
+    ``lost`` are tables that the runs had rows in which are no more: the runs do not count as finished.
+    """
+    digests, hashes = dict.fromkeys(lost, ""), sorted(spec_hashes)
+    for name in (*RECORDED, "runs"):
+        if name in tables:
             place = partition(results, name, sweep, task) / f"{part}.parquet"
-            data = part_bytes(name, pa.concat_tables(parts), sweep, hashes, runs)
+            vouched = digests if name == "runs" else None
+            data = part_bytes(name, tables[name], sweep, hashes, tables["runs"], task=task, parts=vouched)
             publish(data, staged(results, sweep, f"{part}-{name}-{task}"), place)
+            digests.setdefault(name, digest_in(data))
 
 
 def staged(results: Path, sweep: str, name: str) -> Path:
@@ -48,7 +68,7 @@ def staged(results: Path, sweep: str, name: str) -> Path:
 
 def clear_staging(results: Path, sweep: str) -> None:
     """Remove what a killed writer of ``sweep`` left half built; only for the one that holds its lock."""
-    for path in sorted(staged(results, sweep, "any").parent.glob("*.parquet")):
+    for path in [*sorted(staged(results, sweep, "any").parent.glob("*.parquet")), *on_the_way(results, sweep)]:
         remove(path)
 
 

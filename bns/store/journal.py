@@ -89,17 +89,25 @@ def read_journal(file: JournalFile) -> Scan:
         if isinstance(error.__cause__, FileNotFoundError):
             return Scan(b"", [], 0, 0)
         raise
-    return scan(data, file.path)
+    return scan(data, file)
 
 
-def scan(data: bytes, path: Path) -> Scan:
-    """The frames in ``data``; after damage it goes on at the next frame whose checksums are right."""
+def scan(data: bytes, file: JournalFile) -> Scan:
+    """The frames in ``data``; after damage it goes on at the next frame whose checksums are right.
+
+    A frame of another sweep counts as damage: the file was exchanged for another.
+    """
     frames, at, damaged = [], 0, 0
     while at < len(data):
         payload = _payload_at(data, at)
         if payload is not None:
-            frames.append(_decoded(payload, path))
-            at += _HEAD_SIZE + len(payload)
+            size = _HEAD_SIZE + len(payload)
+            frame = _decoded(payload, file)
+            if frame is None:
+                damaged += size
+            else:
+                frames.append(frame)
+            at += size
             continue
         following = _next_frame(data, at + 1)
         if following is None:
@@ -139,7 +147,7 @@ class Journal:
 
     def append(self, frame: Frame) -> None:
         """Write one frame and sync it; StoreError if that fails or the file is gone, and the journal is as before."""
-        data = encoded(frame)
+        data = encoded(frame, self.file.sweep)
         if not is_same(self.file.path, self._made):
             # Writes to a deleted file go well, and to nowhere.
             raise gone(self.file.path, f"It held {self.runs} finished runs; run {frame.run_id} is not stored.")
@@ -164,13 +172,14 @@ class Journal:
             os.ftruncate(self._descriptor, self._end)
 
 
-def encoded(frame: Frame) -> bytes:
-    """The bytes of one frame."""
+def encoded(frame: Frame, sweep: str) -> bytes:
+    """The bytes of one frame of ``sweep``."""
     streams = {name: _stream(table) for name, table in frame.tables.items()}
     index = json.dumps(
         {
             "schema_version": SCHEMA_VERSION,
             "run_id": frame.run_id,
+            "sweep": sweep,
             "task": frame.task,
             "status": frame.status,
             "spec_hash": frame.spec_hash,
@@ -222,13 +231,16 @@ def _is_torn(data: bytes, at: int) -> bool:
     return (len(rest) < _HEAD_SIZE and MAGIC[: len(rest)] == rest[: len(MAGIC)]) or not any(rest)
 
 
-def _decoded(payload: bytes, path: Path) -> Frame:
+def _decoded(payload: bytes, file: JournalFile) -> Frame | None:
+    """The frame in ``payload``; None if it belongs to another sweep (frames of older versions do not say)."""
     start = _CHECK.size + _CHECK.unpack(payload[: _CHECK.size])[0]
     index: dict[str, Any] = json.loads(payload[_CHECK.size : start])
     version = index["schema_version"]
+    if index.get("sweep", file.sweep) != file.sweep:
+        return None
     if version > SCHEMA_VERSION:
         raise StoreError(
-            f"{path} was written with schema version {version}; this bns knows "
+            f"{file.path} was written with schema version {version}; this bns knows "
             f"{SCHEMA_VERSION}. Update it: pip install -U bns"
         )
     tables = {}

@@ -10,18 +10,19 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from bns.store.files import partition, publish, remove, set_aside
-from bns.store.fold import clear_staging, fold_journal, staged
+from bns.store.files import publish, remove, set_aside
+from bns.store.fold import clear_staging, fold_journal, publish_fold, staged
 from bns.store.journal import journals
-from bns.store.parquet import READ_FAULTS, file_bytes, joined_hashes, part_bytes, read_part, renewed_metadata
+from bns.store.parquet import file_bytes, joined_hashes, read_part, renewed_metadata
 from bns.store.parts import Part, check_version, find_parts
 from bns.store.record import STATUSES
 from bns.store.schema import RECORDED, SCHEMA_VERSION, SCHEMAS, upgraded
+from bns.store.whole import exchanged, lacking, without
 
 FEWEST_RUNS, MOST_RUNS = 100, 200
 """Runs that a file should hold: fewer slow the readers down, more make every change costly."""
 
-_NO_EVALS = len(STATUSES)
+_INCOMPLETE = len(STATUSES)
 
 
 @dataclass
@@ -41,7 +42,8 @@ class _Fold:
     place: str
     parts: dict[str, Part]
     kept: frozenset[str]
-    whole: bool  # every run that is ok has its evaluations here
+    lost: tuple[str, ...]  # tables that the runs have rows in and that are not there
+    whole: bool  # every run that counts here and is ok has all of its rows here
 
     @property
     def runs(self) -> Part:
@@ -53,14 +55,14 @@ class _Fold:
 
     @property
     def old_files(self) -> int:
-        return sum(part.version < SCHEMA_VERSION for part in self.parts.values())
+        return sum(_is_old(part) for part in self.parts.values())
 
 
 def compact_sweep(root: Path, sweep: str, tally: Tally) -> None:
     """Bring one sweep in order; only for the one that holds its lock."""
     clear_staging(root, sweep)
     tally.recovered += sum(fold_journal(root, file) for file in journals(root, sweep))
-    tables = {table: _readable(root, table, sweep, tally) for table in SCHEMAS}
+    tables = _readable(root, sweep, tally)
     for part in tables["specs"]:
         _upgrade_alone(root, part, tally)
     folds = _folds(tables)
@@ -72,25 +74,26 @@ def compact_sweep(root: Path, sweep: str, tally: Tally) -> None:
             tally.upgraded += sum(fold.old_files for fold in group)
 
 
-def _readable(root: Path, table: str, sweep: str, tally: Tally) -> list[Part]:
-    """Parts of one table; files that cannot be read to the end are set aside."""
-    parts, bad = find_parts(root, table, sweep)
-    tally.set_aside += [set_aside(root, file.path) for file in bad]
-    good = []
-    for part in parts:
+def _readable(root: Path, sweep: str, tally: Tally) -> dict[str, list[Part]]:
+    """Parts by table; files that are not as they were written are set aside, verified afresh whatever is remembered."""
+    found = {table: find_parts(root, table, sweep, afresh=True) for table in SCHEMAS}
+    tables = {table: parts for table, (parts, _) in found.items()}
+    for part in (part for parts in tables.values() for part in parts):
         if part.version > SCHEMA_VERSION:
             check_version(part, root)
-        try:
-            read_part(part.path)
-        except READ_FAULTS:
-            tally.set_aside.append(set_aside(root, part.path))
-        else:
-            good.append(part)
-    return good
+    others = exchanged(tables)
+    tally.set_aside += [set_aside(root, file.path) for _, bad in found.values() for file in bad]
+    tally.set_aside += [set_aside(root, file.path) for file in others]
+    return without(tables, others)
+
+
+def _is_old(part: Part) -> bool:
+    """Whether the file must be written anew: for its schema version, or because it has no digest."""
+    return part.version < SCHEMA_VERSION or not part.digest
 
 
 def _upgrade_alone(root: Path, part: Part, tally: Tally) -> None:
-    if part.version < SCHEMA_VERSION:
+    if _is_old(part):
         data = file_bytes(part.table, _rows(part), renewed_metadata(part.metadata))
         publish(data, staged(root, part.sweep, part.path.stem), part.path)
         tally.upgraded += 1
@@ -99,15 +102,15 @@ def _upgrade_alone(root: Path, part: Part, tally: Tally) -> None:
 def _folds(tables: dict[str, list[Part]]) -> list[_Fold]:
     """The folds of a sweep by place, with what counts in each: best status first, then first place."""
     by_place = {name: {part.place: part for part in parts} for name, parts in tables.items()}
+    gaps = lacking(tables)
     best: dict[str, tuple[int, str]] = {}
     for place, part in by_place["runs"].items():
         rows = read_part(part.path, ["run_id", "status"])
         for run, status in zip(rows["run_id"].to_pylist(), rows["status"].to_pylist(), strict=True):
-            lost = status == "ok" and place not in by_place["evals"]
-            claim = (_NO_EVALS if lost else STATUSES.index(status), place)
+            claim = (_INCOMPLETE if status == "ok" and place in gaps else STATUSES.index(status), place)
             best[run] = min(claim, best.get(run, claim))
     kept: dict[str, set[str]] = {place: set() for place in by_place["runs"]}
-    lacking = {place for claim, place in best.values() if claim == _NO_EVALS}
+    incomplete = {place for claim, place in best.values() if claim == _INCOMPLETE}
     for run, (_, place) in best.items():
         kept[place].add(run)
     names = ("runs", *RECORDED)
@@ -116,7 +119,8 @@ def _folds(tables: dict[str, list[Part]]) -> list[_Fold]:
             place,
             {name: by_place[name][place] for name in names if place in by_place[name]},
             frozenset(kept[place]),
-            place not in lacking,
+            gaps.get(place, ()),
+            place not in incomplete,
         )
         for place in sorted(kept)
     ]
@@ -155,16 +159,13 @@ def _size(group: Iterable[_Fold]) -> int:
 
 def _rewrite(root: Path, sweep: str, task: str, group: list[_Fold]) -> None:
     """Publish what counts in ``group`` as one fold, "runs" last; then remove its files, "runs" first."""
-    runs = _gathered("runs", group)
-    if runs.num_rows:
-        name = _name(group)
+    tables = {
+        table: _gathered(table, group) for table in ("runs", *RECORDED) if any(table in fold.parts for fold in group)
+    }
+    if tables["runs"].num_rows:
         hashes = joined_hashes(fold.runs.metadata for fold in group)
-        for table in (*RECORDED, "runs"):
-            if any(table in fold.parts for fold in group):
-                rows = runs if table == "runs" else _gathered(table, group)
-                data = part_bytes(table, rows, sweep, hashes, runs)
-                place = partition(root, table, sweep, task) / f"{name}.parquet"
-                publish(data, staged(root, sweep, f"{name}-{table}-{task}"), place)
+        lost = {table for fold in group if not fold.whole for table in fold.lost}
+        publish_fold(root, sweep, task, _name(group), tables, hashes, lost)
     for table in ("runs", *RECORDED):
         for fold in group:
             if table in fold.parts:

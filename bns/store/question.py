@@ -2,37 +2,75 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
 import pyarrow as pa
 
 from bns.errors import StoreError
+from bns.store.schema import SCHEMAS
 from bns.store.views import pattern
 
+MOST_ROWS, MOST_BYTES = 5_000_000, 1 << 29
+_ROWS_AT_ONCE = 2_048
+_LEVELS = ("", "/sweep=*", "/sweep=*/task=*")
 _PARQUET_NAME = re.compile(r"""["']([^"']+\.parquet)["']""")
 _EXPLAIN = re.compile(r"\s*EXPLAIN\s+(ANALYZE\s+)?", re.IGNORECASE)
 
 
-def answer(connection: duckdb.DuckDBPyConnection, results: Path, sql: str) -> pa.Table:
+def answer(connection: duckdb.DuckDBPyConnection, results: Path, sql: str, *, bounded: bool = False) -> pa.Table:
     """The rows of ``sql`` over the views of ``connection``, which is locked to ``results`` from then on.
+
+    ``bounded``: at most `MOST_ROWS` rows and `MOST_BYTES` are fetched, and DuckDB works with at most half of the memory.
 
     Of columns that share a name the second is called name_1, the third name_2, as DuckDB does in subqueries.
 
     Raises:
-        StoreError: ``sql`` is not one SELECT (or EXPLAIN of one), or DuckDB cannot carry it out.
+        StoreError: ``sql`` is not one SELECT (or EXPLAIN of one), gives too many rows, or DuckDB cannot carry it out.
         duckdb.IOException: a file went away or cannot be read.
     """
     try:
+        if bounded:
+            connection.execute(f"SET memory_limit = '{_half_of_memory_mib()}MiB'")
         _lock(connection, results)
         _check(connection, sql)
-        rows: pa.Table = connection.sql(sql).to_arrow_table()
+        rows = _fetched(connection, sql) if bounded else connection.sql(sql).to_arrow_table()
     except duckdb.IOException:
         raise
     except duckdb.Error as error:
         raise StoreError(f"DuckDB cannot answer {sql!r}: {error}{damage_hint(results, error)}") from error
     return rows.rename_columns(_distinct(rows.column_names))
+
+
+def _fetched(connection: duckdb.DuckDBPyConnection, sql: str) -> pa.Table:
+    """The rows, as long as they are not too many: they are counted as they come, and not made all at once."""
+    reader = connection.sql(sql).to_arrow_reader(_ROWS_AT_ONCE)
+    batches, rows, size = [], 0, 0
+    for batch in _batches(reader, sql):
+        batches.append(batch)
+        rows, size = rows + batch.num_rows, size + batch.nbytes
+        if rows > MOST_ROWS or size > MOST_BYTES:
+            raise StoreError(
+                f"{sql!r} gives more than {rows - batch.num_rows} rows; {MOST_ROWS} rows or {MOST_BYTES >> 20} MiB are fetched "
+                "at most. Ask for fewer with WHERE or LIMIT, count or average them in the query, or read the files with bns.load."
+            )
+    return pa.Table.from_batches(batches, schema=reader.schema)
+
+
+def _batches(reader: pa.RecordBatchReader, sql: str) -> Iterator[pa.RecordBatch]:
+    try:
+        yield from reader
+    except OSError as error:  # what DuckDB throws while rows are made comes through Arrow as one of these
+        if "IO Error" in str(error):
+            raise duckdb.IOException(str(error)) from error
+        raise StoreError(f"DuckDB cannot answer {sql!r}: {str(error).splitlines()[0]}") from error
+
+
+def _half_of_memory_mib() -> int:
+    return max(256, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2 >> 20)
 
 
 def damage_hint(results: Path, error: duckdb.Error) -> str:
@@ -47,17 +85,28 @@ def damage_hint(results: Path, error: duckdb.Error) -> str:
 
 def _lock(connection: duckdb.DuckDBPyConnection, results: Path) -> None:
     # Last of all the lock itself: after it a statement can no longer undo the others.
-    folder = "'" + str(results).replace("'", "''") + "'"
+    folders = [results, *_linked(results)]
+    allowed = ", ".join(f"{_text(str(folder))}, {pattern(folder)}" for folder in folders)
     for setting in (
         "python_enable_replacements = false",
         "autoinstall_known_extensions = false",
         "autoload_known_extensions = false",
         # The views name their files as patterns, and DuckDB compares letter by letter.
-        f"allowed_directories = [{folder}, {pattern(results)}]",
+        f"allowed_directories = [{allowed}]",
         "enable_external_access = false",
         "lock_configuration = true",
     ):
         connection.execute(f"SET {setting}")
+
+
+def _linked(results: Path) -> list[Path]:
+    """Where folders of the tables really lie that are links: DuckDB goes by that."""
+    places = [place for table in SCHEMAS for below in _LEVELS for place in results.glob(f"{table}{below}")]
+    return sorted({place.resolve() for place in places if place.is_symlink()} | {results.resolve()})
+
+
+def _text(value: str) -> str:
+    return "'" + value.replace("'", "''") + "'"
 
 
 def _check(connection: duckdb.DuckDBPyConnection, sql: str) -> None:

@@ -39,12 +39,12 @@ def query(results: Path | str, sql: str) -> pd.DataFrame:
     """The rows that the SELECT statement ``sql`` gives over the views of `connect`.
 
     Nothing is written and no file outside ``results`` is read. Columns that share a name are numbered: success,
-    success_1.
+    success_1. At most 5 million rows or 512 MiB are fetched: `load` and `connect` have no such bound.
 
     Raises:
         StoreError: as in `connect`, ``sql`` is not one SELECT (or EXPLAIN), or DuckDB cannot carry it out.
     """
-    return _frame(_answer(Path(results), sql))
+    return _frame(_answer(Path(results), sql, bounded=True))
 
 
 def load(
@@ -76,7 +76,7 @@ def load(
 def finished(results: Path | str, sweep: str) -> dict[str, str]:
     """Status of every run of ``sweep`` that is really there, by run id; empty where there is none.
 
-    A run that is ok counts only with all of its rows in evals.
+    A run that is ok counts only with all of its evaluations in evals, and with every table that it was written with.
     """
     return _settled(Path(results), lambda: _finished(snapshot(Path(results), sweep)))
 
@@ -86,19 +86,19 @@ def _finished(found: Snapshot) -> dict[str, str]:
         return {}
     with connect_views(found) as connection:
         rows = connection.execute("""
-            SELECT run_id, status FROM runs
+            SELECT run_id, status FROM runs ANTI JOIN store.unfinished USING (sweep, run_id)
             LEFT JOIN (SELECT run_id, count(*) AS stored FROM evals GROUP BY run_id) USING (run_id)
             WHERE status <> 'ok' OR stored = evaluations ORDER BY run_id""").fetchall()
     return dict(rows)
 
 
-def _answer(results: Path, sql: str) -> pa.Table:
-    return _settled(results, lambda: _answer_once(full_snapshot(results), sql))
+def _answer(results: Path, sql: str, *, bounded: bool = False) -> pa.Table:
+    return _settled(results, lambda: _answer_once(full_snapshot(results), sql, bounded))
 
 
-def _answer_once(found: Snapshot, sql: str) -> pa.Table:
+def _answer_once(found: Snapshot, sql: str, bounded: bool) -> pa.Table:
     with connect_views(found) as connection:
-        return answer(connection, found.results, sql)
+        return answer(connection, found.results, sql, bounded=bounded)
 
 
 def _settled(results: Path, work: Callable[[], _T]) -> _T:

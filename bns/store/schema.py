@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from bns.errors import StoreError, unknown_name
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 METADATA_KEY = b"bns"
 FOLDER_COLUMNS = ("sweep", "task")
 IDENTITY = ("run_id", "sweep", "robot", "task")
@@ -34,7 +34,7 @@ def _near(prefix: str) -> list[pa.Field]:
 
 _WHO = _fields(pa.string(), "run_id robot")
 _PARAMETERS = [
-    *_fields(pa.string(), "world"),
+    *_fields(pa.string(), "world approach"),
     *_fields(pa.int64(), "seed root_seed"),
     *_fields(pa.int32(), "population_size"),
     *_fields(pa.float64(), "tournament_size mutation_rate real_world_selection_size"),
@@ -57,7 +57,7 @@ _EVALS = [
     *_fields(pa.bool_(), "success evaluated_success ever_success"),
     *_fields(pa.float64(), "training_error validation_error"),
     *_fields(pa.int32(), "training_patterns validation_patterns commands fittest_commands"),
-    *_fields(pa.float64(), "mean_commands driven_ms"),
+    *_fields(pa.float64(), "mean_commands driven_ms robot_s"),
     *_fields(pa.int32(), "generations"),
     *_fields(pa.int64(), "bound_hits arithmetic_failures"),
     *_fields(pa.float64(), "training_cpu_s evolution_cpu_s"),
@@ -138,9 +138,21 @@ def empty(table: str) -> pa.Table:
 
 
 def file_metadata(
-    table: str, sweep: str, *, spec_hash: str, git_sha: str, git_clean: bool | None, bns_version: str
+    table: str,
+    sweep: str,
+    *,
+    spec_hash: str,
+    git_sha: str,
+    git_clean: bool | None,
+    bns_version: str,
+    task: str = "",
+    parts: Mapping[str, str] | None = None,
 ) -> bytes:
-    """The JSON that stands in every file's key-value metadata under ``METADATA_KEY``."""
+    """The JSON that stands in every file's key-value metadata under ``METADATA_KEY``; its digest is added last.
+
+    ``parts`` (of table "runs" alone): by name, the digests of the fold's other tables, "" of one that is lost.
+    """
+    vouched = {} if parts is None else {"parts": dict(parts)}
     return json.dumps(
         {
             "schema_version": SCHEMA_VERSION,
@@ -150,6 +162,8 @@ def file_metadata(
             "git_sha": git_sha,
             "git_clean": git_clean,
             "bns_version": bns_version,
+            "task": task,
+            **vouched,
         }
     ).encode()
 
@@ -161,7 +175,22 @@ def _from_version_0(name: str, table: pa.Table) -> pa.Table:
     return table.append_column("arithmetic_failures", pa.repeat(pa.scalar(0, pa.int64()), table.num_rows))
 
 
-UPGRADES: Mapping[int, Callable[[str, pa.Table], pa.Table]] = {0: _from_version_0}
+def _from_version_1(name: str, table: pa.Table) -> pa.Table:
+    # Version 1 knew one approach and no robot time: half a minute beside driving is what a spec says today by default.
+    if "world" in SCHEMAS[name].names and "approach" not in table.column_names:
+        table = table.append_column("approach", pa.repeat(pa.scalar("bns", pa.string()), table.num_rows))
+    if name != "evals" or "robot_s" in table.column_names:
+        return table
+    rows = table.select(["run_id", "evaluation", "driven_ms"]).to_pylist()
+    spent: dict[str, float] = {}
+    robot_s = [0.0] * len(rows)
+    for place in sorted(range(len(rows)), key=lambda i: (rows[i]["run_id"], rows[i]["evaluation"])):
+        run, driven_s = rows[place]["run_id"], rows[place]["driven_ms"] / 1000.0
+        spent[run] = robot_s[place] = spent.get(run, 0.0) + driven_s + 30
+    return table.append_column("robot_s", pa.array(robot_s, pa.float64()))
+
+
+UPGRADES: Mapping[int, Callable[[str, pa.Table], pa.Table]] = {0: _from_version_0, 1: _from_version_1}
 """From each older version to the next one; a new nullable column needs no entry of its own."""
 
 

@@ -12,17 +12,22 @@ from bns.store.journal import Frame, JournalFile, best_frames, journals, read_jo
 from bns.store.parquet import READ_FAULTS, read_part
 from bns.store.parts import Part, Unreadable, check_version, find_parts, list_files
 from bns.store.schema import RECORDED, SCHEMAS
+from bns.store.whole import exchanged, lacking, without
 
 _TRIES = 20
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Parts by table, and the frames of each journal, every run once a journal."""
+    """Parts by table, and the frames of each journal, every run once a journal.
+
+    ``lacking``: by place, tables that its runs have rows in and that cannot be read; those runs are not finished.
+    """
 
     results: Path
     parts: dict[str, list[Part]]
     journals: list[tuple[JournalFile, list[Frame]]]
+    lacking: dict[str, tuple[str, ...]]
 
     @property
     def is_empty(self) -> bool:
@@ -33,7 +38,8 @@ class Snapshot:
 def snapshot(results: Path, sweep: str | None = None) -> Snapshot:
     """Look through ``results`` (one sweep of it) as it is now.
 
-    Files that cannot be read are left out with one StoreWarning each.
+    Files that cannot be read, or are not as they were written, are left out with one StoreWarning each; so are
+    named those that are gone.
 
     Raises:
         StoreError: a file has another schema version, or a folder cannot be read.
@@ -43,10 +49,14 @@ def snapshot(results: Path, sweep: str | None = None) -> Snapshot:
     parts, bad = _settled_parts(results, sweep)
     for part in (one for found in parts.values() for one in found):
         check_version(part, results)
-    _warn(bad)
+    others = exchanged(parts)
+    parts = without(parts, others)
+    found = Snapshot(results, parts, pending, lacking(parts))
+    _warn(bad + others)
+    _warn_of_gone(found, {file.path for file in bad + others})
     for table in RECORDED:
         parts[table] = _counted(results, parts[table], parts["runs"])
-    return Snapshot(results, parts, pending)
+    return found
 
 
 def full_snapshot(results: Path) -> Snapshot:
@@ -112,6 +122,25 @@ def _is_lost(results: Path, part: Part, runs: list[Part]) -> bool:
         return False  # a compaction is moving them
 
 
+def _warn_of_gone(found: Snapshot, named: set[Path]) -> None:
+    """Name the parts that are gone, not ``named`` yet, that no other copy of their runs makes up for."""
+    runs = found.parts["runs"] if found.lacking else []
+    whole = {part.sweep: set[str]() for part in runs}
+    for file, frames in found.journals:
+        whole.setdefault(file.sweep, set()).update(frame.run_id for frame in frames)
+    for part in (part for part in runs if part.place not in found.lacking):
+        whole[part.sweep] |= _run_ids([part])
+    for part in (part for part in runs if part.place in found.lacking):
+        gone = [found.results / table / part.place for table in found.lacking[part.place]]
+        if not named.intersection(gone) and not _run_ids([part]) <= whole[part.sweep]:
+            warnings.warn(
+                f"{', '.join(map(str, gone))}: gone, though {part.path} was written with it. "
+                f"Its {part.rows} runs do not count as finished: sweep {part.sweep} does them again.",
+                StoreWarning,
+                stacklevel=4,
+            )
+
+
 def _run_ids(parts: list[Part]) -> set[str]:
     return {run for part in parts for run in read_part(part.path, ["run_id"])["run_id"].to_pylist()}
 
@@ -119,5 +148,7 @@ def _run_ids(parts: list[Part]) -> set[str]:
 def _warn(bad: list[Unreadable]) -> None:
     for file in bad:
         warnings.warn(
-            f"{file.path} is skipped: {file.reason}. bns compact moves it to set-aside/.", StoreWarning, stacklevel=4
+            f"{file.path} is skipped: {file.reason}. bns compact moves it to set-aside/, and the sweep makes up for it.",
+            StoreWarning,
+            stacklevel=4,
         )

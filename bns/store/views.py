@@ -55,19 +55,18 @@ def _copy(connection: duckdb.DuckDBPyConnection, table: str, rows: pa.Table) -> 
 
 def _find_duplicates(connection: duckdb.DuckDBPyConnection, found: Snapshot) -> set[str]:
     """Fill store.losers with the copies that do not count; the places (parts and journals) that hold any."""
-    connection.execute("CREATE TABLE store.places (place VARCHAR)")
-    if found.parts["evals"]:
-        places = pa.table({"place": [part.place for part in found.parts["evals"]]})
-        connection.register("arriving", places)
-        connection.execute("INSERT INTO store.places SELECT place FROM arriving")
+    connection.execute("CREATE TABLE store.lacking (place VARCHAR)")
+    if found.lacking:
+        connection.register("arriving", pa.table({"place": list(found.lacking)}))
+        connection.execute("INSERT INTO store.lacking SELECT place FROM arriving")
         connection.unregister("arriving")
     rank = " ".join(f"WHEN status = '{status}' THEN {rank}" for rank, status in enumerate(STATUSES))
-    # A run whose evaluations are gone is the worst claim of all, whatever its row says.
+    # A run some rows of which are gone is the worst claim of all, whatever its row says.
     claims = [f"""SELECT sweep, run_id, place, true AS journal, CASE {rank} END AS claim FROM store.runs"""]
     if found.parts["runs"]:
         claims.append(f"""
             SELECT sweep, run_id, place, false, CASE
-                WHEN status = 'ok' AND place NOT IN (SELECT place FROM store.places)
+                WHEN status = 'ok' AND place IN (SELECT place FROM store.lacking)
                 THEN {len(STATUSES)} {rank} END
             FROM (SELECT *, {_place(found.results / "runs")} AS place FROM {_read(found.parts["runs"])})""")
     connection.execute(f"CREATE TABLE store.claims AS {' UNION ALL '.join(claims)}")
@@ -76,6 +75,8 @@ def _find_duplicates(connection: duckdb.DuckDBPyConnection, found: Snapshot) -> 
         SEMI JOIN (SELECT sweep, run_id FROM store.claims GROUP BY ALL HAVING count(*) > 1)
         USING (sweep, run_id)
         QUALIFY row_number() OVER (PARTITION BY sweep, run_id ORDER BY {_BEST_FIRST}) > 1""")
+    connection.execute(f"""CREATE TABLE store.unfinished AS SELECT sweep, run_id FROM store.claims
+        GROUP BY ALL HAVING min(claim) = {len(STATUSES)}""")
     return {row[0] for row in connection.execute("SELECT DISTINCT place FROM store.losers").fetchall()}
 
 

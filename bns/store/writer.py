@@ -16,8 +16,10 @@ from bns.store.fold import clear_staging, fold_journal, staged
 from bns.store.journal import Frame, Journal, JournalFile, journals
 from bns.store.lock import ShardLock, SweepLock
 from bns.store.parquet import file_bytes
+from bns.store.parts import find_parts
 from bns.store.provenance import provenance
 from bns.store.record import RunRecord, record_tables
+from bns.store.repair import set_aside_damaged
 from bns.store.schema import SCHEMAS, file_metadata
 
 
@@ -37,8 +39,8 @@ class Writer:
         fold_at: runs in the journal at which they are folded into parquet files.
         shard: name of the share that this writer has of the sweep; writers of other shares may be at work.
 
-    Entering takes the sweep's lock and folds what a killed writer left; ``recovered`` counts those runs. The
-    writer of a shard takes the shard's lock and leaves alone whatever it did not make: a journal that looks
+    Entering takes the sweep's lock, folds what a killed writer left (``recovered`` counts those runs) and sets aside
+    what is damaged. The writer of a shard takes the shard's lock and leaves alone whatever it did not make: a journal that looks
     abandoned may be that of another machine.
     """
 
@@ -70,6 +72,7 @@ class Writer:
             if self._is_alone:
                 clear_staging(self.results, self.sweep)
                 self.recovered = self.fold()
+                set_aside_damaged(self.results, self.sweep)
             self._publish_spec()
         except BaseException:
             self._lock.release()
@@ -144,7 +147,8 @@ class Writer:
         name = spec_hash(self._text)
         place = self.results / "specs" / f"sweep={self.sweep}" / f"spec-{name}.parquet"
         # Beside others it is written again, with today's date: the latest file is the one that the sweep follows.
-        if not name or (place.exists() and len(list(place.parent.glob("spec-*.parquet"))) == 1):
+        there = [part.path for part in find_parts(self.results, "specs", self.sweep)[0]] if name else []
+        if not name or there == [place]:
             return
         made = provenance()
         row = {"spec_hash": [name], "written_at": [datetime.now(UTC)], "text": [self._text], "runs": [self._planned]}

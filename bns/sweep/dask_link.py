@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import time
 from collections import Counter
 from collections.abc import Mapping
@@ -20,6 +21,7 @@ with extra("cluster"):
 PATIENCE_S = 600.0
 """How long a sweep waits for a scheduler that went away, or for the first worker."""
 
+_ADDRESS = re.compile(r"((tcp|tls|ws|wss|ucx|ucxx|inproc)://.+|[\w.-]+:\d{1,5}|\[[0-9a-fA-F:.%]+\]:\d{1,5})")
 _FIRST_S, _TRY_S = 30.0, 5.0
 _CLOSE_S = 10.0
 _LOOK_S = 2.0
@@ -44,9 +46,14 @@ class DaskLink:
         if self.address is None:
             self._cluster = _own_cluster(self._workers)
             self.address = self._cluster.scheduler_address
+        elif not _ADDRESS.fullmatch(self.address):
+            raise ClusterError(
+                f"{self.address!r} is no address of a Dask scheduler; write HOST:PORT or tcp://HOST:PORT, as 'dask scheduler' "
+                "prints it, or leave --scheduler out to use this machine."
+            )
         try:
             self._connect(min(_FIRST_S, self._patience_s))
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
             raise ClusterError(
                 f"no Dask scheduler answers at {self.address}: {error}. Start one with 'dask scheduler' and give the "
                 "address that it prints, as --scheduler tcp://HOST:8786, or leave --scheduler out to use this machine."

@@ -11,8 +11,10 @@ import pandas as pd
 
 from bns.errors import SpecError
 from bns.spec import RunSpec
-from bns.store.reader import load
+from bns.store.reader import finished, load
 from bns.sweep.grid import Sweep, parse_sweep
+
+_COLUMNS = ["sweep", "task", "status", "started_at", "wall_s", "spec"]
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,15 @@ def sweep_status(results: Path) -> list[SweepRow]:
 
     ``mean_wall_s`` is the mean of the runs that are done, NaN without any.
     """
-    runs = load(results, "runs", columns=["sweep", "task", "status", "started_at", "wall_s", "spec"])
+    runs = _that_count(results, load(results, "runs", columns=["run_id", *_COLUMNS]))
     files = _newest_files(load(results, "specs", columns=["sweep", "written_at", "text"]))
     return [row for name in sorted({*runs["sweep"], *files}) for row in _rows(name, runs[runs["sweep"] == name], files)]
+
+
+def _that_count(results: Path, runs: pd.DataFrame) -> pd.DataFrame:
+    """``runs`` without those that are ok and have lost rows: the sweep does them again."""
+    known = {name: finished(results, str(name)) for name in runs["sweep"].unique()}
+    return runs[[run in known[sweep] for run, sweep in zip(runs["run_id"], runs["sweep"], strict=True)]]
 
 
 def _rows(name: str, runs: pd.DataFrame, files: dict[str, Sweep]) -> list[SweepRow]:

@@ -6,7 +6,6 @@ a day of computing deserves better.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
@@ -14,33 +13,13 @@ from typing import Any, NoReturn
 import yaml
 
 from bns.errors import SpecError
-
-
-class _Loader(yaml.SafeLoader):
-    """SafeLoader that takes ``1e-3`` for a number, as YAML 1.2 does (PyYAML wants ``1.0e-3``)."""
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789")
-)
-
-
-# What PyYAML raises for `!!int ""`, `!!bool x`, `!!timestamp x`, endless sexagesimals and deep nesting.
-_CONFUSED = (
-    yaml.YAMLError,
-    ValueError,
-    TypeError,
-    LookupError,
-    AttributeError,
-    ArithmeticError,
-    RecursionError,
-)
+from bns.safe_yaml import CONFUSED, MOST_BYTES, Loader, excess
 
 
 class Located:
     """A piece of a YAML file: its value on demand, and errors that begin with ``file:line:``."""
 
-    def __init__(self, node: yaml.Node, loader: _Loader, path: Path) -> None:
+    def __init__(self, node: yaml.Node, loader: Loader, path: Path) -> None:
         self._node, self._loader, self.path = node, loader, path
 
     @property
@@ -56,7 +35,7 @@ class Located:
         """The piece as plain Python data."""
         try:
             return self._loader.construct_object(self._node, deep=True)
-        except _CONFUSED as fault:
+        except CONFUSED as fault:
             self.fail(f"cannot be understood: {_first_line(fault)}. Write a plain number or text here.")
 
     def items(self, what: str) -> Iterator[tuple[str, Located, Located]]:
@@ -88,8 +67,10 @@ class Located:
 
 def parse_yaml(text: str, path: Path) -> Located:
     """The root of a YAML text; SpecError with ``path`` and the line if it cannot be parsed."""
+    if len(text) > MOST_BYTES:
+        raise SpecError(f"{path}:1: the file has {len(text)} characters; {MOST_BYTES} are allowed. It is no sweep file.")
     try:
-        loader = _Loader(text)
+        loader = Loader(text)
         node = _root_node(loader, path)
     except yaml.MarkedYAMLError as fault:
         mark = fault.problem_mark or fault.context_mark
@@ -102,10 +83,13 @@ def parse_yaml(text: str, path: Path) -> Located:
         raise SpecError(f"{path}:1: not valid YAML: {_first_line(fault)}.") from None
     if node is None:
         raise SpecError(f"{path}:1: the file is empty. It needs at least the keys 'name' and 'robot'.")
+    beyond = excess(node, loops=False)
+    if beyond:
+        raise SpecError(f"{path}:{beyond.removeprefix('line ')}")
     return Located(node, loader, path)
 
 
-def _root_node(loader: _Loader, path: Path) -> yaml.Node | None:
+def _root_node(loader: Loader, path: Path) -> yaml.Node | None:
     try:
         return loader.get_single_node()
     except RecursionError:

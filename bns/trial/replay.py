@@ -14,6 +14,7 @@ import numpy as np
 from bns.bootstrap.loop import run
 from bns.console import live_view
 from bns.errors import HardwareError
+from bns.hardware.hardware_log import events
 from bns.robots import load_robot
 from bns.sweep.single_run import keep_run
 from bns.trial.background import BackgroundDriver
@@ -45,8 +46,9 @@ def replayed(journal: Path, results: Path) -> str:
         result = run(spec, show, RobotWorld("robot-replayed"), driver)
     keep_run(spec, result, results, SWEEP, started, time.perf_counter() - began)
     evals = result.tables["evals"]
+    cut = "" if any(events(journal, "complete")) else "; the journal has no line `complete`: the trial did not come to its end"
     return (
         f"replayed {len(past)} evaluations of {journal}, run {spec.run_id}: fitness of the last in the world "
         f"{evals['evaluated_fitness_world'][-1]:.4f}, goals reached {evals['evaluated_goals_reached'][-1]}; "
-        f"stored in sweep {SWEEP}"
+        f"stored in sweep {SWEEP}{cut}"
     )

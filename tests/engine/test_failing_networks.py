@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bns.bootstrap.evolver import Evolver
+from bns.bootstrap.simulators import NetworkSimulator
 from bns.bootstrap.trainer import Trainer
 from bns.engine.philox import Key, Purpose
 from bns.engine.snn import initial_weights
@@ -15,9 +16,12 @@ from bns.worlds import build_world
 ROBOT, KEY = load_robot("khepera"), Key(5, 1)
 
 
+TASK = load_task("khepera", "circle")
+
+
 def evolver(weights, **changes):
     spec = RunSpec(population_size=60, generations_per_evaluation=1, max_commands=30, **changes)
-    return Evolver.start(ROBOT, load_task("khepera", "circle"), Key(2, 1), spec, weights)
+    return Evolver.start(ROBOT, TASK, Key(2, 1), spec, NetworkSimulator(ROBOT, TASK, weights))
 
 
 @pytest.mark.parametrize("rate", [0.0, 0.1, 1.0])
@@ -25,7 +29,7 @@ def test_best_fitness_never_falls_while_the_networks_stay(rate):
     weights = initial_weights(Key(0, 1), 3, 20)
     some, best = evolver(weights, mutation_rate=rate), []
     for _ in range(60):
-        some.evolve(weights)
+        some.evolve(NetworkSimulator(ROBOT, TASK, weights))
         best.append(some.best_fitness)
     # The elite's place in the batch moves its float32 outputs by an ulp or two.
     assert (np.diff(best) >= -1e-5 * np.array(best[1:])).all()
@@ -36,11 +40,11 @@ def test_best_fitness_never_falls_while_the_networks_stay(rate):
 def test_a_population_on_failed_networks_goes_on_and_recovers():
     good = initial_weights(Key(0, 1), 3, 20)
     some = evolver(good)
-    some.evolve(np.full_like(good, np.nan))
+    some.evolve(NetworkSimulator(ROBOT, TASK, np.full_like(good, np.nan)))
     assert (some.best_fitness, some.mean_fitness) == (0, 0)
     assert some.failures == 120  # scored before and after the generation
     assert len(some.pick(1)) >= 1
-    some.evolve(good)
+    some.evolve(NetworkSimulator(ROBOT, TASK, good))
     assert some.best_fitness > 0
     assert some.failures == 120
     assert some.population.lengths.min() >= 4

@@ -61,7 +61,7 @@ def test_a_changed_byte_is_always_another_one():
         ("faults: [{kind: silent-servo, rate: 0.1, id: a}]", "id is 'a'; it must be the number of a servo"),
         ("faults: 3", "must hold `faults:`, a list"),
         ("seed: -1\nfaults: []", "seed is -1"),
-        ("faults: [", "cannot read the fault plan"),
+        ("faults: [", "line 1: no valid YAML"),
     ],
 )
 def test_bad_plans_are_named(tmp_path, text, message):

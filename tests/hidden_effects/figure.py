@@ -13,7 +13,15 @@ from bns.plotting.style import PAGE_IN, save, style
 from tests.hidden_effects.listed import LISTED
 from tests.hidden_effects.summary import Result
 
-FAMILIES = {"pair": "two effects", "tie": "confusable set", "unlisted": "unlisted effect", "none": "nothing hidden"}
+FAMILIES = {
+    "pair": "two effects",
+    "tie": "confusable set",
+    "unlisted": "unlisted effect",
+    "none": "nothing hidden",
+    "removed": "listed effect, barred",
+    "triple": "three effects",
+    "size": "other sizes, rates, noise",
+}
 ELSE = ("right set", "other set", "right tie", "other tie", "unlisted", "none", "insufficient-data", "no answer")
 LABEL = (
     "what was said: one effect, a set of effects, or a verdict\n(count of worlds; shade: share of the row; bold: right)"

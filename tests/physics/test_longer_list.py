@@ -142,3 +142,10 @@ def test_ranges_grow_with_the_robot():
         for wheelbase in (0.05, 0.4, 1.5):
             for p in effect.scaled(wheelbase).parameters:
                 assert p.low <= p.plausible[0] < p.plausible[1] <= p.high
+
+
+def test_a_patch_covers_no_whole_floor():
+    patch = effect_named("floor-patch").within(1.5)
+    radius = patch.parameters[2]
+    assert radius.high == radius.plausible[1] == pytest.approx(0.33 * 1.5)
+    assert effect_named("backlash").within(1.5) is effect_named("backlash")

@@ -56,7 +56,7 @@ def test_khepera_is_shipped_inside_the_package():
         ("motor-lag", "motorlag", r"unknown effect 'motorlag'\. Did you mean 'motor-lag'\?"),
         ("tau_s", "tau", r"unknown key 'tau'\. Did you mean 'tau_s'\?"),
         ("tau_s: 0.1", "tau_s: -0.1", r"motor-lag: tau_s is -0.1; it must be a number from 0 to 5"),
-        ("tau_s: 0.1", "tau_s: 1e-1", r"tau_s is '1e-1'.*exponent with a point"),
+        ("tau_s: 0.1", "tau_s: '1e-1'", r"tau_s is '1e-1'.*exponent with a point"),
         ("{tau_s: 0.1}", "{}", r"motor-lag lacks tau_s"),
         ("wheelbase_m: 0.1", "wheelbase_m: 0", r"wheelbase_m is 0; it must be a number from 0.001 to 10"),
         ("differential-drive", "snake", r"unknown base 'snake'"),
@@ -65,7 +65,7 @@ def test_khepera_is_shipped_inside_the_package():
         ("0.1}, basis: guess, reason: a test", "0.1}, basis: guess", r"lacks reason"),
         ("position_m: 0.001, ", "", r"noise of model robot lacks position_m"),
         ("effects:\n  - {name", "effects:\n    {name", r"effects is \{.*must be a list"),
-        ("base: differential-drive\n", "base: [\n", r"model robot is no valid YAML"),
+        ("base: differential-drive\n", "base: [\n", r"model robot, line .*: no valid YAML"),
     ],
 )
 def test_faults_in_a_file_are_named(tmp_path, old, new, message):

@@ -235,7 +235,7 @@ def test_numbers_that_are_no_body_together_are_refused(changed, message):
 def test_files_that_are_no_text_or_no_yaml_are_refused(tmp_path):
     (tmp_path / "latin.yaml").write_bytes("links: 13 # Länge".encode("latin-1"))
     (tmp_path / "open.yaml").write_text("links: {value: 13")
-    for name, message in (("latin", "is not UTF-8 text"), ("open", "no valid YAML.*Correct the place it names")):
+    for name, message in (("latin", "is not UTF-8 text"), ("open", "no valid YAML.*Look at indentation")):
         with pytest.raises(ModelError, match=f"(?s){message}"):
             build(load_robot("snake"), str(tmp_path / f"{name}.yaml"))
 

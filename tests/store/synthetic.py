@@ -13,9 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from bns.spec import RunSpec
-from bns.store.files import partition, publish
-from bns.store.fold import staged
-from bns.store.parquet import part_bytes
+from bns.store.fold import publish_fold
 from bns.store.provenance import provenance
 from bns.store.record import RunRecord
 from bns.store.schema import PARAMETERS, SCHEMAS
@@ -111,9 +109,8 @@ def publish_chunk(
     filled["started_at"] = [START + timedelta(seconds=number) for number in range(len(chunk))]
     filled["spec"] = [spec.canonical_json() for spec in chunk]
     runs = _table("runs", chunk, 1, filled)
-    for name, table in (("evals", _table("evals", chunk, evaluations, evals)), ("runs", runs)):
-        place = partition(path, name, sweep, chunk[0].task) / f"{part}.parquet"
-        publish(part_bytes(name, table, sweep, ["s0"], runs), staged(path, sweep, part), place)
+    tables = {"evals": _table("evals", chunk, evaluations, evals), "runs": runs}
+    publish_fold(path, sweep, chunk[0].task, part, tables, ["s0"])
 
 
 def _table(name: str, chunk: list[RunSpec], rows_each: int, own: dict[str, Any]) -> pa.Table:

@@ -8,7 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from bns.spec import RunSpec
-from bns.store import SCHEMA_VERSION, SCHEMAS, Writer, compact, load, spec_hash
+from bns.store import SCHEMA_VERSION, SCHEMAS, StoreWarning, Writer, compact, load, spec_hash
+from bns.store.digest import digest_in
 from bns.store.provenance import git_state, provenance
 
 from .synthetic import failed, make_store, record, records, specs
@@ -77,7 +78,12 @@ def test_files_carry_version_spec_and_commit(tmp_path):
         for table in ("evals", "runs", "specs"):
             for path in parts(tmp_path, table):
                 known = json.loads(pq.read_metadata(path).metadata[b"bns"])
-                assert known == {**expected, "table": table}
+                digest, vouched = known.pop("digest"), known.pop("parts", None)
+                assert known == {**expected, "table": table, "task": "" if table == "specs" else "circle"}
+                assert digest == digest_in(path.read_bytes())
+                if table == "runs":
+                    evals = next(one for one in parts(results=tmp_path, table="evals") if one.name == path.name)
+                    assert vouched == {"evals": digest_in(evals.read_bytes())}
                 assert {"sweep", "task"}.isdisjoint(pq.read_schema(path).names)
         compact(tmp_path)
 
@@ -92,7 +98,8 @@ def test_damaged_page_is_found_and_set_aside(tmp_path):
     summary = compact(tmp_path)
     assert [moved.name for moved in summary.set_aside] == [path.name]
     assert f"set aside: {summary.set_aside[0]}" in str(summary)
-    assert len(load(tmp_path)) == 100
+    with pytest.warns(StoreWarning, match=f"{path.name}: gone"):
+        assert len(load(tmp_path)) == 100
 
 
 def test_journals_left_behind_are_recovered(tmp_path):

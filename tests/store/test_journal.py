@@ -124,7 +124,7 @@ def test_journal_of_another_sweep_is_left_alone(left):
 def test_journal_of_a_newer_version_is_refused(left, monkeypatch):
     results, _, _, _ = left
     monkeypatch.setattr(journal_module, "SCHEMA_VERSION", 0)
-    with pytest.raises(StoreError, match=r"schema version 1; this bns knows 0.*pip install -U bns"):
+    with pytest.raises(StoreError, match=r"schema version 2; this bns knows 0.*pip install -U bns"):
         finished(results, "s")
 
 

@@ -24,6 +24,8 @@ _JUMP_RAD = DEFAULTS.data.jump_rad
 _JUMP_ROUNDS = DEFAULTS.data.jump_rounds
 _NEAR_S = DEFAULTS.data.jump_near_s
 _LONG_STEP_S = DEFAULTS.data.long_step_s
+_LONGEST_TRIAL_S = DEFAULTS.data.longest_trial_s
+_LARGEST = DEFAULTS.data.largest_number
 _FINER = DEFAULTS.data.finer_units
 _UNTOLD_RATIO = DEFAULTS.data.untold_ratio
 _DEGREES_AT_LEAST = DEFAULTS.data.degrees_rad_m
@@ -45,20 +47,50 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     to_numbers(table, COLUMNS[1:])
     findings: list[Finding] = []
     _held(table, findings)
+    t, pose = table["t_s"].to_numpy(), table[list(POSE)].to_numpy()
     kept = []
-    for trial, rows in table.groupby("trial", sort=False):
-        good = forward_in_time(str(trial), rows, findings)
-        good = _without_jumps(str(trial), good, findings)
-        _gaps_and_losses(str(trial), good, findings)
-        if _tracked(good).any():
-            kept.append(good)
-        else:
-            findings.append(Finding(str(trial), int(rows.index[0]), "no pose was tracked in it; the trial is left out"))
-    usable = pd.concat(kept) if kept else table
+    for trial, at in rows_by_trial(table):
+        if not _is_sound(t[at], pose[at]):
+            good = _looked_through(trial, table.iloc[at], findings)
+            at = good.index.to_numpy()  # noqa: PLW2901  # rows are numbered from 0
+            pose[at] = good[list(POSE)].to_numpy()
+        kept.append(at)
+    chosen = np.concatenate([np.zeros(0, np.int64), *kept])
+    usable = table.iloc[chosen].copy()
+    usable[list(POSE)] = pose[chosen]
     if not _tracked(usable).any():
         raise DataError("There is no tracked pose in these measurements: every x_m, y_m or heading_rad is empty.")
     _units(usable)
     return usable.reset_index(drop=True), findings
+
+
+def rows_by_trial(table: pd.DataFrame) -> list[tuple[str, np.ndarray]]:
+    """Name and row numbers of each trial, trials in the order in which they come; rows without a name belong to none."""
+    codes, names = pd.factorize(table["trial"])
+    order = np.argsort(codes, kind="stable")[int((codes < 0).sum()) :]
+    ends = np.cumsum(np.bincount(codes[codes >= 0], minlength=len(names)))
+    return list(zip(map(str, names), np.split(order, ends[:-1]) if len(names) else [], strict=True))
+
+
+def _is_sound(t: np.ndarray, pose: np.ndarray) -> bool:
+    """Whether a trial has nothing to find: what most trials are, and looking closer takes a hundred times as long."""
+    steps = np.diff(t)
+    if not (np.isfinite(pose).all() and (steps > 0).all()):
+        return False
+    if len(t) > 2 and (steps > max(5 * float(np.median(steps)), 0.2)).any():
+        return False
+    return len(t) < 5 or not _jumps(pose, t).any()
+
+
+def _looked_through(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
+    """The rows of a trial that can be used; none, if no pose was tracked in it."""
+    good = forward_in_time(trial, rows, findings)
+    good = _without_jumps(trial, good, findings)
+    _gaps_and_losses(trial, good, findings)
+    if _tracked(good).any():
+        return good
+    findings.append(Finding(trial, int(rows.index[0]), "no pose was tracked in it; the trial is left out"))
+    return good.iloc[:0]
 
 
 def _tracked(rows: pd.DataFrame) -> pd.Series[bool]:
@@ -89,6 +121,9 @@ def to_numbers(table: pd.DataFrame, columns: Sequence[str]) -> None:
         if np.isinf(values).any():
             row = int(np.flatnonzero(np.isinf(values))[0])
             raise DataError(f"Row {row}: {name} is infinite; leave it empty where nothing was measured.")
+        if (values.abs() > _LARGEST).any():
+            row = int(np.flatnonzero(values.abs() > _LARGEST)[0])
+            raise DataError(f"Row {row}: {name} is {values.iloc[row]:g}; nothing that was measured is that large.")
         table[name] = values.astype(float)
     if table["t_s"].isna().any():
         row = int(np.flatnonzero(table["t_s"].isna())[0])
@@ -194,6 +229,7 @@ def _units(table: pd.DataFrame) -> None:
     if step > _LONG_STEP_S:  # before anything is done second by second
         unit = next(unit for least, unit in _FINER if step > least)
         raise DataError(f"Successive rows are {step:g} s apart: t_s looks like {unit}; it must be seconds.")
+    _check_length(table)
     ways = np.array(list(_driven(table)))
     speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
     ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
@@ -227,6 +263,16 @@ def _units(table: pd.DataFrame) -> None:
             )
 
 
+def _check_length(table: pd.DataFrame) -> None:
+    times = table.groupby("trial", sort=False)["t_s"]
+    lasted = times.max() - times.min()
+    if lasted.max() > _LONGEST_TRIAL_S:
+        raise DataError(
+            f"Trial {lasted.idxmax()} lasts {lasted.max():g} s, from its first t_s to its last; {_LONGEST_TRIAL_S:g} s are "
+            "allowed. Is one of its times wrong?"
+        )
+
+
 def _turns_as_degrees(table: pd.DataFrame) -> bool:
     """Typical change of heading from row to row over that of the wheels' way: one over the wheelbase, in radians."""
     span = table["t_s"].diff().where(table["trial"].eq(table["trial"].shift()))
@@ -243,13 +289,13 @@ def _ratio(commanded: np.ndarray, seen: np.ndarray) -> float:
 
 def _driven(table: pd.DataFrame) -> Iterator[tuple[float, float, float, float]]:
     """For windows of about a second: way and turn commanded (base of 1 m), way and turn seen."""
-    for _, rows in table.groupby("trial", sort=False):
-        t = rows["t_s"].to_numpy()
-        left, right = np.nan_to_num(rows[list(COMMANDS)].to_numpy()).T
+    times, commands, poses = table["t_s"].to_numpy(), table[list(COMMANDS)].to_numpy(), table[list(POSE)].to_numpy()
+    for _, at in rows_by_trial(table):
+        t, pose = times[at], poses[at]
+        left, right = np.nan_to_num(commands[at]).T
         span = np.append(np.diff(t), 0.0)
         way = np.concatenate([[0], np.cumsum((np.abs(left + right) / 2 * span)[:-1])])
         turn = np.concatenate([[0], np.cumsum(((right - left) * span)[:-1])])
-        pose = rows[list(POSE)].to_numpy()
         seen = np.flatnonzero(np.isfinite(pose).all(axis=1))
         marks = (
             seen[np.unique(np.searchsorted(t[seen], np.arange(t[0], t[-1] + 1e-9, 1.0)).clip(max=len(seen) - 1))]

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import yaml
+from pyarrow import ArrowException
 
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import Finding, checked
@@ -19,8 +22,12 @@ from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.relative_motions import read_json_lines
 from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracks import Tracks, tracks_of
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import POSE
+
+MOST_COLUMNS = DEFAULTS.data.most_columns
+_LONGEST_LINE = DEFAULTS.data.longest_line
 
 
 @dataclass(frozen=True)
@@ -51,9 +58,11 @@ def load_measured(path: str | Path, robot: str | None = None, more: Sequence[Pat
 
 def measured_table(table: pd.DataFrame, path: Path, digest: str = "", robot: str | None = None) -> Measured:
     """Check a table that was read and mapped already. ``path`` names it; ``digest``: by default that of its values."""
-    table = _of_one_robot(table, robot)
+    with naming(path):
+        table = _of_one_robot(table, robot)
     of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
-    tracks, findings = _tracks(table)
+    with naming(path):
+        tracks, findings = _tracks(table)
     return Measured(path, tracks, tuple(findings), digest or table_sha256(table)[:20], of, table)
 
 
@@ -115,7 +124,7 @@ def read_table(path: Path) -> pd.DataFrame:
             return read_json_lines(path)
         if path.suffix == ".parquet":
             return pd.read_parquet(path)
-    except (ValueError, OSError, yaml.YAMLError) as fault:
+    except (ValueError, OSError, EOFError, zlib.error, OverflowError, KeyError, ArrowException, yaml.YAMLError) as fault:
         raise DataError(f"{path} does not read as {path.suffix[1:]}: {fault}.") from fault
     raise DataError(f"{path} is no .csv or .parquet file; measurements come as one of these.")
 
@@ -124,8 +133,13 @@ def _written(path: Path) -> tuple[str, str]:
     """What separates a .csv's columns, and its decimals, by its first two lines: many spreadsheets write 1,5;2,5."""
     opened = gzip.open if path.suffix == ".gz" else open
     with opened(path, "rt", encoding="utf-8", errors="replace") as lines:
-        head, first = lines.readline(), lines.readline()
+        head, first = lines.readline(_LONGEST_LINE), lines.readline(_LONGEST_LINE)
     separator = max(",;\t", key=head.count)
+    if head.count(separator) >= MOST_COLUMNS or len(head) >= _LONGEST_LINE:
+        raise DataError(
+            f"{path} has {head.count(separator) + 1} columns or more, by its first line; {MOST_COLUMNS} are allowed. "
+            "Keep those that the diagnosis needs (docs/logs.md)."
+        )
     return separator, "," if separator != "," and "," in first and "." not in first else "."
 
 
@@ -142,11 +156,25 @@ def _joined(paths: Sequence[Path]) -> pd.DataFrame:
 
 def _mapped(path: Path) -> pd.DataFrame:
     table, mapping = read_table(path), mapping_beside(path)
-    return table if mapping is None else applied(table, mapping, path.parent, read_table)
+    with naming(path):
+        return table if mapping is None else applied(table, mapping, path.parent, read_table)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name the file in the DataError that is met with it, if it does not say yet which it is about."""
+    try:
+        yield
+    except DataError as error:
+        if str(path) in str(error):
+            raise
+        raise DataError(f"{path}: {error}") from error
 
 
 def _of_one_robot(table: pd.DataFrame, robot: str | None) -> pd.DataFrame:
     if "robot" not in table.columns:
+        if robot is not None:
+            raise DataError(f"There is no column robot to choose {robot!r} by; leave out --robot, or name the robot of each row.")
         return table
     names = sorted(str(name) for name in table["robot"].dropna().unique())
     if robot is None and len(names) > 1:

@@ -17,9 +17,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from bns.errors import DataError, unknown_name
+from bns.safe_yaml import Lines, read_yaml_file, shown
 
 UNITS: Mapping[str, tuple[str, float]] = {
     "s": ("s", 1.0),
@@ -68,6 +67,7 @@ DURATION, WAYS = "duration_s", ("left_m", "right_m")
 _TABLE_KEYS = ("columns", "also", *_LENGTHS, "trials", "repeated_poses", "relative")
 _ALSO_KEYS = ("file", "columns")
 _KEYS = ("from", "unit", "scale", "offset", "clockwise", "zero_deg", "up", "counts")
+_NUMBERS, _FLAGS = ("scale", "offset", "zero_deg"), ("clockwise", "counts")
 _UP = ("z", "y")
 
 
@@ -79,28 +79,33 @@ def mapping_beside(data: Path) -> dict[str, Any] | None:
 
 def load_mapping(path: Path) -> dict[str, Any]:
     """A mapping file, checked; DataError with the key that is wrong."""
-    try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as fault:
-        raise DataError(f"The mapping {path} does not read: {fault}.") from fault
-    return checked_mapping(tree, path)
+    tree, lines = read_yaml_file(path, "the mapping", DataError)
+    return checked_mapping(tree, path, lines)
 
 
-def checked_mapping(tree: Any, path: Path) -> dict[str, Any]:
-    """A mapping that was read already, checked; ``path`` names it. DataError with the key that is wrong."""
+def checked_mapping(tree: Any, path: Path, lines: Lines | None = None) -> dict[str, Any]:
+    """A mapping that was read already, checked; ``path`` names it. DataError with the key that is wrong, and its line."""
+    lines = lines or Lines()
     if not isinstance(tree, dict) or not isinstance(tree.get("columns"), dict):
         raise DataError(f"The mapping {path} must have the key columns, with an entry for each column of the table.")
     _check_keys(f"{path}", tree, _TABLE_KEYS)
-    if tree.get("repeated_poses", "kept") not in REPEATED:
-        raise DataError(f"{path}: " + unknown_name("word for repeated_poses", tree["repeated_poses"], REPEATED))
-    for name in _LENGTHS:
-        if name in tree and not _positive(tree[name]):
-            raise DataError(f"{path}: {name} is {tree[name]!r}; it must be a number above 0.")
-    if not isinstance(tree.get("relative", False), bool):
-        raise DataError(f"{path}: relative is {tree['relative']!r}; it must be true or false.")
-    _check_trials(path, tree)
-    _check_columns(path, tree["columns"])
-    _check_also(path, tree.get("also", []))
+    with lines.at("repeated_poses"):
+        if tree.get("repeated_poses", "kept") not in REPEATED:
+            raise DataError(f"{path}: " + unknown_name("word for repeated_poses", tree["repeated_poses"], REPEATED))
+    for name in (name for name in _LENGTHS if name in tree):
+        with lines.at(name):
+            if not _positive(tree[name]):
+                raise DataError(f"{path}: {name} is {shown(tree[name])}; it must be a number above 0.")
+    with lines.at("relative"):
+        if not isinstance(tree.get("relative", False), bool):
+            raise DataError(f"{path}: relative is {shown(tree['relative'])}; it must be true or false.")
+    with lines.at("trials"):
+        _check_trials(path, tree)
+    for name in tree["columns"]:
+        with lines.at("columns", name):
+            _check_columns(path, {name: tree["columns"][name]})
+    with lines.at("also"):
+        _check_also(path, tree.get("also", []))
     return tree
 
 
@@ -125,7 +130,7 @@ def _check_trials(path: Path, tree: Mapping[str, Any]) -> None:
         or not _positive(*split.values())
     ):
         raise DataError(
-            f"{path}: trials is {split!r}; write one of {{standing_s: 1}}, {{lasting_s: 20}}, {{gap_s: 2}}."
+            f"{path}: trials is {shown(split)}; write one of {{standing_s: 1}}, {{lasting_s: 20}}, {{gap_s: 2}}."
         )
     if "trial" in tree["columns"]:
         raise DataError(
@@ -135,14 +140,14 @@ def _check_trials(path: Path, tree: Mapping[str, Any]) -> None:
 
 def _check_also(path: Path, others: Any) -> None:
     if not isinstance(others, list):
-        raise DataError(f"{path}: also is {others!r}; it must be a list of {{file: NAME, columns: ...}}.")
+        raise DataError(f"{path}: also is {shown(others)}; it must be a list of {{file: NAME, columns: ...}}.")
     for other in others:
         if (
             not isinstance(other, dict)
             or not isinstance(other.get("file"), str)
             or not isinstance(other.get("columns"), dict)
         ):
-            raise DataError(f"{path}: also has {other!r}; write {{file: NAME, columns: ...}}.")
+            raise DataError(f"{path}: also has {shown(other)}; write {{file: NAME, columns: ...}}.")
         _check_keys(f"{path}: also", other, _ALSO_KEYS)
         _check_columns(path, other["columns"])
         if "t_s" not in other["columns"]:
@@ -152,17 +157,31 @@ def _check_also(path: Path, others: Any) -> None:
 def _check_columns(path: Path, columns: Mapping[str, Any]) -> None:
     for name, entry in columns.items():
         if not isinstance(entry, dict) or "from" not in entry:
-            raise DataError(f"{path}: {name} is {entry!r}; write {{from: COLUMN, unit: UNIT}}.")
+            raise DataError(f"{path}: {name} is {shown(entry)}; write {{from: COLUMN, unit: UNIT}}.")
         _check_keys(f"{path}: {name}", entry, _KEYS)
+        _check_entry(path, name, entry)
         _check_unit(path, name, entry)
         _check_quaternion(path, name, entry)
+
+
+def _check_entry(path: Path, name: str, entry: Mapping[str, Any]) -> None:
+    sources = entry["from"] if isinstance(entry["from"], list) else [entry["from"]]
+    if not isinstance(name, str) or not all(isinstance(source, str) for source in sources):
+        raise DataError(f"{path}: {name!r} is taken from {shown(entry['from'])}; both are names of columns: put them in quotes.")
+    for key in (key for key in _NUMBERS if key in entry):
+        value = entry[key]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < math.inf:
+            raise DataError(f"{path}: {name}: {key} is {shown(value)}; it must be a number.")
+    for key in (key for key in _FLAGS if key in entry):
+        if not isinstance(entry[key], bool):
+            raise DataError(f"{path}: {name}: {key} is {shown(entry[key])}; it must be true or false.")
 
 
 def _check_unit(path: Path, name: str, entry: Mapping[str, Any]) -> None:
     unit = entry.get("unit")
     if unit is None:
         return
-    if unit not in UNITS:
+    if not isinstance(unit, str) or unit not in UNITS:
         raise DataError(f"{path}: {name}: " + unknown_name("unit", unit, UNITS))
     wanted = "m" if entry.get("counts") and _SI.get(name) == "m/s" else _SI.get(name)
     if wanted is not None and UNITS[unit][0] != wanted:
@@ -177,7 +196,7 @@ def _check_quaternion(path: Path, name: str, entry: Mapping[str, Any]) -> None:
     source, quaternion = entry["from"], entry.get("unit") == "quaternion"
     if quaternion != isinstance(source, list) or (quaternion and len(source) != 4):
         raise DataError(
-            f"{path}: {name}: a quaternion is {{from: [QX, QY, QZ, QW], unit: quaternion}}; given: {source!r}."
+            f"{path}: {name}: a quaternion is {{from: [QX, QY, QZ, QW], unit: quaternion}}; given: {shown(source)}."
         )
     if "up" in entry and (not quaternion or entry["up"] not in _UP):
-        raise DataError(f"{path}: {name}: up is {entry['up']!r}; it is for quaternions, and z or y.")
+        raise DataError(f"{path}: {name}: up is {shown(entry['up'])}; it is for quaternions, and z or y.")

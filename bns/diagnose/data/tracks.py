@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bns.diagnose.data.checks import rows_by_trial
 from bns.diagnose.settings import DEFAULTS
 from bns.measurements import BEFORE, COMMANDS, POSE, SESSION
 
@@ -116,44 +117,51 @@ def slimmed(tracks: Tracks) -> Tracks:
 
 def tracks_of(table: pd.DataFrame) -> Tracks:
     """The arrays of a table of measurements that has passed the checks; trials in the order in which they come."""
-    groups = [rows for _, rows in table.groupby("trial", sort=False)]
-    commands = [_commands(rows) for rows in groups]
-    seen = [rows[list(POSE)].notna().all(axis=1).to_numpy() for rows in groups]
+    trials = rows_by_trial(table)
+    rows = [at for _, at in trials]
+    t, pose = table["t_s"].to_numpy(dtype=float), table[list(POSE)].to_numpy(dtype=float)
+    tracked = np.isfinite(pose).all(axis=1)
+    seen = np.concatenate([at[tracked[at]] for at in rows])
     run_up = RUN_UP_S if set(BEFORE) <= set(table.columns) else 0.0
-    times = [(rows["t_s"] - rows["t_s"].iloc[0]).to_numpy(dtype=float) + run_up for rows in groups]
-    frames = [int(mask.sum()) for mask in seen]
-    start, known = _session(table, groups, times)
+    since = np.empty(len(t))
+    for at in rows:
+        since[at] = t[at] - t[at[0]] + run_up
+    commands = _commands(table, rows, t)
+    start, known = _session(table, rows, since)
     others = [name for name in table.columns if name not in {"trial", "t_s", *COMMANDS, *POSE, *BEFORE}]
     numeric = [name for name in others if pd.api.types.is_numeric_dtype(table[name])]
     return Tracks(
-        names=tuple(str(rows["trial"].iloc[0]) for rows in groups),
-        first=np.concatenate([[0], np.cumsum(frames)]).astype(np.int64),
-        t_s=np.concatenate([t[mask] for t, mask in zip(times, seen, strict=True)]),
-        pose=np.concatenate([g[list(POSE)].to_numpy(dtype=float)[m] for g, m in zip(groups, seen, strict=True)]),
+        names=tuple(name for name, _ in trials),
+        first=np.concatenate([[0], np.cumsum([int(tracked[at].sum()) for at in rows])]).astype(np.int64),
+        t_s=since[seen],
+        pose=pose[seen],
         left_m_s=_padded([c[0] for c in commands], "edge"),
         right_m_s=_padded([c[1] for c in commands], "edge"),
         duration_s=_padded([c[2] for c in commands], "constant"),
         start_s=start,
         start_known=known,
-        extra={
-            name: np.concatenate([g[name].to_numpy(dtype=float)[m] for g, m in zip(groups, seen, strict=True)])
-            for name in numeric
-        },
+        extra={name: table[name].to_numpy(dtype=float)[seen] for name in numeric},
     )
 
 
-def _commands(rows: pd.DataFrame) -> tuple[Array, Array, Array]:
-    """Runs of equal commands of one trial: left, right, duration."""
-    t = rows["t_s"].to_numpy(dtype=float)
-    given = np.nan_to_num(rows[list(COMMANDS)].to_numpy(dtype=float))
-    changes = np.flatnonzero(np.any(np.diff(given, axis=0) != 0, axis=1)) + 1
-    begins = np.concatenate([[0], changes])
-    ends = np.append(t[begins[1:]], t[-1])
-    left, right, lasted = given[begins, 0], given[begins, 1], ends - t[begins]
-    if not set(BEFORE) <= set(rows.columns):
-        return left, right, lasted
-    before = np.nan_to_num(rows[list(BEFORE)].to_numpy(dtype=float)[0])
-    return np.append(before[0], left), np.append(before[1], right), np.append(RUN_UP_S, lasted)
+def _commands(table: pd.DataFrame, rows: list[NDArray[np.int64]], t_s: Array) -> list[tuple[Array, Array, Array]]:
+    """Runs of equal commands of each trial: left, right, duration."""
+    told = np.nan_to_num(table[list(COMMANDS)].to_numpy(dtype=float))
+    before = None
+    if set(BEFORE) <= set(table.columns):
+        before = np.nan_to_num(table[list(BEFORE)].to_numpy(dtype=float))
+    found = []
+    for at in rows:
+        t, given = t_s[at], told[at]
+        changes = np.flatnonzero(np.any(np.diff(given, axis=0) != 0, axis=1)) + 1
+        begins = np.concatenate([[0], changes])
+        ends = np.append(t[begins[1:]], t[-1])
+        left, right, lasted = given[begins, 0], given[begins, 1], ends - t[begins]
+        if before is not None:
+            first = before[at[0]]
+            left, right, lasted = np.append(first[0], left), np.append(first[1], right), np.append(RUN_UP_S, lasted)
+        found.append((left, right, lasted))
+    return found
 
 
 def _padded(rows: list[Array], mode: Literal["edge", "constant"]) -> Array:
@@ -162,10 +170,11 @@ def _padded(rows: list[Array], mode: Literal["edge", "constant"]) -> Array:
     return np.stack([np.pad(row, (0, width - len(row)), mode=mode) for row in rows])
 
 
-def _session(table: pd.DataFrame, groups: list[pd.DataFrame], times: list[Array]) -> tuple[Array, bool]:
+def _session(table: pd.DataFrame, rows: list[NDArray[np.int64]], since: Array) -> tuple[Array, bool]:
     """When each trial began in its session: as logged, else one trial right after the other."""
     if SESSION in table.columns and table[SESSION].notna().any():
-        first = [float((rows[SESSION] - (rows["t_s"] - rows["t_s"].iloc[0])).median()) for rows in groups]
-        return np.nan_to_num(np.array(first)), True
-    lasted = np.array([t[-1] for t in times])
+        t, session = table["t_s"].to_numpy(dtype=float), table[SESSION].to_numpy(dtype=float)
+        first = [session[at] - (t[at] - t[at[0]]) for at in rows]
+        return np.array([float(np.median(known)) if len(known := one[np.isfinite(one)]) else 0.0 for one in first]), True
+    lasted = np.array([since[at[-1]] for at in rows])
     return np.concatenate([[0.0], np.cumsum(lasted)[:-1]]), False

@@ -34,8 +34,17 @@ def listed(
     """
     barred = {active.effect.name for active in model.effects} | set(without)
     unfit = ("track" if tracks.relative else "motions") if tracks is not None else None
-    catalogue = {name: e.scaled(model.wheelbase_m) for name, e in all_effects().items() if e.needs != unfit}
+    catalogue = {name: fitting(e, model, tracks) for name, e in all_effects().items() if e.needs != unfit}
     return {name: effect for name, effect in {**catalogue, **(extra or {})}.items() if name not in barred}
+
+
+def fitting(effect: Effect, model: Model, tracks: Tracks | None) -> Effect:
+    """The effect with ranges and starts for the model's size and the floor on which the robot was seen."""
+    scaled = effect.scaled(model.wheelbase_m)
+    if tracks is None or not len(tracks.pose):
+        return scaled
+    low, high = np.quantile(tracks.pose[:, :2], [0.02, 0.98], axis=0)
+    return scaled.within(float(np.hypot(*(high - low))))
 
 
 def fit_with(problem: Problem, base: Fit, effect: Effect) -> Fit:

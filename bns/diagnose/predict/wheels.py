@@ -174,7 +174,8 @@ class WheelPredictor:
             [
                 np.searchsorted(self.grid.node_s[r], t + 1e-9, side="right") - 1
                 for r, t in zip(rows, self.tracks.t_s[frames], strict=True)
-            ]
+            ],
+            dtype=np.int64,
         ).clip(0, self.grid.step_s.shape[1] - 1)
         return {name: values[rows, steps] for name, values in self.variables().items()}
 

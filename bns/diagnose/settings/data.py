@@ -21,6 +21,12 @@ class Data:
     jump_near_s: float = setting(
         0.4, "s", f"Neighbours further apart than this do not say where a pose between them belongs; {BY_HAND}."
     )
+    longest_trial_s: float = setting(
+        1e6, "s", "A trial of more than eleven days is a wrong unit of time, and its grid would fill the memory."
+    )
+    largest_number: float = setting(1e30, "1", "Larger numbers are no measurements: their squares overflow.")
+    most_columns: int = setting(2_000, "columns", f"A table of more columns is no log of a robot; {BY_HAND}.")
+    longest_line: int = setting(1 << 20, "characters", f"A longer first line is no table's heading; {BY_HAND}.")
     long_step_s: float = setting(
         30.0, "s", f"Rows further apart are no seconds: refused before anything is done second by second; {BY_HAND}."
     )

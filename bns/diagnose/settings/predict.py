@@ -26,7 +26,9 @@ class Predict:
         0.1, "s", f"Longest step of the grid in a search over many poses that were thinned out, for speed; {BY_HAND}."
     )
     picture_rounds: int = setting(
-        3, "rounds", "Rounds in which a place in the picture is traced back to the floor: each leaves a power of the distortion."
+        3,
+        "rounds",
+        "Rounds in which a place in the picture is traced back to the floor: each leaves a power of the distortion.",
     )
     tail_s: float = setting(
         1.0, "s", "What the last row says, a command or none, is in force this long: poses may be stamped early."

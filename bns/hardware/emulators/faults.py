@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from bns.errors import HardwareError, unknown_name
+from bns.safe_yaml import Lines, read_yaml_file, shown
 
 KINDS: Mapping[str, str] = {
     "lost-request": "the robot hears nothing of a command",
@@ -104,22 +104,26 @@ class FaultPlan:
 
 def load_plan(path: Path) -> FaultPlan:
     """A plan from a YAML file; HardwareError names what is wrong in it."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
-        raise HardwareError(f"cannot read the fault plan {path}: {error}") from error
+    content, lines = read_yaml_file(path, "the fault plan", HardwareError)
     if not isinstance(content, dict) or not isinstance(content.get("faults"), list) or set(content) - {"seed", "faults"}:
         raise HardwareError(f"the fault plan {path} must hold `faults:`, a list, and may hold `seed:`; nothing else.")
     seed = content.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        raise HardwareError(f"{path}: seed is {seed!r}; it must be a whole number from 0.")
-    return FaultPlan(tuple(_fault(path, entry) for entry in content["faults"]), seed)
+        raise HardwareError(f"{path}: seed is {shown(seed)}; it must be a whole number from 0.")
+    return FaultPlan(tuple(_located(path, content["faults"], at, lines) for at in range(len(content["faults"]))), seed)
+
+
+def _located(path: Path, entries: list[Any], at: int, lines: Lines) -> Fault:
+    with lines.at("faults", at):
+        return _fault(path, entries[at])
 
 
 def _fault(path: Path, entry: Any) -> Fault:
     if not isinstance(entry, dict) or set(entry) - _ALLOWED or "kind" not in entry:
-        raise HardwareError(f"{path}: {entry!r} is no fault; it has a kind and of {', '.join(sorted(_ALLOWED))} what it needs.")
-    if entry["kind"] not in KINDS:
+        raise HardwareError(
+            f"{path}: {shown(entry)} is no fault; it has a kind and of {', '.join(sorted(_ALLOWED))} what it needs."
+        )
+    if not isinstance(entry["kind"], str) or entry["kind"] not in KINDS:
         raise HardwareError(f"{path}: {unknown_name('fault', entry['kind'], KINDS)}")
     if ("rate" in entry) == ("at_s" in entry):
         raise HardwareError(f"{path}: {entry['kind']} needs either rate (0 to 1) or at_s (seconds).")
@@ -134,5 +138,5 @@ def _fault(path: Path, entry: Any) -> Fault:
 
 def _number(path: Path, name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
-        raise HardwareError(f"{path}: {name} is {value!r}; it must be a number from 0.")
+        raise HardwareError(f"{path}: {name} is {shown(value)}; it must be a number from 0.")
     return float(value)

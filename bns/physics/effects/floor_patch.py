@@ -72,7 +72,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("x_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "middle of the patch, east", resolution=2e-3),
         Parameter("y_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "middle of the patch, north", resolution=2e-3),
-        Parameter("radius_m", "m", 5e-3, 1e3, (0.02, 100.0), 0.2, "of the patch", resolution=2e-3),
+        Parameter("radius_m", "m", 5e-3, 1e3, (0.02, 100.0), 0.2, "of the patch", floor_share=0.33, resolution=2e-3),
         Parameter("loss", "1", -1.0, 0.99, (-0.5, 0.95), 0.0, "share of speed lost on it (negative: faster)"),
     ),
     equation="v, s, omega times 1 - k where (x - px)^2 + (y - py)^2 < r^2",

@@ -11,10 +11,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import number
+from bns.safe_yaml import read_yaml, shown
 
 BASIS = ("measured", "published", "fitted", "guess")
 """How a value came to be known."""
@@ -108,10 +107,7 @@ class SnakeParameters:
 
 def read_parameters(text: str) -> SnakeParameters:
     """Parameters of a YAML text; ModelError names an entry that is missing, unknown or without its basis and reason."""
-    try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as fault:
-        raise ModelError(f"the snake's parameters are no valid YAML: {fault}. Correct the place it names.") from fault
+    content, _ = read_yaml(text, "the snake's parameters", ModelError)
     names = [field.name for field in dataclasses.fields(SnakeParameters)]
     if not isinstance(content, dict):
         raise ModelError(f"the snake's parameters are no mapping; give {', '.join(names)}.")
@@ -119,7 +115,7 @@ def read_parameters(text: str) -> SnakeParameters:
         if name not in names:
             raise ModelError(unknown_name("parameter of the snake", name, names))
         if not isinstance(entry, dict) or set(entry) != {"value", "basis", "reason"}:
-            raise ModelError(f"the snake's {name} is {entry!r}; it needs value, basis and reason.")
+            raise ModelError(f"the snake's {name} is {shown(entry)}; it needs value, basis and reason.")
         if entry["basis"] not in BASIS:
             raise ModelError(unknown_name(f"basis of the snake's {name}", entry["basis"], BASIS))
     if missing := [name for name in names if name not in content]:

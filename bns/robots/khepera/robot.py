@@ -17,7 +17,7 @@ from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.snn import INPUTS
 from bns.measurements import COLUMNS, trial_table
 from bns.robots.base import RandomStream, Scores, rotate
-from bns.robots.khepera.rollout import inputs, roll_out
+from bns.robots.khepera.rollout import inputs, roll_out, walked
 from bns.robots.khepera.rules import (
     GOAL_RADIUS_M,
     HIGH,
@@ -129,7 +129,9 @@ class Khepera:
         """As they are: no command of two wheels is unstable."""
         return poses
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, stream: RandomStream | None = None) -> np.ndarray:
+    def plan(
+        self, controller: np.ndarray, weights: np.ndarray | None, task: Task, stream: RandomStream | None = None
+    ) -> np.ndarray:
         """A controller is driven as it is."""
         return controller
 
@@ -159,6 +161,12 @@ class Khepera:
         known = None if parents is None else parents.outputs
         fitness, reached, failures, outputs = roll_out(population, weights, task.goals_m, known)
         return Scores(fitness, reached, failures, outputs=outputs)
+
+    def walk(
+        self, population: Population, displacements: np.ndarray, task: Task, stream: RandomStream | None = None
+    ) -> Scores:
+        """As `score`, from displacements (commands, 3)."""
+        return Scores(*walked(population, self.targets(displacements), task.goals_m))
 
     def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
         """Fitness per metre, and goals reached, of one path; 0 where `score` would call the arithmetic failed."""

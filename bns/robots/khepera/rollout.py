@@ -221,6 +221,13 @@ def roll_out(population: Population, weights: np.ndarray, goals_m: np.ndarray, k
     return Rollout(fitness, reached, int(failures), outputs)
 
 
+def walked(population: Population, outputs: np.ndarray, goals_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Algorithm 2 on outputs (3, commands) that are known: fitness (n,), goals reached (n,), how many failed."""
+    fitness, reached = np.empty(len(population)), np.empty(len(population), np.int32)
+    failures = _walk(np.ascontiguousarray(outputs), population.lengths, SCALE, goals_m, fitness, reached)
+    return fitness, reached, int(failures)
+
+
 def inputs(commands: np.ndarray) -> np.ndarray:
     """Inputs (5, n) of the networks for one controller's commands (n, 3)."""
     X, lengths = np.empty((INPUTS, len(commands)), np.float32), np.array([len(commands)], np.int32)

@@ -146,13 +146,17 @@ class Snake:
         marked[[number - 1 for number in commands], path.STABLE] = 0.0
         return marked
 
-    def plan(self, controller: np.ndarray, weights: np.ndarray, task: Task, stream: RandomStream | None = None) -> np.ndarray:
+    def plan(
+        self, controller: np.ndarray, weights: np.ndarray | None, task: Task, stream: RandomStream | None = None
+    ) -> np.ndarray:
         """Cycles that are driven, every repeat a row: only those that simulation needs to finish the task (section 5.3.2).
 
         With a stream these are as many as any of the noisy evaluations that decide on its fitness needed (figure 5.18); those
         that did not finish do not count; where none did, all are driven.
         """
         in_full = cycles.in_full(controller)
+        if weights is None:
+            return in_full
         moved = self.displacements(predict(weights, self.inputs(in_full), self.sigmoid_output))
         if stream is None or "cut-without-noise" in self._options:
             return in_full[: self._needed(moved, in_full, task)[1]]
@@ -174,10 +178,16 @@ class Snake:
     ) -> Scores:
         """Mean fitness over ten noisy evaluations, all controllers under the same noise; without a stream there is none."""
         commands = population.commands
+        outputs = predict(weights, self.inputs(commands.reshape(-1, commands.shape[2])), self.sigmoid_output)
+        return self.walk(population, self.displacements(outputs), task, stream)
+
+    def walk(
+        self, population: Population, displacements: np.ndarray, task: Task, stream: RandomStream | None = None
+    ) -> Scores:
+        """As `score`, from displacements (cycles, 5)."""
+        commands = population.commands
         n, length, _ = commands.shape
-        moves = np.ascontiguousarray(
-            self.displacements(predict(weights, self.inputs(commands.reshape(n * length, -1)), self.sigmoid_output)).T
-        )
+        moves = np.ascontiguousarray(displacements.T)
         fitness, reached, used = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int32)
         half = (task.region_m / 2, task.surface_m[0] / 2, task.surface_m[1] / 2)
         noise = self._noise(stream, length * MOST_REPEATS)

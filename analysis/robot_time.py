@@ -1,0 +1,53 @@
+"""Success of approaches against what the robot's time is spent on, and how long the robot was needed until it lasted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from analysis.intervals import wilson
+
+LASTING = 3
+"""Evaluations in a row whose fittest controller succeeds: what counts as success that lasts."""
+
+
+def success_by_minute(evals: pd.DataFrame, minutes: Sequence[float] | np.ndarray) -> pd.DataFrame:
+    """Share of runs whose latest evaluation by each minute of robot time was a success, with Wilson intervals.
+
+    ``evals``: run_id, robot_s, success, in the order of the evaluations. Columns minute, runs, successes, low, high. A run counts
+    up to the robot time that it has used; before its first evaluation it has no success.
+    """
+    runs = [(own.robot_s.to_numpy() / 60, own.success.to_numpy(bool)) for _, own in evals.groupby("run_id", sort=False)]
+    rows = []
+    for minute in minutes:
+        within = [(spent, success) for spent, success in runs if minute <= spent[-1]]
+        done = [bool(success[: np.searchsorted(spent, minute, side="right")][-1:].any()) for spent, success in within]
+        rows.append((float(minute), len(done), sum(done)))
+    table = pd.DataFrame(rows, columns=["minute", "runs", "successes"])
+    table = table[table.runs > 0]
+    low, high = wilson(table.successes, table.runs)
+    return table.assign(low=low, high=high)
+
+
+def minutes_until_lasting(evals: pd.DataFrame, lasting: int = LASTING) -> pd.DataFrame:
+    """Robot minutes of each run until the first of ``lasting`` successes in a row; ``ended`` False where there were none, and the
+    minutes those of the whole run."""
+    rows = []
+    for run, own in evals.groupby("run_id", sort=False):
+        success, minutes = own.success.to_numpy(bool), own.robot_s.to_numpy() / 60
+        begins = [i for i in range(len(success) - lasting + 1) if success[i : i + lasting].all()]
+        rows.append((run, minutes[begins[0]] if begins else minutes[-1], bool(begins)))
+    return pd.DataFrame(rows, columns=["run_id", "minutes", "ended"])
+
+
+def survival(minutes: Sequence[float] | np.ndarray, ended: Sequence[bool] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Kaplan and Meier's estimate (1958): times of ends, beginning with 0, and the share that goes on after each of them."""
+    minutes, ended = np.asarray(minutes, float), np.asarray(ended, bool)
+    times, share = [0.0], [1.0]
+    for time in np.unique(minutes[ended]):
+        at_risk = np.count_nonzero(minutes >= time)
+        times.append(float(time))
+        share.append(share[-1] * (1 - np.count_nonzero(ended & (minutes == time)) / at_risk))
+    return np.array(times), np.array(share)

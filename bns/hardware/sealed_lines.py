@@ -1,0 +1,96 @@
+"""Lines of a log that each carry a number and a checksum, so that none can be changed, lost, doubled or exchanged unseen.
+
+A line of JSON ends with ``"n":NUMBER,"crc":"8 hexadecimal digits"}``. The CRC-32 is that of the checksum before it and of all of
+the line that stands before its own; the first one begins with the CRC-32 of whatever stands above it, which is older lines
+without checksums, or nothing.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+import zlib
+from pathlib import Path
+
+from bns.errors import HardwareError
+
+_SEAL = re.compile(rb',"n":(\d{1,15}),"crc":"([0-9a-f]{8})"\}')
+
+
+class LogWarning(UserWarning):
+    """A log cannot be checked; the message names it."""
+
+
+class Seals:
+    """Numbers and checksums of the lines to come after ``above``, what a log already holds."""
+
+    def __init__(self, above: bytes = b"") -> None:
+        lines = above.splitlines(keepends=True)
+        last = _sealed(lines[-1].rstrip(b"\n")) if lines else None
+        self._number = last[0] if last else len(lines)
+        self._crc = last[1] if last else zlib.crc32(above)
+
+    def line(self, event: str) -> str:
+        """``event``, a JSON object without spaces, as the next line."""
+        self._number += 1
+        body = f'{event[:-1]},"n":{self._number}'
+        self._crc = _crc(self._crc, body.encode())
+        return f'{body},"crc":"{self._crc:08x}"}}\n'
+
+
+def checked_lines(path: Path, data: bytes) -> list[str]:
+    """The whole lines of a log, in order; a last one without an end is passed over.
+
+    HardwareError names the first line that is not as it was written. LogWarning if there are lines without checksums.
+    """
+    lines = data[: data.rfind(b"\n") + 1].split(b"\n")[:-1]
+    unsealed = next((at for at, line in enumerate(lines) if b'"crc"' in line), len(lines))
+    crc = zlib.crc32(b"".join(line + b"\n" for line in lines[:unsealed]))
+    for number, line in enumerate(lines[unsealed:], unsealed + 1):
+        crc = _followed(path, number, line, crc)
+    text = [_text(path, number, line) for number, line in enumerate(lines, 1)]
+    if unsealed:
+        warnings.warn(
+            f"{path}: lines 1 to {unsealed} were written before lines had checksums; whether they are as they were "
+            "written cannot be told.",
+            LogWarning,
+            stacklevel=3,
+        )
+    return text
+
+
+def _followed(path: Path, number: int, line: bytes, crc: int) -> int:
+    """The checksum of a line that must follow one with ``crc``."""
+    seal = _sealed(line)
+    if seal is None:
+        raise _wrong(path, number, "was changed")
+    if seal[0] > number:
+        raise _wrong(path, number, f"is number {seal[0]}: lines before it are lost")
+    if seal[0] < number:
+        raise _wrong(path, number, f"is number {seal[0]}: it is there twice, or lines changed places")
+    if _crc(crc, line[: line.rindex(b',"crc"')]) != seal[1]:
+        raise _wrong(path, number, "was changed, or the one before it")
+    return seal[1]
+
+
+def _sealed(line: bytes) -> tuple[int, int] | None:
+    at = line.rfind(b',"n":')
+    match = _SEAL.fullmatch(line, at) if at >= 0 else None
+    return (int(match[1]), int(match[2], 16)) if match else None
+
+
+def _crc(before: int, body: bytes) -> int:
+    return zlib.crc32(body, zlib.crc32(before.to_bytes(4, "little")))
+
+
+def _text(path: Path, number: int, line: bytes) -> str:
+    try:
+        return line.decode()
+    except UnicodeDecodeError as error:
+        raise _wrong(path, number, "is no text") from error
+
+
+def _wrong(path: Path, number: int, what: str) -> HardwareError:
+    kept = f"head -n {number - 2} {path}" if number > 2 else ""
+    below = f" What stands above it can be gone on with: {kept} > FILE, in its place." if kept else ""
+    return HardwareError(f"line {number} of {path} {what}. Take the file from a copy, unedited.{below}")

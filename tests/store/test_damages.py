@@ -1,0 +1,153 @@
+"""A sample of the damages that `python -m tests.store.damages` does by the thousand."""
+
+import json
+import os
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from bns.store import StoreWarning, Writer, compact, finished, load, query
+from bns.store.digest import Memory, identity
+from bns.store.parquet import file_bytes
+from bns.store.parts import find_parts
+from bns.sweep.status import sweep_status
+
+from .damages import survey
+from .synthetic import record, records, specs
+
+
+def files(results, table):
+    return sorted((results / table).rglob("*.parquet"))
+
+
+def store(results, runs, sweep="s"):
+    with Writer(results, sweep, sweep_text="name: s\nrobot: khepera\nseeds: 3\n") as writer:
+        for run in runs:
+            writer.append(run)
+
+
+def full(count):
+    return [record(spec, ("evals", "paths", "generations", "probes")) for spec in specs(count, 2, record="full")]
+
+
+def test_no_damage_goes_unnoticed_and_a_sweep_makes_up_for_each():
+    outcomes = survey(14, 7)
+    assert [one for one in outcomes if one.verdict not in {"named", "harmless", "again"}] == []
+    assert sum(one.verdict == "named" for one in outcomes) >= 7
+
+
+@pytest.mark.parametrize("table", ["evals", "paths", "generations", "probes"])
+def test_what_is_set_aside_is_run_again(tmp_path, table):
+    store(tmp_path, full(2))
+    path = files(tmp_path, table)[0]
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.warns(StoreWarning, match=f"{path.name} is skipped: it is"):
+        assert finished(tmp_path, "s") == {}
+    with pytest.warns(StoreWarning, match=f"{path.name} is skipped: it is"):
+        assert [row.done for row in sweep_status(tmp_path)] == [0]
+    with pytest.warns(StoreWarning, match=rf"{path.name} is set aside as .*set-aside/{table}/.* are done again"):
+        store(tmp_path, full(2))
+    assert len(finished(tmp_path, "s")) == 2
+    assert not path.exists()
+    compact(tmp_path)
+    assert len(finished(tmp_path, "s")) == 2
+    assert len(files(tmp_path, "runs")) == 1
+
+
+def test_compaction_does_not_take_runs_with_lost_rows_for_finished(tmp_path):
+    runs = full(3)
+    store(tmp_path, runs[:2])
+    store(tmp_path, runs[1:])
+    path = files(tmp_path, "paths")[0]
+    path.unlink()
+    for _ in range(2):
+        compact(tmp_path)
+        with pytest.warns(StoreWarning, match="gone, though"):
+            known = finished(tmp_path, "s")
+        assert len(known) == 2
+    store(tmp_path, [run for run in runs if run.spec.run_id not in known])
+    compact(tmp_path)
+    assert len(finished(tmp_path, "s")) == 3
+    assert len(load(tmp_path, "paths")) == sum(len(run.tables["paths"]["step"]) for run in runs)
+
+
+def test_damaged_spec_file_is_written_again(tmp_path):
+    store(tmp_path, records(1))
+    path = files(tmp_path, "specs")[0]
+    path.write_bytes(bytes(len(path.read_bytes())))
+    with pytest.warns(StoreWarning, match=f"{path.name} is set aside"):
+        store(tmp_path, [])
+    assert load(tmp_path, "specs")["text"].tolist() == ["name: s\nrobot: khepera\nseeds: 3\n"]
+
+
+def test_one_bit_of_a_columns_name_makes_no_traceback(tmp_path):
+    store(tmp_path, records(3))
+    path = files(tmp_path, "evals")[0]
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"mutation_rate", b"\xedutation_rate", 1))
+    for read in (
+        load,
+        lambda folder: query(folder, "SELECT * FROM runs"),
+        lambda folder: finished(folder, "s"),
+        sweep_status,
+    ):
+        with pytest.warns(StoreWarning, match=f"{path.name} is skipped: it is damaged"):
+            read(tmp_path)
+    assert [moved.name for moved in compact(tmp_path).set_aside] == [path.name]
+
+
+def test_the_same_in_a_file_from_before_digests(tmp_path, monkeypatch):
+    monkeypatch.setattr("bns.store.parts.is_sealed", lambda path: False)
+    store(tmp_path, records(3))
+    path = files(tmp_path, "evals")[0]
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"mutation_rate", b"\xedutation_rate", 1))
+    with pytest.warns(StoreWarning, match=f"{path.name} is skipped: "):
+        load(tmp_path)
+
+
+def test_run_with_some_of_its_evaluations_is_not_finished(tmp_path):
+    store(tmp_path, records(2, evaluations=4))
+    assert list(finished(tmp_path, "s").values()) == ["ok", "ok"]
+    with_more(files(tmp_path, "runs")[0], [4, 5])
+    assert len(finished(tmp_path, "s")) == 1
+
+
+def with_more(path, evaluations):
+    """The runs file at ``path`` says that its runs had this many evaluations, under a digest that is right."""
+    table = pq.read_table(path, partitioning=None)
+    known = json.loads(table.schema.metadata[b"bns"])
+    at = table.schema.get_field_index("evaluations")
+    changed = table.set_column(at, table.schema.field(at), pa.array(evaluations, pa.int32()))
+    path.write_bytes(file_bytes("runs", changed, json.dumps(known).encode()))
+
+
+def test_second_look_reads_no_file_again_and_a_changed_one_is_read(tmp_path, monkeypatch):
+    results = tmp_path / "results"
+    store(results, records(3))
+    find_parts(results, "evals")
+    path = files(results, "evals")[0]
+    with monkeypatch.context() as patch:
+        patch.setattr("bns.store.parts.is_intact", lambda path: pytest.fail(f"{path} was read again"))
+        assert len(find_parts(results, "evals")[0]) == 1
+    data, times = bytearray(path.read_bytes()), path.stat()
+    data[500] ^= 1
+    path.write_bytes(data)
+    os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))  # as a copy that keeps the times
+    assert find_parts(results, "evals")[0] == []
+
+
+def test_large_stores_are_remembered_by_the_next_process(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("bns.store.digest._REMEMBER_FROM", 1)
+    path = tmp_path / "a.parquet"
+    path.write_bytes(b"x" * 10)
+    now, memory = identity(path.stat()), Memory(tmp_path)
+    memory.add(path, now)
+    memory.save()
+    assert Memory(tmp_path).has(path, now)
+    assert not Memory(tmp_path).has(path, (*now[:3], now[3] + 1))
+    for kept in (tmp_path / "cache" / "bns").iterdir():
+        kept.write_text("no JSON")
+    assert not Memory(tmp_path).has(path, now)
