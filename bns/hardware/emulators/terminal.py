@@ -15,6 +15,7 @@ from typing import Protocol, Self
 from bns.hardware.clock import EmulatedClock
 
 _LONGEST_WAY_S = 1.0  # by the computer's clock; somebody reads meanwhile, or nobody can
+_LONGEST_TURN_S = 30.0  # likewise; a pump that takes longer to come round hangs
 
 
 class Device(Protocol):
@@ -54,14 +55,20 @@ class PseudoTerminal:
         self._device = device
         self._wake_read, self._wake_write = os.pipe()
         self._lock = threading.RLock()
+        self._came_round = threading.Condition()
+        self._plugged = self._watched = 0
+        """How many lines there have been, and which of them the pump is at; it looks for another one in between."""
         self._master = self._slave = -1
         self._open = True
-        self.plug_in()
         self._thread = threading.Thread(target=self._pump, name=f"emulated {name}", daemon=True)
         self._thread.start()
+        self.plug_in()
 
     def plug_in(self) -> None:
-        """A new line in the place of the one that was cut."""
+        """A new line in the place of the one that was cut; the pump waits at it when this returns.
+
+        Else a busy computer would let the next question wait for an answer that the last one, on the dead line, is owed.
+        """
         with self._lock:
             self.cut()
             import tty  # noqa: PLC0415  # Windows has no pseudo-terminals
@@ -71,7 +78,11 @@ class PseudoTerminal:
             os.set_blocking(self._master, False)  # a host that does not read must not stop the pump
             self.path.unlink(missing_ok=True)
             self.path.symlink_to(os.ttyname(self._slave))
+            self._plugged = number = self._plugged + 1
         self._wake()
+        if threading.current_thread() is not self._thread:
+            with self._came_round:
+                self._came_round.wait_for(lambda: self._watched >= number, _LONGEST_TURN_S)
 
     def send(self, data: bytes) -> None:
         """What the device says unasked; it can be read at the near end when this returns."""
@@ -110,7 +121,10 @@ class PseudoTerminal:
     def _pump(self) -> None:
         while self._open:
             with self._lock:
-                line = self._master
+                line, number = self._master, self._plugged
+            with self._came_round:
+                self._watched = number
+                self._came_round.notify_all()
             for ready in self._ready(line):
                 if ready == self._wake_read:
                     os.read(self._wake_read, 64)
