@@ -57,7 +57,8 @@ def test_shipped_sweeps_can_be_read_and_are_named_after_their_file(file):
     sweep = load_sweep(file)
     assert sweep.name == file.stem
     totals = {"khepera": 45_000, "khepera-small": 480, "prototype": 9, "budget": 120}
-    totals |= {"snake": 30_000, "snake-small": 80, "snake-prototype": 6, "snake-changes": 6}
+    totals |= {"snake": 30_000, "snake-small": 80, "snake-prototype": 20, "snake-changes": 6}
+    totals |= {"approaches": 1080, "approaches-small": 48}
     assert sweep.total == totals[file.stem]
     if sweep.total < 1000:
         assert len({spec.run_id for spec in ordered_specs(sweep)}) == sweep.total

@@ -19,8 +19,8 @@ _SHOWN = {
     "after": ("with what was found", "D", OKABE_ITO[0], -0.15),
 }
 _NOTE = (
-    "Lines: 95 % bootstrap intervals over trials. Noise floor: what a perfect model would show if all scatter that is left were "
-    "noise, an upper bound. Windows of the Warthog last 2 s. Driven by encoders, every row of a log is a command."
+    "Lines: 95 % bootstrap intervals over trials, before and after on the same windows. Noise: of the tracking alone, where the "
+    "poses show it. Windows of the Warthog last 2 s. Driven by encoders, every row of a log is a command."
 )
 
 
@@ -56,4 +56,5 @@ def _draw(ax: Axes, row: int, answer: Mapping[str, Any], horizon: str) -> None:
         ends = answer["intervals"][horizon][key]
         ax.plot(ends, [row + lift] * 2, color=colour, linewidth=1)
         ax.plot(error[key], row + lift, marker, color=colour, label=label, linestyle="none")
-    ax.plot(error["noise_floor"], row, "|", color="black", markersize=9, label="noise floor", linestyle="none")
+    if error["noise_floor"] is not None:
+        ax.plot(error["noise_floor"], row, "|", color="black", markersize=9, label="tracking noise", linestyle="none")

@@ -27,8 +27,8 @@ def _figure(title: str, x: str, y: str, tools: str = "pan,wheel_zoom,reset", hei
         y_axis_label=y,
         tools=tools,
         height=height,
-        min_width=280,
         sizing_mode="stretch_width",
+        styles={"max-width": "calc(100vw - 28px)"},  # where what stands beside it is wider than the window
         toolbar_location="above",
         **drag,
         **more,

@@ -34,7 +34,7 @@ def test_motors_that_follow_late_are_no_other_robot(tau_s):
     check_same_robot(predictor(hidden(motor_lag={"tau_s": tau_s})), NOMINAL)
 
 
-@pytest.mark.parametrize("factor", [0.45, 2.0, 4.0])
+@pytest.mark.parametrize("factor", [0.25, 4.0])
 def test_another_wheelbase_is_another_robot(factor):
     other = replace(NOMINAL, wheelbase_m=factor * NOMINAL.wheelbase_m)
     with pytest.raises(DataError, match=r"A wheelbase of 0.088\d* m would fit: --wheelbase 0.088"):

@@ -165,7 +165,7 @@ def test_letters_that_mean_something_to_a_browser_do_no_harm(tmp_path):
 
 def test_single_poses_have_a_page_that_says_what_is_wrong(tmp_path):
     data, out = tmp_path / "single.csv", tmp_path / "page.html"
-    table = measured(NOMINAL, trials=10, ends_only=True)
+    table = measured(NOMINAL, trials=12, ends_only=True)
     write_measurements(table.groupby("trial").head(1), data)
     assert main(["report", str(data), "--model", "khepera", "-o", str(out)]) == 0
     assert "single tracked pose" in first_screen(out)

@@ -124,7 +124,7 @@ def test_what_asks_for_too_much_once_noise_and_numbers_have_settled_is_passed_ov
     def rejected_because(fit, name, bounds=True):
         return "too much" if name == "wheelbase" and not bounds else implausible(fit, name, bounds)
 
-    monkeypatch.setattr("bns.diagnose.select.stepwise.implausible", rejected_because)
+    monkeypatch.setattr(StepwiseSelection, "_rejected", lambda _, fit, name, bounds=True: rejected_because(fit, name, bounds))
     tracks = tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=12, seed=11))
     found = StepwiseSelection(WheelPredictor(tracks), NOMINAL).run()
     first = found.steps[0].ranking[0]

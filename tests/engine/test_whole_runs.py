@@ -23,7 +23,7 @@ OTHER = {
     "task": "infinity", "world": "physics", "seed": 1, "root_seed": 1, "population_size": 15, "tournament_size": 0.1,
     "mutation_rate": 0.5, "real_world_selection_size": 0.1, "evaluations": 5, "generations_per_evaluation": 5,
     "training_iterations_per_evaluation": 31, "training_algorithm": "irprop-", "min_commands": 8, "max_commands": 4,
-    "record": "full",
+    "record": "full", "approach": "on-robot", "overhead_s": 5.0,
 }  # fmt: skip
 
 
@@ -54,6 +54,8 @@ def test_every_parameter_changes_something(name):
     if name == "record":
         assert set(after) - set(before) == {"paths", "generations", "probes"}
         assert same(evals(SMALL), evals(but(record="full")))  # looking more closely changes nothing
+    elif name == "overhead_s":
+        assert not np.array_equal(before["evals"]["robot_s"], after["evals"]["robot_s"])
     else:
         a, b = before["evals"], after["evals"]
         assert not np.array_equal(a["fitness_simulation"], b["fitness_simulation"])

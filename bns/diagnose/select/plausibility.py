@@ -7,6 +7,16 @@ import numpy as np
 from bns.diagnose.estimate.fit import Fit
 
 
+def at_bound(fit: Fit, name: str) -> bool:
+    """Whether a number of an effect lies at a bound of the model: the data ask for more than it can be."""
+    numbers = [
+        (number.parameter, float(value))
+        for number, value in zip(fit.free, fit.values, strict=True)
+        if number.effect == name
+    ]
+    return any(value in {p.low, p.high} for p, value in numbers)
+
+
 def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
     """Why an effect with these numbers cannot be believed; "" if it can. ``bounds``: do numbers at one count?"""
     for index, number in enumerate(fit.free):

@@ -19,7 +19,7 @@ from bns.diagnose.estimate.starts import best_start, fit_with, listed
 from bns.diagnose.estimate.trial_clock_test import TrialClocks, compare_clocks, fit_trial_clocks, with_shared_clock
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.indistinguishable import indistinguishable
-from bns.diagnose.select.plausibility import implausible
+from bns.diagnose.select.plausibility import at_bound, implausible
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.decoys import DECOYS
@@ -169,9 +169,8 @@ class StepwiseSelection:
 
     def _rejected(self, fit: Fit, name: str, bounds: bool = True) -> str:
         """Why an effect may not be taken; where all numbers are believed, only for one at a bound."""
-        if self._all_believed and implausible(fit, name, bounds=False):
-            return ""
-        return implausible(fit, name, bounds)
+        why = implausible(fit, name, bounds)
+        return "" if self._all_believed and not at_bound(fit, name) else why
 
     def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
         self.tick(effect.name)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
+from bns.extras import extra
 from bns.physics.snake.parameters import SnakeParameters
+
+with extra("snake"):
+    import mujoco
 
 GRAVITY_M_S2 = 9.81
 
