@@ -9,7 +9,6 @@ lines of JSON.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import re
@@ -17,11 +16,14 @@ import select
 import signal
 import socket
 import sys
-import termios
 import time
-import tty
 from pathlib import Path
 from typing import Any
+
+with contextlib.suppress(ImportError):  # not on Windows, where a robot's port has no guard
+    import fcntl
+    import termios
+    import tty
 
 TICK_S = 0.05
 _BUSY_S = 3.0
