@@ -82,7 +82,7 @@ class Guard:
         self._poll = select.poll()
         self._poll.register(control, select.POLLIN)
         self._heard = b""
-        self._armed = self._gone = self._still = self._terminated = False
+        self._armed = self._gone = self._still = self._terminated = self._spoke = False
         self.why = ""
         """What made it stop the robot; empty while it forwards."""
         self._tripped_s = self._beat_s = self._tried_s = self._plugged_s = 0.0
@@ -198,6 +198,7 @@ class Guard:
             return
         except OSError:
             data = b""
+        self._spoke |= bool(data)
         if not data:
             self._lose()
         elif self.why:
@@ -242,11 +243,11 @@ class Guard:
 
     def _listens(self) -> bool:
         """Whether the robot may be spoken to: a board that starts when its port is opened must not be disturbed."""
-        return bool(self._heard) or time.monotonic() - self._plugged_s >= self._setup["stop"]["quiet_s"]
+        return self._spoke or time.monotonic() - self._plugged_s >= self._setup["stop"]["quiet_s"]
 
     def _plug(self, port: int) -> None:
         """Take a port, and make the line that the driver opens instead of it."""
-        self._port, self._plugged_s, self._heard = port, time.monotonic(), b""
+        self._port, self._plugged_s, self._spoke = port, time.monotonic(), False
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
         os.set_blocking(self._near, False)
