@@ -133,8 +133,11 @@ def diagnose(
         imitating = tuple(name for name in selection.accepted if name not in standing)
         if imitating:
             selection = refitted(selection.only(standing), predictor, model)
-            dependence, rest = _left(selection)
             errors = errors_before_and_after(selection, model)
+            if selection.accepted and not errors.falls:
+                withdrawn, selection = selection.accepted, selection.withdrawn()
+                errors = errors_before_and_after(selection, model)
+            dependence, rest = _left(selection)
     # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
     guesses = rest.residual_dependence or (tuple(dependence[:1]) if rest.outliers else ())
     formula = best_formula(selection.problem, selection.fit, guesses) if guesses else None
