@@ -11,9 +11,10 @@ import yaml
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import checked
-from bns.diagnose.data.guess_mapping import drafted
-from bns.diagnose.data.load import load_measured, read_table
+from bns.diagnose.data.guess.mapping import drafted
+from bns.diagnose.data.load import load_measured
 from bns.diagnose.data.mapping import load_mapping
+from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.split_trials import KEPT_S, split
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.check_robot import check_same_robot

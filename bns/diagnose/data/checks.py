@@ -217,9 +217,27 @@ def _gaps_and_losses(trial: str, rows: pd.DataFrame, findings: list[Finding]) ->
         for i in map(int, np.flatnonzero(np.diff(t) > max(5 * usual, 0.2))):
             if usual < 0.2:
                 findings.append(Finding(trial, int(rows.index[i]), f"no row for {t[i + 1] - t[i]:.2f} s"))
-    lost = rows[list(POSE)].isna().any(axis=1)
-    if lost.any():
-        findings.append(Finding(trial, int(rows.index[lost][0]), f"{lost.sum()} poses lost, the first here"))
+    lost, first = poses_lost(t, _tracked(rows).to_numpy())
+    if lost:
+        findings.append(Finding(trial, int(rows.index[first]), f"{lost} poses lost, the first here"))
+
+
+def poses_lost(t_s: np.ndarray, tracked: np.ndarray) -> tuple[int, int]:
+    """How many poses of a trial are lost, and the first row that lacks one.
+
+    Rows without a pose between two poses that follow each other as quickly as usual hold commands alone: nothing is lost there.
+    ``t_s`` (rows,), ``tracked`` (rows,) of bool: does the row hold a whole pose?
+    """
+    at = np.flatnonzero(tracked)
+    if len(at) < 2:
+        return len(t_s) - len(at), int(np.argmin(tracked))
+    usual = float(np.median(np.diff(t_s[at])))
+    marks = np.concatenate([[-1], at, [len(t_s)]])
+    most = 0.6 * usual  # before the first and after the last pose one is due only where nearly a whole interval passes
+    times = np.concatenate([[t_s[0] - most], t_s[at], [t_s[-1] + most]])
+    due = np.maximum(np.round(np.diff(times) / usual) - 1, 0)
+    lost = np.minimum(np.diff(marks) - 1, due).astype(int)
+    return int(lost.sum()), int(marks[np.argmax(lost > 0)] + 1)
 
 
 def _units(table: pd.DataFrame) -> None:
