@@ -119,12 +119,17 @@ class Workbench:
         errors = paired_errors(predictor, list(zip([*fitted.names, BY_HAND], steps, strict=True)))
         return replace(fitted, switches=switches, model=model, errors=errors, steps=steps)
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The log's further columns, which a formula may use."""
+        return tuple(self.ready.predictor.tracks.extra)
+
     def effect(self, switches: Switches, name: str) -> tuple[Effect, Mapping[str, str]]:
         """A listed effect or a formula, and how a model file writes it. The same object each time: fits are known by it."""
         for term in switches.terms:
             if term.name == name:
                 if term not in self._formulas:
-                    self._formulas[term] = formula_effect(term.name, term.term, term.on)
+                    self._formulas[term] = formula_effect(term.name, term.term, term.on, self.columns)
                 return self._formulas[term], {"term": term.term, "on": term.on}
         return self.catalogue[name], {}
 

@@ -140,8 +140,21 @@ def tracks_of(table: pd.DataFrame) -> Tracks:
         duration_s=_padded([c[2] for c in commands], "constant"),
         start_s=start,
         start_known=known,
-        extra={name: table[name].to_numpy(dtype=float)[seen] for name in numeric},
+        extra={name: _at_poses(table[name].to_numpy(dtype=float), t, rows, tracked)[seen] for name in numeric},
     )
+
+
+def _at_poses(values: Array, t_s: Array, rows: list[NDArray[np.int64]], tracked: NDArray[np.bool_]) -> Array:
+    """A column (rows,) that was logged in rows without poses alone, by straight lines between these; else as it is."""
+    known = np.isfinite(values)
+    if (known & tracked).any() or not known.any():
+        return values
+    out = values.copy()
+    for at in rows:
+        there = at[known[at]]
+        if len(there):
+            out[at] = np.interp(t_s[at], t_s[there], values[there])
+    return out
 
 
 def _commands(table: pd.DataFrame, rows: list[NDArray[np.int64]], t_s: Array) -> list[tuple[Array, Array, Array]]:

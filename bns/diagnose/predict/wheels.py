@@ -20,7 +20,7 @@ from bns.physics.effect import Effect
 from bns.physics.grid import Grid
 from bns.physics.model import ActiveEffect, Model
 from bns.physics.motion import flow_of, wheel_motion, with_body_effects
-from bns.physics.signals import Body, Conditions, View, Wheels
+from bns.physics.signals import Body, Conditions, Logged, View, Wheels
 
 RECENT_S = DEFAULTS.predict.recent_s
 _COARSE_S = DEFAULTS.predict.coarse_s
@@ -298,7 +298,12 @@ def _conditions(tracks: Tracks, node_s: Array) -> Conditions:
         reference = volts[np.isfinite(volts)][0]
         drop = np.stack([_held(tracks, volts, row, middle[row]) for row in range(len(tracks))]) - reference
         drop = -drop
-    return Conditions(session_s=tracks.start_s[:, None] + middle, battery_drop_v=drop)
+    def on_grid(name: str) -> Array:
+        values = tracks.extra[name]
+        return np.stack([_held(tracks, values, row, middle[row]) for row in range(len(tracks))])
+
+    there = [name for name, values in tracks.extra.items() if np.isfinite(values).any()]
+    return Conditions(tracks.start_s[:, None] + middle, drop, logged=Logged(there, on_grid))
 
 
 def _between_frames(tracks: Tracks, grid: Grid) -> NDArray[np.bool_]:
