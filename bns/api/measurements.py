@@ -65,7 +65,8 @@ class Measurements(Shown):
         table = pd.DataFrame({"trial": tracks.names, "poses": np.diff(tracks.first)})
         if not isinstance(tracks, CycleTracks):
             lasts = tracks.duration_s
-            table["commands"], table["duration_s"] = (lasts > 0).sum(axis=1), lasts.sum(axis=1)
+            lead = 0.0 if tracks.lead_s is None else tracks.lead_s
+            table["commands"], table["duration_s"] = (lasts > 0).sum(axis=1), lasts.sum(axis=1) - lead
         return table
 
     @property

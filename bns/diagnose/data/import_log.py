@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from bns.diagnose.data.apply_mapping import applied
-from bns.diagnose.data.checks import Finding, checked
+from bns.diagnose.data.checks import Finding, checked, own_rows
 from bns.diagnose.data.guess.mapping import guessed, lacking
 from bns.diagnose.data.load import naming
 from bns.diagnose.data.mapping import mapping_beside
@@ -35,7 +35,7 @@ class Imported:
 
     def summary(self, where: str) -> str:
         """How much was written; rows without a pose hold commands (or other columns) alone."""
-        alone = len(self.table) - self.poses
+        alone = int(own_rows(self.table).sum()) - self.poses
         rest = f", {alone} without a pose" if alone else ""
         return f"{len(self.table)} rows of {self.trials} trials written to {where}: {self.poses} with a pose{rest}"
 

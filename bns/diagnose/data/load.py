@@ -109,7 +109,7 @@ def _jump_findings(tracks: Tracks, usable: pd.DataFrame) -> Iterator[Finding]:
             yield Finding(trial, int(rows[frame]), text)
             continue
         text = (
-            f"the tracked pose jumps by {1e3 * moved:.0f} mm at {tracks.t_s[frame]:.2f} s and stays there: another marker was "
+            f"the tracked pose jumps by {1e3 * moved:.0f} mm at {tracks.own_s[frame]:.2f} s and stays there: another marker was "
             "taken for the robot's, or somebody moved it; nothing is judged by the poses that follow in this trial"
         )
         yield Finding(trial, int(rows[frame]), text)
