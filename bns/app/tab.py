@@ -23,8 +23,8 @@ from bns.api.run import RunResult
 from bns.app.background import Background
 from bns.app.switches import History, Switches
 from bns.app.workbench import Workbench
-from bns.diagnose.data.guess_mapping import drafted
-from bns.diagnose.data.load import read_table
+from bns.diagnose.data.guess.mapping import drafted
+from bns.diagnose.data.sources.read import read_table
 from bns.errors import DataError, ModelError
 
 FIRST_MODEL = "khepera"

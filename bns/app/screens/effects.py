@@ -210,10 +210,10 @@ class EffectsScreen:
 
     def _check_term(self) -> bool:
         """Live: the library's own message, or nothing."""
-        text = self._term.value_input
+        text, bench = self._term.value_input, self._tab.bench
         try:
             if text:
-                formula_effect(self._name.value_input or "mine", text, self._on.value)
+                formula_effect(self._name.value_input or "mine", text, self._on.value, bench.columns if bench else ())
         except ModelError as fault:
             self._formula_problem.show(str(fault))
             return False
