@@ -43,12 +43,17 @@ class Surface:
 @dataclass(frozen=True)
 class Limits:
     """What a drive must keep: the surface, how long the robot may be out of sight, how late a look may come, and how long the
-    guard of its port may hear nothing from the trial."""
+    guard of its port may hear nothing from the trial.
+
+    After a trial that is gone, its guard tries to stop the robot until that has not answered for `gives_up_s`: four hours, in
+    which the battery of a robot that drives should be empty.
+    """
 
     surface: Surface
     lost_s: float = 0.5
     late_s: float = 1.0
     silent_s: float = 0.3
+    gives_up_s: float = 4 * 3600.0
 
 
 class Watch:

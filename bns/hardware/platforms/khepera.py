@@ -12,6 +12,7 @@ from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.clock import Clock, EmulatedClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.khepera_rig import EmulatedKheperaRig
+from bns.hardware.guard.recipe import StopRecipe, khepera_recipe
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.khepera import BAUD, STILL_M_S, KheperaIII, RobotLostError, check_battery, firmware
 from bns.hardware.platform import Driven
@@ -19,7 +20,6 @@ from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
 from bns.hardware.serial_link import SerialLink
 from bns.hardware.stop import Stop
-from bns.hardware.stop_recipe import StopRecipe, khepera_recipe
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.sight import Sight, Tracker

@@ -15,6 +15,7 @@ from bns.hardware.dynamixel import BAUD as BUS_BAUD
 from bns.hardware.dynamixel import Ax12Chain
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
+from bns.hardware.guard.recipe import StopRecipe, ax12_recipe, bridge_recipe
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
@@ -23,7 +24,6 @@ from bns.hardware.servo_chain import ServoChain, ServoError
 from bns.hardware.snake_drive import SnakeDrive
 from bns.hardware.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
-from bns.hardware.stop_recipe import StopRecipe, ax12_recipe, bridge_recipe
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import checked, open_tracker
 
