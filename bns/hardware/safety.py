@@ -73,7 +73,10 @@ class Watch:
         self._stopping.check()
         late_s, self._looked_s = now_s - self._looked_s, now_s
         if late_s > self._limits.late_s:
-            raise TrialPausedError(f"the computer was too busy to look at the robot for {late_s:.1f} s; end other programs.")
+            raise TrialPausedError(
+                f"nobody looked at the robot for {late_s:.1f} s: the computer is too busy, or the robot answers too slowly. "
+                "End other programs, bring the robot nearer, or allow more late_s in the rig."
+            )
         if sight is not None:
             self._seen_s = max(self._seen_s, sight.t_s)
             x_m, y_m = float(sight.pose[0]), float(sight.pose[1])

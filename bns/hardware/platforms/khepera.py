@@ -15,6 +15,7 @@ from bns.hardware.emulators.khepera_rig import EmulatedKheperaRig
 from bns.hardware.guard.recipe import StopRecipe, khepera_recipe
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.khepera import BAUD, STILL_M_S, KheperaIII, RobotLostError, check_battery, firmware
+from bns.hardware.khepera_settings import khepera_settings
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
@@ -156,9 +157,10 @@ def _row(t_s: float, left_m_s: float, right_m_s: float, pose: np.ndarray) -> dic
 
 def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stopping) -> KheperaPlatform:
     """Open port and tracker, and make sure before anything else that the robot stands still, is charged and is seen."""
-    link = SerialLink(rig.port, BAUD, clock, journal)
+    settings = khepera_settings(rig.driver)
+    link = SerialLink(rig.port, BAUD, clock, journal, settings.reply)
     try:
-        driver = KheperaIII(link, clock, journal)
+        driver = KheperaIII(link, clock, journal, settings.stop_s)
         with StopsAtTheEnd(driver.stop):
             check_battery(driver.battery_v())
         tracker = open_tracker(rig.tracker, clock)
