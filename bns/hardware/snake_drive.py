@@ -38,7 +38,8 @@ class SnakeDrive:
         self._markers = np.full(4, math.nan)
         self._began_s = 0.0
         self._cycles: list[np.ndarray] = []
-        self._observations: list[np.ndarray] = []
+        self._seen: list[tuple[float, np.ndarray]] = []
+        self._observed: list[tuple[float, float, float]] = []
         self.rows: list[dict[str, float]] = []
         self.spans_s: list[tuple[float, float]] = []
         """When each cycle began and ended, by the trial's clock."""
@@ -49,7 +50,22 @@ class SnakeDrive:
 
     def observed(self) -> np.ndarray:
         """(k + 1, 9): the markers at the start, then at the begin and end of each cycle, and whether it was stable."""
-        return np.array(self._observations).reshape(-1, 9)
+        if not self._seen:
+            return np.empty((0, 9))
+        start = self._seen[0][1]
+        cycles = [np.concatenate([self._at(a), self._at(b), [stable]]) for a, b, stable in self._observed]
+        return np.array([np.concatenate([start, start, [1.0]]), *cycles])
+
+    def _at(self, t_s: float) -> np.ndarray:
+        """The markers (4,) then: between the two times around it at which they were filmed."""
+        times, places = np.array([t for t, _ in self._seen]), np.array([place for _, place in self._seen])
+        return np.array([np.interp(t_s, times, column) for column in places.T])
+
+    def finish(self) -> None:
+        """The last posture is held until it has been filmed."""
+        while self._observed and self._seen[-1][0] < self._observed[-1][1]:
+            self._clock.sleep(_TICK_S / 2)
+            self._look()
 
     def straighten(self) -> None:
         """Torque on, slowly straight; where the markers are then is where the drive starts."""
@@ -62,8 +78,8 @@ class SnakeDrive:
         self._watch.begin()
         self._began_s = self._clock.now_s()
         self._markers = np.concatenate([start.points[name] for name in _MARKERS])
-        self.rows = [self._row()]
-        self._observations = [np.concatenate([self._markers, self._markers, [1.0]])]
+        self.rows = [self._row(self._began_s)]
+        self._seen = [(self._began_s, self._markers)]
 
     def carry_out(self, cycle: np.ndarray) -> None:
         """One cycle: up to its first posture, then through it; ServoError, DriveEnded, TrialPausedError."""
@@ -72,25 +88,23 @@ class SnakeDrive:
         self._journal.note("command", **commanded)
         first = len(self.rows)
         self.rows[-1] |= {"cycle": float(len(self._cycles) + 1), **commanded}
-        self._strain.stalled, before = False, self._markers
+        self._strain.stalled, before_s = False, began_s
         try:
             self._posture(angles[0])
-            before = self._seen()
+            before_s = self._in_sight()
             for target in angles[1:]:
                 self._posture(target)
-            after, stable = self._seen(), not self._strain.stalled
+            after_s, stable = self._in_sight(), not self._strain.stalled
         except OutOfSight:
-            self._over(cycle, before, self._markers, False, began_s, first)
+            self._over(cycle, (before_s, self._clock.now_s()), False, began_s, first)
             raise
         finally:
             self.rows[-1] |= dict.fromkeys(("cycle", *PARAMETERS), math.nan)  # nothing is in force any more
-        self._over(cycle, before, after, stable, began_s, first)
+        self._over(cycle, (before_s, after_s), stable, began_s, first)
 
-    def _over(
-        self, cycle: np.ndarray, before: np.ndarray, after: np.ndarray, stable: bool, began_s: float, first: int
-    ) -> None:
+    def _over(self, cycle: np.ndarray, between_s: tuple[float, float], stable: bool, began_s: float, first: int) -> None:
         self._cycles.append(cycle)
-        self._observations.append(np.concatenate([before, after, [float(stable)]]))
+        self._observed.append((*between_s, float(stable)))
         self.spans_s.append((began_s, self._clock.now_s()))
         for row in self.rows[first:]:
             row["stable"] = float(stable)
@@ -119,18 +133,19 @@ class SnakeDrive:
         sight = self._eye.look()
         if sight is not None:
             self._markers = np.concatenate([sight.points[name] for name in _MARKERS])
-            if self.rows:
+            if self._seen and sight.t_s > self._seen[-1][0]:
+                self._seen.append((sight.t_s, self._markers))
+            if self.rows and sight.t_s - self._began_s > self.rows[-1]["t_s"]:
                 here = {name: self.rows[-1][name] for name in ("cycle", *PARAMETERS)}
-                self.rows.append(self._row() | here)
+                self.rows.append(self._row(sight.t_s) | here)
         self._watch.check(sight)
         return sight
 
-    def _seen(self) -> np.ndarray:
-        """Where the markers are now; if they are not seen just then, the posture is held until they are, or the drive ends."""
+    def _in_sight(self) -> float:
+        """Now; if the markers are not seen just then, the posture is held until they are, or the drive ends."""
         while self._look() is None:
             self._clock.sleep(_TICK_S / 2)
-        return self._markers
+        return self._clock.now_s()
 
-    def _row(self) -> dict[str, float]:
-        t_s = self._clock.now_s() - self._began_s
-        return {"t_s": t_s, **_NOTHING, **dict(zip(_PLACES, self._markers.tolist(), strict=True))}
+    def _row(self, filmed_s: float) -> dict[str, float]:
+        return {"t_s": filmed_s - self._began_s, **_NOTHING, **dict(zip(_PLACES, self._markers.tolist(), strict=True))}

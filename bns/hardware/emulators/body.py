@@ -17,6 +17,8 @@ from bns.physics.differential_drive import observe, track
 from bns.physics.model import Model
 
 _STEP_S = 0.01
+SPEED_OVER_S = _STEP_S
+"""A speed is the mean over so long before its time."""
 _AHEAD_S = 4.0
 
 

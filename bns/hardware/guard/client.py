@@ -11,6 +11,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -235,10 +236,17 @@ class GuardedPlatform:
 
         Where the guard has stopped the robot, nothing that the drive left counts, and what its driver missed is not the cause.
         """
+        return self._guarded(lambda: self._platform.drive(commands))
+
+    def turn_about(self, seconds: float) -> Any:
+        """Turn to and fro, guarded likewise, where the robot's platform can."""
+        return self._guarded(lambda: self._platform.turn_about(seconds))  # type: ignore[attr-defined]
+
+    def _guarded(self, move: Callable[[], Any]) -> Any:
         self._stopping.check()
         self._guard.arm()
         try:
-            driven = self._platform.drive(commands)
+            driven = move()
         except StopNotConfirmedError:
             raise
         except BaseException:
