@@ -1,10 +1,11 @@
 """How much older than its time stamp a tracker's pose is, from a motion that robot and tracker both report.
 
 The robot turns on the spot to and fro, in steps of unequal lengths. Its encoders tell its heading up to a scale (wheels slip)
-and an offset, its tracker tells it up to a delay. Correlated over all delays (Knapp and Carter, The generalized correlation method for
-estimation of time delay, IEEE Transactions on Acoustics, Speech, and Signal Processing 24(4), 1976), the best of them is the
-tracker's: the one at which a straight line through the encoders' heading leaves the least of the seen one. An encoder's reading
-belongs to the middle between question and answer; a link slower one way than the other makes that wrong by half the difference.
+and an offset, its tracker tells it up to a delay. Correlated over all delays (Knapp and Carter, The generalized correlation
+method for estimation of time delay, IEEE Transactions on Acoustics, Speech, and Signal Processing 24(4), 1976), the best of them
+is the tracker's: the one at which a straight line through the encoders' heading leaves the least of the seen one. An encoder's
+reading belongs to the middle between question and answer; a link slower one way than the other makes that wrong by half the
+difference.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def turned(wheels: TurningWheels, eye: Eye, watch: Watch, clock: Clock, seconds:
         left_m, right_m = wheels.encoders_m()
         robot.append(((asked_s + clock.now_s()) / 2.0, right_m - left_m))
         sight = eye.look()
-        watch.check(sight)
+        watch.check(sight, eye.picture_s)
         if sight is not None and (not seen or sight.t_s > seen[-1][0]):
             seen.append((sight.t_s, float(sight.pose[2])))
         clock.sleep(_LOOK_S)

@@ -27,6 +27,8 @@ _READINGS = 2
 """The protocol has no checksum: one reading can be garbled into a zero, two in a row hardly."""
 _OBEYS_S = 0.2
 """An order to stop that shows no effect for so long is given again."""
+WHEELBASE_M = 0.0884
+"""Between the wheels, published."""
 HIGHEST_UNITS = 43_000
 """End of the range that the firmware regulates."""
 _FLAT_V = 6.0

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from bns.errors import TrialPausedError
+from bns.hardware.agreement import SameScene
 from bns.hardware.ax12_table import RAD_PER_STEP
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
@@ -19,6 +20,8 @@ from bns.physics.snake.gait import PARAMETERS, cycle_angles
 
 _TICK_S = 0.15
 _STRAIGHTENING_RAD_S = 0.5
+_FROZEN_RAD = 0.35
+"""Joints that turn so far move the ends of the body by centimetres."""
 _MARKERS = ("yellow", "green")
 _PLACES = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
 _NOTHING = dict.fromkeys(("cycle", *PARAMETERS, "stable"), math.nan)
@@ -34,6 +37,8 @@ class SnakeDrive:
         self._chain, self._eye, self._watch, self._settings = chain, eye, watch, settings
         self._clock, self._journal = clock, journal
         self._strain = StrainWatch(settings.limits)
+        self._scene, self._turned_rad = SameScene(), 0.0
+        self._joints_rad: np.ndarray | None = None
         self._angles = np.zeros(len(settings.ids))
         self._markers = np.full(4, math.nan)
         self._began_s = 0.0
@@ -129,17 +134,30 @@ class SnakeDrive:
 
     def _look(self) -> Sight | None:
         """Look at servos and markers; a row if there is something new to see."""
-        self._strain.look(self._chain.health(), self._clock.now_s())
+        healths = self._chain.health()
+        self._strain.look(healths, self._clock.now_s())
         sight = self._eye.look()
         if sight is not None:
             self._markers = np.concatenate([sight.points[name] for name in _MARKERS])
+            self._follow(np.array([health.position_rad for health in healths.values()]))
             if self._seen and sight.t_s > self._seen[-1][0]:
                 self._seen.append((sight.t_s, self._markers))
             if self.rows and sight.t_s - self._began_s > self.rows[-1]["t_s"]:
                 here = {name: self.rows[-1][name] for name in ("cycle", *PARAMETERS)}
                 self.rows.append(self._row(sight.t_s) | here)
-        self._watch.check(sight)
+        self._watch.check(sight, self._eye.picture_s)
         return sight
+
+    def _follow(self, joints_rad: np.ndarray) -> None:
+        """TrialPausedError if the joints turn on and on and the markers stay where they were."""
+        self._turned_rad += 0.0 if self._joints_rad is None else float(np.abs(joints_rad - self._joints_rad).max())
+        self._joints_rad = joints_rad
+        unseen_rad = self._scene.since_it_moved(self._markers.reshape(2, 2), self._turned_rad)
+        if self._seen and unseen_rad > _FROZEN_RAD:
+            raise TrialPausedError(
+                f"joints have turned by {math.degrees(unseen_rad):.0f}° and the picture shows both markers where they were: the "
+                "camera hangs or shows another scene. Look at it: bns track"
+            )
 
     def _in_sight(self) -> float:
         """Now; if the markers are not seen just then, the posture is held until they are, or the drive ends."""

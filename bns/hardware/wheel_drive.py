@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from bns.hardware.agreement import Agreement
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.safety import Watch
@@ -42,10 +43,17 @@ class WheelDrive:
     """`start` (3,) is where the robot stands. Times of poses are those at which they were filmed."""
 
     def __init__(
-        self, wheels: Wheels, eye: Eye, watch: Watch, clock: Clock, journal: HardwareLog, start: np.ndarray
+        self,
+        wheels: Wheels,
+        eye: Eye,
+        watch: Watch,
+        agreement: Agreement,
+        clock: Clock,
+        journal: HardwareLog,
+        start: np.ndarray,
     ) -> None:
         self._wheels, self._eye, self._watch, self._clock, self._journal = wheels, eye, watch, clock, journal
-        self._start = start
+        self._agreement, self._start = agreement, start
         self._orders: list[Order] = []
         self._ends_s: list[float] = []
         self._seen: list[tuple[float, np.ndarray]] = []
@@ -57,6 +65,7 @@ class WheelDrive:
         if not self._orders:
             self._seen.append((asked_s, self._start))
         self._orders.append(Order(asked_s, left, right))
+        self._agreement.ordered(asked_s, left, right)
         self._journal.note("command", left_m_s=left, right_m_s=right, duration_s=duration_s)
         end_s, looks = asked_s + duration_s, 0
         while self._clock.now_s() + _TICK_S < end_s:
@@ -64,7 +73,7 @@ class WheelDrive:
             self._look()
             looks += 1
             if looks % _HEARTBEATS == 0:
-                self._wheels.speed_m_s()
+                self._agreement.measured(self._clock.now_s(), *self._wheels.speed_m_s())
         self._clock.sleep(end_s - self._clock.now_s())
         while self._look() is None:
             self._clock.sleep(_POLL_S)
@@ -80,7 +89,9 @@ class WheelDrive:
         sight = self._eye.look()
         if sight is not None and self._seen and sight.t_s > self._seen[-1][0] + _SAME_S:
             self._seen.append((sight.t_s, sight.pose))
-        self._watch.check(sight)
+        self._watch.check(sight, self._eye.picture_s)
+        if sight is not None:
+            self._agreement.seen(sight)
         return sight
 
     @property

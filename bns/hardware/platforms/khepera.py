@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import HardwareError, TrialPausedError
+from bns.hardware.agreement import Agreement
 from bns.hardware.clock import Clock, EmulatedClock
 from bns.hardware.delay import Turns, turned
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.khepera_rig import EmulatedKheperaRig
 from bns.hardware.guard.recipe import StopRecipe, khepera_recipe
 from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.khepera import BAUD, STILL_M_S, KheperaIII, RobotLostError, check_battery, firmware
+from bns.hardware.khepera import BAUD, STILL_M_S, WHEELBASE_M, KheperaIII, RobotLostError, check_battery, firmware
 from bns.hardware.khepera_settings import khepera_settings
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
@@ -49,7 +50,7 @@ class KheperaPlatform:
     ) -> None:
         self._driver, self._link, self._clock, self._journal = driver, link, clock, journal
         self._eye = Eye(tracker, clock, journal, math.pi / 2, delay_of(rig.tracker))
-        self._watch = Watch(rig.limits, clock, stopping)
+        self._watch, self._disagree_s = Watch(rig.limits, clock, stopping), rig.limits.disagree_s
 
     @property
     def retries(self) -> int:
@@ -92,7 +93,8 @@ class KheperaPlatform:
         start = self.pose()
         if start is None:
             raise TrialPausedError("the tracker does not see the robot: is it lit, marked and on the surface? Try: bns track")
-        drive = WheelDrive(self._driver, self._eye, self._watch, self._clock, self._journal, start)
+        agreement = Agreement(self._disagree_s, WHEELBASE_M)
+        drive = WheelDrive(self._driver, self._eye, self._watch, agreement, self._clock, self._journal, start)
         ended = ""
         guard = StopsAtTheEnd(self.stop)
         began_s = self._clock.now_s()

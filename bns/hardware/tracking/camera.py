@@ -121,12 +121,15 @@ class FrameTracker:
         self.camera, self._find = camera, find
         self.facts: Mapping[str, Any] = {"picture": getattr(camera, "picture", {}), "stamps": getattr(camera, "stamps", "")}
         self._last: tuple[float, Sight | None] = (-1.0, None)
+        self.picture_s: float | None = None
+        """When the newest picture came, whatever it shows."""
 
     def look(self) -> Sight | None:
         """What the newest frame shows."""
         frame = self.camera.newest()
         if frame is None:
             return None
+        self.picture_s = frame.t_s
         if frame.t_s != self._last[0]:
             self._last = (frame.t_s, self._find(frame))
         return self._last[1]

@@ -24,6 +24,11 @@ class Eye:
         if facts := getattr(tracker, "facts", None):  # of a camera: how it takes its pictures
             journal.note("tracker", **facts)
 
+    @property
+    def picture_s(self) -> float | None:
+        """When the newest picture came, seen or not; None of a tracker that does not tell."""
+        return getattr(self._tracker, "picture_s", None)
+
     def look(self) -> Sight | None:
         """A sight newer than the last, with the time at which it was filmed; None if there is none.
 

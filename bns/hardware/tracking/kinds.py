@@ -77,7 +77,7 @@ def emulated(
         raise HardwareError(f"the {settings['kind']} tracker has no emulation; name a rig with another tracker, such as wii.")
     kept = {name: settings[name] for name in ("kind", DELAY) if name in settings}
     found, device = emulate(
-        {"kind": settings["kind"], **own}, folder, lambda t_s: pose(t_s - faults.lateness_s(t_s)), clock, faults, seed
+        {"kind": settings["kind"], **own}, folder, lambda t_s: pose(faults.filmed_s(t_s)), clock, faults, seed
     )
     return {**found, **kept}, device
 
