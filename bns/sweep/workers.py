@@ -24,6 +24,7 @@ from bns.spec import RunSpec
 from bns.store.record import RunRecord
 from bns.sweep.executor import ATTEMPTS, Job, attempted, without_result
 from bns.sweep.job import describe, run_job
+from bns.sweep.trackers import without_complaints
 
 _ONE_THREAD = dict.fromkeys(
     (
@@ -75,6 +76,7 @@ class LokyExecutor:
         self._job, self._slots, self._cancelled = job, [_Slot() for _ in range(jobs)], False
 
     def __enter__(self) -> Self:
+        without_complaints()
         return self
 
     def __exit__(self, *exc: object) -> None:
