@@ -44,7 +44,7 @@ if TYPE_CHECKING:
         TrialPausedError,
     )
     from bns.physics.effect import Effect, Parameter
-    from bns.store.reader import load, query
+    from bns.store.read.reader import load, query
 
 __version__ = "0.2.0"
 
@@ -106,7 +106,7 @@ _HOMES = {
         *("StopNotConfirmedError", "StoreError", "TrialFileError", "TrialPausedError"),
     ),
     "physics.effect": ("Effect", "Parameter"),
-    "store.reader": ("load", "query"),
+    "store.read.reader": ("load", "query"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 _CALLABLE_ROOMS = ("diagnose", "trial")

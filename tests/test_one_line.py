@@ -66,7 +66,7 @@ def test_a_killed_tracker_of_shared_names_says_nothing(tmp_path):
     script = """
 import os, signal, sys, time
 from joblib.externals.loky.backend import resource_tracker as of_loky
-from bns.sweep.workers import LokyExecutor
+from bns.sweep.jobs.workers import LokyExecutor
 def main():
     with LokyExecutor(1, abs) as pool:
         pool.submit(-3)
@@ -92,7 +92,7 @@ def test_the_error_stream_is_back_after_a_tracker_has_started(capfd):
 
 
 def test_workers_that_die_before_they_begin_are_tried_again_and_named(monkeypatch):
-    dask_link = pytest.importorskip("bns.sweep.dask_link")
+    dask_link = pytest.importorskip("bns.sweep.jobs.dask_link")
     tried = []
 
     def cluster(**options):
