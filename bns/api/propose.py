@@ -25,7 +25,7 @@ from bns.diagnose.report.proposal_figure import trial_axes
 from bns.diagnose.report.proposal_text import proposal_text
 from bns.errors import DataError
 from bns.physics.effect import Effect
-from bns.store.files import publish
+from bns.store.disk.files import publish
 
 MOST_MINUTES = 600.0
 

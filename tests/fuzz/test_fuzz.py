@@ -25,7 +25,7 @@ from bns.hardware.rig import load_rig
 from bns.physics.formula import formula_effect
 from bns.physics.model import load_model
 from bns.physics.signals import Body
-from bns.sweep.grid import load_sweep
+from bns.sweep.expand.grid import load_sweep
 
 from . import files
 

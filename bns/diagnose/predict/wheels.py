@@ -15,12 +15,12 @@ from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import HORIZONS, windows
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
-from bns.physics.differential_drive import taken_at
 from bns.physics.effect import Effect
-from bns.physics.grid import Grid
 from bns.physics.model import ActiveEffect, Model
-from bns.physics.motion import flow_of, wheel_motion, with_body_effects
 from bns.physics.signals import Body, Conditions, View, Wheels
+from bns.physics.wheels.differential_drive import taken_at
+from bns.physics.wheels.grid import Grid
+from bns.physics.wheels.motion import flow_of, wheel_motion, with_body_effects
 
 RECENT_S = DEFAULTS.predict.recent_s
 _COARSE_S = DEFAULTS.predict.coarse_s
