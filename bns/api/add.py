@@ -11,8 +11,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.progress import Progress, silent
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.common.shown import Shown, drawn
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
 from bns.diagnose.adding import ExtendedModel, Memory, add_effects, effect_from
@@ -117,8 +118,7 @@ def add(
     twice = next((name for name in given if given.count(name) > 1), None)
     if twice is not None:
         raise ModelError(f"{twice} is given {given.count(twice)} times; a model has each effect once: leave the others out.")
-    ticks(progress)("fitting")
-    return added(ready, chosen, per_trial)
+    return added(ready, chosen, per_trial, progress=progress)
 
 
 def added(
@@ -126,9 +126,15 @@ def added(
     effects: Sequence[tuple[Effect, Mapping[str, str]]],
     per_trial: bool = False,
     memory: Memory | None = None,
+    progress: Progress | None = None,
 ) -> AddResult:
     """As `add`, for effects and data that are there; ``memory`` keeps fits from one call to the next."""
-    return AddResult(ready, add_effects(ready.predictor, ready.model, effects, ready.measured, per_trial, memory))
+    told = progress or silent
+    extended = add_effects(
+        ready.predictor, ready.model, effects, ready.measured, per_trial, memory, told
+    )
+    told(1.0, "done")
+    return AddResult(ready, extended)
 
 
 def _effect(wanted: Wanted, term: str | None, on: str, columns: Iterable[str]) -> tuple[Effect, Mapping[str, str]]:

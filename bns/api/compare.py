@@ -9,8 +9,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from bns.api.common.prepared import prepared, prepared_networks
+from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.common.shown import Shown, drawn
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.comparison import Comparison
@@ -21,6 +22,9 @@ from bns.diagnose.report.network_text import network_errors_text
 from bns.diagnose.report.text import ahead, comparison_text
 from bns.diagnose.residuals.network_errors import NetworkErrors, why_wrong
 from bns.errors import DataError
+
+PHASES = {"noise": 0.0, "errors": 0.3, "what explains them": 0.5, "curves": 0.9}
+"""What share of a comparison is done when it tells so."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -103,9 +107,10 @@ def compare(log: Log, model: Given, *, progress: Progress | None = None) -> Comp
     """
     networks = prepared_networks(log, model)
     ready = networks or prepared(log, model)
-    ticks(progress)("comparing")
-    result = held_against(ready.predictor, ready.model)
+    meter = Meter(progress, PHASES, pace=1)
+    result = held_against(ready.predictor, ready.model, tick=meter)
     kept = isinstance(ready.predictor, NetworkPredictor) and ready.predictor.learned_from.size > 0
     causes = why_wrong(cast("NetworkPredictor", ready.predictor)) if kept else None
     of_networks = isinstance(ready.predictor, NetworkPredictor)
+    meter.done()
     return CompareResult(ready.log, ready.model, result, causes, of_networks)

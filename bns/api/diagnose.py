@@ -12,8 +12,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.common.shown import Shown, drawn
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
 from bns.diagnose.diagnosis import Diagnosis
@@ -22,7 +23,7 @@ from bns.diagnose.report.figures import ranking_axes
 from bns.diagnose.report.text import diagnosis_text
 from bns.errors import DataError
 from bns.physics.effect import Effect
-from bns.physics.effects import effect_in_file, effect_named
+from bns.physics.effects import all_effects, effect_in_file, effect_named
 
 if TYPE_CHECKING:
     from bns.api.propose import ProposeResult
@@ -31,6 +32,10 @@ if TYPE_CHECKING:
     Explorer = Any
     """`bns.Explorer`: it stands on a higher floor."""
 
+PHASES = {"errors on trials held out": 0.7, "what is left": 0.8, "longer explanations": 0.9}
+"""What share of a diagnosis is done when it tells so; before that every effect is tried."""
+STEPS = 2.0
+"""How often each effect is tried in most searches: once for every effect that is found, and once more."""
 RANKING = ("rank", "elpd_diff", "dse", "p_value", "rejected_because")
 
 
@@ -154,7 +159,7 @@ def diagnose(
         model: `bns.Model`, or the name or file of one.
         also: effects of your own, tried beside the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
         without_effects: names of listed effects that are not to be tried.
-        progress: told what is being looked at; the share that is done is not known (None).
+        progress: told the share that is done (0 to 1, an estimate that never falls) and what is being looked at.
 
     Raises:
         DataError: measurements that cannot be used, or of another robot.
@@ -164,5 +169,7 @@ def diagnose(
     ready = prepared(log, model)
     barred = [effect_named(name).name for name in without_effects]
     extra = {effect.name: effect for effect in own}
-    found = find(ready.predictor, ready.model, extra=extra, tick=ticks(progress), barred=barred)
+    meter = Meter(progress, PHASES, pace=STEPS * (len(all_effects()) + len(extra)))
+    found = find(ready.predictor, ready.model, extra=extra, tick=meter, barred=barred)
+    meter.done()
     return DiagnoseResult(ready, found)

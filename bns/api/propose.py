@@ -13,14 +13,16 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
+from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.common.shown import Shown, drawn
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log
 from bns.api.model import Given
 from bns.diagnose.design.limits import arena_of, bounds_of
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.design.proposal import propose as search
+from bns.diagnose.design.search import GENERATIONS
 from bns.diagnose.report.proposal_figure import trial_axes
 from bns.diagnose.report.proposal_text import proposal_text
 from bns.errors import DataError
@@ -28,6 +30,8 @@ from bns.physics.effect import Effect
 from bns.store.disk.files import publish
 
 MOST_MINUTES = 600.0
+PHASES = {"competing models": 0.0, "random trials": 0.15, "random commands, for comparison": 0.75, "power": 0.9}
+"""What share of the planning is done when it tells so."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -111,8 +115,9 @@ def propose(
         DataError: as `bns.diagnose`; limits that make no sense; or there are no two explanations to tell apart.
     """
     checked_minutes(minutes)
-    found = diagnose(log, model, also=also, progress=progress)
-    return proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=progress)
+    found = diagnose(log, model, also=also, progress=part(progress, 0.0, 0.5))
+    rest = part(progress, 0.5, 1.0)
+    return proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
 
 
 def proposed(
@@ -128,7 +133,10 @@ def proposed(
     checked_minutes(minutes)
     tracks = found.ready.predictor.tracks
     inside, bounds = arena_of(tracks, arena, start), bounds_of(tracks, found.ready.model, speeds)
-    return ProposeResult(found, search(found.diagnosis, inside, bounds, minutes, tick=ticks(progress)))
+    meter = Meter(progress, PHASES, pace=GENERATIONS)
+    result = ProposeResult(found, search(found.diagnosis, inside, bounds, minutes, tick=meter))
+    meter.done()
+    return result
 
 
 def checked_minutes(minutes: float) -> None:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 
-from bns.api.common.shown import Progress, Shown, ticks
+from bns.api.common.progress import Meter, Progress, part
+from bns.api.common.shown import Shown
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log
 from bns.api.model import Given
@@ -17,6 +18,9 @@ from bns.api.propose import checked_minutes, checked_output, proposed
 from bns.diagnose.report.page import gathered, report_html
 from bns.physics.effect import Effect
 from bns.store.disk.files import publish
+
+PHASES = {"where the model fails": 0.0, "the error, step by step": 0.1, "the next experiment": 0.3, "paths": 0.9}
+"""What share of the page is done when it tells so."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,8 +75,9 @@ def report(
     """
     checked_minutes(minutes)
     checked_output(Path(path), "The report", ".html")
-    found = diagnose(log, model, also=also, progress=progress)
-    return reported(found, path, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=progress)
+    found = diagnose(log, model, also=also, progress=part(progress, 0.0, 0.4))
+    rest = part(progress, 0.4, 1.0)
+    return reported(found, path, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
 
 
 def reported(
@@ -89,16 +94,19 @@ def reported(
     """The page of a diagnosis that is there. ``command``: words (data, model) that the commands shown on the page repeat."""
     checked_minutes(minutes)
     target, ready = checked_output(Path(path), "The report", ".html"), found.ready
+    meter = Meter(progress, PHASES, pace=1)
+    planning = part(progress, PHASES["the next experiment"], PHASES["paths"])
     material = gathered(
         ready.measured,
         ready.predictor,
         ready.model,
         found.diagnosis,
-        lambda: proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=progress).proposal,
-        ticks(progress),
+        lambda: proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=planning).proposal,
+        meter,
     )
     page = report_html(material, command or repeated(fspath(ready.measured.path), ready.model.name)).encode()
     publish(page, target.with_name(f".{target.name}.part"), target)
+    meter.done()
     return ReportResult(target, found, len(page))
 
 
