@@ -8,7 +8,8 @@ from typing import Any, cast
 import pandas as pd
 from matplotlib.axes import Axes
 
-from bns.api.common.prepared import prepared, prepared_networks
+from bns.api.common.cache import remembered
+from bns.api.common.prepared import Prepared, prepared, prepared_networks
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown, drawn
@@ -93,13 +94,16 @@ class CompareResult(Shown):
         return f"{c.model} on {self.log.name}: {error}, {ahead(c.near)} ahead, {c.trials} trials"
 
 
-def compare(log: Log, model: Given, *, progress: Progress | None = None) -> CompareResult:
+def compare(
+    log: Log, model: Given, *, fresh: bool = False, progress: Progress | None = None
+) -> CompareResult:
     """Hold a model as it is against measurements; nothing is fitted.
 
     Args:
         log: a file, a table, or `bns.Measurements`.
         model: `bns.Model`, the name or file of one, networks (.safetensors), or a robot's static simulator (``snake``).
-        progress: told what is being done.
+        fresh: work it out again even where the same was asked before (`bns.api.common.cache`).
+        progress: told the share that is done (0 to 1) and what is being done.
 
     Raises:
         DataError: measurements that cannot be used, or of another robot.
@@ -108,7 +112,12 @@ def compare(log: Log, model: Given, *, progress: Progress | None = None) -> Comp
     networks = prepared_networks(log, model)
     ready = networks or prepared(log, model)
     meter = Meter(progress, PHASES, pace=1)
-    result = held_against(ready.predictor, ready.model, tick=meter)
+
+
+    def work() -> Comparison:
+        return held_against(ready.predictor, ready.model, tick=meter)
+
+    result = remembered("compare", ready, (), work, Comparison, fresh) if isinstance(ready, Prepared) else work()
     kept = isinstance(ready.predictor, NetworkPredictor) and ready.predictor.learned_from.size > 0
     causes = why_wrong(cast("NetworkPredictor", ready.predictor)) if kept else None
     of_networks = isinstance(ready.predictor, NetworkPredictor)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 from matplotlib.axes import Axes
 
+from bns.api.common.cache import remembered
 from bns.api.common.prepared import Prepared, prepared
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
@@ -150,6 +151,7 @@ def diagnose(
     *,
     also: Iterable[Effect | str | PathLike[str]] = (),
     without_effects: Iterable[str] = (),
+    fresh: bool = False,
     progress: Progress | None = None,
 ) -> DiagnoseResult:
     """Find what a model lacks.
@@ -159,6 +161,7 @@ def diagnose(
         model: `bns.Model`, or the name or file of one.
         also: effects of your own, tried beside the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
         without_effects: names of listed effects that are not to be tried.
+        fresh: work it out again even where the same was asked before (`bns.api.common.cache`).
         progress: told the share that is done (0 to 1, an estimate that never falls) and what is being looked at.
 
     Raises:
@@ -170,6 +173,10 @@ def diagnose(
     barred = [effect_named(name).name for name in without_effects]
     extra = {effect.name: effect for effect in own}
     meter = Meter(progress, PHASES, pace=STEPS * (len(all_effects()) + len(extra)))
-    found = find(ready.predictor, ready.model, extra=extra, tick=meter, barred=barred)
+
+    def work() -> Diagnosis:
+        return find(ready.predictor, ready.model, extra=extra, tick=meter, barred=barred).slim()
+
+    found = work() if own else remembered("diagnose", ready, sorted(barred), work, Diagnosis, fresh)
     meter.done()
     return DiagnoseResult(ready, found)

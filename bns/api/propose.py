@@ -97,6 +97,7 @@ def propose(
     start: tuple[float, float, float] | None = None,
     speeds: tuple[float, float] | None = None,
     also: Iterable[Effect | str | PathLike[str]] = (),
+    fresh: bool = False,
     progress: Progress | None = None,
 ) -> ProposeResult:
     """Diagnose, then find the experiment that tells the remaining explanations apart.
@@ -109,13 +110,14 @@ def propose(
         start: x_m, y_m (m) and heading_rad (rad, counter-clockwise from x) of the start of every trial; by default as before.
         speeds: lowest and highest of a wheel (m/s); by default the robot's own and those seen.
         also: effects of your own, tried beside the listed ones.
-        progress: told what is being worked out.
+        fresh: work out the diagnosis again even where the same was asked before.
+        progress: told the share that is done (0 to 1) and what is being worked out.
 
     Raises:
         DataError: as `bns.diagnose`; limits that make no sense; or there are no two explanations to tell apart.
     """
     checked_minutes(minutes)
-    found = diagnose(log, model, also=also, progress=part(progress, 0.0, 0.5))
+    found = diagnose(log, model, also=also, fresh=fresh, progress=part(progress, 0.0, 0.5))
     rest = part(progress, 0.5, 1.0)
     return proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
 

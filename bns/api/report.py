@@ -63,6 +63,7 @@ def report(
     start: tuple[float, float, float] | None = None,
     speeds: tuple[float, float] | None = None,
     also: Iterable[Effect | str | PathLike[str]] = (),
+    fresh: bool = False,
     progress: Progress | None = None,
 ) -> ReportResult:
     """Diagnose, propose the next experiment, and write both as one page that needs no other file and no network.
@@ -75,7 +76,7 @@ def report(
     """
     checked_minutes(minutes)
     checked_output(Path(path), "The report", ".html")
-    found = diagnose(log, model, also=also, progress=part(progress, 0.0, 0.4))
+    found = diagnose(log, model, also=also, fresh=fresh, progress=part(progress, 0.0, 0.4))
     rest = part(progress, 0.4, 1.0)
     return reported(found, path, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
 

@@ -71,6 +71,7 @@ def add_commands(command: Adder) -> None:
         add_model_options(one)
         one.add_argument("--figures", type=Path, metavar="DIR", help="also draw figures into this folder")
     add_effect_options(found)
+    add_fresh(held)
     for one in (held, more):
         add_trust(one, also=True)
 
@@ -97,6 +98,13 @@ def add_model_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_fresh(parser: argparse.ArgumentParser) -> None:
+    """Whether an answer from before may be shown."""
+    parser.add_argument(
+        "--fresh", action="store_true", help="work it out again, even where the same was asked before"
+    )
+
+
 def add_effect_options(parser: argparse.ArgumentParser) -> None:
     """What is tried beside the listed effects."""
     parser.add_argument(
@@ -113,6 +121,7 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="a listed effect that is not to be tried, say because it was measured apart",
     )
+    add_fresh(parser)
     add_trust(parser)
 
 
@@ -146,7 +155,7 @@ def compare(options: argparse.Namespace) -> int:
 
     model, log = model_of(options), log_of(options)
     with ticking("comparing") as tick:
-        seen = held_against(log, model, progress=tick)
+        seen = held_against(log, model, fresh=options.fresh, progress=tick)
     if seen.of_networks and seen.causes is None:
         print(
             "bns: these networks come without their training patterns, so why they are wrong is not said",
@@ -177,7 +186,14 @@ def diagnosed(options: argparse.Namespace) -> DiagnoseResult:
 
     model, log = model_of(options), log_of(options)
     with ticking("diagnosing") as tick:
-        found = find(log, model, also=options.also, without_effects=options.without_effect, progress=tick)
+        found = find(
+            log,
+            model,
+            also=options.also,
+            without_effects=options.without_effect,
+            fresh=options.fresh,
+            progress=tick,
+        )
     _say_thinned(found.ready)
     return found
 
