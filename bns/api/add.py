@@ -20,6 +20,8 @@ from bns.diagnose.adding import ExtendedModel, Memory, add_effects, effect_from
 from bns.diagnose.predict.paired_errors import noise_json
 from bns.diagnose.report.figures import error_by_step_axes
 from bns.diagnose.report.text import extension_text
+from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.settings.chosen import in_force
 from bns.diagnose.values import numbers_of
 from bns.errors import ModelError
 from bns.physics.effect import Effect
@@ -121,6 +123,7 @@ def add(
     return added(ready, chosen, per_trial, progress=progress)
 
 
+@in_force(DEFAULTS)
 def added(
     ready: Prepared,
     effects: Sequence[tuple[Effect, Mapping[str, str]]],

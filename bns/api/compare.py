@@ -22,6 +22,8 @@ from bns.diagnose.report.figures import curve_axes, curves_of
 from bns.diagnose.report.network_text import network_errors_text
 from bns.diagnose.report.text import ahead, comparison_text
 from bns.diagnose.residuals.network_errors import NetworkErrors, why_wrong
+from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.settings.chosen import in_force
 from bns.errors import DataError
 
 PHASES = {"noise": 0.0, "errors": 0.3, "what explains them": 0.5, "curves": 0.9}
@@ -94,6 +96,7 @@ class CompareResult(Shown):
         return f"{c.model} on {self.log.name}: {error}, {ahead(c.near)} ahead, {c.trials} trials"
 
 
+@in_force(DEFAULTS)
 def compare(
     log: Log, model: Given, *, fresh: bool = False, progress: Progress | None = None
 ) -> CompareResult:

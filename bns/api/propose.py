@@ -25,6 +25,7 @@ from bns.diagnose.design.proposal import propose as search
 from bns.diagnose.design.search import GENERATIONS
 from bns.diagnose.report.proposal_figure import trial_axes
 from bns.diagnose.report.proposal_text import proposal_text
+from bns.diagnose.settings.chosen import in_force
 from bns.errors import DataError
 from bns.physics.effect import Effect
 from bns.store.disk.files import publish
@@ -74,7 +75,7 @@ class ProposeResult(Shown):
     def to_json(self) -> dict[str, Any]:
         """One object of plain values, the same that `bns propose --json` prints."""
         ready = self.diagnosis.ready
-        return {**self.proposal.as_json(), "provenance": provenance(ready.model, ready.log.sha256)}
+        return {**self.proposal.as_json(), "provenance": provenance(ready.model, ready.log.sha256, self.diagnosis.settings)}
 
     def plot(self, ax: Axes | None = None, trial: int = 0) -> Axes:
         """One proposed trial (by its number from 0) in the arena, as each explanation foresees it. DataError if there is none."""
@@ -137,7 +138,8 @@ def proposed(
     tracks = found.ready.predictor.tracks
     inside, bounds = arena_of(tracks, arena, start), bounds_of(tracks, found.ready.model, speeds)
     meter = Meter(progress, PHASES, pace=GENERATIONS)
-    result = ProposeResult(found, search(found.diagnosis, inside, bounds, minutes, tick=meter))
+    with in_force(found.settings):
+        result = ProposeResult(found, search(found.diagnosis, inside, bounds, minutes, tick=meter))
     meter.done()
     return result
 

@@ -16,6 +16,7 @@ from bns.api.measurements import Log
 from bns.api.model import Given
 from bns.api.propose import checked_minutes, checked_output, proposed
 from bns.diagnose.report.page import gathered, report_html
+from bns.diagnose.settings.chosen import in_force
 from bns.physics.effect import Effect
 from bns.store.disk.files import publish
 
@@ -97,15 +98,16 @@ def reported(
     target, ready = checked_output(Path(path), "The report", ".html"), found.ready
     meter = Meter(progress, PHASES, pace=1)
     planning = part(progress, PHASES["the next experiment"], PHASES["paths"])
-    material = gathered(
-        ready.measured,
-        ready.predictor,
-        ready.model,
-        found.diagnosis,
-        lambda: proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=planning).proposal,
-        meter,
-    )
-    page = report_html(material, command or repeated(fspath(ready.measured.path), ready.model.name)).encode()
+    with in_force(found.settings):
+        material = gathered(
+            ready.measured,
+            ready.predictor,
+            ready.model,
+            found.diagnosis,
+            lambda: proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=planning).proposal,
+            meter,
+        )
+        page = report_html(material, command or repeated(fspath(ready.measured.path), ready.model.name)).encode()
     publish(page, target.with_name(f".{target.name}.part"), target)
     meter.done()
     return ReportResult(target, found, len(page))

@@ -68,14 +68,13 @@ def test_whatever_changes_is_asked_again(table, asked, monkeypatch):
     assert ask() == 6
 
 
-def test_settings_are_part_of_the_question(table, monkeypatch):
+def test_settings_are_part_of_the_question(table):
     ready = bns.diagnose(table, NOMINAL).ready
     before = cache.key("diagnose", ready, ())
     assert cache.key("diagnose", ready, ()) == before
     assert cache.key("compare", ready, ()) != before
     other = Settings(select=type(DEFAULTS.select)(false_alarm=0.01))
-    monkeypatch.setattr(cache, "DEFAULTS", other)
-    assert cache.key("diagnose", ready, ()) != before
+    assert cache.key("diagnose", ready, (), other) != before
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from typing import Any, TypeVar
 import bns
 from bns.api.common.prepared import Prepared
 from bns.diagnose.adding import model_yaml
-from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.settings import DEFAULTS, Settings
 from bns.physics.effects import all_effects
 from bns.registry import EFFECTS
 
@@ -48,7 +48,13 @@ def folder() -> Path | None:
 
 
 def remembered(
-    question: str, ready: Prepared, more: Iterable[Any], work: Callable[[], T], kind: type[T], fresh: bool = False
+    question: str,
+    ready: Prepared,
+    more: Iterable[Any],
+    work: Callable[[], T],
+    kind: type[T],
+    fresh: bool = False,
+    settings: Settings = DEFAULTS,
 ) -> T:
     """What ``work`` gives for these data and this model, or gave before.
 
@@ -58,7 +64,7 @@ def remembered(
     place = folder()
     if place is None or not _may_be_kept(ready):
         return work()
-    entry = place / f"{key(question, ready, more)}.pickle"
+    entry = place / f"{key(question, ready, more, settings)}.pickle"
     found = None if fresh else _read(entry, ready, kind)
     if found is not None:
         return found
@@ -67,14 +73,14 @@ def remembered(
     return answer
 
 
-def key(question: str, ready: Prepared, more: Iterable[Any]) -> str:
+def key(question: str, ready: Prepared, more: Iterable[Any], settings: Settings = DEFAULTS) -> str:
     """64 hexadecimal digits of all that the answer depends on."""
     made_of = {
         "question": question,
         "data": ready.log.sha256,
         "columns": [str(name) for name in ready.log.measured.table.columns],
         "model": [ready.model.name, ready.model.canonical_json(), model_yaml(ready.model)],
-        "settings": DEFAULTS.digest(),
+        "settings": settings.digest(),
         "more": list(more),
         "source": source_sha256(),
         "machine": [platform.machine(), platform.processor(), platform.python_version(), *map(version, _LIBRARIES)],

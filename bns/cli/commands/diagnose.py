@@ -121,6 +121,9 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="a listed effect that is not to be tried, say because it was measured apart",
     )
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE.yaml", help="thresholds that differ from the default (docs/settings.md)"
+    )
     add_fresh(parser)
     add_trust(parser)
 
@@ -191,6 +194,7 @@ def diagnosed(options: argparse.Namespace) -> DiagnoseResult:
             model,
             also=options.also,
             without_effects=options.without_effect,
+            settings=options.settings,
             fresh=options.fresh,
             progress=tick,
         )
