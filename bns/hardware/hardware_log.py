@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self, TextIO
 
@@ -27,6 +27,8 @@ class HardwareLog:
     def __init__(self, path: Path | None, clock: Clock) -> None:
         self._clock = clock
         self._file: TextIO | None = None
+        self.listeners: list[Callable[[str, Mapping[str, Any]], None]] = []
+        """Told the kind and content of every event."""
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._seals = Seals(_drop_torn_line(path))
@@ -34,6 +36,8 @@ class HardwareLog:
 
     def note(self, kind: str, **what: Any) -> None:
         """Append one event."""
+        for listener in self.listeners:
+            listener(kind, what)
         if self._file is not None:
             event = {"t_s": round(self._clock.now_s(), 6), "wall_s": round(time.time(), 6), "kind": kind, **what}
             self._file.write(self._seals.line(json.dumps(event, separators=(",", ":"), allow_nan=False)))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from bns.console import live_view
 from bns.errors import HardwareError, SpecError
 from bns.hardware.rig import surface_text
 from bns.hardware.safety import Stopping
@@ -15,7 +16,7 @@ from bns.robots import load_robot
 from bns.robots.base import Robot, on_floor
 from bns.trial.driver import TrialDriver
 from bns.trial.folder import JOURNAL, MEASUREMENTS, forget_unless, measured, past_evaluations
-from bns.trial.session import TrialSetup, open_rig
+from bns.trial.session import PICTURE, TrialSetup, open_rig
 
 _START = ("start_x_m", "start_y_m", "start_heading_rad")
 
@@ -82,10 +83,15 @@ def drive_commands(path: Path, how: TrialSetup, results: Path, seed: int) -> str
             )
     try:
         with Stopping() as stopping, open_rig(how, seed, journal, stopping) as opened:
-            driver = TrialDriver(opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log)
-            for number, (commands, start) in enumerate(trials[done:], done + 1):
-                driver.start = start
-                driver.evaluate(number, commands)
+            driver = TrialDriver(
+                opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log, folder / PICTURE
+            )
+            with live_view(None, now=driver.underway.text) as show:
+                driver.suspended = show.suspended
+                for number, (commands, start) in enumerate(trials[done:], done + 1):
+                    driver.start = start
+                    if driver.evaluate(number, commands).skipped:
+                        driver.skipped(number, commands, 0)
     except HardwareError:
         forget_unless(journal, "driven")
         raise

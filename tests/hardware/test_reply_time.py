@@ -35,7 +35,10 @@ def test_the_time_out_is_that_of_the_rfc():
     assert time.timeout_s == pytest.approx(0.2 + 4 * 0.1)
     time.measured(0.1)
     assert time.deviation_s == pytest.approx(0.75 * 0.1 + 0.25 * 0.1)
-    assert time.smoothed_s == pytest.approx(0.875 * 0.2 + 0.125 * 0.1)
+    assert time.smoothed_s == pytest.approx(0.1875)
+    time.measured(0.1)
+    assert time.deviation_s == pytest.approx(0.75 * 0.1 + 0.25 * 0.0875)
+    assert time.smoothed_s == pytest.approx(0.875 * 0.1875 + 0.125 * 0.1)
 
 
 def test_a_steady_link_is_waited_for_little_longer_than_it_takes():
