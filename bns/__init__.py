@@ -43,7 +43,7 @@ if TYPE_CHECKING:
         TrialPausedError,
     )
     from bns.physics.effect import Effect, Parameter
-    from bns.store.reader import load, query
+    from bns.store.read.reader import load, query
 
 __version__ = "0.2.0"
 
@@ -104,7 +104,7 @@ _HOMES = {
         *("StopNotConfirmedError", "StoreError", "TrialPausedError"),
     ),
     "physics.effect": ("Effect", "Parameter"),
-    "store.reader": ("load", "query"),
+    "store.read.reader": ("load", "query"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 _CALLABLE_ROOMS = ("diagnose", "trial")

@@ -116,7 +116,7 @@ def test_each_library_that_an_error_names_comes_with_its_extra():
     [
         ("import bns; print(bns.__file__)", "{place}/bns/__init__.py"),
         ("from bns.plotting.scripts import scripts; print(scripts())", "{place}/bns/_shipped"),
-        ("from bns.sweep.grid import load_sweep; print(load_sweep('khepera').total)", "45000"),
+        ("from bns.sweep.expand.grid import load_sweep; print(load_sweep('khepera').total)", "45000"),
         ("from bns.tasks import task_names; print(*task_names('snake'))", "three-regions two-regions"),
         ("from bns.robots.simulator import load_static_simulator as f; print(len(f('snake').networks) > 0)", "True"),
         ("from bns.examples import copy_example as f; print(len(f('new')))", "5"),

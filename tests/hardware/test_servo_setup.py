@@ -20,7 +20,7 @@ from bns.hardware.snake_settings import snake_settings
 def bus(tmp_path, monkeypatch):
     """bus(*ids, **registers) -> servos, path of the port; the command line runs on its clock."""
     clock, opened = EmulatedClock(np.inf), []
-    monkeypatch.setattr("bns.cli.servos.RealClock", lambda: clock)
+    monkeypatch.setattr("bns.cli.commands.servos.RealClock", lambda: clock)
     monkeypatch.setattr("bns.hardware.servo_setup._LAST_ID", 12)
 
     def build(*ids, **registers):
