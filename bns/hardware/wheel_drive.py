@@ -21,6 +21,10 @@ _SAME_S = 1e-4
 """Two times closer than this are one."""
 
 
+class RobotLostError(Exception):
+    """The robot does not answer any more."""
+
+
 class Wheels(Protocol):
     """What a drive asks of a robot's driver; speeds are those of the wheels' surfaces, m/s."""
 
