@@ -247,6 +247,8 @@ CAUSES = {
     "link gone": _unplugged,
     "link gone, then SIGKILL": _killed_and_unplugged,
 }
+_ARMED_S = 4.0
+"""By then the servos have their torque and the body is straight; before, nothing depends on the camera."""
 SURVIVES = {"SIGSTOP", "hang"}
 GONE_S = {"link gone": 1.0, "link gone, then SIGKILL": 1.0}
 """How long the link stays away; the time until the robot stands counts from its return."""
@@ -275,7 +277,7 @@ def _befell(nursery, robot, cause, folder, gone_s):
     process, terminal = nursery.begin(robot.link, robot.path, folder / "journal.jsonl")
     try:
         robot.until(True, HANGS_S)
-        time.sleep(0.25)
+        time.sleep(_ARMED_S if cause.startswith("camera") and robot.link != "serial" else 0.25)
         began_s = time.monotonic()
         CAUSES[cause](robot, process, terminal)
         if cause in GONE_S:

@@ -28,10 +28,10 @@ COMMANDS = {
     "sweep": ["sweep", "sweep.yaml", "--jobs", "1", "--results", "results"],
     "diagnose": ["diagnose", "log.csv", "--model", "bare.yaml", "--json"],
     "trial": ["trial", *ROBOT, "--emulated", "--yes", "--speed", "inf", "--no-figures", "--evaluations", "1", *SMALL,
-              "--max-commands", "6", "--results", "driven"],
-    "delay": ["calibrate", "--delay", *ROBOT, "--emulated"],
+              "--max-commands", "4", "--results", "driven"],
+    "delay": ["calibrate", "--delay", *ROBOT, "--emulated", "--rig", "wii.yaml"],
     "trial with faults": ["trial", *ROBOT, "--emulated", "--yes", "--speed", "inf", "--no-figures", "--evaluations", "1", *SMALL,
-                          "--max-commands", "4", "--results", "faulty", "--faults", "faults.yaml"],
+                          "--max-commands", "4", "--results", "faulty", "--faults", "faults.yaml", "--rig", "wii.yaml"],
 }  # fmt: skip
 FAULTS = "faults: [{kind: lost-reply, rate: 0.05}, {kind: lost-request, rate: 0.05}]\n"
 
@@ -42,6 +42,8 @@ def folder(tmp_path_factory):
     assert main(["example", "robot", str(made)]) == 0
     announce(made, "my-robot", tomllib.loads((made / "pyproject.toml").read_text())["project"]["entry-points"])
     (made / "faults.yaml").write_text(FAULTS)
+    camera = (made / "my_robot" / "rig.yaml").read_text().split("tracker:")[0]
+    (made / "wii.yaml").write_text(f"{camera}tracker: {{kind: wii, height_m: 3.5, view_rad: 0.75}}\n")
     return made
 
 
@@ -52,7 +54,7 @@ def done(folder):
     (folder / "commands.py").write_text(SCRIPT)
     carried_out = subprocess.run(
         [sys.executable, "commands.py", json.dumps(COMMANDS)],
-        cwd=folder, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=240, check=False,
+        cwd=folder, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=280, check=False,
     )  # fmt: skip
     assert carried_out.returncode == 0, carried_out.stderr
     return json.loads(carried_out.stdout.splitlines()[-1])
@@ -90,14 +92,13 @@ def test_its_trial_drove_and_stopped(done, folder):
     (journal,) = (folder / "driven" / "trials").glob("my-robot-*/journal.jsonl")
     assert all(e["confirmed"] for e in events(journal, "stop"))
     table = pd.read_csv(journal.with_name("measurements.csv"))
-    assert len(table) > 20
+    assert len(table) > 5
     assert table.x_m.abs().max() < 1.9
 
 
-def test_its_camera_is_not_late(done):
-    said = done["delay"][1]
-    late_ms = float(said.split("poses are ")[1].split(" ms")[0])
-    assert abs(late_ms) < 5.0
+def test_its_tracker_is_as_late_as_the_kernels_smoothing(done):
+    late_ms = float(done["delay"][1].split("poses are ")[1].split(" ms")[0])
+    assert -5.0 < late_ms < 35.0
 
 
 @pytest.mark.parametrize("words", [["robot", "a", "b"], ["rover", "x"]])
