@@ -41,7 +41,7 @@ class WheelDriver(Protocol):
         """Way of the wheels' surfaces since any fixed instant, m."""
 
     def battery_v(self) -> float:
-        """Voltage of the battery."""
+        """Voltage of the battery; NaN of a robot that does not tell."""
 
     def stop(self) -> Stop:
         """Stop, and see that the wheels stand still; never raises."""
@@ -57,6 +57,9 @@ class Wheels:
     units_per_m_s: float
     units_per_s: float
     wheelbase_m: float
+    heartbeat_looks: int = 5
+    """Every so many looks (a tenth of a second each) the robot is asked for its speed. A robot that stops by itself when it hears
+    nothing for half a second needs 2."""
 
 
 class WheeledPlatform:
@@ -90,7 +93,8 @@ class WheeledPlatform:
     def readings(self) -> dict[str, float]:
         """Battery."""
         try:
-            return {"battery_v": self._driver.battery_v()}
+            volts = self._driver.battery_v()
+            return {} if math.isnan(volts) else {"battery_v": volts}
         except RobotLostError as error:
             raise TrialPausedError(f"the robot is lost: {error}") from error
 
@@ -119,7 +123,7 @@ class WheeledPlatform:
         if start is None:
             raise TrialPausedError(_NOT_SEEN)
         agreement = Agreement(self._disagree_s, self._wheels.wheelbase_m)
-        drive = WheelDrive(self._driver, self._eye, self._watch, agreement, self._clock, self._journal, start)
+        drive = WheelDrive(self._driver, self._eye, self._watch, agreement, self._clock, self._journal, start, self._wheels.heartbeat_looks)
         ended = ""
         guard = StopsAtTheEnd(self.stop)
         began_s = self._clock.now_s()

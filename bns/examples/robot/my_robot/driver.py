@@ -17,7 +17,7 @@ from my_robot.emulator import EmulatedRig
 from my_robot.protocol import FASTEST_MM_S, Message, decoded
 
 RIG = Path(__file__).with_name("rig.yaml")
-WHEELS = Wheels(units_per_m_s=1000.0, units_per_s=1000.0, wheelbase_m=0.24)
+WHEELS = Wheels(units_per_m_s=1000.0, units_per_s=1000.0, wheelbase_m=0.24, heartbeat_looks=2)
 ATTEMPTS, REPLY_S, STILL_M_S, FLAT_V = 4, 0.15, 0.005, 9.5
 
 
