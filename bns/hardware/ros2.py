@@ -227,4 +227,5 @@ def open_ros2(
     except BaseException:
         driver.close()
         raise
-    return WheeledPlatform(driver, tracker, Wheels(*units, settings.wheelbase_m, heartbeat_looks=2), rig, clock, journal, stopping)
+    wheels = Wheels(*units, settings.wheelbase_m, heartbeat_looks=2)
+    return WheeledPlatform(driver, tracker, wheels, rig, clock, journal, stopping)

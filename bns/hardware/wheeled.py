@@ -123,7 +123,8 @@ class WheeledPlatform:
         if start is None:
             raise TrialPausedError(_NOT_SEEN)
         agreement = Agreement(self._disagree_s, self._wheels.wheelbase_m)
-        drive = WheelDrive(self._driver, self._eye, self._watch, agreement, self._clock, self._journal, start, self._wheels.heartbeat_looks)
+        often = self._wheels.heartbeat_looks
+        drive = WheelDrive(self._driver, self._eye, self._watch, agreement, self._clock, self._journal, start, often)
         ended = ""
         guard = StopsAtTheEnd(self.stop)
         began_s = self._clock.now_s()
