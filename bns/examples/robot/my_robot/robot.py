@@ -1,7 +1,8 @@
 """My robot: two wheels, commands of left speed, right speed (mm/s) and duration (ms).
 
 Genetic operators, kinematics and drawing are those of the Khepera, which has two wheels as well; ranges, scales and goal radius
-are its own, and with them how a population is scored.
+are its own, and with them how a population is scored. Its commands stand in the store under the Khepera's names (left_units,
+right_units, duration_ms), since a store has the same columns for all robots; here a unit is a mm/s.
 """
 
 from __future__ import annotations
@@ -34,7 +35,6 @@ class MyRobot(Khepera):
     world_model = str(Path(__file__).with_name("world.yaml"))
     simulators = "my_robot"
     bounds = CommandBounds(LOW, HIGH, np.array([30.0, 30.0, 500.0], np.float32))
-    command_columns = ("left_mm_s", "right_mm_s", "duration_ms")
     given_columns = {"left_m_s": (-0.5, 0.5), "right_m_s": (-0.5, 0.5), "duration_s": (0.01, 60.0)}  # noqa: RUF012  # read only
     radii_m = (GOAL_RADIUS_M,)
 
