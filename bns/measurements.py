@@ -71,8 +71,12 @@ def write_measurements(table: pd.DataFrame, path: str | Path, columns: Sequence[
         )
     check_table_name(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    if path.suffix == ".csv":
-        table.to_csv(unfinished, index=False)
-    else:
-        table.to_parquet(unfinished, index=False)
-    unfinished.replace(path)
+    try:
+        if path.suffix == ".csv":
+            table.to_csv(unfinished, index=False)
+        else:
+            table.to_parquet(unfinished, index=False)
+        unfinished.replace(path)
+    except BaseException:  # a part of a table would take the space that is missing
+        unfinished.unlink(missing_ok=True)
+        raise

@@ -193,7 +193,7 @@ def _with_interval(fit: Fit, active: ActiveEffect, reason: str) -> ActiveEffect:
 
 def model_yaml(model: Model) -> str:
     """A model as the text of a YAML file that `load_model` reads back."""
-    tree: dict[str, Any] = {"base": model.base, "wheelbase_m": model.wheelbase_m, "dt_s": model.dt_s}
+    tree: dict[str, Any] = model.written_base()
     if model.jitter_relative:
         tree["jitter"] = {
             "wheel_speed_relative": model.jitter_relative,

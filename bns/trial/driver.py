@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -183,8 +183,9 @@ class TrialDriver:
             return ""
         sketch = self.underway.sketch()
         if self._picture is not None and self.underway.path:
-            draw_drive(self.underway.path, self.underway.goals_m, self._rig.limits.surface, self._picture)
-            sketch += f"\n(as a picture: {self._picture})"
+            with suppress(OSError):  # a full disk costs the picture alone
+                draw_drive(self.underway.path, self.underway.goals_m, self._rig.limits.surface, self._picture)
+                sketch += f"\n(as a picture: {self._picture})"
         return f"{sketch}\n" if sketch else ""
 
     def _asked(self, text: str, controller: np.ndarray, driven: Driven) -> Decision:

@@ -155,7 +155,7 @@ def test_a_driver_that_does_not_know_cannot_go_on(held):
     robot.until(False)
     until(guard.tripped)
     with pytest.raises(NoReplyError):
-        driver._link.exchange(b"D,l20000,l20000\n")
+        driver._link.exchange(b"D,l20000,l20000\n", 0.3)
     assert not robot.moves()
     assert driver.stop(HANGS_S).confirmed
     assert driver.battery_v() > 7

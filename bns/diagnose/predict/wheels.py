@@ -41,6 +41,7 @@ class WheelPredictor:
     horizons: tuple[str, ...] = HORIZONS
     near = "1s"
     tracking: tuple[float, float] | None = None
+    screening = None
 
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
         self.tracks, self._dt_s = tracks, dt_s
@@ -71,6 +72,9 @@ class WheelPredictor:
                 view = active.effect.apply(view, **active.by_name)
         body = displacements(view.poses, self.tracks.is_first)
         return Steps(self._pictured(body, placed) if placed else body, self._drift(model, poses, sums))
+
+    def anchor(self, model: Model) -> None:
+        """Every answer is exact."""
 
     def _pictured(self, body: Array, placed: Sequence[ActiveEffect]) -> Array:
         """Displacements (frames, 3) as they look where the robot was seen: the picture is undone there, and made again."""
