@@ -17,7 +17,7 @@ from bns.console import live_view
 from bns.errors import BnsError, HardwareError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
-from bns.hardware.guard import Guard, GuardedClock, GuardedPlatform
+from bns.hardware.guard.client import Guard, GuardedClock, GuardedPlatform
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Emulation, Platform, PlatformModule, platform_module, repeats_of
 from bns.hardware.rig import Rig
@@ -121,7 +121,7 @@ def _guard(rig: Rig, module: PlatformModule, journal: Path | None, stack: ExitSt
     if recipe_of is None or os.name != "posix":  # Windows has no pseudo-terminals
         return None
     log = None if journal is None else journal.with_name(GUARD_LOG)
-    guard = Guard(rig.port, recipe_of(rig), rig.limits.silent_s, log)
+    guard = Guard(rig.port, recipe_of(rig), rig.limits.silent_s, log, rig.limits.gives_up_s)
     stack.callback(_let_go, guard)
     return guard
 
