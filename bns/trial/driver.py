@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,10 @@ REPEATED = "repeat-"
 """Before the kinds of events of a controller that is driven once more: they are no evaluation."""
 
 
+Stuck = tuple[str, tuple[tuple[str, int], ...], str]
+"""A drive that could not go on, as in the journal: before the kind of event, its numbers, what was stuck."""
+
+
 @dataclass(frozen=True)
 class _Purpose:
     """What a drive is for: in kinds of events, in text, and in numbers of events."""
@@ -36,14 +40,25 @@ class _Purpose:
 
 
 class TrialDriver:
-    """Implements `bns.trial.background.RobotDriver`. `start` (3,) is where the task, or the next drive, begins."""
+    """Implements `bns.trial.background.RobotDriver`.
+
+    `start` (3,) is where the task, or the next drive, begins; `stuck` are drives of earlier attempts that could not go on.
+    """
 
     def __init__(
-        self, platform: Platform, operator: Operator, rig: Rig, start: np.ndarray, clock: Clock, log: HardwareLog
+        self,
+        platform: Platform,
+        operator: Operator,
+        rig: Rig,
+        start: np.ndarray,
+        clock: Clock,
+        log: HardwareLog,
+        stuck: Iterable[Stuck] = (),
     ) -> None:
         self._platform, self._operator, self._rig, self.start = platform, operator, rig, start
         self._clock, self._log = clock, log
         self._began_s = clock.now_s()
+        self._stuck = set(stuck)
         self._first = True
         self.placing_s = 0.0
         self.readings: dict[str, float] = {}
@@ -68,6 +83,11 @@ class TrialDriver:
         while True:
             self._ready(void)
             driven = self._drive(purpose, controller)
+            if driven.stuck and self._stuck_anew(purpose, driven.stuck):
+                self._note(purpose, "discarded", why=driven.ended)
+                self._log.sync()
+                self._operator.place(self.start, driven.ended)
+                continue
             if not len(driven.commands):
                 void += 1
                 self._note(purpose, "discarded", why=driven.ended)
@@ -82,6 +102,15 @@ class TrialDriver:
                     self._log.sync()
                 return Evaluation(controller, driven.commands, driven.poses, unstable=decision.unstable)
             self._note(purpose, "discarded", why=decision.answer)
+
+    def _stuck_anew(self, purpose: _Purpose, what: str) -> bool:
+        """Whether a controller was stuck there for the first time. At the second it is the controller's: what it did is kept."""
+        cause = (purpose.prefix, tuple(purpose.numbers.items()), what)
+        if cause in self._stuck:
+            return False
+        self._stuck.add(cause)
+        self._note(purpose, "stuck", what=what)
+        return True
 
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         """Note it, durably."""

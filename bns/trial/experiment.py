@@ -21,6 +21,7 @@ from bns.trial.folder import (
     measured,
     measurements_however_it_ends,
     past_evaluations,
+    stuck_before,
 )
 from bns.trial.session import TrialSetup, open_rig
 
@@ -92,12 +93,13 @@ def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journa
     columns = load_robot(how.rig.robot).measured_columns
     done = _driven_before(journal, [commands for commands, _ in trials], how.resume)
     try:
+        stuck = stuck_before(journal)
         with (
             measurements_however_it_ends(journal, columns),
             Stopping() as stopping,
             open_rig(how, seed, journal, stopping) as opened,
         ):
-            driver = TrialDriver(opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log)
+            driver = TrialDriver(opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log, stuck)
             for number, (commands, start) in enumerate(trials[done:], done + 1):
                 driver.start = start
                 driver.evaluate(number, commands)

@@ -40,6 +40,7 @@ from bns.trial.folder import (
     measurements_however_it_ends,
     robot_stands,
     spec_event,
+    stuck_before,
 )
 from bns.trial.operator import EmulatedHands, Operator, TerminalOperator, UnattendedOperator
 from bns.trial.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
@@ -153,6 +154,7 @@ def _driven(
     started, robot = datetime.now(UTC), load_robot(spec.robot)
     start = on_floor(robot, robot.start_pose())[0]
     try:
+        stuck = stuck_before(folder.journal)
         with (
             measurements_however_it_ends(folder.journal, robot.measured_columns),
             Stopping() as stopping,
@@ -160,7 +162,7 @@ def _driven(
         ):
             opened.log.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
             opened.log.sync()
-            driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log)
+            driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log, stuck)
             result = _looped(spec, how, driver, past, started, on_evaluation)
             _repeated(spec, how, driver, folder, result)
             opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
