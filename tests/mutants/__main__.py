@@ -108,8 +108,12 @@ def survives(copy: Path, mutant: Mutant, tests: str, limit_s: float) -> str | No
     """The changed lines if the tests pass with it, nothing if they notice; LookupError if it changes nothing."""
     place = copy / mutant.path
     original = (HERE / mutant.path).read_text()
-    changed = mutate_code(original, get_operator(mutant.kind)(), mutant.number)
-    if changed is None or meaning(changed) == meaning(original):
+    changed = mutate_code(original, get_operator(mutant.kind)(), mutant.number) or original
+    try:
+        same = meaning(changed) == meaning(original)
+    except SyntaxError as fault:  # cosmic-ray replaces the * of an unpacking, too
+        raise LookupError(mutant) from fault
+    if same:
         raise LookupError(mutant)
     place.write_text(changed)
     try:
@@ -163,6 +167,7 @@ def main() -> None:
                     killed[room] += 1
                 else:
                     survivors[room].append(f"{mutant.path}:{lines}")
+                options.out.write_text(written(sizes, killed, survivors, options))
                 print("killed  " if lines is None else "SURVIVED", room, mutant.path, lines or "", flush=True)
     options.out.write_text(written(sizes, killed, survivors, options))
 

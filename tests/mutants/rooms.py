@@ -1,7 +1,7 @@
 """The rooms where numbers are made, and the tests nearest to each."""
 
 ROOMS: dict[str, tuple[str, str]] = {
-    "engine": ("bns/engine/[!_rj]*.py bns/engine/rprop.py", "tests/engine"),
+    "engine": ("bns/engine/[!_rj]*.py bns/engine/rprop.py", "tests/engine tests/robots/test_snake_breeding.py"),
     "tasks": ("bns/tasks/__init__.py bns/robots/khepera/robot.py", "tests/robots/test_khepera.py tests/robots/test_contract.py"),
     "store": (
         "bns/store/disk/*.py bns/store/write/*.py bns/store/read/*.py",
