@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Progress, Shown, drawn, ticks
 from bns.api.measurements import Log
@@ -110,12 +110,13 @@ def add(
     if term is not None and len(wanted) != 1:
         names = ", ".join(map(_name, wanted))
         raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
-    chosen = [_effect(each, term, on) for each in wanted]
+    robot = with_effects(model)
+    chosen = [_effect(each, robot, term, on) for each in wanted]
     given = [effect.name for effect, _ in chosen]
     twice = next((name for name in given if given.count(name) > 1), None)
     if twice is not None:
         raise ModelError(f"{twice} is given {given.count(twice)} times; a model has each effect once: leave the others out.")
-    ready = prepared(log, model)
+    ready = prepared(log, robot)
     ticks(progress)("fitting")
     return added(ready, chosen, per_trial)
 
@@ -130,8 +131,8 @@ def added(
     return AddResult(ready, add_effects(ready.predictor, ready.model, effects, ready.measured, per_trial, memory))
 
 
-def _effect(wanted: Wanted, term: str | None, on: str) -> tuple[Effect, Mapping[str, str]]:
-    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), term, on)
+def _effect(wanted: Wanted, model: Model, term: str | None, on: str) -> tuple[Effect, Mapping[str, str]]:
+    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), model, term, on)
 
 
 def _name(wanted: Wanted) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Progress, Shown, drawn, ticks
 from bns.api.measurements import Log
@@ -22,7 +22,7 @@ from bns.diagnose.report.figures import ranking_axes
 from bns.diagnose.report.text import diagnosis_text
 from bns.errors import DataError
 from bns.physics.effect import Effect
-from bns.physics.effects import effect_in_file, effect_named
+from bns.physics.effects import effect_in_file
 
 if TYPE_CHECKING:
     from bns.api.propose import ProposeResult
@@ -161,8 +161,9 @@ def diagnose(
         ModelError: no such model, or an effect's file that cannot be used.
     """
     own = [each if isinstance(each, Effect) else effect_in_file(Path(each)) for each in also]
-    ready = prepared(log, model)
-    barred = [effect_named(name).name for name in without_effects]
+    robot = with_effects(model)
+    barred = [robot.effect_named(name).name for name in without_effects]
+    ready = prepared(log, robot)
     extra = {effect.name: effect for effect in own}
     found = find(ready.predictor, ready.model, extra=extra, tick=ticks(progress), barred=barred)
     return DiagnoseResult(ready, found)

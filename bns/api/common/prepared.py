@@ -12,25 +12,30 @@ from bns.diagnose.data.cycles import CycleTracks
 from bns.diagnose.data.load import Measured
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.check_robot import check_named_robot, check_same_robot
+from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.predict.saved_networks import network_predictor, networks_file
-from bns.diagnose.predict.wheels import WheelPredictor, predictor_for_search
+from bns.diagnose.predict.wheels import predictor_for_search
 from bns.errors import DataError, ModelError
 from bns.physics import model as physics
+from bns.physics.jointed.model import JointedModel
+from bns.physics.jointed.model_files import SNAKE
 from bns.physics.model import model_names
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A model on wheels over the poses that are used. ``measured`` has the same poses."""
+    """A model with effects over the poses that are used. ``measured`` has the same poses."""
 
     log: Measurements
     measured: Measured
-    predictor: WheelPredictor
+    predictor: Predictor
     model: Model
 
     @property
     def thinned(self) -> str:
         """How many of the poses are used, in words; "" for all."""
+        if isinstance(self.predictor, JointedPredictor):
+            return self.predictor.used_in_words
         used, there = len(self.predictor.tracks.t_s), len(self.log.measured.tracks.t_s)
         return f"{used} of {there} poses are used, evenly chosen; all commands are" if used < there else ""
 
@@ -51,22 +56,42 @@ def prepared(log: Log, model: Given) -> Prepared:
         ModelError: no such model, or networks, which have no effects.
         DataError: measurements that cannot be used, or of another robot.
     """
-    if _networks(model) is not None:
-        raise ModelError(f"{_name(model)} holds networks, which have no effects: they can be compared, not diagnosed.")
-    robot = as_model(model)
+    robot = with_effects(model)
     read = as_measurements(log)
     measured = read.measured
     check_named_robot(measured.robot, robot)
+    if isinstance(robot, JointedModel):
+        return _prepared_body(read, robot)
     if isinstance(measured.tracks, CycleTracks):
         raise DataError(
-            f"{measured.path} holds cycles and markers, and the model {robot.name} drives wheels; "
-            "compare them with networks: --model snake, or a file (.safetensors) of bns run --robot snake --save-snn FILE."
+            f"{measured.path} holds cycles and markers, and the model {robot.name} drives wheels; give the model of the robot "
+            "that was driven in cycles: --model snake."
         )
     predictor = predictor_for_search(measured.tracks)
     if len(predictor.tracks.t_s) < len(measured.tracks.t_s):
         measured = replace(measured, tracks=predictor.tracks)
     check_same_robot(predictor, robot)
     return Prepared(read, measured, predictor, robot)
+
+
+def with_effects(model: Given) -> Model:
+    """The model that is given; ModelError if these are networks."""
+    if _networks(model) is not None:
+        raise ModelError(f"{_name(model)} holds networks, which have no effects: they can be compared, not diagnosed.")
+    return as_model(model)
+
+
+def _prepared_body(read: Measurements, model: Model) -> Prepared:
+    """A body on joints over cycles of it."""
+    measured = read.measured
+    assert isinstance(model, JointedModel)
+    if not isinstance(measured.tracks, CycleTracks):
+        raise DataError(
+            f"{measured.path} holds wheel speeds and poses, and the model {model.name} is a body on joints; give the model of a "
+            "drive: --model khepera, or --model differential-drive --wheelbase METRES."
+        )
+    predictor = JointedPredictor(measured.tracks, model)
+    return Prepared(read, replace(measured, tracks=predictor.tracks), predictor, model)
 
 
 def prepared_networks(log: Log, model: Given) -> PreparedNetworks | None:
@@ -85,7 +110,7 @@ def are_networks(model: Given) -> bool:
 
 
 def _networks(model: Given) -> tuple[Path, str] | None:
-    return None if isinstance(model, physics.Model) else networks_file(fspath(model), model_names())
+    return None if isinstance(model, physics.Model) else networks_file(fspath(model), [*model_names(), SNAKE])
 
 
 def _name(model: Given) -> str:

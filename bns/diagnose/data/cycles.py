@@ -42,7 +42,7 @@ class CycleTracks(Tracks):
 
 
 def only_cycles(tracks: CycleTracks, chosen: NDArray[np.int64]) -> CycleTracks:
-    """Some of the cycles, each a stretch of its own: what happens between two is not looked at. Trials without any are left out."""
+    """Some of the cycles, each a stretch of its own: what happens between two is not looked at. Trials without go."""
     frames = np.repeat(2 * chosen, 2) + np.tile([0, 1], len(chosen))
     kept, counts = np.unique(tracks.trial[frames], return_counts=True)
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
@@ -67,8 +67,10 @@ def only_cycles(tracks: CycleTracks, chosen: NDArray[np.int64]) -> CycleTracks:
 
 
 def marker_noise_m(tracks: CycleTracks) -> float | None:
-    """Noise of one marker's coordinate: a stable cycle ends in the posture in which it began, so what the markers' distance differs
-    by is the camera's; None where there are too few."""
+    """Noise of one marker's coordinate; None where there are too few.
+
+    A stable cycle ends in the posture in which it began, so what the markers' distance differs by is the camera's.
+    """
     differ = np.abs(tracks.gap_m[1::2] - tracks.gap_m[::2])[tracks.stable]
     if len(differ) < _FEW:
         return None

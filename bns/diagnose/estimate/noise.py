@@ -58,8 +58,8 @@ class Filter:
 
 def filter_for(predictor: Predictor, steps: Steps, noise: Array) -> Filter:
     """The filter with the gains that these steps and this noise ask for."""
-    gains = filter_gains(steps.body, predictor.tracks.is_first, predictor.way_m, noise)
-    return Filter(noise, *gains, _scatter(steps.apart_m))
+    gain, whiten, logdet = filter_gains(steps.body, predictor.tracks.is_first, predictor.way_m, noise)
+    return Filter(noise, gain, whiten, logdet, _scatter(steps.apart_m))
 
 
 def _scatter(apart_m: Array | None) -> Array | None:

@@ -27,7 +27,7 @@ from bns.physics.model import ActiveEffect, Model
 from bns.physics.signals import Body
 from bns.robots.snake.gait import joint_angles
 from bns.robots.snake.table import GAIT
-from bns.sweep.cores import cores
+from bns.sweep.jobs.cores import cores
 
 _COARSER = DEFAULTS.predict.coarser
 _SHARES = DEFAULTS.predict.response_shares
@@ -38,7 +38,7 @@ _STILL_M = DEFAULTS.predict.still_m
 COMMANDS = 13
 """Postures of a cycle, the first and the last the same."""
 LUCK = (("floor-friction", "factor"), ("floor-slope", "east_rad"), ("floor-slope", "north_rad"))
-"""What chance does to a cycle: a floor that is a little rougher here, or falls a little there; by the first node of each curve."""
+"""What chance does to a cycle: a floor that is a little rougher, or falls a little; by the first node of each curve."""
 
 
 class JointedPredictor:
@@ -53,6 +53,7 @@ class JointedPredictor:
     def __init__(self, tracks: CycleTracks, model: JointedModel) -> None:
         cycles, bare = _Cycles.of(tracks, model.mechanism), replace(model, effects=())
         self._setup(cycles, bare, Responses(cycles.seen, bare, cycles.exactly, _SHARES))
+        self._unstable = int((~tracks.stable).sum())
         wild = self._luck_m() > _WILD_M
         self.left_out = int(wild.sum())
         """Cycles that nobody can foresee: a little luck moves them far."""
@@ -76,6 +77,15 @@ class JointedPredictor:
         self._at = np.arange(len(self.tracks.t_s)) - self.tracks.first[:-1][self.tracks.trial]
         self._step_s = self._on_grid(np.diff(self.tracks.t_s, append=self.tracks.t_s[-1]), fill=0.0)
         self.way_m = np.where(self.tracks.is_first, 0.0, np.repeat(self._luck_m() ** 2 / _STILL_M + _STILL_M, 2))
+
+    @property
+    def used_in_words(self) -> str:
+        """Which cycles are compared."""
+        unstable, used = self._unstable, len(self._cycles)
+        return (
+            f"{used} of {used + unstable + self.left_out} cycles are compared; {unstable} were not stable, and {self.left_out} "
+            "nobody can foresee: a little luck moves the robot far in them"
+        )
 
     def anchor(self, model: Model) -> None:
         """Simulate this model itself: later answers nearby start from it."""
@@ -130,7 +140,8 @@ class JointedPredictor:
         rates = [self._on_grid(body[to, i] * sign) / lasting for i, sign in ((0, 1.0), (1, -1.0), (2, 1.0))]
         moving = (self._step_s > 0).astype(float)
         session = self.tracks.start_s[:, None] + np.cumsum(self._step_s, axis=1)
-        state = Body(rates[0], rates[1], rates[2], moving, rates[0], rates[0], session)
+        place = np.stack([self._on_grid(self.tracks.pose[:, i]) for i in range(3)], axis=2)
+        state = Body(rates[0], rates[1], rates[2], moving, rates[0], rates[0], session, place)
         for active in model.at("body"):
             state = active.effect.apply(state, **active.by_name)
         ways = np.stack([state.forward_m_s, -state.sideways_m_s, state.yaw_rad_s], axis=2) * self._step_s[..., None]
@@ -171,7 +182,9 @@ def _a_little(bare: JointedModel, effect: Effect, parameter: str) -> Model:
     """The model with one number of an effect at the first node of its curve."""
     p = next(p for p in effect.parameters if p.name == parameter)
     value = p.neutral + _SHARES[0] * (p.plausible[1] - p.neutral)
-    return replace(bare, effects=(ActiveEffect(effect, tuple(value if q is p else q.neutral for q in effect.parameters)),))
+    return replace(
+        bare, effects=(ActiveEffect(effect, tuple(value if q is p else q.neutral for q in effect.parameters)),)
+    )
 
 
 def _frames_of(cycles: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -182,7 +195,9 @@ def _frames_of(cycles: NDArray[np.int64]) -> NDArray[np.int64]:
 class _Cycles:
     """Chosen cycles and their simulations, fine and coarse."""
 
-    def __init__(self, tracks: CycleTracks, fine: Simulator, coarse: Simulator, rests: tuple[Rest, Rest], exactly: Array) -> None:
+    def __init__(
+        self, tracks: CycleTracks, fine: Simulator, coarse: Simulator, rests: tuple[Rest, Rest], exactly: Array
+    ) -> None:
         self.tracks, self._fine, self._coarse, self._rests, self.exactly = tracks, fine, coarse, rests, exactly
 
     @classmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ def through_postures(
     q = mechanism.resolution_rad
     targets = np.round(postures / q) * q if q else postures
     parts, furthest = [targets[:1]], mechanism.joint_speed_rad_s * dt_s
-    for start, target in zip(targets[:-1], targets[1:], strict=True):
+    for start, target in pairwise(targets):
         way = target - start
         steps = int(np.ceil((np.abs(way).max() / mechanism.joint_speed_rad_s + mechanism.settle_s) / dt_s))
         reach = furthest * np.arange(1, steps + 1)[:, None]
