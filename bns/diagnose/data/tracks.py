@@ -50,6 +50,11 @@ class Tracks:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def timed(self) -> bool:
+        """Are frames seen at times of their own, so that a clock can be wrong?"""
+        return True
+
     @cached_property
     def trial(self) -> NDArray[np.int64]:
         """The trial of every frame, (frames,)."""

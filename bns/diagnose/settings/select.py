@@ -41,7 +41,7 @@ class Select:
         f"Effects that a search accepts at most: beyond, each mends what the others left of a seventh; {BY_HAND}.",
     )
     screen_most: int = setting(
-        12, "effects", f"Where fits are costly, so many effects at most are fitted after each step of a search; {BY_HAND}."
+        8, "effects", f"Where fits are costly, so many effects at most are fitted after each step of a search; {BY_HAND}."
     )
     screen_chance: float = setting(
         0.2, "1", f"And only those that luck alone does not make look as good in one case of five, on few cycles; {BY_HAND}."
