@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Progress, silent
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown, drawn
@@ -114,8 +114,10 @@ def add(
     if term is not None and len(wanted) != 1:
         names = ", ".join(map(_name, wanted))
         raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
-    ready = prepared(log, model)
-    chosen = [_effect(each, term, on, ready.predictor.tracks.extra) for each in wanted]
+    robot = with_effects(model)
+    ready = prepared(log, robot)
+    columns = getattr(ready.predictor.tracks, "extra", ())
+    chosen = [_effect(each, robot, term, on, columns) for each in wanted]
     given = [effect.name for effect, _ in chosen]
     twice = next((name for name in given if given.count(name) > 1), None)
     if twice is not None:
@@ -140,8 +142,10 @@ def added(
     return AddResult(ready, extended)
 
 
-def _effect(wanted: Wanted, term: str | None, on: str, columns: Iterable[str]) -> tuple[Effect, Mapping[str, str]]:
-    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), term, on, columns)
+def _effect(
+    wanted: Wanted, model: Model, term: str | None, on: str, columns: Iterable[str]
+) -> tuple[Effect, Mapping[str, str]]:
+    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), model, term, on, columns)
 
 
 def _name(wanted: Wanted) -> str:

@@ -12,7 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from bns.api.common.cache import remembered
-from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown, drawn
@@ -26,7 +26,7 @@ from bns.diagnose.settings import DEFAULTS, Settings
 from bns.diagnose.settings.chosen import Chosen, changes_text, in_force, settings_of
 from bns.errors import DataError
 from bns.physics.effect import Effect
-from bns.physics.effects import all_effects, effect_in_file, effect_named
+from bns.physics.effects import effect_in_file
 
 if TYPE_CHECKING:
     from bns.api.propose import ProposeResult
@@ -196,10 +196,11 @@ def _found(
     progress: Progress | None,
 ) -> DiagnoseResult:
     own = [each if isinstance(each, Effect) else effect_in_file(Path(each)) for each in also]
-    ready = prepared(log, model)
-    barred = [effect_named(name).name for name in without_effects]
+    robot = with_effects(model)
+    barred = [robot.effect_named(name).name for name in without_effects]
+    ready = prepared(log, robot)
     extra = {effect.name: effect for effect in own}
-    meter = Meter(progress, PHASES, pace=STEPS * (len(all_effects()) + len(extra)))
+    meter = Meter(progress, PHASES, pace=STEPS * (len(ready.model.catalogue()) + len(extra)))
 
     def work() -> Diagnosis:
         return find(ready.predictor, ready.model, extra=extra, tick=meter, barred=barred).slim()

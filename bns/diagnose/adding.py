@@ -25,7 +25,7 @@ from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
 from bns.diagnose.select.plausibility import implausible
 from bns.errors import ModelError
 from bns.physics.effect import Effect
-from bns.physics.effects import all_effects, effect_in_file, effect_named
+from bns.physics.effects import effect_in_file
 from bns.physics.formula import formula_effect
 from bns.physics.model import ActiveEffect, Model
 
@@ -55,14 +55,17 @@ Memory = dict[tuple[str, bool, frozenset[Effect]], tuple[Judged, Fit]]
 
 
 def effect_from(
-    text: str, term: str | None = None, on: str | None = None, columns: Iterable[str] = ()
+    text: str, model: Model, term: str | None = None, on: str | None = None, columns: Iterable[str] = ()
 ) -> tuple[Effect, dict[str, str]]:
-    """The effect of a name, a Python file, or a formula, which may use ``columns`` of the log; and how a model file says so."""
+    """The effect of a name that the model can lack, of a Python file, or of a formula; and how a model file says so.
+
+    ``columns``: of the log, which a formula may use.
+    """
     if term is not None:
         return formula_effect(text, term, on or "v", columns), {"term": term, "on": on or "v"}
     if text.endswith(".py"):
         return effect_in_file(Path(text)), {"file": str(Path(text).resolve())}
-    return effect_named(text), {}
+    return model.effect_named(text), {}
 
 
 @one_thread_each()
@@ -81,7 +84,7 @@ def add_effects(
     those of this one are added. ``told``: the share that is done (0 to 1), and what is being fitted.
     """
     if per_trial and not any(effect.per_trial_allowed for effect, _ in effects):
-        able = ", ".join(e.name for e in all_effects().values() if e.per_trial_allowed)
+        able = ", ".join(e.name for e in model.catalogue().values() if e.per_trial_allowed) or "none of this robot"
         given = ", ".join(e.name for e, _ in effects)
         raise ModelError(f"None of {given} may differ from trial to trial; --per-trial goes with {able}.")
     for effect, _ in effects:
