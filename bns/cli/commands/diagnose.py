@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bns.cli.parser import Parser, add_trust, data_first
-from bns.errors import DataError
 
 if TYPE_CHECKING:
     from bns.api.common.prepared import Prepared
@@ -26,7 +25,14 @@ Adder = Callable[[str, Callable[[argparse.Namespace], int], str], Parser]
 def add_commands(command: Adder) -> None:
     """The parsers of these commands; ``command`` makes one of a name, a function and a text."""
     read = command("import", import_, "turn a log with other columns or units into a table of measurements")
-    read.add_argument("data", type=Path, metavar="LOG", help="a .csv, .parquet or .tuple file (one JSON object a line)")
+    read.add_argument(
+        "data",
+        type=Path,
+        nargs="+",
+        metavar="LOG",
+        help="a .csv, .tsv, .dat, .txt, .parquet or .tuple file, a recording of ROS (.bag, .mcap, .db3 or its folder); further "
+        "files are joined with the first by time",
+    )
     read.add_argument(
         "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml beside the log"
     )
@@ -111,32 +117,21 @@ def import_(options: argparse.Namespace) -> int:
     """A log as a table of measurements; the mapping is kept beside it."""
     import yaml
 
-    from bns.diagnose.data.apply_mapping import applied
-    from bns.diagnose.data.checks import checked
-    from bns.diagnose.data.guess_mapping import drafted
-    from bns.diagnose.data.load import naming, read_table
-    from bns.diagnose.data.mapping import load_mapping, mapping_beside
+    from bns.diagnose.data.import_log import import_log
+    from bns.diagnose.data.mapping import load_mapping
     from bns.diagnose.report.text import findings_text
-    from bns.measurements import write_measurements
+    from bns.measurements import check_table_name, write_measurements
 
-    table = read_table(options.data)
-    mapping = load_mapping(options.map) if options.map else mapping_beside(options.data)
-    if mapping is None:
-        raise DataError(
-            f"There is no mapping beside {options.data}, which has the columns {', '.join(map(str, table.columns))}. Write "
-            f"{options.data.name}.import.yaml, or give such a file with --map; docs/logs.md has all that may stand in it. "
-            f"A beginning, guessed from the names, to be checked line by line:\n\n{drafted(table)}"
-        )
-    with naming(options.data):
-        table = applied(table, mapping, options.data.parent, read_table)
-        checked_table, findings = checked(table)
-    write_measurements(table, options.output)
+    check_table_name(options.output)
+    first = options.data[0]
+    found = import_log(options.data, load_mapping(options.map) if options.map else None)
+    write_measurements(found.table, options.output)
     if options.map:
-        beside = options.data.with_name(options.data.name + ".import.yaml")
+        beside = first.with_name(first.name + ".import.yaml")
         if not beside.exists():
-            beside.write_text(yaml.safe_dump(mapping, sort_keys=False), encoding="utf-8")
-    print(f"{len(table)} rows of {checked_table['trial'].nunique()} trials written to {options.output}")
-    print(findings_text(tuple(findings)))
+            beside.write_text(yaml.safe_dump(found.mapping, sort_keys=False), encoding="utf-8")
+    print(found.summary(str(options.output)))
+    print(findings_text(found.findings))
     return 0
 
 

@@ -15,7 +15,7 @@ def add_commands(command: Adder) -> None:
     """The parser of this command."""
     page = command("explore", explore, "a page in the browser: switch effects on and watch the error fall")
     page.add_argument(
-        "data", type=Path, nargs="*", metavar="DATA", help="measurements; without any, sample logs are offered"
+        "data", type=Path, nargs="*", metavar="DATA", help="measurements or a saved session; without any: sample logs"
     )
     page.add_argument(
         "--model", default="khepera", metavar="M", help="khepera (default), differential-drive, a YAML file"
@@ -38,7 +38,8 @@ def explore(options: argparse.Namespace) -> int:
     given = {} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}
     words = (options.model, *(["--wheelbase", f"{options.wheelbase:g}"] if given else []))
     files = [str(file) for file in options.data]
-    explorer = Explorer(tabs_of(files or None, Model(options.model, **given), " ".join(files), words), options.port)
+    log = files[0] if len(files) == 1 else files or None
+    explorer = Explorer(tabs_of(log, Model(options.model, **given), " ".join(files), words), options.port)
     print(explorer.address, flush=True)
     print("open this address in a browser on this machine; Ctrl-C ends the page", flush=True)
     explorer.serve(browser=not options.no_browser)
