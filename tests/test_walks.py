@@ -43,7 +43,7 @@ class Walk:
         """One line of a shell."""
         if not line or line.startswith(SET_UP) or line in self.said:
             return
-        words = shlex.split(line, comments=True)
+        words, self.said[line] = shlex.split(line, comments=True), ""
         if words[0] == "cd":
             self.folder /= words[1]
         elif words[:2] == ["bns", "explore"]:  # it serves until it is stopped: tests/app goes through it

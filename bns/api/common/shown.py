@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from bns.plotting.style import COLUMN_IN, style
 
 Progress = Callable[[float | None, str], None]
-"""Called as work goes on: the share that is done (0 to 1; None where nobody can know), and what is being done."""
+"""Called as work goes on: the fraction that is done (0 to 1; None if unknown), and what is being done."""
 LONGEST_LINE = 200
 
 
@@ -27,7 +27,7 @@ class Shown(ABC):
 
     @abstractmethod
     def _line(self) -> str:
-        """What is most worth knowing, after the class's name."""
+        """The most important facts, after the class's name."""
 
     def __repr__(self) -> str:
         line = " ".join(f"<{type(self).__name__}: {self._line()}>".split())

@@ -10,9 +10,9 @@ from bns.diagnose.settings import DEFAULTS, Settings
 from bns.diagnose.settings.setting import BY_HAND
 
 _HEAD = f"""\
-# What the diagnosis goes by
+# Settings of the diagnosis
 
-Every threshold of `bns diagnose`, `compare`, `add`, `propose` and `report`, by the room of `bns/diagnose` that uses it. The
+Every threshold of `bns diagnose`, `compare`, `add`, `propose` and `report`, by the folder of `bns/diagnose` that uses it. The
 values stand in `bns/diagnose/settings`; this page is made from them (`python -m bns.diagnose.settings > docs/settings.md`).
 `--json` and `to_json()` carry them all under `provenance`, with their digest, here `{{digest}}`: two verdicts with the same
 digest were made by the same settings.
@@ -24,7 +24,7 @@ which units are recognised, steps of derivatives) are not listed; plausible rang
 
 
 def page(settings: Settings = DEFAULTS) -> str:
-    """Markdown: a table for each room, with every setting's value, unit and reason."""
+    """Markdown: a table for each folder, with every setting's value, unit and reason."""
     rows = list(settings.rows())
     unmeasured = sum(BY_HAND in row[-1] for row in rows)
     parts = [_HEAD.format(digest=settings.digest(), count=len(rows), unmeasured=unmeasured)]

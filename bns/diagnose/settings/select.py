@@ -38,7 +38,7 @@ class Select:
     most_effects: int = setting(
         6,
         "effects",
-        f"Effects that a search accepts at most: beyond, each mends what the others left of a seventh; {BY_HAND}.",
+        f"Effects that a search accepts at most: beyond, each only corrects what the others left of a seventh; {BY_HAND}.",
     )
     tie_z: float = setting(
         2.0,

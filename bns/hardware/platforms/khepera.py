@@ -32,7 +32,7 @@ from bns.robots.khepera import UNITS_PER_M_S
 RIG = resources.files("bns.hardware") / "rigs" / "khepera.yaml"
 
 REPEATS = 1
-"""How often a trial drives its final controller, unless it is told otherwise: the source shows one drive of it (section 4.3)."""
+"""How often a trial drives its final controller by default: the dissertation shows one drive of it (section 4.3)."""
 
 
 class KheperaPlatform:
