@@ -25,7 +25,7 @@ class Design:
         (6.0, 25.0), "s", f"A planned trial is as long as those seen, within these bounds; {BY_HAND}."
     )
     heading_rad: float = setting(
-        math.pi / 2, "rad", "A start that nobody named faces north, as that of every task of the Khepera does."
+        math.pi / 2, "rad", "A start without a heading faces north, as that of every task of the Khepera does."
     )
     largest_m: float = setting(1000.0, "m", f"A longer side of an arena is no arena but a mistaken unit; {BY_HAND}.")
     margin_m: float = setting(

@@ -12,14 +12,18 @@ from bns.diagnose.settings.setting import BY_HAND
 _HEAD = f"""\
 # Settings of the diagnosis
 
-Every threshold of `bns diagnose`, `compare`, `add`, `propose` and `report`, by the folder of `bns/diagnose` that uses it. The
-values stand in `bns/diagnose/settings`; this page is made from them (`python -m bns.diagnose.settings > docs/settings.md`).
-`--json` and `to_json()` carry them all under `provenance`, with their digest, here `{{digest}}`: two verdicts with the same
-digest were made by the same settings.
+Every threshold of `bns diagnose`, `compare`, `add`, `propose` and `report`, grouped by the folder of
+`bns/diagnose` that uses it. [How the diagnosis decides](explain/diagnosis.md) explains where they act.
 
-Of the {{count}} settings {{unmeasured}} are marked "{BY_HAND}": no study tried other values of that one. All of them together
-are judged on generated worlds ([hidden effects](hidden-effects.md)). Numbers that are written inside a function (factors by
-which units are recognised, steps of derivatives) are not listed; plausible ranges of an effect's numbers stand in its own file.
+The values are defined in `bns/diagnose/settings`; this page is made from them by `python -m
+bns.diagnose.settings > docs/settings.md`. `--json` and `to_json()` carry all of them under `provenance`, with
+their digest, here `{{digest}}`. Two results with the same digest were made by the same settings.
+
+Of the {{count}} settings, {{unmeasured}} are marked "{BY_HAND}": no study tried other values of that one alone.
+All of them together are judged on generated worlds ([hidden effects](hidden-effects.md)).
+
+Not listed are numbers inside a function (factors by which units are recognised, steps of derivatives) and the
+plausible ranges of an effect's parameters; those are on the pages of the [effects](gallery/effects.md).
 """
 
 
