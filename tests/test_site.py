@@ -12,8 +12,10 @@ import pytest
 import bns
 from bns.cli.main import _parser
 from bns.physics.effects import all_effects
+from bns.registry import JOINT_EFFECTS
 from site_pages.command_pages import page as command_page
 from site_pages.drives import VALUES, demonstrate, visible_values
+from site_pages.effect_pages import joints
 
 ROOT = Path(__file__).resolve().parent.parent
 FETCHED = {
@@ -79,6 +81,14 @@ def test_every_effect_has_a_page_with_its_picture(site):
         for heading in ("Parameters", "Look-alikes", "Confirm it on the bench"):
             assert f">{heading}<" in page, name
         assert all(f"<code>{p.name}</code>" in page for p in effect.parameters)
+
+
+def test_effects_of_joints_are_listed_with_no_blank_left():
+    text = joints()
+    assert len(JOINT_EFFECTS.names()) > 10
+    for name in JOINT_EFFECTS.names():
+        assert f"| {name} |" in text
+    assert "{" not in text
 
 
 def test_every_public_name_has_its_docstring_on_the_page(site):
