@@ -29,7 +29,7 @@ class _NoRobot:
     """A driver that is never asked to drive."""
 
     def evaluate(self, number: int, controller: np.ndarray) -> Evaluation:
-        raise HardwareError(f"the journal has no evaluation {number}; go on with the trial itself: --resume")
+        raise HardwareError(f"the journal has no evaluation {number}; resume the trial itself: --resume")
 
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         pass

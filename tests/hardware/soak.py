@@ -111,7 +111,7 @@ def judged(seed, results, robot="khepera"):
     again, _ = trial(robot, seed, results, "--resume")
     assert again in {0, 3, 4}
     assert len(past_evaluations(journal)) >= len(kept)
-    return "paused, gone on with"
+    return "paused, resumed"
 
 
 def soak(robot, count, first=0):

@@ -86,9 +86,9 @@ def test_check_names_what_is_not_fit_and_mends_it(bus, capsys):
     assert code == 2
     for what in ("return delay 500 µs", "status return level 1", "angle limits 300 to 1023"):
         assert f"BAD  servo 2: {what}" in said.out
-    assert f"bns servos check --mend --port {port}" in said.out
+    assert f"bns servos check --fix --port {port}" in said.out
     assert servos[0].get("status_return") == 1  # nothing was written
-    code, said = call(capsys, "check", "--mend", "--port", port)
+    code, said = call(capsys, "check", "--fix", "--port", port)
     assert (code, said.out.splitlines()[-1]) == (0, "all fine")
     assert [s.get("return_delay") for s in servos] == [0, 0]
     assert "servo 1: status_return, return_delay, cw_angle_limit written" in said.err
@@ -110,7 +110,7 @@ def test_nobody_and_no_port(bus, capsys):
     assert call(capsys, "check", "--port", port)[0] == 2
     code, said = call(capsys, "scan", "--port", port)
     assert code == 2
-    assert said.out.startswith("nobody answers")
+    assert said.out.startswith("no servo answers")
     code, said = call(capsys, "scan", "--port", "/dev/none")
     assert code == 2
     assert "there is no port /dev/none" in said.err

@@ -25,7 +25,7 @@ RIG = resources.files("bns.hardware") / "rigs" / "khepera.yaml"
 
 WHEELS = Wheels(UNITS_PER_M_S, 1000.0, WHEELBASE_M)
 REPEATS = 1
-"""How often a trial drives its final controller, unless it is told otherwise: the source shows one drive of it (section 4.3)."""
+"""How often a trial drives its final controller by default: the dissertation shows one drive of it (section 4.3)."""
 
 
 def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stopping) -> WheeledPlatform:

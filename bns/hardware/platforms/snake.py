@@ -28,7 +28,7 @@ from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import checked, delay_of, open_tracker
 
 REPEATS = 3
-"""How often a trial drives its final controller, unless it is told otherwise: the source drove it three times (section 5.7)."""
+"""How often a trial drives its final controller by default: the dissertation drove it three times (section 5.7)."""
 RIG = resources.files("bns.hardware") / "rigs" / "snake.yaml"
 
 
