@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +31,10 @@ REPEATED = "repeat-"
 """Before the kinds of events of a controller that is driven once more: they are no evaluation."""
 
 
+Stuck = tuple[str, tuple[tuple[str, int], ...], str]
+"""A drive that could not go on, as in the journal: before the kind of event, its numbers, what was stuck."""
+
+
 @dataclass(frozen=True)
 class _Purpose:
     """What a drive is for: in kinds of events, in text, and in numbers of events."""
@@ -41,7 +45,10 @@ class _Purpose:
 
 
 class TrialDriver:
-    """Implements `bns.trial.background.RobotDriver`. `start` (3,) is where the task, or the next drive, begins."""
+    """Implements `bns.trial.background.RobotDriver`.
+
+    `start` (3,) is where the task, or the next drive, begins; `stuck` are drives of earlier attempts that could not go on.
+    """
 
     def __init__(
         self,
@@ -53,6 +60,7 @@ class TrialDriver:
         log: HardwareLog,
         picture: Path | None = None,
         goals_m: np.ndarray | None = None,
+        stuck: Iterable[Stuck] = (),
     ) -> None:
         self._platform, self._operator, self._rig, self.start = platform, operator, rig, start
         self._clock, self._log = clock, log
@@ -64,6 +72,7 @@ class TrialDriver:
         log.listeners.append(self.underway.heard)
         self.suspended: Callable[[], AbstractContextManager[None]] = nullcontext
         """Entered while somebody is asked: a live view leaves the terminal alone."""
+        self._stuck = set(stuck)
         self.placing_s = 0.0
         self.readings: dict[str, float] = {}
         self.stops_s: list[float] = []
@@ -88,6 +97,11 @@ class TrialDriver:
             self._ready(void)
             self._arm(purpose, controller)
             driven = self._drive(purpose, controller)
+            if driven.stuck and self._stuck_anew(purpose, driven.stuck):
+                self._note(purpose, "discarded", why=driven.ended)
+                self._log.sync()
+                self._operator.place(self.start, driven.ended)
+                continue
             if not len(driven.commands):
                 void += 1
                 self._note(purpose, "discarded", why=driven.ended)
@@ -109,6 +123,15 @@ class TrialDriver:
             self._note(purpose, "discarded", why=decision.answer)
             if decision.answer == "skip":
                 return Evaluation(controller, driven.commands[:0], driven.poses[:0], skipped=True)
+
+    def _stuck_anew(self, purpose: _Purpose, what: str) -> bool:
+        """Whether a controller was stuck there for the first time. At the second it is the controller's: what it did is kept."""
+        cause = (purpose.prefix, tuple(purpose.numbers.items()), what)
+        if cause in self._stuck:
+            return False
+        self._stuck.add(cause)
+        self._note(purpose, "stuck", what=what)
+        return True
 
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         """Note it, durably."""

@@ -22,6 +22,7 @@ from bns.trial.folder import (
     measured,
     measurements_however_it_ends,
     past_evaluations,
+    stuck_before,
 )
 from bns.trial.session import PICTURE, TrialSetup, open_rig
 
@@ -93,6 +94,7 @@ def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journa
     columns = load_robot(how.rig.robot).measured_columns
     done = _driven_before(journal, [commands for commands, _ in trials], how.resume)
     try:
+        stuck = stuck_before(journal)
         with (
             measurements_however_it_ends(journal, columns),
             Stopping() as stopping,
@@ -100,7 +102,7 @@ def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journa
         ):
             picture = journal.with_name(PICTURE)
             driver = TrialDriver(
-                opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log, picture
+                opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log, picture, stuck=stuck
             )
             with live_view(None, now=driver.underway.text) as show:
                 driver.suspended = show.suspended

@@ -17,7 +17,7 @@ from bns.errors import BnsError, HardwareError, StoreError, TrialFileError
 from bns.hardware.hardware_log import events
 from bns.measurements import write_measurements
 from bns.spec import RunSpec
-from bns.trial.driver import REPEATED
+from bns.trial.driver import REPEATED, Stuck
 from bns.trial.evaluation import Evaluation
 
 JOURNAL, MEASUREMENTS, REPEATS = "journal.jsonl", "measurements.csv", "repeats.csv"
@@ -97,6 +97,15 @@ def past_repeats(journal: Path, evaluation: int) -> list[Evaluation]:
         ),
         2,
     )
+
+
+def stuck_before(journal: Path) -> list[Stuck]:
+    """The drives of a journal that were stuck, and where: what is stuck there again is not driven a third time."""
+    found: list[Stuck] = []
+    for event in events(journal, "stuck", REPEATED + "stuck") if journal.exists() else ():
+        numbers = tuple((name, event[name]) for name in ("evaluation", "repeat") if name in event)
+        found.append((event["kind"].removesuffix("stuck"), numbers, event["what"]))
+    return found
 
 
 def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation]:

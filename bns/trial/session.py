@@ -40,6 +40,7 @@ from bns.trial.folder import (
     measurements_however_it_ends,
     robot_stands,
     spec_event,
+    stuck_before,
 )
 from bns.trial.operator import EmulatedHands, Operator, TerminalOperator, UnattendedOperator
 from bns.trial.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
@@ -157,6 +158,7 @@ def _driven(
     started, robot = datetime.now(UTC), load_robot(spec.robot)
     start = on_floor(robot, robot.start_pose())[0]
     try:
+        stuck = stuck_before(folder.journal)
         with (
             measurements_however_it_ends(folder.journal, robot.measured_columns),
             Stopping() as stopping,
@@ -166,7 +168,7 @@ def _driven(
             opened.log.sync()
             goals_m, picture = load_task(spec.robot, spec.task).goals_m, folder.path / PICTURE
             driver = TrialDriver(
-                opened.platform, opened.operator, how.rig, start, opened.clock, opened.log, picture, goals_m
+                opened.platform, opened.operator, how.rig, start, opened.clock, opened.log, picture, goals_m, stuck
             )
             result = _looped(spec, how, driver, past, started, on_evaluation)
             _repeated(spec, how, driver, folder, result)

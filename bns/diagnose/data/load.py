@@ -14,6 +14,7 @@ import pandas as pd
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import Finding, checked
 from bns.diagnose.data.cycles import are_cycles, checked_cycles, cycle_tracks
+from bns.diagnose.data.joints import are_joints, joint_tracks
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.tracker_faults import jumps, without_faults
@@ -93,6 +94,8 @@ def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:
     if are_cycles(table):
         cycles, findings = checked_cycles(table)
         return cycle_tracks(cycles), findings
+    if are_joints(table):
+        return joint_tracks(table)
     usable, findings = checked(table)
     tracks = tracks_of(usable)
     return without_faults(tracks), [*findings, *_jump_findings(tracks, usable)]
