@@ -72,6 +72,9 @@ class Design:
         "samples",
         "Samples of a planned outcome: a probability of 0.9 is then known within 0.007 (standard error).",
     )
+    power_points: int = setting(
+        9, "points", "Of the curve of the chance of a decision against minutes: enough to see where it rises."
+    )
     target_power: float = setting(
         0.9, "1", f"An experiment decides if it does so with this probability: a usual power; {BY_HAND}."
     )
