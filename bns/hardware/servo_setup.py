@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 from bns.errors import HardwareError
 from bns.extras import extra
-from bns.hardware.ax12_table import REGISTERS
 from bns.hardware.clock import Clock
 from bns.hardware.doctor import Finding, latency_of
-from bns.hardware.dynamixel import BAUD
-from bns.hardware.dynamixel_port import ClockedPort
-from bns.hardware.servo_chain import ServoLimits
-from bns.hardware.terminal_error import TerminalError
+from bns.hardware.link.terminal_error import TerminalError
+from bns.hardware.servos.ax12_table import REGISTERS
+from bns.hardware.servos.dynamixel import BAUD
+from bns.hardware.servos.dynamixel_port import ClockedPort
+from bns.hardware.servos.servo_chain import ServoLimits
 
 with extra("robot"):
     from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler

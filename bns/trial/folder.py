@@ -14,7 +14,7 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 from bns.errors import BnsError, HardwareError, StoreError, TrialFileError
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.measurements import write_measurements
 from bns.spec import RunSpec
 from bns.trial.driver import REPEATED, Stuck

@@ -14,7 +14,7 @@ import numpy as np
 from bns.bootstrap.loop import run
 from bns.console import live_view
 from bns.errors import HardwareError
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.robots import load_robot
 from bns.sweep.single_run import keep_run
 from bns.trial.background import BackgroundDriver

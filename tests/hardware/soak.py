@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 from bns.cli.main import main
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.trial.folder import past_evaluations
 
 QUICK = [

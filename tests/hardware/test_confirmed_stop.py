@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.hardware.hardware_log import HardwareLog, events
-from bns.hardware.khepera import KheperaIII, firmware
+from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.platform import Driven
 from bns.hardware.rig import shipped_rig
-from bns.hardware.servo_chain import Health, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
+from bns.hardware.wheels.khepera import KheperaIII, firmware
 from bns.trial.driver import TrialDriver
 from bns.trial.operator import Decision
 

@@ -12,7 +12,7 @@ import pytest
 from bns.cli.main import main
 from bns.errors import StopNotConfirmedError, TrialFileError
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.hardware_log import HardwareLog, events
+from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
 from bns.trial.folder import measurements_however_it_ends, past_evaluations
@@ -83,7 +83,7 @@ def full(monkeypatch):
                 return write(descriptor, data[: len(data) // 2])
             raise OSError(errno.ENOSPC, "No space left on device")
 
-        monkeypatch.setattr("bns.hardware.hardware_log.os.write", half)
+        monkeypatch.setattr("bns.hardware.link.hardware_log.os.write", half)
 
     return fill
 

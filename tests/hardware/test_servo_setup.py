@@ -8,12 +8,12 @@ import pytest
 from bns.cli.main import main
 from bns.errors import HardwareError
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.ax12 import Bus
+from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.servo import Servo
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
-from bns.hardware.emulators.servo import Servo
-from bns.hardware.emulators.terminal import PseudoTerminal
 from bns.hardware.servo_setup import ServoBus, adapter
-from bns.hardware.snake_settings import snake_settings
+from bns.hardware.servos.snake_settings import snake_settings
 
 
 @pytest.fixture

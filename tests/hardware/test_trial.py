@@ -20,7 +20,7 @@ from rich.console import Console
 import bns
 from bns.cli.main import main
 from bns.console import view
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.trial.folder import past_evaluations
 
 from . import soak
@@ -264,7 +264,7 @@ def test_what_calibrating_writes_needs_a_place(capsys, arguments, message):
     assert message in capsys.readouterr().err
 
 
-@pytest.mark.filterwarnings("default::bns.hardware.sealed_lines.LogWarning")
+@pytest.mark.filterwarnings("default::bns.hardware.link.sealed_lines.LogWarning")
 def test_an_edited_journal_is_refused(tmp_path, capsys):
     assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path) == 0
     journal = journal_of(tmp_path)

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Callable, Mapping
 
 from bns.hardware.clock import RealClock
-from bns.hardware.servo_chain import ServoLimits
 from bns.hardware.servo_setup import BAUDS, ServoBus, adapter
+from bns.hardware.servos.servo_chain import ServoLimits
 
 
 def served(options: argparse.Namespace) -> int:

@@ -8,12 +8,12 @@ import numpy as np
 
 from bns.errors import TrialPausedError
 from bns.hardware.agreement import SameScene
-from bns.hardware.ax12_table import RAD_PER_STEP
 from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.safety import OutOfSight, Watch
-from bns.hardware.servo_chain import ServoChain, StrainWatch, StuckServoError
-from bns.hardware.snake_settings import SnakeSettings
+from bns.hardware.servos.ax12_table import RAD_PER_STEP
+from bns.hardware.servos.servo_chain import ServoChain, StrainWatch, StuckServoError
+from bns.hardware.servos.snake_settings import SnakeSettings
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight
 from bns.physics.snake.gait import PARAMETERS, cycle_angles
