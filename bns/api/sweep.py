@@ -13,7 +13,8 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from bns.api.common.shown import Progress, Shown, plain, silent
+from bns.api.common.progress import Progress, silent
+from bns.api.common.shown import Shown, plain
 from bns.errors import SpecError
 from bns.sweep.budget import Budget
 from bns.sweep.confirm import confirmation

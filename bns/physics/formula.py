@@ -105,20 +105,31 @@ def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | N
     return logged, unknown
 
 
-def _parsed(name: str, term: str) -> tuple[set[str], Any]:
+class Compiled:
+    """A checked term, ready to be calculated; pickled as its text."""
+
+    def __init__(self, name: str, term: str) -> None:
+        self._made_of = name, term
+        self.code = compile(checked_formula(f"formula {name}", term, FUNCTIONS), name, "eval")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Compiled, self._made_of
+
+
+def _parsed(name: str, term: str) -> tuple[set[str], Compiled]:
     tree = checked_formula(f"formula {name}", term, FUNCTIONS)
     called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
     names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - called
-    return names, compile(tree, name, "eval")
+    return names, Compiled(name, term)
 
 
-def _apply(name: str, code: Any, on: str, logged: list[str], body: Body, **numbers: float) -> Body:
+def _apply(name: str, code: Compiled, on: str, logged: list[str], body: Body, **numbers: float) -> Body:
     if body.place is None and _needs(code, on):
         return body  # first round of a simulation: nobody knows yet where the robot goes
     values = {**_values(body), **{column: body.logged[column] for column in logged}, **numbers}
     try:
         with np.errstate(all="ignore"):
-            added = np.asarray(eval(code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
+            added = np.asarray(eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
     except (ArithmeticError, TypeError, ValueError) as fault:  # of numbers that are fitted: k / (k - k), (-k)**0.5
         raise ModelError(f"formula {name} cannot be calculated with {numbers}: {fault}. Write it in another way.") from fault
     if added.dtype.kind == "c":
@@ -135,8 +146,8 @@ def _apply(name: str, code: Any, on: str, logged: list[str], body: Body, **numbe
     return body.with_drift(on, added, body.place[..., 2])
 
 
-def _needs(code: Any, on: str) -> bool:
-    return on in {"east", "north"} or bool(_PLACE & set(code.co_names))
+def _needs(code: Compiled, on: str) -> bool:
+    return on in {"east", "north"} or bool(_PLACE & set(code.code.co_names))
 
 
 def _values(body: Body) -> dict[str, Array]:

@@ -15,7 +15,6 @@ from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, ties_of
 from bns.physics.decoys import DECOYS
-from bns.physics.effects import all_effects
 
 _VERDICTS = {
     "none": "Nothing is missing that these measurements could show.",
@@ -71,8 +70,8 @@ def _intervals(fit: Fit, *, equations: bool = False) -> Iterator[str]:
         for name, n in numbers.items():
             if n["low"] is not None and n["high"] is not None:
                 yield f"  {effect}: {name} = {n['value']:.5g} {n['unit']} (95 %: {n['low']:.5g} to {n['high']:.5g})"
-        if equations and effect in all_effects():
-            yield f"    {all_effects()[effect].equation}"
+        if equations and effect in fit.model.catalogue():
+            yield f"    {fit.model.catalogue()[effect].equation}"
 
 
 def _errors(errors: PairedErrors | None) -> Iterator[str]:
