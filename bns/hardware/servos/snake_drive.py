@@ -20,8 +20,8 @@ from bns.physics.snake.gait import PARAMETERS, cycle_angles
 
 _TICK_S = 0.15
 _STRAIGHTENING_RAD_S = 0.5
-_FROZEN_RAD = 0.35
-"""Joints that turn so far move the ends of the body by centimetres."""
+_FROZEN_RAD = 0.8
+"""Joints that turn so far move an end of the body: in the model, by 3 mm after 0.42 rad at most. A camera adds its delay."""
 _MARKERS = ("yellow", "green")
 _PLACES = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
 _NOTHING = dict.fromkeys(("cycle", *PARAMETERS, "stable"), math.nan)
