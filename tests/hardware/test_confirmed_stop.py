@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bns.hardware.reply_time import ReplyTime
 
 from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.platform import Driven
-from bns.hardware.reply_time import ReplyTime
 from bns.hardware.rig import shipped_rig
 from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
