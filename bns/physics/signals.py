@@ -92,6 +92,10 @@ class Body:
     session_s: Array
     place: Array | None = None
     """Where the robot is in each step, (batch, steps, 3): x_m, y_m, heading_rad; None while nobody knows."""
+    wheelbase_m: float = 1.0
+    """Of the wheels as they drive, effects on it included."""
+    step_s: Array | None = None
+    """How long each step lasts, (batch, steps)."""
 
     def with_added(self, velocity: str, values: Array) -> Body:
         """Something added to the velocity of that name."""

@@ -12,4 +12,4 @@ from bns.physics.model import Model
 def problem_for(predictor: Predictor, model: Model, start: Array | None = None) -> Problem:
     """The problem of fitting models like this one: its noise is estimated under it."""
     steps = predictor.steps(model)
-    return Problem(predictor, filter_for(predictor, steps, estimate_noise(predictor, steps, start)))
+    return Problem(predictor, filter_for(predictor, steps, estimate_noise(predictor, steps, start)), predictor.counted)
