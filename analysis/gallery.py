@@ -11,7 +11,7 @@ from typing import Any
 from analysis.labels import source_position
 from analysis.publish import captions
 from bns.plotting.style import COLUMN_IN, PAGE_IN
-from bns.store.files import publish
+from bns.store.disk.files import publish
 
 STYLE_SHEET = Path(__file__).with_name("page.css")
 FIRST = "findings"

@@ -12,7 +12,7 @@ import pandas as pd
 from analysis.figure_result import FigureResult
 from analysis.results import Results, among
 from bns.plotting.style import save
-from bns.store.files import publish, remove
+from bns.store.disk.files import publish, remove
 
 KINDS = ("png", "svg", "csv", "json")
 

@@ -15,7 +15,7 @@ from analysis.labels import CELL
 from bns import store as results_store
 from bns.errors import BnsError, SpecError, StoreError
 from bns.spec import FIELDS
-from bns.sweep.grid import parse_sweep
+from bns.sweep.expand.grid import parse_sweep
 
 BEGIN = "make sweep-khepera BUDGET=10m"
 OF_RUNS = ("runs", "evals", "paths", "generations", "probes")

@@ -40,10 +40,11 @@ if TYPE_CHECKING:
         SpecError,
         StopNotConfirmedError,
         StoreError,
+        TrialFileError,
         TrialPausedError,
     )
     from bns.physics.effect import Effect, Parameter
-    from bns.store.reader import load, query
+    from bns.store.read.reader import load, query
 
 __version__ = "0.2.0"
 
@@ -70,6 +71,7 @@ __all__ = [
     "StoreError",
     "Sweep",
     "SweepResult",
+    "TrialFileError",
     "TrialPausedError",
     "TrialResult",
     "__version__",
@@ -101,10 +103,10 @@ _HOMES = {
     "app.explore": ("Explorer", "explore"),
     "errors": (
         *("BnsError", "ClusterError", "DataError", "DeviceError", "HardwareError", "ModelError", "SpecError"),
-        *("StopNotConfirmedError", "StoreError", "TrialPausedError"),
+        *("StopNotConfirmedError", "StoreError", "TrialFileError", "TrialPausedError"),
     ),
     "physics.effect": ("Effect", "Parameter"),
-    "store.reader": ("load", "query"),
+    "store.read.reader": ("load", "query"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 _CALLABLE_ROOMS = ("diagnose", "trial")

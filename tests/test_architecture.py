@@ -140,7 +140,7 @@ def test_the_package_does_not_import_its_tests():
 @pytest.mark.parametrize(
     ("source", "rooms"),
     [
-        ("import bns.store.reader", ["store"]),
+        ("import bns.store.read.reader", ["store"]),
         ("def f():\n    from bns.sweep import runner", ["sweep"]),
         ("from bns import bootstrap, errors", ["bootstrap", "errors"]),
         ("from ..store.reader import load", ["store"]),

@@ -10,11 +10,11 @@ import pytest
 
 import bns as package
 from bns.cli.main import main
-from bns.cli.option_types import duration
+from bns.cli.options.option_types import duration
 from bns.errors import BnsError
 from bns.robots.simulator import load_static_simulator
-from bns.sweep.executor import SerialExecutor
-from bns.sweep.grid import load_sweep
+from bns.sweep.expand.grid import load_sweep
+from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.runner import run_sweep
 
 QUICK = ["--evaluations", "2", "--population-size", "20", "--generations-per-evaluation", "2",

@@ -13,9 +13,9 @@ import yaml
 from store.synthetic import record
 
 import bns as package
-from bns.cli import watch as watching
+from bns.cli.commands import watch as watching
 from bns.cli.main import _parser, main
-from bns.cli.option_types import as_json
+from bns.cli.options.option_types import as_json
 from bns.diagnose.data.load import load_measured
 from bns.errors import SpecError
 from bns.examples import FILES
@@ -23,7 +23,7 @@ from bns.physics.effects import all_effects
 from bns.plotting import scripts
 from bns.spec import RunSpec
 from bns.store import Writer
-from bns.sweep.grid import load_sweep
+from bns.sweep.expand.grid import load_sweep
 from tests.sample_log import LOG, WORLD, written
 
 SWEEPS = Path(__file__).resolve().parent.parent / "sweeps"

@@ -35,7 +35,7 @@ for module in pkgutil.walk_packages(bns.__path__, "bns."):
     if not module.name.endswith("__main__"):
         importlib.import_module(module.name)
         imported += 1
-from bns.store import shared
+from bns.store.disk import shared
 from bns.hardware.terminal_error import TerminalError
 assert shared.fcntl is None and TerminalError is OSError, "the block has no effect"
 print(imported)

@@ -9,12 +9,12 @@ import pytest
 
 from bns.api.add import add
 from bns.cli.main import main
-from bns.cli.option_types import interval
+from bns.cli.options.option_types import interval
 from bns.diagnose.data.checks import checked, rows_by_trial
 from bns.diagnose.data.load import load_measured, measured_table
 from bns.errors import ClusterError, DataError, ModelError, StoreError
 from bns.store import Writer, query
-from bns.sweep.dask_link import DaskLink
+from bns.sweep.jobs.dask_link import DaskLink
 from tests.store.synthetic import records
 
 HEAD = "trial,t_s,left_m_s,right_m_s,x_m,y_m,heading_rad\n"

@@ -88,7 +88,7 @@ def test_the_metadata_say_what_is_needed_and_where_it_runs(built):
         [name] = [name for name in file.namelist() if name.endswith(".dist-info/METADATA")]
         said = message_from_string(file.read(name).decode())
         [entry] = [name for name in file.namelist() if name.endswith("entry_points.txt")]
-        assert "bns = bns.cli.main:main" in file.read(entry).decode()
+        assert "bns = bns.__main__:main" in file.read(entry).decode()
     assert said["Version"] == bns.__version__ == "0.2.0"
     assert said["License-Expression"] == "MIT"
     assert said["Author"]
@@ -116,7 +116,7 @@ def test_each_library_that_an_error_names_comes_with_its_extra():
     [
         ("import bns; print(bns.__file__)", "{place}/bns/__init__.py"),
         ("from bns.plotting.scripts import scripts; print(scripts())", "{place}/bns/_shipped"),
-        ("from bns.sweep.grid import load_sweep; print(load_sweep('khepera').total)", "45000"),
+        ("from bns.sweep.expand.grid import load_sweep; print(load_sweep('khepera').total)", "45000"),
         ("from bns.tasks import task_names; print(*task_names('snake'))", "three-regions two-regions"),
         ("from bns.robots.simulator import load_static_simulator as f; print(len(f('snake').networks) > 0)", "True"),
         ("from bns.examples import copy_example as f; print(len(f('new')))", "5"),

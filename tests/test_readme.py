@@ -8,8 +8,8 @@ import pytest
 
 import bns as package
 from bns.cli.main import _parser, main
-from bns.sweep.grid import load_sweep, parse_sweep
-from bns.sweep.order import ordered_specs
+from bns.sweep.expand.grid import load_sweep, parse_sweep
+from bns.sweep.expand.order import ordered_specs
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text()

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from store.synthetic import record
 
-from bns.cli import watch as watching
-from bns.cli.watch import trace, watch
+from bns.cli.commands import watch as watching
+from bns.cli.commands.watch import trace, watch
 from bns.errors import BnsError
 from bns.spec import RunSpec
 from bns.store import Writer

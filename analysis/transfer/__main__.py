@@ -12,7 +12,7 @@ from analysis.transfer.drives import described, summary, transferred
 from analysis.transfer.figure import transfer_figure
 from bns.errors import BnsError
 from bns.robots import load_robot
-from bns.store.files import publish
+from bns.store.disk.files import publish
 from bns.worlds import build_world
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
@@ -96,7 +96,8 @@ def add(
         log: a file, a table, or `bns.Measurements`.
         effects: names of listed effects (`bns.effects`), Python files with an ``EFFECT``, `bns.Effect`, or several of these.
         model: `bns.Model`, or the name or file of one.
-        term: makes the one name given a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w, s, east or north.
+        term: makes the one name given a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w, s, east or north. It may
+            use the log's further columns by name (docs/formulas.md).
         per_trial: an effect that may differ from trial to trial (clock-offset) has a value of its own in each.
         progress: told what is being done.
 
@@ -110,12 +111,12 @@ def add(
     if term is not None and len(wanted) != 1:
         names = ", ".join(map(_name, wanted))
         raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
-    chosen = [_effect(each, term, on) for each in wanted]
+    ready = prepared(log, model)
+    chosen = [_effect(each, term, on, ready.predictor.tracks.extra) for each in wanted]
     given = [effect.name for effect, _ in chosen]
     twice = next((name for name in given if given.count(name) > 1), None)
     if twice is not None:
         raise ModelError(f"{twice} is given {given.count(twice)} times; a model has each effect once: leave the others out.")
-    ready = prepared(log, model)
     ticks(progress)("fitting")
     return added(ready, chosen, per_trial)
 
@@ -130,8 +131,8 @@ def added(
     return AddResult(ready, add_effects(ready.predictor, ready.model, effects, ready.measured, per_trial, memory))
 
 
-def _effect(wanted: Wanted, term: str | None, on: str) -> tuple[Effect, Mapping[str, str]]:
-    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), term, on)
+def _effect(wanted: Wanted, term: str | None, on: str, columns: Iterable[str]) -> tuple[Effect, Mapping[str, str]]:
+    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), term, on, columns)
 
 
 def _name(wanted: Wanted) -> str:

@@ -40,7 +40,7 @@ class Model(physics.Model):
 
         ModelError unless the name ends in .yaml or .yml.
         """
-        from bns.store.files import publish  # noqa: PLC0415  # a model that is not saved needs no store
+        from bns.store.disk.files import publish  # noqa: PLC0415  # a model that is not saved needs no store
 
         target = checked_target(Path(path))
         publish(self.to_yaml().encode(), target.with_name(f".{target.name}.part"), target)

@@ -25,7 +25,7 @@ from bns.diagnose.report.proposal_figure import trial_axes
 from bns.diagnose.report.proposal_text import proposal_text
 from bns.errors import DataError
 from bns.physics.effect import Effect
-from bns.store.files import publish
+from bns.store.disk.files import publish
 
 MOST_MINUTES = 600.0
 
@@ -89,7 +89,7 @@ def propose(
     model: Given,
     *,
     minutes: float = 10.0,
-    arena: tuple[float, float] | None = None,
+    arena: tuple[float, ...] | None = None,
     start: tuple[float, float, float] | None = None,
     speeds: tuple[float, float] | None = None,
     also: Iterable[Effect | str | PathLike[str]] = (),
@@ -101,7 +101,8 @@ def propose(
         log: a file, a table, or `bns.Measurements`.
         model: `bns.Model`, or the name or file of one.
         minutes: of driving, above 0 and at most 600.
-        arena: width and height (m) of where the robot may be; by default where it was seen.
+        arena: where the robot may be: (width, height) in m around the start, or (lowest x, highest x, lowest y, highest y) in m;
+            by default where it was seen.
         start: x_m, y_m (m) and heading_rad (rad, counter-clockwise from x) of the start of every trial; by default as before.
         speeds: lowest and highest of a wheel (m/s); by default the robot's own and those seen.
         also: effects of your own, tried beside the listed ones.
@@ -119,7 +120,7 @@ def proposed(
     found: DiagnoseResult,
     *,
     minutes: float = 10.0,
-    arena: tuple[float, float] | None = None,
+    arena: tuple[float, ...] | None = None,
     start: tuple[float, float, float] | None = None,
     speeds: tuple[float, float] | None = None,
     progress: Progress | None = None,

@@ -16,7 +16,7 @@ from bns.api.model import Given
 from bns.api.propose import checked_minutes, checked_output, proposed
 from bns.diagnose.report.page import gathered, report_html
 from bns.physics.effect import Effect
-from bns.store.files import publish
+from bns.store.disk.files import publish
 
 
 @dataclass(frozen=True, repr=False)

@@ -24,7 +24,7 @@ from bns.plotting.style import COLUMN_IN, path_axes, path_figure
 from bns.robots import load_robot
 from bns.robots.simulator import StaticSimulator, check_writable, save_simulator
 from bns.spec import FIELDS, RADII_CM, RunSpec
-from bns.sweep import memory
+from bns.sweep.jobs import memory
 from bns.sweep.single_run import check_keepable, keep_run
 from bns.tasks import default_task, load_task
 from bns.worlds import build_world

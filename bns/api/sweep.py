@@ -18,14 +18,14 @@ from bns.errors import SpecError
 from bns.sweep.budget import Budget
 from bns.sweep.confirm import confirmation
 from bns.sweep.executors import load_executor
-from bns.sweep.grid import Sweep as Described
-from bns.sweep.grid import load_sweep, parse_sweep
-from bns.sweep.plan import Plan
-from bns.sweep.plan import plan as foretell
+from bns.sweep.expand.grid import Sweep as Described
+from bns.sweep.expand.grid import load_sweep, parse_sweep
+from bns.sweep.expand.shard import Shard
+from bns.sweep.forecast.plan import Plan
+from bns.sweep.forecast.plan import plan as foretell
 from bns.sweep.report import planned, summed_up
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
-from bns.sweep.shard import Shard
 from bns.sweep.status import SweepRow, sweep_status
 
 _Path = str | PathLike[str]
@@ -52,7 +52,7 @@ class SweepResult(Shown):
 
     def load(self, table: str = "evals") -> pd.DataFrame:
         """The rows of this sweep, as `bns.load` gives them."""
-        from bns.store.reader import load  # noqa: PLC0415  # only who looks waits for the reader
+        from bns.store.read.reader import load  # noqa: PLC0415  # only who looks waits for the reader
 
         return load(self.results, table, where={"sweep": self.counts.sweep})
 

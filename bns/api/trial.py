@@ -99,6 +99,7 @@ def trial(
     Raises:
         HardwareError: a port, robot, camera or plan that cannot be used; nothing has moved.
         TrialPausedError: stopped with the robot confirmed still; ``resume=True`` goes on.
+        TrialFileError: a file could not be written; the robot stands, ``resume=True`` goes on.
         StopNotConfirmedError: the robot may still be moving.
         SpecError: a parameter that there is none of, or whose value is not allowed.
     """

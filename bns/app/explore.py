@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import threading
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from bns.api.diagnose import DiagnoseResult
 from bns.api.measurements import Log
 from bns.api.model import Given
 from bns.app.background import Background
+from bns.app.session import is_session, opened
 from bns.app.tab import FIRST_MODEL, Tab, Tabs
 from bns.extras import require
 
@@ -20,7 +22,7 @@ class Explorer:
     def __init__(self, tabs: Tabs, port: int = 0) -> None:
         require("app", "panel", "bokeh")
         from bns.app.page import page  # noqa: PLC0415  # needs Panel
-        from bns.app.server import PageServer  # noqa: PLC0415
+        from bns.app.web.server import PageServer  # noqa: PLC0415
 
         self._server = PageServer(lambda: page(tabs), port)  # Panel would show a partial, not call it
         self.address = self._server.address
@@ -55,7 +57,7 @@ def explore(
     """Open the page and go on; ``.stop()`` ends it.
 
     Args:
-        log: measurements, or what `bns.diagnose` found; without any, the page offers sample logs.
+        log: measurements, what `bns.diagnose` found, or the file of a saved session; without any, the page offers sample logs.
         model: `bns.Model`, or the name or file of one; a diagnosis brings its own.
         port: of this machine, by default any that is free.
         browser: open it in the user's browser.
@@ -71,6 +73,8 @@ def tabs_of(
     log: Log | DiagnoseResult | None, model: Given, data_words: str = "", model_words: tuple[str, ...] = ()
 ) -> Tabs:
     """What every tab begins with."""
+    if isinstance(log, str | PathLike) and is_session(Path(log)):
+        return Tabs(opened(Path(log)))
     first, kept = Tab(), None
     if isinstance(log, DiagnoseResult):
         kept, model, log = Background(log), log.ready.model, log.ready.log

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bns.approaches.base import Approach, Setting
+from bns.approaches.parts.base import Approach, Setting
 from bns.engine.philox import Key
 from bns.errors import SpecError
 from bns.options import OPTION_MARK, parsed_options

@@ -21,9 +21,9 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import least_squares
 
-from bns.approaches.base import Option, Options, Setting
-from bns.approaches.physical import Physical
-from bns.approaches.physics_models import Drives, ModelSpace
+from bns.approaches.parts.base import Option, Options, Setting
+from bns.approaches.parts.physical import Physical
+from bns.approaches.parts.physics_models import Drives, ModelSpace
 from bns.bootstrap.simulators import PhysicsSimulator
 from bns.engine.evolution import Population
 from bns.engine.philox import Purpose

@@ -18,10 +18,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from bns.approaches.base import Option, Options, Setting
-from bns.approaches.model_population import ModelPopulation
-from bns.approaches.physical import Physical
-from bns.approaches.physics_models import ModelSpace
+from bns.approaches.parts.base import Option, Options, Setting
+from bns.approaches.parts.model_population import ModelPopulation
+from bns.approaches.parts.physical import Physical
+from bns.approaches.parts.physics_models import ModelSpace
 from bns.physics.model import Model
 from bns.robots.base import TwoWheeled
 

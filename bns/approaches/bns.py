@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bns.approaches.neuro_simulation import NeuroSimulation
+from bns.approaches.parts.neuro_simulation import NeuroSimulation
 
 
 class BootstrappedNeuroSimulation(NeuroSimulation):

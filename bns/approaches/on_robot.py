@@ -18,9 +18,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from bns.approaches.base import Option, Options, Setting
-from bns.approaches.evolving import Evolving
-from bns.approaches.robot_evolution import RobotEvolution
+from bns.approaches.parts.base import Option, Options, Setting
+from bns.approaches.parts.evolving import Evolving
+from bns.approaches.parts.robot_evolution import RobotEvolution
 from bns.bootstrap.simulators import NoSimulator
 
 

@@ -20,8 +20,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from bns.approaches.base import Option, Options, Setting
-from bns.approaches.neuro_simulation import NeuroSimulation
+from bns.approaches.parts.base import Option, Options, Setting
+from bns.approaches.parts.neuro_simulation import NeuroSimulation
 from bns.bootstrap.trainer import Trainer
 
 MOST_ROUNDS = 25

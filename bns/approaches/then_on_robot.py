@@ -16,9 +16,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from bns.approaches.base import Option, Options
+from bns.approaches.parts.base import Option, Options
+from bns.approaches.parts.robot_evolution import RobotEvolution
 from bns.approaches.precomputed import Precomputed
-from bns.approaches.robot_evolution import RobotEvolution
 from bns.bootstrap.simulators import NoSimulator
 from bns.engine.evolution import Population
 

@@ -22,10 +22,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from bns.approaches.base import Option, Options, Setting
-from bns.approaches.pareto import ParetoEvolver
-from bns.approaches.physical import Physical
-from bns.approaches.physics_models import ModelSpace
+from bns.approaches.parts.base import Option, Options, Setting
+from bns.approaches.parts.pareto import ParetoEvolver
+from bns.approaches.parts.physical import Physical
+from bns.approaches.parts.physics_models import ModelSpace
 from bns.bootstrap.simulators import PhysicsSimulator
 from bns.robots.base import TwoWheeled
 

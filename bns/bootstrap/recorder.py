@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.approaches.base import Approach
+from bns.approaches.parts.base import Approach
 from bns.bootstrap.driver import Drive
 from bns.bootstrap.simulators import Simulator
 from bns.engine.evolution import Population

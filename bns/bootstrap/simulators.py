@@ -9,8 +9,8 @@ import numpy as np
 
 from bns.engine.evolution import Population
 from bns.engine.snn import predict
-from bns.physics.differential_drive import simulate
 from bns.physics.model import Model
+from bns.physics.wheels.differential_drive import simulate
 from bns.robots.base import RandomStream, Robot, Scores, TwoWheeled
 from bns.tasks import Task
 

@@ -11,31 +11,31 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bns import __version__
-from bns.cli import calibrate as calibrating
-from bns.cli import diagnose as measuring
-from bns.cli import examples as listing
-from bns.cli import explore as exploring
-from bns.cli import report as reporting
-from bns.cli import results as looking
-from bns.cli import simulators as simulating
-from bns.cli import sweep as sweeping
+from bns.cli.commands import calibrate as calibrating
+from bns.cli.commands import diagnose as measuring
+from bns.cli.commands import examples as listing
+from bns.cli.commands import explore as exploring
+from bns.cli.commands import report as reporting
+from bns.cli.commands import results as looking
+from bns.cli.commands import simulators as simulating
+from bns.cli.commands import sweep as sweeping
 from bns.cli.compiling import say_if_compiling
-from bns.cli.option_types import add_spec_options, duration, positive
+from bns.cli.options.option_types import add_spec_options, duration, positive
+from bns.cli.options.sweep_options import DEVICES
+from bns.cli.options.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.cli.parser import SHELLS, Completion, Parser, add_results, add_trust, take_trust
-from bns.cli.sweep_options import DEVICES
-from bns.cli.trial_options import add_looking_options, add_servo_options, add_trial_options
+from bns.cli.streams import usable_streams
 from bns.errors import BnsError
 from bns.spec import FIELDS, RunSpec
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _NO_PLACE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.EACCES, errno.EPERM, errno.EROFS}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of ``bns``. Exit codes: 0 done, 1 some runs failed, 2 bad input, 130 interrupted, 143 terminated."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by whoever called
-            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115  # for the life of the process
+    usable_streams()
     warnings.showwarning = _show_warning
     options = _parser().parse_args(arguments)
     try:
@@ -54,9 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("bns: out of memory; use a smaller population or fewer jobs", file=sys.stderr)
         return BnsError.exit_code
     except OSError as error:
-        if error.errno == errno.ENOSPC:
+        if error.errno in _FULL:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            print(f"bns: cannot write the output: {error.strerror}", file=sys.stderr)
+            print(f"bns: cannot write {error.filename or 'the output'}: {error.strerror}", file=sys.stderr)
         elif error.errno in _NO_PLACE and error.filename is not None:
             print(
                 f"bns: cannot use {error.filename}: {error.strerror}. Name another place, or mend that one.",
@@ -146,7 +146,7 @@ def _add_single_runs(command: measuring.Adder) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """One run by hand: live view, rows in the store, figure of the path."""
-    from bns.cli.run import run_by_hand
+    from bns.cli.commands.run import run_by_hand
     from bns.robots import load_robot
     from bns.tasks import default_task
 
@@ -160,12 +160,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def trial(options: argparse.Namespace) -> int:
-    """A run whose world is a robot; codes 0 done, 2 bad input, 3 paused, 4 a robot that may still be moving."""
+    """A run whose world is a robot; codes 0 done, 2 bad input, 3 paused, 4 it may still be moving, 5 a file cannot be written."""
     from bns.extras import require
 
     if options.replay is None:
         require("robot", "serial", "dynamixel_sdk", "cv2")
-    from bns.cli.trial import carried_out
+    from bns.cli.commands.trial import carried_out
 
     say_if_compiling()
     print(carried_out(options, {name: getattr(options, name) for name in FIELDS if name != "world"}))
@@ -174,7 +174,7 @@ def trial(options: argparse.Namespace) -> int:
 
 def calibrate(options: argparse.Namespace) -> int:
     """Print the board, or find the lens and the floor of a camera."""
-    from bns.cli.camera import calibrated
+    from bns.cli.commands.camera import calibrated
 
     print(calibrated(options))
     return 0
@@ -182,7 +182,7 @@ def calibrate(options: argparse.Namespace) -> int:
 
 def track(options: argparse.Namespace) -> int:
     """Poses, one a line, and annotated frames."""
-    from bns.cli.camera import tracked
+    from bns.cli.commands.camera import tracked
 
     print(tracked(options))
     return 0
@@ -190,14 +190,14 @@ def track(options: argparse.Namespace) -> int:
 
 def doctor(options: argparse.Namespace) -> int:
     """What is fine and what is not; 2 if something is to be mended."""
-    from bns.cli.doctor import checked_up
+    from bns.cli.commands.doctor import checked_up
 
     return checked_up(options)
 
 
 def servos(options: argparse.Namespace) -> int:
     """Set up servos."""
-    from bns.cli.servos import served
+    from bns.cli.commands.servos import served
 
     return served(options)
 

@@ -21,14 +21,15 @@ class Kernels:
     def __init__(self, robot: Any, name: str) -> None:
         load = import_module
         self.cuda = load("numba.cuda")
-        own, training = load(f"bns.cuda.robots.{name}"), load("bns.cuda.training")
-        evolution, measuring, networks = load("bns.cuda.evolution"), load("bns.cuda.measuring"), len(robot.networks)
+        own, training = load(f"bns.cuda.robots.{name}"), load("bns.cuda.on_device.training")
+        evolution, measuring = load("bns.cuda.on_device.evolution"), load("bns.cuda.on_device.measuring")
+        networks = len(robot.networks)
         squashed = robot.sigmoid_output
         self.train = training.training_kernel(robot.hidden, squashed, robot.repeats_inputs)
         self.restart, self.warp = training.restart, training.WARP
-        self.merge = load("bns.cuda.merging").merge
+        self.merge = load("bns.cuda.on_device.merging").merge
         self.evolve = evolution.evolution_kernel(own, networks, robot.hidden)
         self.measure = measuring.measuring_kernel(robot.bounds, networks, robot.hidden, squashed)
         self.drive, self.driven, self.measured = own.drive, own.DRIVEN, measuring.MEASURED
         self.driving_grid, self.steps = own.driving_grid, own.STEPS
-        self.evals_of = load("bns.cuda.rows").evals_of
+        self.evals_of = load("bns.cuda.on_device.rows").evals_of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -54,10 +54,12 @@ Memory = dict[tuple[str, bool, frozenset[Effect]], tuple[Judged, Fit]]
 """Fits by what they are of: the model as given, whether clocks are each trial's own, the effects added."""
 
 
-def effect_from(text: str, term: str | None = None, on: str | None = None) -> tuple[Effect, dict[str, str]]:
-    """The effect of a name, a Python file, or a formula; and how a model file says so."""
+def effect_from(
+    text: str, term: str | None = None, on: str | None = None, columns: Iterable[str] = ()
+) -> tuple[Effect, dict[str, str]]:
+    """The effect of a name, a Python file, or a formula, which may use ``columns`` of the log; and how a model file says so."""
     if term is not None:
-        return formula_effect(text, term, on or "v"), {"term": term, "on": on or "v"}
+        return formula_effect(text, term, on or "v", columns), {"term": term, "on": on or "v"}
     if text.endswith(".py"):
         return effect_in_file(Path(text)), {"file": str(Path(text).resolve())}
     return effect_named(text), {}
@@ -191,7 +193,7 @@ def _with_interval(fit: Fit, active: ActiveEffect, reason: str) -> ActiveEffect:
 
 def model_yaml(model: Model) -> str:
     """A model as the text of a YAML file that `load_model` reads back."""
-    tree: dict[str, Any] = {"base": model.base, "wheelbase_m": model.wheelbase_m, "dt_s": model.dt_s}
+    tree: dict[str, Any] = model.written_base()
     if model.jitter_relative:
         tree["jitter"] = {
             "wheel_speed_relative": model.jitter_relative,

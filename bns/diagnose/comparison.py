@@ -142,7 +142,7 @@ def _worst(predictor: Predictor, errors: Errors, most: int = 5) -> list[Moment]:
             out.append(
                 Moment(
                     tracks.names[trial],
-                    float(tracks.t_s[errors.start[i]]),
+                    float(tracks.own_s[errors.start[i]]),
                     float(errors.position_m[i]),
                     float(errors.heading_rad[i]),
                 )

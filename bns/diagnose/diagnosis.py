@@ -255,7 +255,8 @@ def _established(selection: SelectionResult, predictor: Predictor, rest: Unexpla
 
     Single relative motions are calibrated with all numbers free instead (`calibrated`).
     """
-    if selection.fit.model.per_trial_effect is not None or predictor.tracks.relative:
+    wheeled = isinstance(predictor, WheelPredictor)
+    if not wheeled or selection.fit.model.per_trial_effect is not None or predictor.tracks.relative:
         return None
     if not rest.any and not left_over(selection.problem, selection.fit):
         return None

@@ -14,6 +14,8 @@ from bns.physics.signals import Wheels
 
 STAGES = ("wheel", "body", "world", "clock", "measure")
 """In the order in which they act; `bns.physics.signals` says what each one passes on."""
+JOINTED_STAGES = ("mechanics", "sight")
+"""Of bodies on joints: what they are, and what a camera makes of them (`bns.physics.jointed.plant`)."""
 
 
 NEEDS = ("", "track", "motions")
@@ -104,7 +106,7 @@ class Effect:
 
     def __post_init__(self) -> None:
         for kind, given, valid in (
-            ("stage of an effect", self.stage, STAGES),
+            ("stage of an effect", self.stage, (*STAGES, *JOINTED_STAGES)),
             ("place of an effect", self.after, ORDER),
             ("need of an effect", self.needs, NEEDS),
         ):
@@ -142,7 +144,7 @@ class Effect:
     @property
     def of_measuring(self) -> bool:
         """Is it a fault of the measuring, not of the robot?"""
-        return self.stage in {"clock", "measure"}
+        return self.stage in {"clock", "sight", "measure"}
 
     @property
     def neutral(self) -> dict[str, float]:

@@ -1,9 +1,14 @@
-"""An effect written as a formula, by people who would rather not write Python: ``term: k * v * abs(w)``, ``on: v``."""
+"""An effect written as a formula, by people who would rather not write Python: ``term: k * v * abs(w)``, ``on: v``.
+
+A name in it is one of `VARIABLES`, a column of the log, or a number to fit, which is a letter, perhaps with digits (k, a, b2),
+or begins with ``k_``. Any other name is an error: a misspelt column must not become a number.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -13,8 +18,8 @@ from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, Parameter
 from bns.physics.formula_check import checked_formula
 from bns.physics.order import FORMULAS
-from bns.physics.scans import first_order, reversed_since, trailing
 from bns.physics.signals import CREEP_M_S, Array, Body
+from bns.physics.wheels.scans import first_order, reversed_since, trailing
 
 SHARE, WHEELS = "share", "wheels"
 ON: Mapping[str, str] = {
@@ -64,17 +69,28 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "round": np.round,
 }
 _PLACE = {"x", "y", "heading"}
+_NUMBER = re.compile(r"[A-Za-z]\d*|k_\w+")
 
 
-def formula_effect(name: str, term: str, on: str) -> Effect:
-    """The effect that adds ``term`` to the velocity ``on``; names that are no variable are its parameters.
+def formula_effect(
+    name: str, term: str, on: str, columns: Iterable[str] = (), numbers: Iterable[str] | None = None
+) -> Effect:
+    """The effect that adds ``term`` to the velocity ``on``.
 
-    ModelError if the term does not parse, uses anything but arithmetic, `FUNCTIONS` and `VARIABLES`, or has no parameter.
+    Args:
+        columns: names of the log's further columns, which the term may use.
+        numbers: names of its numbers where a model file lists them; all names that are neither these nor could be numbers are
+            columns then, to be found in whatever log the model is held against.
+
+    Raises:
+        ModelError: the term does not parse, uses anything but arithmetic, `FUNCTIONS` and names, has an unknown name (the message
+            lists all that there are) or no number to fit.
     """
     if on not in ON:
         raise ModelError(f"formula {name}: " + unknown_name("velocity to add to (on)", on, ON))
     names, code = _parsed(name, term)
-    unknown = sorted(names - set(VARIABLES) - (set(OF_A_WHEEL) if on == WHEELS else set()))
+    known = set(VARIABLES) | (set(OF_A_WHEEL) if on == WHEELS else set())
+    logged, unknown = _sorted(name, names - known, set(columns), None if numbers is None else set(numbers))
     if not unknown:
         raise ModelError(f"formula {name}: {term!r} has no number to fit; multiply it by one, as in k * ({term}).")
     return Effect(
@@ -87,7 +103,7 @@ def formula_effect(name: str, term: str, on: str) -> Effect:
         equation=f"{on}' = {on} + {term}",
         residuals="as the formula says",
         lookalikes=(),
-        apply=partial(_apply, name, code, on),
+        apply=partial(_apply, name, code, on, logged),
         after=FORMULAS,
         needs_place=bool(names & _PLACE) or on in {"east", "north"},
     )
@@ -102,6 +118,24 @@ def value_of(term: str, names: Mapping[str, Any]) -> Array:
         )  # checked by _parsed
 
 
+def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | None) -> tuple[list[str], list[str]]:
+    """Columns of the log and numbers to fit among the names that are no variables, in order."""
+    logged, unknown = [], []
+    for one in sorted(names):
+        if numbers is not None and one in numbers:
+            unknown.append(one)
+        elif one in columns:
+            logged.append(one)
+        elif _NUMBER.fullmatch(one):
+            unknown.append(one)
+        elif numbers is not None:
+            logged.append(one)
+        else:
+            known = unknown_name("name", one, [*VARIABLES, *columns])
+            raise ModelError(f"formula {name}: {known} A number to fit is a letter (k, a, b2) or begins with k_ (k_drag).")
+    return logged, unknown
+
+
 def _parsed(name: str, term: str) -> tuple[set[str], Any]:
     tree = checked_formula(f"formula {name}", term, FUNCTIONS)
     called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
@@ -109,10 +143,10 @@ def _parsed(name: str, term: str) -> tuple[set[str], Any]:
     return names, compile(tree, name, "eval")
 
 
-def _apply(name: str, code: Any, on: str, body: Body, **numbers: float) -> Body:
+def _apply(name: str, code: Any, on: str, logged: list[str], body: Body, **numbers: float) -> Body:
     if body.place is None and _needs(code, on):
         return body  # first round of a simulation: nobody knows yet where the robot goes
-    values = {**_values(body, code), **numbers}
+    values = {**_values(body, code), **{column: body.logged[column] for column in logged}, **numbers}
     if on == WHEELS:
         left, right = (
             _added(name, code, {**values, **_of_wheel(body, speed, code)}, body)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, number
@@ -81,9 +81,12 @@ class Model:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """How the model came to be: data and their hash, date, error before and after; free text for people."""
 
+    bases: ClassVar[tuple[str, ...]] = BASES
+    """What its ``base`` may be."""
+
     def __post_init__(self) -> None:
-        if self.base not in BASES:
-            raise ModelError(unknown_name("base", self.base, BASES))
+        if self.base not in self.bases:
+            raise ModelError(unknown_name("base", self.base, self.bases))
         for name, (low, high) in LIMITS.items():
             value = number(f"model {self.name}: {name}", getattr(self, name), low, high)
             object.__setattr__(self, name, value)
@@ -108,7 +111,19 @@ class Model:
         for active in self.effects:
             if active.effect.name == name:
                 return active.by_name
-        return effect_named(name).neutral
+        return self.effect_named(name).neutral
+
+    def catalogue(self) -> Mapping[str, Effect]:
+        """Name -> effect that a robot of this kind can lack."""
+        return all_effects()
+
+    def effect_named(self, name: str) -> Effect:
+        """The effect of that name of its catalogue; ModelError with the names there are."""
+        return effect_named(name)
+
+    def written_base(self) -> dict[str, Any]:
+        """What the model file says beside effects, noise and provenance."""
+        return {"base": self.base, "wheelbase_m": self.wheelbase_m, "dt_s": self.dt_s}
 
     def with_active(self, effect: Effect, values: tuple[float, ...]) -> Model:
         """The model with an effect object at these values, listed or not; in its place in the chain."""
@@ -117,7 +132,7 @@ class Model:
 
     def with_effect(self, name: str, basis: str = "guess", reason: str = "", **values: float) -> Model:
         """The model with that effect switched on at these values; in its old place, else last."""
-        effect = effect_named(name)
+        effect = self.effect_named(name)
         active = ActiveEffect(effect, effect.checked(values), basis, reason)
         if all(a.effect.name != name for a in self.effects):
             return replace(self, effects=(*self.effects, active))
@@ -152,7 +167,7 @@ class Model:
     def without(self, name: str) -> Model:
         """The model with that effect switched off."""
         if all(a.effect.name != name for a in self.effects):
-            effect_named(name)
+            self.effect_named(name)
         return replace(self, effects=tuple(a for a in self.effects if a.effect.name != name))
 
     def canonical_json(self) -> str:
@@ -199,17 +214,16 @@ def parse_model(text: str, name: str, folder: Path | None = None) -> Model:
     No Python file is run but those that are trusted (`bns.physics.trust`).
     """
     tree, lines = read_yaml(text, f"model {name}", ModelError)
+    if isinstance(tree, dict) and tree.get("base") == "mujoco":
+        from bns.physics.jointed.model_files import parse_body  # noqa: PLC0415  # it needs MuJoCo, and knows this module
+
+        return parse_body(tree, lines, name, folder or Path())
     top = keys(f"model {name}", tree, _TOP, required=("base", "wheelbase_m"))
     for key in ("wheelbase_m", "dt_s"):
         with lines.at(key):
             number(f"model {name}: {key}", top.get(key, Model.dt_s), *LIMITS[key])
     jitter, noise = (_group(name, top, key, lines) for key in _GROUPS)
-    listed = top.get("effects") or []
-    if not isinstance(listed, list):
-        raise ModelError(f"model {name}: effects is {shown(listed)}; it must be a list of {join(_EFFECT_KEYS)}.")
-    provenance = top.get("provenance") or {}
-    if not isinstance(provenance, dict):
-        raise ModelError(f"provenance of model {name} is {shown(provenance)}; it must be a mapping (lines of key: value).")
+    effects, provenance = effects_and_provenance(top, lines, name, folder or Path(), effect_named)
     return Model(
         name=name,
         base=top["base"],
@@ -218,21 +232,34 @@ def parse_model(text: str, name: str, folder: Path | None = None) -> Model:
         jitter_relative=jitter["wheel_speed_relative"],
         noise_position_m=noise["position_m"],
         noise_heading_rad=noise["heading_rad"],
-        effects=tuple(_located_effect(name, listed, at, folder or Path(), lines) for at in range(len(listed))),
+        effects=effects,
         provenance=provenance,
     )
 
 
-def _located_effect(model: str, listed: list[Any], at: int, folder: Path, lines: Lines) -> ActiveEffect:
-    with lines.at("effects", at):
-        return _effect(model, listed[at], folder)
+def effects_and_provenance(
+    top: Mapping[str, Any], lines: Lines, name: str, folder: Path, named: Callable[[str], Effect]
+) -> tuple[tuple[ActiveEffect, ...], dict[str, Any]]:
+    """What model files of all bases share; ``named`` finds a listed effect."""
+    listed = top.get("effects") or []
+    if not isinstance(listed, list):
+        raise ModelError(f"model {name}: effects is {shown(listed)}; it must be a list of {join(_EFFECT_KEYS)}.")
+    provenance = top.get("provenance") or {}
+    if not isinstance(provenance, dict):
+        raise ModelError(f"provenance of model {name} is {shown(provenance)}; it must be a mapping (lines of key: value).")
+    effects = []
+    for at, entry in enumerate(listed):
+        with lines.at("effects", at):
+            effects.append(_effect(name, entry, folder, named))
+    return tuple(effects), provenance
 
 
-def _effect(model: str, entry: Any, folder: Path) -> ActiveEffect:
+def _effect(model: str, entry: Any, folder: Path, named: Callable[[str], Effect]) -> ActiveEffect:
     where = f"an effect of model {model}"
     given = keys(where, entry, (*_EFFECT_KEYS, *_EFFECT_MAY), required=_EFFECT_KEYS)
     written: dict[str, str] = {str(key): str(given[key]) for key in ("term", "on", "file") if key in given}
-    effect = _written_effect(where, str(given["name"]), written, folder)
+    numbers = given["values"] if isinstance(given["values"], dict) else {}
+    effect = _written_effect(where, str(given["name"]), written, folder, named, map(str, numbers))
     names = tuple(p.name for p in effect.parameters)
     values = keys(f"values of {effect.name} in model {model}", given["values"], names)
     intervals = keys(f"intervals of {effect.name} in model {model}", given.get("intervals") or {}, names)
@@ -249,17 +276,24 @@ def _effect(model: str, entry: Any, folder: Path) -> ActiveEffect:
     )
 
 
-def _written_effect(where: str, name: str, written: Mapping[str, str], folder: Path) -> Effect:
+def _written_effect(
+    where: str,
+    name: str,
+    written: Mapping[str, str],
+    folder: Path,
+    named: Callable[[str], Effect],
+    numbers: Iterable[str],
+) -> Effect:
     """The effect of that name: from the catalogue, a formula, or a Python file with an ``EFFECT``."""
     if "file" in written:
         return trusted_effect(folder / written["file"], f"{where}, {name},")
     if not written:
-        return effect_named(name)
+        return named(name)
     if set(written) != {"term", "on"}:
         raise ModelError(f"{where}, {name}: a formula needs both term and on (term: k * v * abs(w), on: v).")
     if name in effect_names():
         raise ModelError(f"{where}: {name} is the name of a listed effect; give the formula another one.")
-    return formula_effect(name, written["term"], written["on"])
+    return formula_effect(name, written["term"], written["on"], numbers=numbers)
 
 
 def _group(model: str, top: Mapping[str, Any], key: str, lines: Lines) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 
 from bns.robots.base import on_floor
-from bns.store.files import publish
+from bns.store.disk.files import publish
 
 if TYPE_CHECKING:  # a figure of stored results does not wait for the compiler
     from bns.bootstrap.loop import RunResult

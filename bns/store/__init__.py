@@ -6,20 +6,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bns.store.compaction import CompactSummary, bytes_per_run, compact
-    from bns.store.files import StoreWarning
-    from bns.store.reader import connect, finished, load, query
+    from bns.store.disk.files import StoreWarning
+    from bns.store.read.reader import connect, finished, load, query
     from bns.store.record import RunRecord
     from bns.store.schema import SCHEMA_VERSION, SCHEMAS
-    from bns.store.writer import Writer, spec_hash
+    from bns.store.write.compaction import CompactSummary, bytes_per_run, compact
+    from bns.store.write.writer import Writer, spec_hash
 
 _HOMES = {
-    "compaction": ("CompactSummary", "bytes_per_run", "compact"),
-    "files": ("StoreWarning",),
-    "reader": ("connect", "finished", "load", "query"),
+    "write.compaction": ("CompactSummary", "bytes_per_run", "compact"),
+    "disk.files": ("StoreWarning",),
+    "read.reader": ("connect", "finished", "load", "query"),
     "record": ("RunRecord",),
     "schema": ("SCHEMAS", "SCHEMA_VERSION"),
-    "writer": ("Writer", "spec_hash"),
+    "write.writer": ("Writer", "spec_hash"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -15,8 +15,8 @@ import yaml
 
 from bns.errors import StoreError, SweepWarning
 from bns.spec import FIELDS, RunSpec
-from bns.store.reader import finished, query
-from bns.sweep.grid import Sweep, parse_sweep
+from bns.store.read.reader import finished, query
+from bns.sweep.expand.grid import Sweep, parse_sweep
 
 RANKED_BY = ("success", "success_10cm", "success_14cm", "success_20cm", "fitness_world")
 """Means over the runs of a combination at their last evaluation, the first that differs decides (section 4.5). ``success`` is

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from bns.sweep.plan import Plan
+from bns.sweep.forecast.plan import Plan
 from bns.sweep.progress import in_words
 from bns.sweep.request import Placement
 from bns.sweep.runner import Summary

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bns.sweep.budget import Budget
+from bns.sweep.expand.shard import Shard
 from bns.sweep.runner import Summary, silent
-from bns.sweep.shard import Shard
 
 
 @dataclass(frozen=True)

@@ -11,18 +11,18 @@ from pathlib import Path
 
 from bns.errors import SweepWarning
 from bns.spec import RunSpec
-from bns.store.reader import finished
+from bns.store.read.reader import finished
 from bns.store.record import RunRecord
-from bns.store.writer import Writer
+from bns.store.write.writer import Writer
 from bns.sweep.budget import Budget
-from bns.sweep.digests import WorldDigests
-from bns.sweep.executor import Executor, Job
-from bns.sweep.grid import Sweep
+from bns.sweep.expand.digests import WorldDigests
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.expand.order import ordered_specs
+from bns.sweep.expand.shard import Shard
 from bns.sweep.interrupt import GRACE_S, Interrupts
-from bns.sweep.job import prepare, run_job
-from bns.sweep.order import ordered_specs
-from bns.sweep.shard import Shard
-from bns.sweep.workers import LokyExecutor
+from bns.sweep.jobs.executor import Executor, Job
+from bns.sweep.jobs.job import prepare, run_job
+from bns.sweep.jobs.workers import LokyExecutor
 
 _POLL_S = 0.2
 

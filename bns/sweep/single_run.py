@@ -11,12 +11,12 @@ from pathlib import Path
 
 from bns.bootstrap.loop import RunResult
 from bns.spec import RunSpec
-from bns.store.lock import SweepLockedError
-from bns.store.reader import finished
+from bns.store.disk.lock import SweepLockedError
+from bns.store.read.reader import finished
 from bns.store.record import RunRecord
-from bns.store.writer import Writer
-from bns.sweep import memory
-from bns.sweep.digests import WorldDigests
+from bns.store.write.writer import Writer
+from bns.sweep.expand.digests import WorldDigests
+from bns.sweep.jobs import memory
 
 _PATIENCE_S = 60.0
 
@@ -43,7 +43,7 @@ def keep_run(
         "attempts": 1,
     }
     if device != "cpu":
-        from bns.sweep.batches import gpu_columns  # noqa: PLC0415  # as below
+        from bns.sweep.jobs.batches import gpu_columns  # noqa: PLC0415  # as below
 
         row |= gpu_columns()
     with patient_writer(results, sweep) as writer:

@@ -10,10 +10,10 @@ from pathlib import Path
 from types import FrameType
 
 from bns.extras import extra
-from bns.sweep.cores import cores
-from bns.sweep.grid import Sweep
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.expand.shard import Shard
+from bns.sweep.jobs.cores import cores
 from bns.sweep.runner import Summary, run_sweep
-from bns.sweep.shard import Shard
 
 with extra("cluster"):
     from submitit.helpers import DelayedSubmission

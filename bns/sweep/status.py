@@ -11,8 +11,8 @@ import pandas as pd
 
 from bns.errors import SpecError
 from bns.spec import RunSpec
-from bns.store.reader import finished, load
-from bns.sweep.grid import Sweep, parse_sweep
+from bns.store.read.reader import finished, load
+from bns.sweep.expand.grid import Sweep, parse_sweep
 
 _COLUMNS = ["sweep", "task", "status", "started_at", "wall_s", "spec"]
 

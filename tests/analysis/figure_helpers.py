@@ -9,8 +9,8 @@ from store.synthetic import record
 
 from bns.spec import RunSpec
 from bns.store import RunRecord, Writer
-from bns.sweep.grid import parse_sweep
-from bns.sweep.order import ordered_specs
+from bns.sweep.expand.grid import parse_sweep
+from bns.sweep.expand.order import ordered_specs
 
 MUTATION = """
 name: mutation
@@ -44,7 +44,7 @@ def with_evals(spec: RunSpec, **columns) -> RunRecord:
 
 def carry_out(results: Path, text: str, keep: slice = slice(None)) -> None:
     """Do a sweep (a part of its runs) in this process."""
-    from bns.sweep.job import run_job  # which loads the compiled kernels
+    from bns.sweep.jobs.job import run_job  # which loads the compiled kernels
 
     sweep = parse_sweep(text, Path("test.yaml"))
     with Writer(results, sweep.name, sweep_text=text, sweep_runs=sweep.total) as writer:

@@ -16,7 +16,7 @@ from analysis.selection import selections
 from bns.spec import RunSpec
 from bns.store import load
 from bns.sweep.confirm import confirmation
-from bns.sweep.grid import parse_sweep
+from bns.sweep.expand.grid import parse_sweep
 
 NEAR = {f"success_{cm}cm": False for cm in (7, 10, 14, 20)}
 

@@ -12,7 +12,7 @@ from bns.bootstrap.loop import run
 from bns.robots import load_robot
 from bns.spec import RunSpec
 from bns.store.record import RunRecord
-from bns.store.writer import Writer
+from bns.store.write.writer import Writer
 from bns.worlds import build_world
 
 ROBOT = load_robot("khepera")

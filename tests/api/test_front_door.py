@@ -22,8 +22,8 @@ from bns.cli.main import main
 from bns.measurements import write_measurements
 from bns.physics.effects import all_effects
 from bns.spec import FIELDS
-from bns.sweep.grid import load_sweep
-from bns.sweep.order import ordered_specs
+from bns.sweep.expand.grid import load_sweep
+from bns.sweep.expand.order import ordered_specs
 from tests.diagnose.worlds import hidden, measured
 
 SMALL = {"population_size": 20, "evaluations": 4, "generations_per_evaluation": 2}

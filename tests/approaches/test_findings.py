@@ -5,13 +5,13 @@ import pytest
 
 from bns.approaches import start_approach
 from bns.approaches.estimation_exploration import disagreement
-from bns.approaches.physics_models import UNITS
+from bns.approaches.parts.physics_models import UNITS
 from bns.bootstrap.evolver import Evolver
 from bns.bootstrap.loop import run
 from bns.bootstrap.simulators import PhysicsSimulator
 from bns.engine.philox import Key, Purpose
-from bns.physics.khepera_drive import KheperaPhysics
 from bns.physics.model import load_model
+from bns.physics.wheels.khepera_drive import KheperaPhysics
 from bns.robots import load_robot
 from bns.spec import RunSpec
 from bns.tasks import load_task

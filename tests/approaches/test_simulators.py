@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from bns.approaches.pareto import fronts_of
-from bns.approaches.physics_models import COMMON, Drives, ModelSpace
+from bns.approaches.parts.pareto import fronts_of
+from bns.approaches.parts.physics_models import COMMON, Drives, ModelSpace
 from bns.bootstrap.simulators import NetworkSimulator, NoSimulator, PhysicsSimulator
 from bns.engine.philox import Key, Purpose
 from bns.engine.snn import initial_weights, predict
-from bns.physics.khepera_drive import KheperaPhysics
 from bns.physics.model import load_model
+from bns.physics.wheels.khepera_drive import KheperaPhysics
 from bns.robots import load_robot
 from bns.tasks import default_task, load_task
 

@@ -25,8 +25,8 @@ from bns.cuda.batch import Batch
 from bns.cuda.device import OutOfDeviceMemoryError, device_name
 from bns.errors import DeviceError
 from bns.spec import RunSpec
-from bns.sweep.cores import cores
-from bns.sweep.job import run_job
+from bns.sweep.jobs.cores import cores
+from bns.sweep.jobs.job import run_job
 from bns.tasks import task_names
 
 ROBOTS = ("khepera", "snake")

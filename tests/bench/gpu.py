@@ -23,8 +23,8 @@ from bns.cuda.device import OutOfDeviceMemoryError, device_name
 from bns.errors import DeviceError
 from bns.robots import load_robot
 from bns.spec import RunSpec
-from bns.sweep.grid import load_sweep
-from bns.sweep.order import ordered_specs
+from bns.sweep.expand.grid import load_sweep
+from bns.sweep.expand.order import ordered_specs
 from tests.bench import operations
 from tests.bench.__main__ import write
 from tests.bench.line import Line, at_least, at_most, without_target
@@ -196,7 +196,7 @@ def _carried_out(specs: Sequence[RunSpec]) -> np.ndarray:
 
 def _cpu_s(specs: Sequence[RunSpec], runs: int) -> float:
     """Mean processor seconds of runs spread over the slice."""
-    from bns.sweep.job import run_job
+    from bns.sweep.jobs.job import run_job
 
     return fmean(run_job(spec).run["cpu_s"] for spec in specs[:: max(1, len(specs) // runs)][:runs])
 

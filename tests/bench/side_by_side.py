@@ -16,9 +16,9 @@ from bns.engine.rprop import Rprop
 from bns.engine.snn import initial_weights
 from bns.spec import RunSpec
 from bns.store.record import RunRecord
-from bns.sweep.executor import Job
-from bns.sweep.job import run_job, warm
-from bns.sweep.workers import LokyExecutor
+from bns.sweep.jobs.executor import Job
+from bns.sweep.jobs.job import run_job, warm
+from bns.sweep.jobs.workers import LokyExecutor
 
 JOBS = 2
 PATTERNS, ITERATIONS = 400, 20_000

@@ -16,8 +16,8 @@ import pandas as pd
 
 from bns.store import Writer, load
 from bns.sweep import runner
-from bns.sweep.grid import Sweep, parse_sweep
-from bns.sweep.job import warm
+from bns.sweep.expand.grid import Sweep, parse_sweep
+from bns.sweep.jobs.job import warm
 from bns.sweep.runner import Summary, run_sweep
 from tests.bench.line import Line, at_least, at_most, without_target
 from tests.bench.side_by_side import JOBS, slowdowns

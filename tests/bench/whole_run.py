@@ -10,7 +10,7 @@ import numpy as np
 from bns.bootstrap.loop import run
 from bns.robots.khepera import ROBOT
 from bns.spec import RunSpec
-from bns.sweep.job import warm
+from bns.sweep.jobs.job import warm
 from tests.bench import operations as counted
 from tests.bench.clock import one_core
 from tests.bench.line import Line, at_most

@@ -14,13 +14,13 @@ from bns.cuda import batch, device
 from bns.cuda.device import OutOfDeviceMemoryError, faults
 from bns.errors import DeviceError
 from bns.spec import RunSpec
-from bns.store.reader import load
+from bns.store.read.reader import load
 from bns.store.schema import PARAMETERS, SCHEMAS
-from bns.sweep import batches
-from bns.sweep.batches import BatchExecutor, DeviceWarning
 from bns.sweep.budget import Budget
-from bns.sweep.grid import Sweep
-from bns.sweep.order import ordered_specs
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.expand.order import ordered_specs
+from bns.sweep.jobs import batches
+from bns.sweep.jobs.batches import BatchExecutor, DeviceWarning
 from bns.sweep.runner import run_sweep
 
 SWEEP = Sweep("demo", "khepera", 3, tuple({"population_size": 10 + n, "evaluations": 2} for n in range(4)), "", Path("x.yaml"))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bns.cuda.merging import merge
+from bns.cuda.on_device.merging import merge
 from bns.cuda.settings import SETTINGS
 from bns.engine.patterns import PatternSet
 

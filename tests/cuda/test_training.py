@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from bns.cuda.on_device.training import WARP, layout_of, restart, training_kernel
 from bns.cuda.settings import SETTINGS
-from bns.cuda.training import WARP, layout_of, restart, training_kernel
 from bns.engine.philox import Key
 from bns.engine.rprop import INITIAL_STEP, Rprop
 from bns.engine.snn import initial_weights

@@ -10,7 +10,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.check_robot import check_same_robot
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError
-from bns.physics.differential_drive import track
+from bns.physics.wheels.differential_drive import track
 
 from .worlds import FRAME_S, NOMINAL, hidden
 

@@ -7,7 +7,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.engine import reference
 from bns.engine.pose_filter import displacements, filter_gains, innovations
-from bns.physics.differential_drive import track
+from bns.physics.wheels.differential_drive import track
 from tests.diagnose.worlds import FRAME_S, NOMINAL, hidden, measured
 
 NOISE = np.array([2e-3, 8e-3, 4e-3, 2e-3, 2e-2])

@@ -31,7 +31,7 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.proposal_text import proposal_text
 from bns.errors import DataError
 from bns.measurements import write_measurements
-from bns.physics.differential_drive import simulate
+from bns.physics.wheels.differential_drive import simulate
 from bns.robots import load_robot
 from bns.trial.experiment import read_commands
 from tests.diagnose.worlds import BASE_M, NOMINAL, hidden, measured

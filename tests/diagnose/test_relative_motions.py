@@ -10,14 +10,15 @@ import pytest
 
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
-from bns.diagnose.data.load import load_measured, read_table
+from bns.diagnose.data.load import load_measured
+from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.estimate.calibration import calibrated
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import predictor_for_search
 from bns.diagnose.values import numbers_of
 from bns.errors import DataError
-from bns.physics.differential_drive import observe, simulate
 from bns.physics.model import Model
+from bns.physics.wheels.differential_drive import observe, simulate
 
 LASER = Path(__file__).parents[3] / "shared" / "data" / "khepera3_laser"
 RADIUS_M, WHEELBASE_M = 0.02075, 0.09

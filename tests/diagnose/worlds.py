@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from bns.physics.differential_drive import observe, track
 from bns.physics.model import Model
+from bns.physics.wheels.differential_drive import observe, track
 
 BASE_M = 0.0884
 NOMINAL = Model(wheelbase_m=BASE_M, name="khepera")

@@ -17,15 +17,16 @@ from hypothesis import HealthCheck, given, seed, settings
 
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
-from bns.diagnose.data.load import load_measured, read_table
+from bns.diagnose.data.load import load_measured
 from bns.diagnose.data.mapping import load_mapping
+from bns.diagnose.data.sources.read import read_table
 from bns.errors import BnsError
 from bns.hardware.emulators.faults import load_plan
 from bns.hardware.rig import load_rig
 from bns.physics.formula import formula_effect
 from bns.physics.model import load_model
 from bns.physics.signals import Body
-from bns.sweep.grid import load_sweep
+from bns.sweep.expand.grid import load_sweep
 
 from . import files
 

@@ -22,11 +22,11 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.guard import Guard
+from bns.hardware.guard.client import Guard
+from bns.hardware.guard.recipe import khepera_recipe
 from bns.hardware.platforms import khepera, snake
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
-from bns.hardware.stop_recipe import khepera_recipe
 from bns.hardware.tracking.sight import Sight
 from bns.trial.session import TrialSetup, open_rig
 

@@ -6,8 +6,8 @@ import pytest
 from bns.engine.philox import Key
 from bns.hardware.emulators.body import DifferentialBody
 from bns.hardware.emulators.braking import FULL_VOLTAGE_M_S, Braking, motor_tau_s
-from bns.physics.differential_drive import simulate
 from bns.physics.model import load_model
+from bns.physics.wheels.differential_drive import simulate
 
 NORTH = (0.0, 0.0, np.pi / 2)
 COMMANDS = np.array([[0.1, 0.2, 1.3], [0.2, 0.05, 0.7], [0.03, 0.03, 2.1]])

@@ -258,7 +258,7 @@ def test_calibrate_asks_for_the_rig_and_writes_what_it_found(tmp_path, monkeypat
     rig = tmp_path / "rig.yaml"
     text = "robot: khepera\nport: x\nsurface_m: {x: [-0.5, 0.5], y: [-0.5, 0.5]}\n"
     rig.write_text(f"{text}tracker: {{kind: wii, device: {emulator.path}, height_m: 1.8, view_rad: 0.5}}\n")
-    monkeypatch.setattr("bns.cli.camera.RealClock", lambda: clock)
+    monkeypatch.setattr("bns.cli.commands.camera.RealClock", lambda: clock)
     monkeypatch.setattr("builtins.input", lambda _text: "")
     assert main(["calibrate", "--wii", "--rig", str(rig)]) == 0
     said = capsys.readouterr().out

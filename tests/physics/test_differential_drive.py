@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bns.errors import ModelError
-from bns.physics.differential_drive import observe, simulate, track
 from bns.physics.model import Model
+from bns.physics.wheels.differential_drive import observe, simulate, track
 
 B = 0.0884
 IDEAL = Model(wheelbase_m=B)

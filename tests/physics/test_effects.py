@@ -9,12 +9,12 @@ import pytest
 
 from bns.errors import ModelError
 from bns.physics import effects
-from bns.physics.differential_drive import observe, simulate
 from bns.physics.effect import STAGES, number
 from bns.physics.effects import all_effects, effect_named
 from bns.physics.model import Model
 from bns.physics.order import ORDER
 from bns.physics.signals import Body, Flow, Stamps, View, Wheels
+from bns.physics.wheels.differential_drive import observe, simulate
 from bns.registry import EFFECTS
 
 SIGNALS = dict(zip(STAGES, (Wheels, Body, Flow, Stamps, View), strict=True))

@@ -5,9 +5,9 @@ import pytest
 
 from bns.errors import ModelError
 from bns.physics.formula import NEVER_M, formula_effect, since_reversal, swing, value_of
-from bns.physics.grid import Grid
 from bns.physics.model import Model
-from bns.physics.motion import body_motion
+from bns.physics.wheels.grid import Grid
+from bns.physics.wheels.motion import body_motion
 
 BASE_M, STEP_S = 0.1, 0.5
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from bns.physics.differential_drive import observe, simulate
 from bns.physics.effect import REFERENCE_WHEELBASE_M
 from bns.physics.effects import all_effects, effect_named
 from bns.physics.effects.wheel_eccentricity import starts_from
 from bns.physics.model import Model
 from bns.physics.signals import Conditions, Wheels
+from bns.physics.wheels.differential_drive import observe, simulate
 from tests.hidden_effects.driving import Driving
 from tests.hidden_effects.listed import cause
 from tests.hidden_effects.motion import move

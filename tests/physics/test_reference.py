@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from bns.errors import ModelError
-from bns.physics.differential_drive import simulate
 from bns.physics.model import Model, load_model
-from bns.physics.reference import ORDER, simulate_slowly
+from bns.physics.wheels.differential_drive import simulate
+from bns.physics.wheels.reference import ORDER, simulate_slowly
 
 IDEAL = Model(wheelbase_m=0.0884)
 VALUES = {

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from bns.registry import EFFECTS, EXECUTORS, FIGURES, PLATFORMS, ROBOTS, TRACKERS, WORLDS
-from bns.store.reader import load
+from bns.store.read.reader import load
 from bns.tasks import TASKS
 from tests.plugins.package import blocks, entry_points, install
 

@@ -21,7 +21,7 @@ import pandas as pd
 
 from bns.errors import BnsError
 from bns.store import SCHEMAS, Writer, compact, connect, finished
-from bns.store.parts import find_parts
+from bns.store.disk.parts import find_parts
 from bns.store.record import RunRecord
 from bns.store.schema import RECORDED, SORT_KEYS, read_columns
 from tests.store.synthetic import failed, record, specs

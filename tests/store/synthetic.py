@@ -13,10 +13,10 @@ import numpy as np
 import pyarrow as pa
 
 from bns.spec import RunSpec
-from bns.store.fold import publish_fold
 from bns.store.provenance import provenance
 from bns.store.record import RunRecord
 from bns.store.schema import PARAMETERS, SCHEMAS
+from bns.store.write.fold import publish_fold
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 MUTATION_RATES = (0.02, 0.05, 0.1, 0.2, 0.4)

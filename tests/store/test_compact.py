@@ -9,7 +9,7 @@ import pytest
 
 from bns.spec import RunSpec
 from bns.store import SCHEMA_VERSION, SCHEMAS, StoreWarning, Writer, compact, load, spec_hash
-from bns.store.digest import digest_in
+from bns.store.disk.digest import digest_in
 from bns.store.provenance import git_state, provenance
 
 from .synthetic import failed, make_store, record, records, specs

@@ -10,7 +10,7 @@ import pandas.testing as pdt
 import pytest
 
 from bns.store import Writer, compact, finished, load
-from bns.store.journal import journals
+from bns.store.disk.journal import journals
 
 from .synthetic import records
 from .victim import sample

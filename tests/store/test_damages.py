@@ -8,9 +8,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from bns.store import StoreWarning, Writer, compact, finished, load, query
-from bns.store.digest import Memory, identity
-from bns.store.parquet import file_bytes
-from bns.store.parts import find_parts
+from bns.store.disk.digest import Memory, identity
+from bns.store.disk.parquet import file_bytes
+from bns.store.disk.parts import find_parts
 from bns.sweep.status import sweep_status
 
 from .damages import survey
@@ -98,7 +98,7 @@ def test_one_bit_of_a_columns_name_makes_no_traceback(tmp_path):
 
 
 def test_the_same_in_a_file_from_before_digests(tmp_path, monkeypatch):
-    monkeypatch.setattr("bns.store.parts.is_sealed", lambda path: False)
+    monkeypatch.setattr("bns.store.disk.parts.is_sealed", lambda path: False)
     store(tmp_path, records(3))
     path = files(tmp_path, "evals")[0]
     data = path.read_bytes()
@@ -129,7 +129,7 @@ def test_second_look_reads_no_file_again_and_a_changed_one_is_read(tmp_path, mon
     find_parts(results, "evals")
     path = files(results, "evals")[0]
     with monkeypatch.context() as patch:
-        patch.setattr("bns.store.parts.is_intact", lambda path: pytest.fail(f"{path} was read again"))
+        patch.setattr("bns.store.disk.parts.is_intact", lambda path: pytest.fail(f"{path} was read again"))
         assert len(find_parts(results, "evals")[0]) == 1
     data, times = bytearray(path.read_bytes()), path.stat()
     data[500] ^= 1
@@ -140,7 +140,7 @@ def test_second_look_reads_no_file_again_and_a_changed_one_is_read(tmp_path, mon
 
 def test_large_stores_are_remembered_by_the_next_process(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("bns.store.digest._REMEMBER_FROM", 1)
+    monkeypatch.setattr("bns.store.disk.digest._REMEMBER_FROM", 1)
     path = tmp_path / "a.parquet"
     path.write_bytes(b"x" * 10)
     now, memory = identity(path.stat()), Memory(tmp_path)

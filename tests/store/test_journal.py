@@ -8,8 +8,8 @@ import pytest
 
 from bns.errors import StoreError
 from bns.store import StoreWarning, Writer, compact, finished, load
-from bns.store import journal as journal_module
-from bns.store.journal import MAGIC, journals
+from bns.store.disk import journal as journal_module
+from bns.store.disk.journal import MAGIC, journals
 
 from .synthetic import failed, record, records, specs
 

@@ -92,7 +92,7 @@ def test_fold_at_must_be_positive(tmp_path):
 
 def test_lock_is_given_back_when_entering_fails(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr("bns.store.writer.clear_staging", Mock(side_effect=StoreError("that is it")))
+        patch.setattr("bns.store.write.writer.clear_staging", Mock(side_effect=StoreError("that is it")))
         with pytest.raises(StoreError, match="that is it"), Writer(tmp_path, "s"):
             pass
     with Writer(tmp_path, "s"):

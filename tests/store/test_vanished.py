@@ -6,7 +6,7 @@ import pytest
 
 from bns.errors import StoreError
 from bns.store import Writer, compact, finished, load
-from bns.store.journal import journals
+from bns.store.disk.journal import journals
 
 from .synthetic import failed, record, records, specs
 

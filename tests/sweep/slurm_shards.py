@@ -6,7 +6,7 @@ from pathlib import Path
 import sweep_jobs
 
 from bns.sweep import slurm_job
-from bns.sweep.executor import SerialExecutor
+from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.runner import Summary, run_sweep
 
 

@@ -15,10 +15,10 @@ from dask_cluster import Cluster, Killer
 
 from bns.store import load
 from bns.sweep.budget import Budget
-from bns.sweep.dask_workers import DaskExecutor
-from bns.sweep.executor import Job
-from bns.sweep.grid import Sweep, parse_sweep
-from bns.sweep.job import run_job
+from bns.sweep.expand.grid import Sweep, parse_sweep
+from bns.sweep.jobs.dask_workers import DaskExecutor
+from bns.sweep.jobs.executor import Job
+from bns.sweep.jobs.job import run_job
 from bns.sweep.runner import run_sweep
 
 TEXT = """

@@ -11,7 +11,7 @@ import numpy as np
 from bns.spec import RunSpec
 from bns.store.record import RunRecord
 from bns.store.schema import PARAMETERS, SCHEMAS
-from bns.sweep.grid import Sweep
+from bns.sweep.expand.grid import Sweep
 
 MARKS = "BNS_TEST_MARKS"
 """Environment variable: the folder that jobs leave marks in."""

@@ -9,12 +9,12 @@ import sweep_jobs
 
 from bns.cli.main import main
 from bns.errors import SpecError, StoreError, SweepWarning
-from bns.store.reader import load
+from bns.store.read.reader import load
 from bns.store.record import RunRecord
 from bns.sweep.confirm import RANKED_BY, best, confirmation, in_turn
-from bns.sweep.executor import SerialExecutor
-from bns.sweep.grid import load_sweep, parse_sweep
-from bns.sweep.order import ordered_specs
+from bns.sweep.expand.grid import load_sweep, parse_sweep
+from bns.sweep.expand.order import ordered_specs
+from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.runner import run_sweep
 from bns.sweep.status import sweep_status
 

@@ -8,14 +8,14 @@ from sweep_jobs import make_sweep
 
 from bns.cli.main import main
 from bns.store import load
-from bns.sweep.cost import MACHINES, START_UP_S, Cost, Machine, cost_table, total
-from bns.sweep.executor import SerialExecutor
 from bns.sweep.executors import load_executor
-from bns.sweep.grid import parse_sweep
-from bns.sweep.plan import plan
+from bns.sweep.expand.grid import parse_sweep
+from bns.sweep.expand.shard import Shard
+from bns.sweep.forecast.cost import MACHINES, START_UP_S, Cost, Machine, cost_table, total
+from bns.sweep.forecast.plan import plan
+from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.request import Request
 from bns.sweep.runner import run_sweep
-from bns.sweep.shard import Shard
 
 TEXT = """
 name: mixed
@@ -101,7 +101,7 @@ def test_a_shard_by_hand(sweep_file, tmp_path):
 
 
 def test_a_machine_is_used_whole(monkeypatch, tmp_path):
-    monkeypatch.setattr("bns.sweep.cores.cpu_count", lambda: 64)
+    monkeypatch.setattr("bns.sweep.jobs.cores.cpu_count", lambda: 64)
     place = load_executor("joblib").placement(Request(tmp_path))
     assert (place.workers, place.where.split()[0]) == (64, "64")
 

@@ -18,13 +18,13 @@ from dask_cluster import Cluster
 
 from bns.errors import ClusterError
 from bns.store import load
-from bns.sweep import dask_link
-from bns.sweep.dask_job import LeavesSignals
-from bns.sweep.dask_workers import DaskExecutor, DaskWarning
-from bns.sweep.executor import SerialExecutor
-from bns.sweep.order import ordered_specs
+from bns.sweep.expand.order import ordered_specs
+from bns.sweep.jobs import dask_link
+from bns.sweep.jobs.dask_job import LeavesSignals
+from bns.sweep.jobs.dask_workers import DaskExecutor, DaskWarning
+from bns.sweep.jobs.executor import SerialExecutor
+from bns.sweep.jobs.workers import LEFT_TO_PARENT
 from bns.sweep.runner import run_sweep
-from bns.sweep.workers import LEFT_TO_PARENT
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,10 @@ import sweep_jobs
 from sweep_jobs import make_sweep
 
 from bns.store.record import RunRecord
-from bns.sweep.executor import ATTEMPTS, Executor, SerialExecutor
-from bns.sweep.job import describe, run_job
-from bns.sweep.order import ordered_specs
-from bns.sweep.workers import LokyExecutor
+from bns.sweep.expand.order import ordered_specs
+from bns.sweep.jobs.executor import ATTEMPTS, Executor, SerialExecutor
+from bns.sweep.jobs.job import describe, run_job
+from bns.sweep.jobs.workers import LokyExecutor
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bns.errors import SpecError
-from bns.sweep.grid import Sweep, load_sweep
+from bns.sweep.expand.grid import Sweep, load_sweep
 from bns.tasks import task_names
 
 HEAD = "name: demo\nrobot: khepera\n"
@@ -175,7 +175,7 @@ def test_files_that_cannot_be_read(tmp_path):
 
 
 def test_default_task_of_another_robot_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("bns.sweep.grid.task_names", lambda _robot: ("letter-s",))
+    monkeypatch.setattr("bns.sweep.expand.grid.task_names", lambda _robot: ("letter-s",))
     with pytest.raises(SpecError, match="no task is given, and robot 'khepera' has no task 'circle'"):
         sweep_of(tmp_path, "")
     assert sweep_of(tmp_path, "fixed: {task: letter-s}").combos == ({"task": "letter-s"},)

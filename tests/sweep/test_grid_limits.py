@@ -7,8 +7,8 @@ import pytest
 
 from bns.cli.main import SWEEP_OF_SINGLE_RUNS
 from bns.errors import SpecError
-from bns.sweep.combos import MOST_RUNS
-from bns.sweep.grid import Sweep, load_sweep
+from bns.sweep.expand.combos import MOST_RUNS
+from bns.sweep.expand.grid import Sweep, load_sweep
 
 HEAD = "name: demo\nrobot: khepera\n"
 

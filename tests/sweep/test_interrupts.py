@@ -15,9 +15,9 @@ import pytest
 import sweep_jobs
 from sweep_jobs import make_sweep
 
-from bns.store.reader import load
-from bns.sweep.executor import SerialExecutor
+from bns.store.read.reader import load
 from bns.sweep.interrupt import Interrupts
+from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.runner import run_sweep
 
 SCRIPT = Path(__file__).with_name("sweep_process.py")

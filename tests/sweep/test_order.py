@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from bns.sweep.grid import Sweep
-from bns.sweep.order import ordered_specs
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.expand.order import ordered_specs
 
 
 def sweep(name: str = "demo", seeds: int = 3, sizes: range = range(10, 60)) -> Sweep:

@@ -10,16 +10,16 @@ from sweep_jobs import make_sweep
 
 from bns.errors import ModelError, StoreError, SweepWarning
 from bns.spec import RunSpec
-from bns.store.reader import load
+from bns.store.read.reader import load
 from bns.store.record import RunRecord
-from bns.store.writer import Writer
+from bns.store.write.writer import Writer
 from bns.sweep.budget import Budget
-from bns.sweep.executor import SerialExecutor
-from bns.sweep.grid import Sweep
-from bns.sweep.job import prepare
-from bns.sweep.order import ordered_specs
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.expand.order import ordered_specs
+from bns.sweep.jobs.executor import SerialExecutor
+from bns.sweep.jobs.job import prepare
+from bns.sweep.jobs.workers import LokyExecutor
 from bns.sweep.runner import Summary, run_sweep
-from bns.sweep.workers import LokyExecutor
 
 
 def serial(sweep, results, job=sweep_jobs.ok, **options) -> Summary:
@@ -186,7 +186,7 @@ def test_kernels_are_warmed_once_and_only_if_there_is_work(tmp_path):
 
 def test_kernels_on_the_disk_are_not_compiled_again_but_a_missing_world_is_found(monkeypatch):
     calls = []
-    monkeypatch.setattr("bns.sweep.job.warm", lambda *what: calls.append(what))
+    monkeypatch.setattr("bns.sweep.jobs.job.warm", lambda *what: calls.append(what))
     monkeypatch.setattr("bns.engine.jit.compiled", lambda _robot, world: world == "substitute")
     prepare([RunSpec(), RunSpec(world="physics"), RunSpec(seed=1, world="physics")])
     assert calls == [("khepera", "physics")]

@@ -9,14 +9,14 @@ import pytest
 import sweep_jobs
 from sweep_jobs import make_sweep
 
-import bns.store.snapshot as snapshots
+import bns.store.read.snapshot as snapshots
 from bns.errors import SpecError, StoreError, SweepWarning
 from bns.store import StoreWarning, Writer, compact, load
-from bns.store.journal import journals
-from bns.sweep.executor import SerialExecutor
-from bns.sweep.order import ordered_specs
+from bns.store.disk.journal import journals
+from bns.sweep.expand.order import ordered_specs
+from bns.sweep.expand.shard import Shard
+from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.runner import run_sweep
-from bns.sweep.shard import Shard
 
 
 def carry_out(folder, shard=None, **options):
@@ -90,8 +90,8 @@ def test_clocks_an_hour_apart_change_nothing(tmp_path, monkeypatch):
 
     carry_out(tmp_path / "whole")
     carry_out(tmp_path / "a", Shard(1, 2))
-    monkeypatch.setattr("bns.store.writer.datetime", Behind)
-    monkeypatch.setattr("bns.store.lock.datetime", Behind)
+    monkeypatch.setattr("bns.store.write.writer.datetime", Behind)
+    monkeypatch.setattr("bns.store.disk.lock.datetime", Behind)
     monkeypatch.setattr("sweep_jobs.datetime", Behind)
     assert carry_out(tmp_path / "a", Shard(2, 2)).new == 4
     assert load(tmp_path / "a", "runs")["started_at"].min() < datetime.now(UTC) - timedelta(minutes=50)
@@ -149,7 +149,7 @@ def test_a_file_system_without_locks_is_warned_of_and_used(tmp_path, monkeypatch
     def no_locks(*_):
         raise OSError(errno.ENOSYS, "Function not implemented")
 
-    monkeypatch.setattr("bns.store.shared.fcntl.flock", no_locks)
+    monkeypatch.setattr("bns.store.disk.shared.fcntl.flock", no_locks)
     with pytest.warns(StoreWarning, match="has no file locks.*bns compact must wait"):
         carry_out(tmp_path, Shard(1, 2))
     assert len(load(tmp_path, "runs")) == 4
@@ -159,7 +159,7 @@ def test_a_failed_fold_of_a_shard_is_made_up_for(tmp_path, monkeypatch):
     specs = ordered_specs(make_sweep())
     with Writer(tmp_path, "demo", shard="1-of-1", fold_at=2) as writer:
         with monkeypatch.context() as full:
-            full.setattr("bns.store.fold.publish", lambda *_: (_ for _ in ()).throw(StoreError("disk full")))
+            full.setattr("bns.store.write.fold.publish", lambda *_: (_ for _ in ()).throw(StoreError("disk full")))
             writer.append(sweep_jobs.ok(specs[0]))
             with pytest.raises(StoreError, match="disk full"):
                 writer.append(sweep_jobs.ok(specs[1]))

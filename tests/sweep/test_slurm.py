@@ -19,12 +19,12 @@ from bns.errors import ClusterError
 from bns.registry import EXECUTORS
 from bns.store import finished, load
 from bns.sweep.budget import Budget
-from bns.sweep.executor import SerialExecutor
 from bns.sweep.executors import executor_names, load_executor, slurm
-from bns.sweep.grid import parse_sweep
+from bns.sweep.expand.grid import parse_sweep
+from bns.sweep.expand.shard import Shard
+from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.request import Request
 from bns.sweep.runner import run_sweep
-from bns.sweep.shard import Shard
 from bns.sweep.slurm_job import ShardJob
 
 TEXT = """

@@ -13,10 +13,10 @@ import pytest
 
 from bns.errors import StoreError
 from bns.store import query
-from bns.store.reader import load
-from bns.sweep.executor import SerialExecutor
-from bns.sweep.grid import load_sweep
-from bns.sweep.job import run_job
+from bns.store.read.reader import load
+from bns.sweep.expand.grid import load_sweep
+from bns.sweep.jobs.executor import SerialExecutor
+from bns.sweep.jobs.job import run_job
 from bns.sweep.runner import run_sweep
 
 TEXT = """

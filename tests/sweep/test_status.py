@@ -12,13 +12,13 @@ from sweep_jobs import make_sweep
 
 from bns.errors import StoreError, SweepWarning
 from bns.spec import RunSpec
-from bns.store.reader import load
+from bns.store.read.reader import load
 from bns.store.record import RunRecord
-from bns.sweep.executor import SerialExecutor
-from bns.sweep.grid import parse_sweep
-from bns.sweep.job import run_job
-from bns.sweep.pace import Pace
-from bns.sweep.plan import plan, work
+from bns.sweep.expand.grid import parse_sweep
+from bns.sweep.forecast.pace import Pace
+from bns.sweep.forecast.plan import plan, work
+from bns.sweep.jobs.executor import SerialExecutor
+from bns.sweep.jobs.job import run_job
 from bns.sweep.progress import SweepProgress, describe_rate
 from bns.sweep.report import status_table, summed_up
 from bns.sweep.runner import Summary, run_sweep
@@ -60,7 +60,7 @@ def serial(sweep, results, **options) -> Summary:
 
 @pytest.fixture(autouse=True)
 def tasks(monkeypatch):
-    monkeypatch.setattr("bns.sweep.grid.task_names", lambda _robot: ("circle", "letter-s"))
+    monkeypatch.setattr("bns.sweep.expand.grid.task_names", lambda _robot: ("circle", "letter-s"))
 
 
 def test_status_counts_by_sweep_and_task_against_the_sweep_file(tmp_path):

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numba import cuda
 
-from bns.cuda.driving import chosen, keep, normals_of
-from bns.cuda.lists import breeding_of_lists
-from bns.cuda.networks import output
+from bns.cuda.on_device.driving import chosen, keep, normals_of
+from bns.cuda.on_device.lists import breeding_of_lists
+from bns.cuda.on_device.networks import output
 from bns.engine.philox import philox
 from bns.engine.snn import weight_count
 from bns.robots.khepera import ROBOT

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numba import cuda, float32, float64
 
-from bns.cuda.driving import chosen, keep, normals_of
-from bns.cuda.networks import squashed_output
+from bns.cuda.on_device.driving import chosen, keep, normals_of
+from bns.cuda.on_device.networks import squashed_output
 from bns.engine.philox import Purpose, philox
 from bns.engine.snn import weight_count
 from bns.robots.snake import ROBOT

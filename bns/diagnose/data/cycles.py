@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,8 @@ from bns.robots.snake.table import COLUMNS, GAIT, MARKERS
 _LARGEST_RAD = DEFAULTS.data.cycle_largest_rad
 _LONGEST_M = DEFAULTS.data.cycle_longest_m
 _STRETCHED_M = DEFAULTS.data.cycle_stretched_m
+_FEW = DEFAULTS.predict.fewest_cycles
+_LEAST_NOISE_M = DEFAULTS.predict.marker_least_m
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +33,47 @@ class CycleTracks(Tracks):
     gait: Array
     stable: NDArray[np.bool_]
     number: NDArray[np.int64]
+
+    @property
+    def gap_m(self) -> Array:
+        """Distance of the markers, (frames,)."""
+        line = self.markers_m[:, 1] - self.markers_m[:, 0]
+        return np.asarray(np.hypot(line[:, 0], line[:, 1]), dtype=np.float64)
+
+
+def only_cycles(tracks: CycleTracks, chosen: NDArray[np.int64]) -> CycleTracks:
+    """Some of the cycles, each a stretch of its own: what happens between two is not looked at. Trials without any are left out."""
+    frames = np.repeat(2 * chosen, 2) + np.tile([0, 1], len(chosen))
+    kept, counts = np.unique(tracks.trial[frames], return_counts=True)
+    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    jumped = np.tile([True, False], len(chosen))
+    jumped[first[:-1]] = False
+    return replace(
+        tracks,
+        names=tuple(tracks.names[i] for i in kept),
+        first=first,
+        t_s=tracks.t_s[frames],
+        pose=tracks.pose[frames],
+        left_m_s=tracks.left_m_s[kept],
+        right_m_s=tracks.right_m_s[kept],
+        duration_s=tracks.duration_s[kept],
+        start_s=tracks.start_s[kept],
+        jumped=jumped,
+        markers_m=tracks.markers_m[frames],
+        gait=tracks.gait[chosen],
+        stable=tracks.stable[chosen],
+        number=tracks.number[chosen],
+    )
+
+
+def marker_noise_m(tracks: CycleTracks) -> float | None:
+    """Noise of one marker's coordinate: a stable cycle ends in the posture in which it began, so what the markers' distance differs
+    by is the camera's; None where there are too few."""
+    differ = np.abs(tracks.gap_m[1::2] - tracks.gap_m[::2])[tracks.stable]
+    if len(differ) < _FEW:
+        return None
+    # robust: the median of a normal difference is 0.674 of its sd, which is twice that of one marker's coordinate
+    return max(float(np.median(differ)) / 0.674 / 2, _LEAST_NOISE_M)
 
 
 def are_cycles(table: pd.DataFrame) -> bool:

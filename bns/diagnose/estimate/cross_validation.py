@@ -39,9 +39,13 @@ def held_out_steps(predictor: Predictor, pose_filter: Filter, model: Model) -> S
         return steps_of(predictor, pose_filter, fitted)
 
     body, drift = np.zeros((len(predictor.tracks.t_s), 3)), np.zeros((len(predictor.tracks.t_s), 2))
+    apart = None
     for frames, steps in zip(held_out, each(predicted, held_out), strict=True):
         body[frames], drift[frames] = steps.body[frames], steps.drift_m[frames]
-    return Steps(body, drift)
+        if steps.apart_m is not None:
+            apart = np.zeros_like(steps.apart_m) if apart is None else apart
+            apart[frames] = steps.apart_m[frames]
+    return Steps(body, drift, apart)
 
 
 @dataclass(frozen=True)

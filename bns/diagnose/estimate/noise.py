@@ -14,6 +14,7 @@ from bns.engine.pose_filter import filter_gains, innovations
 
 HUBER = DEFAULTS.estimate.huber
 
+_LEAST_APART_M = DEFAULTS.predict.marker_least_m
 _ENOUGH = DEFAULTS.estimate.noise_trials
 _GUESS = np.array(DEFAULTS.estimate.noise_guess)
 _LOW = np.array(DEFAULTS.estimate.noise_low)
@@ -44,15 +45,28 @@ class Filter:
     gain: Array
     whiten: Array
     logdet: Array
+    apart_m: Array | None = None
+    """Scatter of each distance between tracked points, (k,)."""
 
     def whitened(self, tracks: Tracks, steps: Steps) -> Array:
-        """Whitened innovations under other steps, (frames, 3)."""
-        return innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, self.gain, self.whiten)
+        """Whitened innovations under other steps, (frames, 3); of robots with several tracked points also their distances."""
+        seen = innovations(steps.body, steps.drift_m, tracks.pose, tracks.is_first, self.gain, self.whiten)
+        if steps.apart_m is None or self.apart_m is None:
+            return seen
+        return np.concatenate([seen, steps.apart_m / self.apart_m], axis=1)
 
 
 def filter_for(predictor: Predictor, steps: Steps, noise: Array) -> Filter:
     """The filter with the gains that these steps and this noise ask for."""
-    return Filter(noise, *filter_gains(steps.body, predictor.tracks.is_first, predictor.way_m, noise))
+    gain, whiten, logdet = filter_gains(steps.body, predictor.tracks.is_first, predictor.way_m, noise)
+    return Filter(noise, gain, whiten, logdet, _scatter(steps.apart_m))
+
+
+def _scatter(apart_m: Array | None) -> Array | None:
+    """Standard deviations (k,) of distances that are off by apart_m (frames, k), by their medians."""
+    if apart_m is None:
+        return None
+    return np.maximum(np.median(np.abs(apart_m), axis=0) / 0.6745, _LEAST_APART_M)
 
 
 def estimate_noise(predictor: Predictor, steps: Steps, start: Array | None = None) -> Array:

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from bns.sweep.cores import cores
+from bns.sweep.jobs.cores import cores
 
 S = TypeVar("S")
 T = TypeVar("T")

@@ -14,7 +14,6 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
-from bns.physics.effects import all_effects
 from bns.physics.model import Model
 
 _SHARES = DEFAULTS.estimate.start_shares
@@ -34,7 +33,7 @@ def listed(
     """
     barred = {active.effect.name for active in model.effects} | set(without)
     unfit = ("track" if tracks.relative else "motions") if tracks is not None else None
-    catalogue = {name: fitting(e, model, tracks) for name, e in all_effects().items() if e.needs != unfit}
+    catalogue = {name: fitting(e, model, tracks) for name, e in model.catalogue().items() if e.needs != unfit}
     return {name: effect for name, effect in {**catalogue, **(extra or {})}.items() if name not in barred}
 
 

@@ -18,7 +18,6 @@ from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.estimate.trial_clocks import with_fitted_clocks
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS
-from bns.physics.effects import all_effects
 from bns.physics.model import Model
 
 BLOCKS = DEFAULTS.estimate.clock_blocks
@@ -43,8 +42,8 @@ def steps_of(predictor: Predictor, pose_filter: Filter, model: Model) -> Steps:
 
 def fit_trial_clocks(problem: Problem, fit: Fit) -> TrialClocks | None:
     """A fitted model with a clock for each trial; None where they hardly differ, or already differ in the model."""
-    effect = next(e for e in all_effects().values() if e.per_trial_allowed)
-    if fit.model.per_trial_effect is not None:
+    effect = next((e for e in fit.model.catalogue().values() if e.per_trial_allowed), None)
+    if effect is None or fit.model.per_trial_effect is not None:
         return None
     if np.median(np.diff(problem.predictor.tracks.first)) < FEWEST_FRAMES:
         return None

@@ -18,18 +18,20 @@ class Steps:
     """Predicted displacement since the frame before; zeros where a trial begins.
 
     ``body`` (frames, 3): forward_m, left_m, turn_rad in the frame of the robot at the frame before; ``drift_m``
-    (frames, 2): east and north, whatever way the robot faces.
+    (frames, 2): east and north, whatever way the robot faces. ``apart_m`` (frames, k): measured minus predicted distances between
+    tracked points, which a pose does not hold; None where there is but one point.
     """
 
     body: Array
     drift_m: Array
+    apart_m: Array | None = None
 
 
 class Predictor(Protocol):
     """Tracks with all that can be worked out of them once.
 
-    ``way_m`` (frames,): how far the robot was driven since the frame before. ``horizons``: names of the times over which
-    predictions are judged; ``near``: the one of them that curves and worst moments are about. ``tracking``: noise of a tracked
+    ``way_m`` (frames,): how far the robot was driven since the frame before (or how strongly its drive scatters, in metres).
+    ``horizons``: names of the times over which predictions are judged; ``near``: the one of them that curves and worst moments are about. ``tracking``: noise of a tracked
     position (m) and heading (rad), where the tracks tell it by themselves; None: it is estimated under a model. ``counted``
     (frames,): what each frame counts in a fit; None: all of them 1.
     """
@@ -46,6 +48,13 @@ class Predictor(Protocol):
 
     def steps(self, model: Model) -> Steps:
         """What the model predicts between successive frames."""
+
+    def anchor(self, model: Model) -> None:
+        """Models near this one are asked for next: what is worked out roughly is worked out well here."""
+
+    @property
+    def screening(self) -> Predictor | None:
+        """The same for few of the tracks, where `steps` is costly: it shows which effects are worth a fit. None: all are."""
 
     def variables(self) -> dict[str, Array]:
         """Name -> values along which errors may show, one a step of the predictor's own grid, (trials, steps)."""

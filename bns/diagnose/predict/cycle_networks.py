@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.cycles import CycleTracks
+from bns.diagnose.data.cycles import CycleTracks, marker_noise_m
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.settings import DEFAULTS
@@ -23,7 +23,6 @@ from bns.static_simulator.train_in_stages import accuracy
 
 SEVERAL = DEFAULTS.predict.middle_cycles
 _FEW = DEFAULTS.predict.fewest_cycles
-_LEAST_NOISE_M = DEFAULTS.predict.marker_least_m
 
 
 class CyclePredictor:
@@ -36,6 +35,7 @@ class CyclePredictor:
 
     horizons: tuple[str, ...] = ("cycle", "change", f"{SEVERAL} cycles", "trial")
     near = "cycle"
+    screening = None
 
     def __init__(self, tracks: CycleTracks, saved: StaticSimulator, robot: Snake) -> None:
         self.tracks: Tracks = tracks
@@ -61,6 +61,9 @@ class CyclePredictor:
         added = rates[self.tracks.trial, np.maximum(self._at - 1, 0)]
         added[self.tracks.is_first] = 0.0
         return Steps(self._networks + added, np.zeros((len(added), 2)))
+
+    def anchor(self, model: Model) -> None:
+        """Every answer is exact."""
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Begins and ends of stable cycles, of changes between two, of several in a row, of all a trial began with."""
@@ -121,14 +124,8 @@ class CyclePredictor:
 
     def _tracking(self) -> tuple[float, float] | None:
         """A stable cycle ends in the posture in which it began: what its markers' distance differs by is the camera's noise."""
-        markers = self._cycles.markers_m
-        gap = np.hypot(*(markers[:, 1] - markers[:, 0]).T)
-        differ = np.abs(gap[1::2] - gap[::2])[self._cycles.stable]
-        if len(differ) < _FEW:
-            return None
-        # robust: the median of a normal difference is 0.674 of its sd, which is twice that of one marker's coordinate
-        marker_m = max(float(np.median(differ)) / 0.674 / 2, _LEAST_NOISE_M)
-        return marker_m / np.sqrt(2), marker_m * np.sqrt(2) / float(np.median(gap))
+        marker_m = marker_noise_m(self._cycles)
+        return None if marker_m is None else (marker_m / np.sqrt(2), marker_m * np.sqrt(2) / float(np.median(self._cycles.gap_m)))
 
     def gap_errors(self, horizon: str) -> Array:
         """Measured minus predicted distance of the markers at the ends of a horizon's windows, m, (windows,)."""

@@ -16,15 +16,16 @@ from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import HORIZONS, windows
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
-from bns.physics.differential_drive import taken_at
 from bns.physics.effect import Effect
-from bns.physics.grid import Grid
 from bns.physics.model import ActiveEffect, Model
-from bns.physics.motion import flow_of, wheel_motion, with_body_effects
-from bns.physics.signals import Body, Conditions, View, Wheels
+from bns.physics.signals import Body, Conditions, Logged, View, Wheels
+from bns.physics.wheels.differential_drive import taken_at
+from bns.physics.wheels.grid import Grid
+from bns.physics.wheels.motion import flow_of, wheel_motion, with_body_effects
 
 RECENT_S = DEFAULTS.predict.recent_s
 _COARSE_S = DEFAULTS.predict.coarse_s
+_RUN_UP_STEP_S = DEFAULTS.data.run_up_step_s
 _TAIL_S = DEFAULTS.predict.tail_s
 _KEPT = 500_000
 """Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
@@ -42,6 +43,7 @@ class WheelPredictor:
     near = "1s"
     tracking: tuple[float, float] | None = None
     counted: Array | None = None
+    screening = None
 
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
         self.tracks, self._dt_s = tracks, dt_s
@@ -78,6 +80,9 @@ class WheelPredictor:
                 view = active.effect.apply(view, **active.by_name)
         body = displacements(view.poses, self.tracks.is_first)
         return Steps(self._pictured(body, placed) if placed else body, self._drift(model, poses, sums))
+
+    def anchor(self, model: Model) -> None:
+        """Every answer is exact."""
 
     def _pictured(self, body: Array, placed: Sequence[ActiveEffect]) -> Array:
         """Displacements (frames, 3) as they look where the robot was seen: the picture is undone there, and made again."""
@@ -164,7 +169,7 @@ class WheelPredictor:
             "previous_speed_m_s": _before(speed, changed),
             "previous_wheel_difference_m_s": _before(turn, changed),
             "time_in_command_s": middle - began,
-            "time_in_trial_s": middle,
+            "time_in_trial_s": middle if tracks.lead_s is None else middle - tracks.lead_s[:, None],
             "session_s": tracks.start_s[:, None] + middle,
             "way_m": way,
             "left_change_m_s": _fresh_change(grid.left_m_s, middle - began, changed),
@@ -250,11 +255,13 @@ def _grid_of(tracks: Tracks, dt_s: float) -> Grid:
     nodes, lefts, rights = [], [], []
     for trial in range(len(tracks)):
         frames = tracks.t_s[tracks.first[trial] : tracks.first[trial + 1]]
+        lead = 0.0 if tracks.lead_s is None else tracks.lead_s[trial]
         ends = np.cumsum(tracks.duration_s[trial])
         marks = np.unique(
-            np.concatenate([[0.0], ends, frames[frames >= 0], [max(ends[-1], *frames[-1:]) + _TAIL_S]]).round(9)
+            np.concatenate([[0.0, lead], ends, frames[frames >= 0], [max(ends[-1], *frames[-1:]) + _TAIL_S]]).round(9)
         )
-        counts = np.maximum(np.ceil(np.diff(marks) / dt_s - 1e-9).astype(np.int64), 1)
+        longest = np.where(marks[1:] <= lead + 1e-9, max(dt_s, _RUN_UP_STEP_S), dt_s)
+        counts = np.maximum(np.ceil(np.diff(marks) / longest - 1e-9).astype(np.int64), 1)
         inner = np.concatenate([[0.0], np.repeat(np.diff(marks) / counts, counts)])
         node = marks[0] + np.cumsum(inner)
         lasting = np.flatnonzero(tracks.duration_s[trial] > 0)
@@ -306,7 +313,12 @@ def _conditions(tracks: Tracks, node_s: Array) -> Conditions:
         reference = volts[np.isfinite(volts)][0]
         drop = np.stack([_held(tracks, volts, row, middle[row]) for row in range(len(tracks))]) - reference
         drop = -drop
-    return Conditions(session_s=tracks.start_s[:, None] + middle, battery_drop_v=drop)
+    def on_grid(name: str) -> Array:
+        values = tracks.extra[name]
+        return np.stack([_held(tracks, values, row, middle[row]) for row in range(len(tracks))])
+
+    there = [name for name, values in tracks.extra.items() if np.isfinite(values).any()]
+    return Conditions(tracks.start_s[:, None] + middle, drop, logged=Logged(there, on_grid))
 
 
 def _between_frames(tracks: Tracks, grid: Grid) -> NDArray[np.bool_]:

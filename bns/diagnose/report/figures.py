@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison, Curve
 from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.report.text import ahead
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, save, style
 
@@ -81,11 +83,18 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
 
 @style()
 def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12) -> Path:
-    """What each effect earns on trials held out, when added alone to the model; bars are 95 % intervals."""
+    """The error before and after (where effects are named), and what each effect earns when it is added alone."""
     assert d.selection is not None
     rows = min(sum(bool(np.isfinite(c.paired_comparison.elpd_diff)) for c in d.selection.steps[0].ranking), most)
-    figure = Figure(figsize=(PAGE_IN * 0.75, 0.24 * rows + 1.2))
-    ranking_axes(figure.subplots(), d, most)
+    falls = d.errors if d.effects else None
+    figure = Figure(figsize=(PAGE_IN * (1.25 if falls else 0.75), max(0.24 * rows + 1.2, 2.8)))
+    if falls:
+        left, right = figure.subplots(1, 2, width_ratios=(2, 3))
+        errors_axes(left, falls, ("as given", "+ " + "\n+ ".join(d.effects)))
+        left.set_title("The error falls (bars: 95 %)")
+        ranking_axes(right, d, most)
+    else:
+        ranking_axes(figure.subplots(), d, most)
     return save(figure, path)[0]
 
 
@@ -107,7 +116,7 @@ def ranking_axes(axes: Axes, d: Diagnosis, most: int = 12) -> None:
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("gain in log-likelihood a trial, on trials held out")
     axes.set_title(f"verdict: {d.verdict}" + (f" ({', '.join(d.effects)})" if d.effects else ""))
-    axes.legend(loc="lower right")
+    axes.legend(loc="upper left")
 
 
 @style()
@@ -120,8 +129,13 @@ def error_by_step_figure(m: ExtendedModel, path: Path) -> Path:
 
 def error_by_step_axes(axes: Axes, m: ExtendedModel) -> None:
     """The same on axes that are there."""
-    names = [name if index == 0 else f"+ {name}" for index, name in enumerate(m.names)]
-    horizons = [e for e in m.errors.horizons.values() if e.windows]
+    errors_axes(axes, m.errors, [name if index == 0 else f"+ {name}" for index, name in enumerate(m.names)])
+    axes.set_title("Error, effect by effect (bars: 95 %)")
+
+
+def errors_axes(axes: Axes, errors: PairedErrors, names: Sequence[str]) -> None:
+    """Root mean square error of models judged on the same windows: one line a horizon, the tracking noise dotted."""
+    horizons = [e for e in errors.horizons.values() if e.windows]
     for colour, marker, e in zip(OKABE_ITO, "os^D", horizons, strict=False):
         values = [1e3 * one.rms_m for one in e.models]
         ends = np.array([[1e3 * (one.rms_m - one.low_m), 1e3 * (one.high_m - one.rms_m)] for one in e.models]).T
@@ -137,9 +151,9 @@ def error_by_step_axes(axes: Axes, m: ExtendedModel) -> None:
         if np.isfinite(e.noise_floor_m):
             axes.plot([0, len(values) - 1], [1e3 * e.noise_floor_m] * 2, color=colour, linestyle=":", linewidth=1)
     axes.set_xticks(range(len(names)), names)
+    axes.set_xlim(-0.3, len(names) - 0.7)
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("{x:g}")
     axes.set_ylabel("position error on held-out trials (mm, RMS)")
     axes.legend(title="horizon (dotted: tracking noise)", loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    axes.set_title("Error, effect by effect (bars: 95 %)")

@@ -106,8 +106,9 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
     if errors.noise is None:
         yield "  (noise: these poses are too far apart in time to show it)"
     else:
-        pose_mm = 1e3 * errors.noise.position_m
-        yield f"  (noise: of the tracking alone, from the poses {errors.noise.basis}: {pose_mm:.2f} mm a pose)"
+        pose_mm, basis = 1e3 * errors.noise.position_m, errors.noise.basis
+        basis = basis if basis.startswith("at ") else f"at {basis}"
+        yield f"  (noise: error of the tracking alone, {pose_mm:.2f} mm a pose, estimated from poses {basis})"
 
 
 def _change(c: Change) -> str:

@@ -41,6 +41,37 @@ class Predict:
     marker_least_m: float = setting(
         1e-4, "m", f"No camera is taken to see a marker better than to a tenth of a millimetre; {BY_HAND}."
     )
+    coarser: float = setting(
+        2.0,
+        "1",
+        "Steps of a body's simulation are so many times as long where only the difference of two models counts: half the time; "
+        f"a cycle then ends 3 mm elsewhere at the median, in both models alike; {BY_HAND}.",
+    )
+    response_shares: tuple[float, ...] = setting(
+        (0.2, 0.6, 1.2),
+        "1",
+        f"Nodes of a response curve of a body: these shares of the way from neutral to what is plausible; {BY_HAND}.",
+    )
+    screening_shares: tuple[float, ...] = setting(
+        (0.6, 1.2), "1", f"The same where effects are only screened: one node a side does; {BY_HAND}."
+    )
+    response_clipped_m: float = setting(
+        0.1,
+        "m",
+        f"A response that moves a point farther than this is a robot that rolled over: it counts as this far; {BY_HAND}.",
+    )
+    anchor_near: float = setting(
+        0.03,
+        "1",
+        f"A model this near to a simulated one (sum over its numbers, in plausible ranges) is not simulated again; {BY_HAND}.",
+    )
+    screening_cycles: int = setting(120, "cycles", f"So many cycles, evenly chosen, screen the effects of a body; {BY_HAND}.")
+    wild_m: float = setting(
+        0.06, "m", f"Cycles that a little luck (`still_m`) moves farther than this cannot be foreseen: left out; {BY_HAND}."
+    )
+    still_m: float = setting(
+        5e-3, "m", f"Cycles that a little luck moves less far than this scatter alike; {BY_HAND}."
+    )
     interval_draws: int = setting(
         1000, "samples", "Bootstrap samples: the ends of a 95 % interval are then known to 10 % of its width."
     )

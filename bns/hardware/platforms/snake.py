@@ -15,6 +15,7 @@ from bns.hardware.dynamixel import BAUD as BUS_BAUD
 from bns.hardware.dynamixel import Ax12Chain
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
+from bns.hardware.guard.recipe import StopRecipe, ax12_recipe, bridge_recipe
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
@@ -23,9 +24,8 @@ from bns.hardware.servo_chain import ServoChain, ServoError
 from bns.hardware.snake_drive import SnakeDrive
 from bns.hardware.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
-from bns.hardware.stop_recipe import StopRecipe, ax12_recipe, bridge_recipe
 from bns.hardware.tracking.eye import Eye
-from bns.hardware.tracking.kinds import checked, open_tracker
+from bns.hardware.tracking.kinds import checked, delay_of, open_tracker
 
 REPEATS = 3
 """How often a trial drives its final controller, unless it is told otherwise: the source drove it three times (section 5.7)."""
@@ -87,6 +87,7 @@ class SnakePlatform:
                 drive.straighten()
                 for cycle in commands.astype(np.float64):
                     drive.carry_out(cycle)
+                drive.finish()
             except DriveEnded as end:
                 ended = str(end)
             except ServoError as error:
@@ -111,7 +112,7 @@ def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stoppi
     try:
         with StopsAtTheEnd(chain.stop):
             chain.health()
-        eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0)
+        eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0, delay_of(rig.tracker))
     except ServoError as error:
         chain.close()
         raise HardwareError(f"the servos are not fit to drive: {error}. See to it, then try again.") from error

@@ -10,8 +10,8 @@ import math
 from dataclasses import replace
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.scans import rate_limited
 from bns.physics.signals import Wheels
+from bns.physics.wheels.scans import rate_limited
 
 
 def apply(wheels: Wheels, max_m_s2: float) -> Wheels:

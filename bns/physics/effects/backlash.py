@@ -7,8 +7,8 @@ a robot was last driven so.
 from __future__ import annotations
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.scans import played
 from bns.physics.signals import Wheels
+from bns.physics.wheels.scans import played
 
 
 def apply(wheels: Wheels, gap_m: float) -> Wheels:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.scans import trailing
 from bns.physics.signals import CREEP_M_S, Body
+from bns.physics.wheels.scans import trailing
 
 
 def apply(body: Body, loss: float, trail_m: float) -> Body:

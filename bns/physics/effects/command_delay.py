@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.scans import delayed
 from bns.physics.signals import Wheels
+from bns.physics.wheels.scans import delayed
 
 
 def apply(wheels: Wheels, delay_s: float) -> Wheels:

@@ -7,8 +7,8 @@ is late by another part of the period: on average that is a `command-delay` of h
 from __future__ import annotations
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.scans import sampled
 from bns.physics.signals import Wheels
+from bns.physics.wheels.scans import sampled
 
 
 def apply(wheels: Wheels, period_s: float) -> Wheels:

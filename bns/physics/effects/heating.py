@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.scans import accumulated
 from bns.physics.signals import Array, Wheels
+from bns.physics.wheels.scans import accumulated
 
 
 def apply(wheels: Wheels, loss_per_m: float, cool_s: float) -> Wheels:

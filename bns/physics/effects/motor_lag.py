@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.scans import first_order
 from bns.physics.signals import Wheels
+from bns.physics.wheels.scans import first_order
 
 
 def apply(wheels: Wheels, tau_s: float) -> Wheels:

@@ -54,7 +54,7 @@ class Khepera:
     switched_on: tuple[str, ...] = ()
     nguyen_widrow, flat_spot = False, 0.0
     substitute_sd_m = None
-    physics = "bns.physics.khepera_drive"
+    physics = "bns.physics.wheels.khepera_drive"
     world_model = "khepera-world"
     simulators = "bns.robots"
     two_wheeled = True

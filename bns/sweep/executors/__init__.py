@@ -10,7 +10,7 @@ from typing import Protocol
 from bns.errors import ClusterError
 from bns.extras import MissingExtraError
 from bns.registry import EXECUTORS
-from bns.sweep.grid import Sweep
+from bns.sweep.expand.grid import Sweep
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
 

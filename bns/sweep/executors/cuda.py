@@ -9,8 +9,8 @@ from bns.cuda.device import device_name
 from bns.cuda.support import check_supported
 from bns.errors import SpecError
 from bns.spec import RunSpec
-from bns.sweep.batches import BatchExecutor
-from bns.sweep.grid import Sweep
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.jobs.batches import BatchExecutor
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary, run_sweep
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from urllib.parse import urlsplit
 
-from bns.sweep.cores import cores
-from bns.sweep.dask_link import DaskLink
-from bns.sweep.dask_workers import DaskExecutor
 from bns.sweep.executors import joblib
-from bns.sweep.grid import Sweep
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.jobs.cores import cores
+from bns.sweep.jobs.dask_link import DaskLink
+from bns.sweep.jobs.dask_workers import DaskExecutor
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary, run_sweep
 

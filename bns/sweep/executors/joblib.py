@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import platform
 
-from bns.sweep.cores import cores
-from bns.sweep.grid import Sweep
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.jobs.cores import cores
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary, run_sweep
 

@@ -15,12 +15,12 @@ from typing import Any
 
 from bns.errors import ClusterError
 from bns.extras import extra
-from bns.store.reader import finished
-from bns.sweep.grid import Sweep
-from bns.sweep.order import ordered_specs
+from bns.store.read.reader import finished
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.expand.order import ordered_specs
+from bns.sweep.expand.shard import Shard
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
-from bns.sweep.shard import Shard
 from bns.sweep.slurm_job import SIGNAL_S, ShardJob
 
 with extra("cluster"):

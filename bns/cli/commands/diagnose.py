@@ -1,0 +1,254 @@
+"""The commands that hold models against measurements: import, compare, diagnose, add."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bns.cli.parser import Parser, add_trust, data_first
+
+if TYPE_CHECKING:
+    from bns.api.common.prepared import Prepared
+    from bns.api.common.shown import Progress
+    from bns.api.diagnose import DiagnoseResult
+    from bns.api.measurements import Measurements
+    from bns.api.model import Given
+
+Adder = Callable[[str, Callable[[argparse.Namespace], int], str], Parser]
+
+
+def add_commands(command: Adder) -> None:
+    """The parsers of these commands; ``command`` makes one of a name, a function and a text."""
+    read = command("import", import_, "turn a log with other columns or units into a table of measurements")
+    read.add_argument(
+        "data",
+        type=Path,
+        nargs="+",
+        metavar="LOG",
+        help="a .csv, .tsv, .dat, .txt, .parquet or .tuple file, a recording of ROS (.bag, .mcap, .db3 or its folder); further "
+        "files are joined with the first by time",
+    )
+    read.add_argument(
+        "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml beside the log"
+    )
+    read.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FILE", help="table to write (.csv or .parquet)"
+    )
+    held = command("compare", compare, "hold a model against measurements: how far it is off, and where")
+    found = command(
+        "diagnose", diagnose, "which physical effect a model lacks, how sure that is, and what else it could be"
+    )
+    more = command("add", add, "add effects to a model, fit it to measurements, and show the error before and after")
+    more.rewrite = data_first
+    more.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
+    more.add_argument(
+        "effects", nargs="+", metavar="EFFECT", help="names of effects, Python files, or one name with --term"
+    )
+    more.add_argument("--term", metavar="FORMULA", help="a formula instead of a listed effect: 'k * v * abs(w)'")
+    more.add_argument(
+        "--on", default="v", metavar="VELOCITY", help="what the formula is added to: v, w, s, east, north"
+    )
+    more.add_argument(
+        "--per-trial",
+        action="store_true",
+        help="every trial has a value of its own (clock-offset: clocks set anew each time)",
+    )
+    more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the mended model")
+    more.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    for one in (held, found):
+        one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
+        one.add_argument("--json", action="store_true", help="one JSON object on stdout")
+        one.add_argument("--findings", action="store_true", help="list everything odd in the data")
+    for one in (held, found, more):
+        add_model_options(one)
+        one.add_argument("--figures", type=Path, metavar="DIR", help="also draw figures into this folder")
+    add_effect_options(found)
+    for one in (held, more):
+        add_trust(one, also=True)
+
+
+def add_model_options(parser: argparse.ArgumentParser) -> None:
+    """Which model, and which robot of the data."""
+    parser.add_argument(
+        "--model",
+        required=True,
+        metavar="M",
+        help="khepera, differential-drive, a YAML file; for compare also networks (.safetensors), snake, snake+changes",
+    )
+    parser.add_argument(
+        "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"
+    )
+    parser.add_argument("--robot", metavar="NAME", help="which robot, where a column robot names several")
+    parser.add_argument(
+        "--more",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="further measurements, taken together with these",
+    )
+
+
+def add_effect_options(parser: argparse.ArgumentParser) -> None:
+    """What is tried beside the listed effects."""
+    parser.add_argument(
+        "--also",
+        action="append",
+        default=[],
+        metavar="FILE.py",
+        help="an effect of your own to try beside the listed ones",
+    )
+    parser.add_argument(
+        "--without-effect",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a listed effect that is not to be tried, say because it was measured apart",
+    )
+    add_trust(parser)
+
+
+def import_(options: argparse.Namespace) -> int:
+    """A log as a table of measurements; the mapping is kept beside it."""
+    import yaml
+
+    from bns.diagnose.data.import_log import import_log
+    from bns.diagnose.data.mapping import load_mapping
+    from bns.diagnose.report.text import findings_text
+    from bns.measurements import check_table_name, write_measurements
+
+    check_table_name(options.output)
+    first = options.data[0]
+    found = import_log(options.data, load_mapping(options.map) if options.map else None)
+    write_measurements(found.table, options.output)
+    if options.map:
+        beside = first.with_name(first.name + ".import.yaml")
+        if not beside.exists():
+            beside.write_text(yaml.safe_dump(found.mapping, sort_keys=False), encoding="utf-8")
+    print(found.summary(str(options.output)))
+    print(findings_text(found.findings))
+    return 0
+
+
+def compare(options: argparse.Namespace) -> int:
+    """Errors of a model as it is; of a run's networks also why they are wrong."""
+    from bns.api.compare import compare as held_against
+    from bns.diagnose.report.figures import comparison_figure
+    from bns.diagnose.report.network_text import network_errors_figure
+
+    model, log = model_of(options), log_of(options)
+    with ticking("comparing") as tick:
+        seen = held_against(log, model, progress=tick)
+    if seen.of_networks and seen.causes is None:
+        print(
+            "bns: these networks come without their training patterns, so why they are wrong is not said",
+            file=sys.stderr,
+        )
+    print(json.dumps(seen.to_json()) if options.json else seen.summary())
+    _drawn(options, lambda folder: comparison_figure(seen.comparison, folder / "comparison"))
+    causes = seen.causes
+    if causes is not None:
+        _drawn(options, lambda folder: network_errors_figure(causes, folder / "network-errors"))
+    return 0
+
+
+def diagnose(options: argparse.Namespace) -> int:
+    """The verdict on what a model lacks."""
+    from bns.diagnose.report.figures import diagnosis_figure
+
+    found = diagnosed(options)
+    print(json.dumps(found.to_json()) if options.json else found.summary())
+    if found.diagnosis.selection is not None:
+        _drawn(options, lambda folder: diagnosis_figure(found.diagnosis, folder / "diagnosis"))
+    return 0
+
+
+def diagnosed(options: argparse.Namespace) -> DiagnoseResult:
+    """The diagnosis of what the options' model lacks on their data."""
+    from bns.api.diagnose import diagnose as find
+
+    model, log = model_of(options), log_of(options)
+    with ticking("diagnosing") as tick:
+        found = find(log, model, also=options.also, without_effects=options.without_effect, progress=tick)
+    _say_thinned(found.ready)
+    return found
+
+
+def add(options: argparse.Namespace) -> int:
+    """An extended model, as a new file."""
+    from bns.api.add import add as fitted
+    from bns.api.model import checked_target
+    from bns.diagnose.report.figures import error_by_step_figure
+
+    checked_target(options.output)
+    model, log = model_of(options), log_of(options)
+    with ticking("fitting") as tick:
+        result = fitted(
+            log,
+            options.effects,
+            model,
+            term=options.term,
+            on=options.on,
+            per_trial=options.per_trial,
+            progress=tick,
+        )
+    _say_thinned(result.ready)
+    result.model.save(options.output)
+    print(json.dumps(result.to_json()) if options.json else result.summary())
+    if not options.json:
+        print(f"written to {options.output}; the model before is as it was ({options.model})")
+    _drawn(options, lambda folder: error_by_step_figure(result.extended, folder / "ladder"))
+    return 0
+
+
+def log_of(options: argparse.Namespace) -> Measurements:
+    """The measurements of the options; what is odd about them goes to stderr."""
+    from bns.api.measurements import Measurements
+    from bns.diagnose.report.text import findings_text
+
+    log = Measurements(options.data, *options.more, robot=options.robot)
+    findings = log.measured.findings
+    if findings:
+        most = len(findings) if getattr(options, "findings", False) else 5
+        print(findings_text(findings, most), file=sys.stderr)
+    return log
+
+
+def model_of(options: argparse.Namespace) -> Given:
+    """The model of the options; the name as it is where it means networks."""
+    from bns.api.common.prepared import are_networks
+    from bns.api.model import Model
+
+    if are_networks(options.model):
+        return str(options.model)
+    return Model(options.model, **({} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}))
+
+
+def _say_thinned(ready: Prepared) -> None:
+    if ready.thinned:
+        print(ready.thinned, file=sys.stderr)
+
+
+def _drawn(options: argparse.Namespace, draw: Callable[[Path], Path]) -> None:
+    if options.figures is not None:
+        options.figures.mkdir(parents=True, exist_ok=True)
+        print(f"figure: {draw(options.figures)}", file=sys.stderr)
+
+
+@contextmanager
+def ticking(text: str) -> Iterator[Progress]:
+    """A line on stderr that says what is being looked at; nothing where stderr is no terminal."""
+    from rich.console import Console
+    from rich.status import Status
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda _share, _what: None
+        return
+    with Status(text, console=console) as line:
+        yield lambda _share, what: line.update(f"{text}: {what}")

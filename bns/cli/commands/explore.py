@@ -1,0 +1,52 @@
+"""The command that opens the page: explore."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from pathlib import Path
+
+from bns.cli.commands.diagnose import Adder
+
+LARGEST_PORT = 65_535
+
+
+def add_commands(command: Adder) -> None:
+    """The parser of this command."""
+    page = command("explore", explore, "a page in the browser: switch effects on and watch the error fall")
+    page.add_argument(
+        "data", type=Path, nargs="*", metavar="DATA", help="measurements or a saved session; without any: sample logs"
+    )
+    page.add_argument(
+        "--model", default="khepera", metavar="M", help="khepera (default), differential-drive, a YAML file"
+    )
+    page.add_argument(
+        "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"
+    )
+    page.add_argument("--port", type=_port, default=0, metavar="N", help="of 127.0.0.1 (default: any that is free)")
+    page.add_argument("--no-browser", action="store_true", help="only print the address")
+
+
+def explore(options: argparse.Namespace) -> int:
+    """Serve the page until Ctrl-C or SIGTERM, which is how it is meant to end: exit code 0."""
+    from bns.api.model import Model
+    from bns.app.explore import Explorer, tabs_of
+    from bns.extras import require
+
+    require("app", "panel", "bokeh")
+    logging.getLogger("tornado.access").setLevel(logging.ERROR)  # no line for every file that the browser fetches
+    given = {} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}
+    words = (options.model, *(["--wheelbase", f"{options.wheelbase:g}"] if given else []))
+    files = [str(file) for file in options.data]
+    log = files[0] if len(files) == 1 else files or None
+    explorer = Explorer(tabs_of(log, Model(options.model, **given), " ".join(files), words), options.port)
+    print(explorer.address, flush=True)
+    print("open this address in a browser on this machine; Ctrl-C ends the page", flush=True)
+    explorer.serve(browser=not options.no_browser)
+    return 0
+
+
+def _port(text: str) -> int:
+    if not text.isdigit() or int(text) > LARGEST_PORT:
+        raise argparse.ArgumentTypeError(f"{text!r} is no port; give a whole number from 0 (any) to {LARGEST_PORT}")
+    return int(text)

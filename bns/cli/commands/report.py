@@ -1,0 +1,80 @@
+"""The commands that make something of a diagnosis: propose the next experiment, report to people."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from bns.cli.commands.diagnose import Adder, add_effect_options, add_model_options, diagnosed, ticking
+
+
+def add_commands(command: Adder) -> None:
+    """The parsers of these commands; ``command`` makes one of a name, a function and a text."""
+    next_one = command("propose", propose, "the next experiment: commands that tell rival explanations apart")
+    next_one.add_argument("-o", "--output", type=Path, metavar="FILE.csv", help="trial file for bns trial --commands")
+    next_one.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    page = command("report", report, "one HTML page for people: what is missing, how sure that is, what to do next")
+    page.add_argument("-o", "--output", type=Path, metavar="FILE.html", default=Path("report.html"), help="the page")
+    for one in (next_one, page):
+        one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
+        add_experiment_options(one)
+        add_model_options(one)
+        add_effect_options(one)
+
+
+def add_experiment_options(parser: argparse.ArgumentParser) -> None:
+    """How long, where and how fast."""
+    parser.add_argument("--minutes", type=float, default=10.0, metavar="N", help="of driving (default: 10)")
+    parser.add_argument("--arena", metavar="WxH", help="where the robot may be, metres (default: where it was seen)")
+    parser.add_argument(
+        "--start", metavar="X,Y,DEG", help="where each trial starts: metres, degrees from east (--start=0,0,90)"
+    )
+    parser.add_argument("--speeds", metavar="LOW,HIGH", help="of a wheel, m/s (default: the robot's, and those seen)")
+
+
+def propose(options: argparse.Namespace) -> int:
+    """Trials that tell the rivals apart, as a file that `bns trial` drives."""
+    from bns.api.propose import checked_minutes, checked_output
+
+    checked_minutes(options.minutes)
+    out, limits = options.output, _limits(options)
+    if out is not None:
+        checked_output(out, "The commands", ".csv")
+    found = diagnosed(options)
+    with ticking("planning") as tick:
+        proposal = found.propose(**limits, progress=tick)
+    written = "" if out is None or proposal.commands.empty else str(proposal.to_csv(out))
+    print(json.dumps(proposal.to_json()) if options.json else proposal.summary(written))
+    if out is not None and not written:
+        print(f"{out} is not written: no commands would decide anything", file=sys.stderr)
+    return 0
+
+
+def report(options: argparse.Namespace) -> int:
+    """The page."""
+    from bns.api.propose import checked_minutes, checked_output
+    from bns.api.report import repeated
+
+    checked_minutes(options.minutes)
+    checked_output(options.output, "The report", ".html")
+    limits = _limits(options)
+    found = diagnosed(options)
+    command = repeated(str(options.data), str(options.model), options.wheelbase)
+    with ticking("reporting") as tick:
+        print(found.report(options.output, **limits, command=command, progress=tick).summary())
+    return 0
+
+
+def _limits(options: argparse.Namespace) -> dict[str, Any]:
+    """How long, where and how fast, as values."""
+    from bns.cli.values import pose_of, size_of, speeds_of
+
+    return {
+        "minutes": options.minutes,
+        "arena": size_of(options.arena),
+        "start": pose_of(options.start),
+        "speeds": speeds_of(options.speeds),
+    }

@@ -1,0 +1,82 @@
+"""The commands that look at what there is: status, query, compact, figures, watch."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import asdict
+
+from bns.cli.commands.diagnose import Adder
+from bns.cli.options.option_types import as_json, interval
+from bns.cli.parser import add_results
+
+
+def add_commands(command: Adder) -> None:
+    """The parsers of these commands."""
+    far = command("status", status, "how far the sweeps in a store are")
+    ask = command("query", query, "answer an SQL query over evals, runs, specs, paths, generations, probes (DuckDB)")
+    ask.add_argument("sql", metavar="SELECT ...")
+    ask.add_argument("--csv", action="store_true", help="comma-separated values, a header first")
+    ask.add_argument("--no-header", action="store_true", help="with --csv: bare rows")
+    for one in (far, ask):
+        one.add_argument("--json", action="store_true", help="a list of JSON objects on stdout, one a row")
+    small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
+    drawn = command("figures", figures, "draw whatever the results allow onto one page, DIR/figures/index.html")
+    drawn.add_argument("--only", metavar="NAME", help="one figure: success-by-mutation, …")
+    look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
+    look.add_argument("--every", type=interval, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
+    for one in (far, ask, small):
+        add_results(one)
+    for one in (drawn, look):
+        add_results(one, once_positional=True)
+
+
+def status(options: argparse.Namespace) -> int:
+    """A table of the sweeps."""
+    from bns.sweep.report import status_table
+    from bns.sweep.status import sweep_status
+
+    rows = sweep_status(options.results)
+    if options.json:
+        print(as_json([asdict(row) | {"remaining": row.remaining} for row in rows]))
+    else:
+        print(status_table(rows))
+    return 0
+
+
+def query(options: argparse.Namespace) -> int:
+    """Rows of a query, as a table, as CSV or as JSON."""
+    from bns.store import query as answer
+
+    rows = answer(options.results, options.sql)
+    if options.json:
+        print(as_json([dict(zip(rows.columns, row, strict=True)) for row in rows.itertuples(index=False, name=None)]))
+    elif options.csv:
+        sys.stdout.write(rows.to_csv(index=False, header=not options.no_header))
+    else:
+        print(rows.to_string(index=False, max_rows=100) if len(rows) else "no rows")
+    sys.stdout.flush()
+    return 0
+
+
+def compact(options: argparse.Namespace) -> int:
+    """Merge small files."""
+    from bns.store import compact as merge
+
+    print(merge(options.results))
+    return 0
+
+
+def figures(options: argparse.Namespace) -> int:
+    """The page of figures, drawn once; the code is that of the figures' scripts."""
+    from bns.plotting.scripts import carry_out
+
+    return carry_out(options.results, *(["--only", options.only] if options.only else []))
+
+
+def watch(options: argparse.Namespace) -> int:
+    """The page of figures, kept up to date."""
+    from bns.cli.commands.watch import watch as keep_drawing
+
+    keep_drawing(options.results, options.every, say=lambda text: print(f"bns: {text}", file=sys.stderr, flush=True))
+    return 0

@@ -1,0 +1,101 @@
+"""The commands that carry out sweeps and say what they would cost: sweep, plan."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import asdict
+
+from bns.cli.commands.diagnose import Adder
+from bns.cli.compiling import say_if_compiling
+from bns.cli.options.option_types import as_json, duration, positive
+from bns.cli.options.sweep_options import add_cluster_options, backend_name, request_of
+from bns.cli.parser import add_results, add_trust
+from bns.spec import RunSpec
+
+INTERRUPTED, TERMINATED = 130, 143
+_FILES = "sweep files (YAML), or names of those that come with bns: khepera, snake, …"
+
+
+def add_commands(command: Adder) -> None:
+    """The parsers of these commands."""
+    many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
+    many.add_argument("files", nargs="+", metavar="FILE", help=f"{_FILES}; taken in this order")
+    many.add_argument("--jobs", type=positive, metavar="N", help="worker processes a machine (default: one a core)")
+    many.add_argument(
+        "--budget", type=duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
+    )
+    add_cluster_options(many, positive, duration)
+    many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
+    many.add_argument(
+        "--confirm-top",
+        type=positive,
+        metavar="K",
+        help="when a sweep is done, run the K best combinations of each task again on fresh seeds, as sweep NAME-confirm",
+    )
+    many.add_argument(
+        "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
+    )
+    costs = command(
+        "plan", plan, "what sweeps would cost on a laptop, a server and a cluster, from this machine's pace"
+    )
+    costs.add_argument("files", nargs="+", metavar="FILE", help=_FILES)
+    costs.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    for one in (many, costs):
+        add_results(one)
+        add_trust(one)
+
+
+def sweep(options: argparse.Namespace) -> int:
+    """Runs of sweep files, one file after the other, on one budget."""
+    from bns.sweep.confirm import in_turn
+    from bns.sweep.executors import load_executor
+    from bns.sweep.expand.grid import load_sweep
+    from bns.sweep.forecast.plan import plan as foretell
+    from bns.sweep.progress import SweepProgress
+    from bns.sweep.report import planned, summed_up
+
+    files = [load_sweep(file) for file in options.files]
+    sweeps = in_turn(files, options.results, options.confirm_top)
+    backend = load_executor(backend_name(options))
+    with SweepProgress() as bar:
+        request = request_of(options, bar)
+        if options.dry_run:
+            place = backend.placement(request)
+            for one in sweeps:
+                estimate = foretell(
+                    one, options.results, place.workers, options.shard, retry_failed=options.retry_failed
+                )
+                print(planned(estimate, place))
+            return 0
+        if options.device == "cpu":
+            say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files))
+        failed = 0
+        for one in sweeps:
+            summary = backend.carry_out(one, request)
+            print(summed_up(summary, options.results), file=sys.stderr)
+            failed += summary.new_failed
+            if summary.stopped_by in {"interrupt", "terminated"}:
+                return INTERRUPTED if summary.stopped_by == "interrupt" else TERMINATED
+    return 1 if failed else 0
+
+
+def plan(options: argparse.Namespace) -> int:
+    """A table of costs; nothing is written."""
+    from bns.sweep.expand.grid import load_sweep
+    from bns.sweep.forecast.cost import MACHINES, Cost, Machine, cost_table
+    from bns.sweep.forecast.plan import plan as planned
+    from bns.sweep.jobs.cores import cores
+
+    plans = [planned(load_sweep(file), options.results, 1) for file in options.files]
+    costs, machines = [Cost.of(each) for each in plans], (Machine("here", 1, cores()), *MACHINES)
+    if options.json:
+        sweeps = [
+            asdict(p) | asdict(c) | {"seconds_on": {machine.name: c.seconds_on(machine) for machine in machines}}
+            for p, c in zip(plans, costs, strict=True)
+        ]
+        print(as_json({"machines": [asdict(machine) for machine in machines], "sweeps": sweeps}))
+        return 0
+    print(cost_table(costs, machines))
+    print("every core as fast as one of this machine's; from " + "; ".join(f"{p.sweep}: {p.basis}" for p in plans))
+    return 0

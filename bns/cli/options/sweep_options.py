@@ -1,0 +1,96 @@
+"""Options of the command line that say where a sweep is carried out."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from bns.errors import SpecError
+
+if TYPE_CHECKING:
+    from bns.sweep.expand.shard import Shard
+    from bns.sweep.progress import SweepProgress
+    from bns.sweep.request import Request
+
+DEVICES = ("cpu", "cuda")
+_ON_CPU = "joblib"
+_TIME_LIMIT_S = 4 * 3600.0
+
+
+def add_cluster_options(
+    parser: argparse.ArgumentParser, positive: Callable[[str], int], duration: Callable[[str], float]
+) -> None:
+    """Add them; ``positive`` and ``duration`` read whole numbers and times."""
+    parser.add_argument("--device", choices=DEVICES, default="cpu", help="what computes: cpu (default), or a GPU: cuda")
+    group = parser.add_argument_group("more than one machine", "from laptop to cluster: docs/cluster.md")
+    add = group.add_argument
+    add(
+        "--shard",
+        type=_shard,
+        metavar="K/N",
+        help="only the K-th of N shares: one command a machine, one folder for all",
+    )
+    add("--executor", metavar="NAME", help=f"{_ON_CPU} (default), dask or slurm")
+    add("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler (default: one of this machine's own)")
+    add("--shards", type=positive, metavar="N", help="jobs of the SLURM array (default: 16)")
+    add(
+        "--time-limit",
+        type=duration,
+        default=_TIME_LIMIT_S,
+        metavar="TIME",
+        help="time of each SLURM job (default: 4h)",
+    )
+    add("--slurm", type=_named, action="append", default=[], metavar="NAME=VALUE", help="option of sbatch (repeatable)")
+    add("--try-locally", action="store_true", help="let the jobs of SLURM run on this machine")
+    add("--wait", action="store_true", help="stay until the jobs of SLURM are done")
+
+
+def backend_name(options: argparse.Namespace) -> str:
+    """Name of the executor; SpecError if a GPU and other machines are asked for at once."""
+    if options.device == "cpu":
+        return options.executor or _ON_CPU
+    if options.executor not in {None, options.device} or options.jobs is not None:
+        given = "--jobs" if options.jobs is not None else f"--executor {options.executor}"
+        raise SpecError(
+            f"--device {options.device} is the GPU of this machine, and {given} shares runs out among cores. Leave one of them "
+            "out; several machines with a GPU each take --shard K/N."
+        )
+    return str(options.device)
+
+
+def request_of(options: argparse.Namespace, bar: SweepProgress) -> Request:
+    """What the options of `bns sweep` ask for."""
+    from bns.sweep.budget import Budget
+    from bns.sweep.request import Request
+
+    return Request(
+        results=options.results,
+        jobs=options.jobs,
+        budget=Budget(options.budget),
+        retry_failed=options.retry_failed,
+        shard=options.shard,
+        on_progress=bar,
+        scheduler=options.scheduler,
+        shards=options.shards,
+        time_limit_s=options.time_limit,
+        options=tuple(options.slurm),
+        cluster="local" if options.try_locally else "slurm",
+        wait=options.wait,
+    )
+
+
+def _shard(text: str) -> Shard:
+    from bns.sweep.expand.shard import Shard
+
+    try:
+        return Shard.parse(text)
+    except SpecError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _named(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, as in partition=long")
+    return name, value

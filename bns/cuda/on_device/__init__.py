@@ -1,0 +1,1 @@
+"""Functions that run on the GPU: networks, lists, drives, evolution, training."""

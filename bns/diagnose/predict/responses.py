@@ -1,0 +1,139 @@
+"""What a simulated body answers to many models at a bearable price: simulated at a few nodes, read between them.
+
+A body's simulation costs seconds, and a search asks for hundreds of models. So every number of an effect has a curve: how far all
+that is seen moves when this number alone leaves neutral, simulated at a few values when they are first needed, straight in
+between. A model is read as the nearest one that was simulated whole (an anchor), plus what the curves say of the difference.
+Wherever noise and numbers are settled (`anchor`), the model itself is simulated: what the curves miss, because effects act on
+each other, is then made good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import copy
+from dataclasses import dataclass, replace
+from threading import RLock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.settings import DEFAULTS
+from bns.physics.effect import Effect, Parameter
+from bns.physics.model import ActiveEffect, Model
+
+Number = tuple[str, str]
+"""Effect and parameter."""
+_NEAR = DEFAULTS.predict.anchor_near
+_CLIPPED_M = DEFAULTS.predict.response_clipped_m
+
+
+@dataclass(frozen=True)
+class _Anchor:
+    values: Mapping[Number, float]
+    seen: Array
+
+
+class Responses:
+    """``seen(model)`` for models that differ in effects of the stage ``mechanics``.
+
+    ``simulate`` gives what is seen of a model, any shape; ``bare``: the model without effects; ``exactly``: the same simulated
+    more finely, to which differences are added. ``shares``: nodes, as shares of the way from neutral to what is plausible.
+    """
+
+    def __init__(
+        self, simulate: Callable[[Model], Array], bare: Model, exactly: Array | None, shares: tuple[float, ...]
+    ) -> None:
+        self._simulate, self._bare, self._shares = simulate, bare, shares
+        self._sound = simulate(bare)
+        self._anchors = [_Anchor({}, self._sound if exactly is None else exactly)]
+        self._curves: dict[Number, dict[float, Array]] = {}
+        self._known: dict[Number, tuple[Effect, Parameter]] = {}
+        self._lock = RLock()
+
+    @property
+    def bare(self) -> Array:
+        """What is seen without effects."""
+        return self._anchors[0].seen
+
+    def seen(self, model: Model) -> Array:
+        """What is seen of a model: an anchor, and along the curves from there."""
+        with self._lock:
+            wanted = self._values(model)
+            anchor = min(self._anchors, key=lambda a: self._distance(a.values, wanted))
+            out = anchor.seen.copy()
+            for number in {**anchor.values, **wanted}:
+                neutral = self._known[number][1].neutral
+                there, here = wanted.get(number, neutral), anchor.values.get(number, neutral)
+                if there != here:
+                    out += self._curve(number, there) - self._curve(number, here)
+            return out
+
+    def anchor(self, model: Model) -> None:
+        """Simulate this model itself, unless one was that is hardly another."""
+        with self._lock:
+            wanted = self._values(model)
+            if min(self._distance(a.values, wanted) for a in self._anchors) > _NEAR:
+                change = self._simulate(model) - self._sound
+                self._anchors.append(_Anchor(wanted, self._anchors[0].seen + change))
+
+    def only(self, frames: NDArray[np.int64], simulate: Callable[[Model], Array]) -> Responses:
+        """The same of some of the frames; ``simulate`` gives these alone."""
+        out = copy(self)
+        out._simulate, out._sound, out._lock = simulate, self._sound[frames], RLock()
+        out._anchors = [_Anchor(a.values, a.seen[frames]) for a in self._anchors]
+        out._curves = {n: {at: seen[frames] for at, seen in nodes.items()} for n, nodes in self._curves.items()}
+        return out
+
+    def _values(self, model: Model) -> dict[Number, float]:
+        """The numbers that are not neutral."""
+        out = {}
+        for active in model.at("mechanics"):
+            for p, value in zip(active.effect.parameters, active.values, strict=True):
+                self._known.setdefault((active.effect.name, p.name), (active.effect, p))
+                if value != p.neutral:
+                    out[active.effect.name, p.name] = value
+        return out
+
+    def _distance(self, one: Mapping[Number, float], other: Mapping[Number, float]) -> float:
+        total = 0.0
+        for number in {**one, **other}:
+            p = self._known[number][1]
+            off = one.get(number, p.neutral) - other.get(number, p.neutral)
+            total += abs(off) / (p.plausible[1] - p.plausible[0])
+        return total
+
+    def _curve(self, number: Number, value: float) -> Array:
+        """What this number alone changes: straight between the nodes on either side, and on beyond the last."""
+        effect, p = self._known[number]
+        side, step = (1.0 if value > p.neutral else -1.0), abs(value - p.neutral)
+        nodes = self._nodes(p, side)
+        known = self._curves.setdefault(number, {})
+        across = [at for at in known if (at - p.neutral) * side < 0 and abs(at - p.neutral) >= step]
+        if not nodes or (p.neutral + side * nodes[0] not in known and step <= nodes[0] and across):
+            nearest = min(across or list(known), key=lambda at: abs(at - p.neutral), default=None)
+            if nearest is not None:
+                return known[nearest] * ((value - p.neutral) / (nearest - p.neutral))
+        at = int(np.searchsorted(nodes, step, side="left"))
+        outer = min(at, len(nodes) - 1)
+        upper = self._node(number, effect, p, p.neutral + side * nodes[outer])
+        if outer == 0:
+            return upper * (step / nodes[0])
+        lower = self._node(number, effect, p, p.neutral + side * nodes[outer - 1])
+        share = (step - nodes[outer - 1]) / (nodes[outer] - nodes[outer - 1])
+        return lower + share * (upper - lower)
+
+    def _nodes(self, p: Parameter, side: float) -> list[float]:
+        """How far the nodes on one side are from neutral."""
+        end, bound = (p.plausible[1], p.high) if side > 0 else (p.plausible[0], p.low)
+        room, width = abs(bound - p.neutral), abs(end - p.neutral) or (p.plausible[1] - p.plausible[0]) / 4
+        return sorted({min(share * width, room) for share in self._shares if room > 0})
+
+    def _node(self, number: Number, effect: Effect, p: Parameter, value: float) -> Array:
+        known = self._curves[number]
+        if value not in known:
+            values = tuple(value if q.name == p.name else q.neutral for q in effect.parameters)
+            model = replace(self._bare, effects=(ActiveEffect(effect, values),))
+            known[value] = np.clip(self._simulate(model) - self._sound, -_CLIPPED_M, _CLIPPED_M)
+        return known[value]
+

@@ -1,0 +1,273 @@
+"""A robot's guard as its trial sees it: a process that owns the port, and must hear from the trial while the robot may move."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bns.errors import HardwareError, StopNotConfirmedError
+from bns.hardware.clock import RealClock
+from bns.hardware.guard.recipe import StopRecipe
+from bns.hardware.platform import Driven, Platform
+from bns.hardware.safety import Stopping
+from bns.hardware.serial_link import no_port, why_not_opened
+from bns.hardware.stop import Stop
+
+_CODE = "import sys; sys.path.append(sys.argv[1]); from guard.process import main; main()"
+"""What the process runs: this folder as a package by itself, found after the standard library."""
+_FOLDER = Path(__file__).parent
+_BEAT_S = 0.02
+_READY_S = 10.0
+_ENDS_S = 2.0
+_SLICE_S = 0.05
+
+
+class Guard:
+    """Starts the process, tells it that the trial lives, and hears when it has stopped the robot.
+
+    `path` is the port to give to the robot's driver. A trial that gives no sign of life for `silent_s` is taken to hang. What the
+    guard does is written into `log`. A guard that has died is started again. One whose trial is gone goes on trying to stop the
+    robot until that has not been heard for `gives_up_s`. `sysfs` is where the system tells which device a port is.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        recipe: StopRecipe,
+        silent_s: float,
+        log: Path | None = None,
+        gives_up_s: float = 14400.0,
+        sysfs: str = "/sys",
+    ) -> None:
+        self._port, self._recipe, self._log = port, recipe, log
+        self._setup: dict[str, Any] = {"silent_s": silent_s, "gives_up_s": gives_up_s, "sysfs": sysfs, "identity": None}
+        self.path = ""
+        self._armed, self._told_s, self._tried_s = False, 0.0, 0.0
+        self._why: str | None = None
+        if not Path(port).exists():
+            raise HardwareError(no_port(port))
+        self._start()
+
+    def _start(self) -> None:
+        folder = Path(self.path).parent if self.path else Path(tempfile.mkdtemp(prefix="bns-guard-"))
+        folder.mkdir(exist_ok=True)
+        self.path = str(folder / "port")
+        self._control, far = socket.socketpair()
+        script = [sys.executable, "-I", "-S", "-c", _CODE, str(_FOLDER.parent)]
+        with far:
+            self._process = subprocess.Popen(
+                script, stdin=far.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+            )
+        self._said = b""
+        setup = self._setup | {"port": self._port, "link": self.path, "process": os.getpid()}
+        setup |= {"log": self._log and str(self._log.absolute()), "stop": self._recipe.as_json()}
+        self._control.sendall((json.dumps(setup) + "\n").encode())
+        answer = self._first_answer()
+        self._control.setblocking(False)
+        if answer["kind"] == "refused":
+            self._gone(folder)
+            raise HardwareError(why_not_opened(self._port, OSError(answer["errno"], answer["what"])))
+        self._setup["identity"] = answer["identity"]
+
+    def _gone(self, folder: Path) -> None:
+        self._control.close()
+        self._process.wait(_READY_S)
+        with suppress(OSError):
+            folder.rmdir()
+
+    def _first_answer(self) -> dict[str, Any]:
+        self._control.settimeout(_READY_S)
+        while b"\n" not in self._said:
+            with suppress(TimeoutError):
+                said = self._control.recv(4096)
+                self._said += said
+                if said:
+                    continue
+            self._process.kill()
+            self._gone(Path(self.path).parent)
+            raise HardwareError(f"the guard of {self._port} did not start within {_READY_S:g} s; is the computer overloaded?")
+        line, self._said = self._said.split(b"\n", 1)
+        return dict(json.loads(line))
+
+    @property
+    def process(self) -> int:
+        """Number of the guard's process."""
+        return self._process.pid
+
+    def beat(self) -> None:
+        """The trial lives; often enough at most."""
+        now_s = time.monotonic()
+        if now_s - self._told_s >= _BEAT_S:
+            self._told_s = now_s
+            self._tell(b".")
+            self._listen()
+
+    def arm(self) -> None:
+        """The robot may move from now on."""
+        self._armed = True
+        self._tell(b"a")
+
+    def still(self) -> None:
+        """It was confirmed to stand."""
+        self._armed = False
+        self._tell(b"s")
+
+    def stop_now(self) -> None:
+        """Have the robot stopped at once, if it may move; the driver's own stop follows. For signal handlers."""
+        with suppress(OSError):
+            self._control.send(b"t")
+
+    def tripped(self) -> str | None:
+        """Why the guard has stopped the robot, if it has."""
+        self._listen()
+        return self._why
+
+    def close(self) -> bool:
+        """Say goodbye; whether the guard has ended. One that goes on is still trying to stop the robot."""
+        self._tell(b"g")
+        self._control.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(_ENDS_S)
+        ended = self._process.returncode is not None
+        self._process.returncode = 0 if not ended else self._process.returncode  # it outlives this process on purpose
+        return ended
+
+    def _tell(self, what: bytes) -> None:
+        try:
+            self._control.send(what)
+        except BlockingIOError:
+            pass  # it has many signs of life to read already
+        except OSError:
+            self._restart()
+
+    def _listen(self) -> None:
+        if not select.select([self._control], [], [], 0)[0]:
+            return
+        try:
+            said = self._control.recv(4096)
+        except OSError:
+            said = b""
+        if not said:
+            self._restart()
+            return
+        *lines, self._said = (self._said + said).split(b"\n")
+        for line in lines:
+            event = json.loads(line)
+            if event["kind"] == "tripped":
+                self._why = f"the guard stopped the robot: {event['why']}"
+
+    def _restart(self) -> None:
+        """The guard was killed: a new one takes the port, and the drive ends."""
+        self._why = "the guard of the robot's port was gone"
+        if time.monotonic() - self._tried_s < 1.0:
+            return
+        self._tried_s = time.monotonic()
+        self._control.close()
+        self._process.wait(_READY_S)
+        with suppress(HardwareError):  # then the driver finds no port, and says so
+            self._start()
+            if self._armed:
+                self.arm()
+
+
+class GuardedClock(RealClock):
+    """The computer's clock; whoever asks it for the time in the thread that made it gives a sign of life.
+
+    A driver asks it all the time, waiting for an answer too; a trial that hangs does not.
+    """
+
+    def __init__(self, guard: Guard) -> None:
+        self._guard, self._owner = guard, threading.get_ident()
+
+    def now_s(self) -> float:
+        """Seconds of the steady clock."""
+        self._alive()
+        return super().now_s()
+
+    def sleep(self, seconds: float) -> None:
+        """Sleep, with signs of life in between."""
+        end_s = time.monotonic() + seconds
+        while (left_s := end_s - time.monotonic()) > 0:
+            self._alive()
+            time.sleep(min(left_s, _SLICE_S))
+        self._alive()
+
+    def _alive(self) -> None:
+        if threading.get_ident() == self._owner:
+            self._guard.beat()
+
+
+class GuardedPlatform:
+    """Implements `bns.hardware.platform.Platform`: another one, whose guard is told when its robot may move."""
+
+    def __init__(self, platform: Platform, guard: Guard, stopping: Stopping) -> None:
+        self._platform, self._guard, self._stopping = platform, guard, stopping
+        stopping.causes.append(guard.tripped)
+        stopping.alarms.append(guard.stop_now)
+
+    @property
+    def retries(self) -> int:
+        """How often a question was asked again so far."""
+        return self._platform.retries
+
+    def pose(self) -> np.ndarray | None:
+        """Where the robot stands."""
+        return self._platform.pose()
+
+    def readings(self) -> dict[str, float]:
+        """Voltages, temperatures."""
+        return self._platform.readings()
+
+    def drive(self, commands: np.ndarray) -> Driven:
+        """Carry out a controller, guarded until the robot was confirmed to stand.
+
+        Where the guard has stopped the robot, nothing that the drive left counts, and what its driver missed is not the cause.
+        """
+        return self._guarded(lambda: self._platform.drive(commands))
+
+    def turn_about(self, seconds: float) -> Any:
+        """Turn to and fro, guarded likewise, where the robot's platform can."""
+        return self._guarded(lambda: self._platform.turn_about(seconds))  # type: ignore[attr-defined]
+
+    def _guarded(self, move: Callable[[], Any]) -> Any:
+        self._stopping.check()
+        self._guard.arm()
+        try:
+            driven = move()
+        except StopNotConfirmedError:
+            raise
+        except BaseException:
+            self._stands()
+            raise
+        self._stands()
+        return driven
+
+    def _stands(self) -> None:
+        self._guard.still()
+        if self._guard.tripped():
+            self._stopping.check()
+
+    def stop(self) -> Stop:
+        """Stop and confirm."""
+        self._guard.arm()
+        stop = self._platform.stop()
+        if stop.confirmed:
+            self._guard.still()
+        return stop
+
+    def close(self) -> None:
+        """Give port and tracker free."""
+        self._platform.close()

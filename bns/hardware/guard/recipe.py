@@ -1,0 +1,78 @@
+"""How a robot is stopped, as data: what to write, which answers confirm it. For the guard, which knows no robot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bns.hardware.ax12_table import BROADCAST, READ, REGISTERS, WRITE
+from bns.hardware.bridge_frames import ANSWER, POSITION, START, STARTED_S, STOP, STOPPED, Frame, encoded
+from bns.hardware.servo_chain import STILL_STEPS
+
+
+@dataclass(frozen=True)
+class StopRecipe:
+    """A stop: `steps` are written one after the other, each with a pattern of its answer (None: nobody answers).
+
+    The groups of the patterns are numbers: with `text` in digits, speeds of at most `within`; without, places in two bytes, low
+    one first, that change by at most `within` from one round to the next. An answer is waited for `wait_s`, twice as long
+    after every round without one, up to `longest_s`. `own_stop` finds the order to stop in what the robot's driver writes.
+    Nothing is written for `quiet_s` after the port was opened, unless something comes from there.
+    """
+
+    baud: int
+    steps: Sequence[tuple[bytes, bytes | None]]
+    own_stop: bytes
+    within: int
+    text: bool
+    wait_s: float
+    longest_s: float
+    quiet_s: float = 0.0
+
+    def as_json(self) -> dict[str, object]:
+        """For the guard; bytes become text, one letter each."""
+        return {
+            "baud": self.baud,
+            "steps": [(send.decode("latin-1"), reply and reply.decode("latin-1")) for send, reply in self.steps],
+            "own_stop": self.own_stop.decode("latin-1"),
+            "within": self.within,
+            "text": self.text,
+            "wait_s": self.wait_s,
+            "longest_s": self.longest_s,
+            "quiet_s": self.quiet_s,
+        }
+
+
+def khepera_recipe(baud: int, still_units: int) -> StopRecipe:
+    """Speeds to zero, and both wheels read back no faster than `still_units`."""
+    steps = ((b"D,l0,l0\n", rb"(?:^|\n)d\r?\n"), (b"E\n", rb"(?:^|\n)e,(-?\d{1,6}),(-?\d{1,6})\r?\n"))
+    return StopRecipe(baud, steps, rb"D,l0,l0\n", still_units, True, 0.12, 1.0)
+
+
+def ax12_recipe(baud: int, ids: Sequence[int]) -> StopRecipe:
+    """Torque off all servos at once; each read back without torque, no joint moved."""
+    torque, place = REGISTERS["torque_enable"], REGISTERS["present_position"]
+    size = place.address + place.size - torque.address
+    order = _packet(BROADCAST, WRITE, bytes([torque.address, 0]))
+    asks = [(_packet(n, READ, bytes([torque.address, size])), _status(n, size)) for n in ids]
+    return StopRecipe(baud, ((order, None), *asks), re.escape(order), STILL_STEPS, False, 0.04, 0.2)
+
+
+def bridge_recipe(baud: int, count: int) -> StopRecipe:
+    """The bridge's own stop: it takes the torque off and answers with what it read back."""
+    size = STOPPED + POSITION.size * count
+    head = re.escape(bytes([START, size, STOP | ANSWER])) + b"."
+    answer = head + b"\x00" * STOPPED + b"(..)" * count + b".."
+    own = re.escape(bytes([START, 0, STOP]))
+    return StopRecipe(baud, ((encoded(Frame(STOP, 0, b"")), answer),), own, STILL_STEPS, False, 0.08, 0.5, STARTED_S)
+
+
+def _packet(number: int, kind: int, parameters: bytes) -> bytes:
+    body = bytes([number, len(parameters) + 2, kind]) + parameters
+    return b"\xff\xff" + body + bytes([~sum(body) & 0xFF])
+
+
+def _status(number: int, size: int) -> bytes:
+    """Error byte, torque (which must be 0), what stands between, the place, checksum."""
+    return b"\xff\xff" + re.escape(bytes([number, size + 2])) + b"." + b"\x00" + b".{%d}(..)." % (size - 3)

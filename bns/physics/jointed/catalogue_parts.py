@@ -1,0 +1,57 @@
+"""Effects that sit at one joint, or at one tracked point: one file, as many effects as there are places."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from bns.physics.effect import Effect
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """``effect``: its ``apply`` also takes where it sits; its sentences may name that in braces."""
+
+    effect: Effect
+
+    @property
+    def name(self) -> str:
+        """Of the family; each member's name ends in its place."""
+        return self.effect.name
+
+    @property
+    def stage(self) -> str:
+        """As of any effect."""
+        return self.effect.stage
+
+    @property
+    def apply(self) -> Callable[..., Any]:
+        """As of any effect, and where."""
+        return self.effect.apply
+
+    def _at(self, name: str, words: dict[str, str], place: dict[str, Any]) -> Effect:
+        return replace(
+            self.effect,
+            name=f"{self.effect.name}-{name}",
+            apply=partial(self.effect.apply, **place),
+            sentence=self.effect.sentence.format(**words),
+            measurement=self.effect.measurement.format(**words),
+        )
+
+
+class PerJoint(_Placed):
+    """One for every joint with a servo."""
+
+    def of(self, joint: str) -> Effect:
+        """The effect at that joint."""
+        return self._at(joint, {"joint": joint}, {"joint": joint})
+
+
+class PerSite(_Placed):
+    """One for every tracked point."""
+
+    def of(self, site: str, number: int) -> Effect:
+        """The effect at that point, the ``number``-th."""
+        return self._at(site, {"site": site}, {"site": number})

@@ -1,0 +1,28 @@
+"""Links slide more easily along their axis than across it, or the other way round: scales, wheels, rubber bands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.jointed.plant import Plant
+
+
+def apply(plant: Plant, across: float) -> Plant:
+    """Friction across each link, as a multiple; along it as it is."""
+    return replace(plant, friction_across=plant.friction_across * across)
+
+
+EFFECT = Effect(
+    name="friction-anisotropy",
+    stage="mechanics",
+    parameters=(
+        Parameter("across", "1", 0.1, 8.0, (0.3, 4.0), 1.0, "friction across a link, as a multiple of that along it"),
+    ),
+    equation="mu_across' = across * mu",
+    residuals="Sideways waves drive the robot along its body, where the model says that it only wriggles.",
+    lookalikes=("floor-friction",),
+    sentence="the links slide more easily in one direction than in the other",
+    measurement="drag the robot, switched off and straight, along and across with a spring balance",
+    apply=apply,
+)

@@ -1,0 +1,34 @@
+"""A marker does not sit where the model has it. Which one is part of the effect's name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.jointed.catalogue_parts import PerSite
+from bns.physics.jointed.plant import Sighting
+
+
+def apply(seen: Sighting, site: int, along_m: float, left_m: float) -> Sighting:
+    """One tracked point moved on its link."""
+    points = seen.point_m.copy()
+    points[..., site, :] += along_m * seen.along[..., site, :] + left_m * seen.left[..., site, :]
+    return replace(seen, point_m=points)
+
+
+EFFECT = PerSite(
+    Effect(
+        name="marker-offset",
+        stage="sight",
+        parameters=(
+            Parameter("along_m", "m", -0.2, 0.2, (-0.08, 0.08), 0.0, "how far the marker sits ahead of where the model has it"),
+            Parameter("left_m", "m", -0.2, 0.2, (-0.08, 0.08), 0.0, "how far it sits to the left"),
+        ),
+        equation="p' = p + along * a + left * l, a and l the link's axes",
+        residuals="The markers' distance is off in every posture; turns of that link move the marker more, or less.",
+        lookalikes=("camera-scale", "joint-zero"),
+        sentence="the marker {site} does not sit where the model has it",
+        measurement="measure with a ruler where {site} sits on its link",
+        apply=apply,
+    )
+)

@@ -1,0 +1,1 @@
+"""What reads a store: a snapshot of its parts, views, queries, tables."""

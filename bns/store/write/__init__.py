@@ -1,0 +1,1 @@
+"""What changes a store: the writer, folding of journals, compaction, repair."""

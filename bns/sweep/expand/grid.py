@@ -1,0 +1,252 @@
+"""A sweep file (YAML) read into parameter combinations.
+
+Keys: ``name``, ``robot`` (required); ``seeds`` (how many; default 1); ``first_seed`` (default 0); ``fixed`` (parameter: value);
+``grid`` (parameter: list; the product); ``zip`` (parameter: list; taken in step, multiplied with the grid);
+``exclude`` (list of mappings; combinations of the product that have all these values are left out);
+``include`` (list of mappings; further combinations, on top of ``fixed``, added after ``exclude``).
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bns.errors import SpecError, unknown_name
+from bns.robots import load_robot
+from bns.spec import FIELDS, RunSpec, checked
+from bns.sweep.expand.combos import Parts, check_size, combinations
+from bns.sweep.expand.shipped_sweeps import sweep_file
+from bns.sweep.expand.yaml_lines import Located, parse_yaml, read_text
+from bns.tasks import task_names
+
+KEYS = ("name", "robot", "seeds", "first_seed", "fixed", "grid", "zip", "include", "exclude")
+PARAMETERS = tuple(name for name in FIELDS if name not in ("robot", "seed"))
+_ELSEWHERE = {
+    "robot": "'robot' is a key of the file itself: one robot a sweep.",
+    "seed": "'seed' is not a parameter of a sweep; write 'seeds: 30' for the seeds 0..29.",
+}
+RESERVED = ("by-hand",)
+"""Names that no sweep file may have: the store keeps the single runs of ``bns run`` under it."""
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_SEEDS = int(FIELDS["seed"].metadata["high"]) + 1
+_LONGEST_NAME = 80
+"""With what the store adds it must still be the name of a file."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One sweep file: ``seeds`` runs of every combination (parameter -> value, without robot and seed)."""
+
+    name: str
+    robot: str
+    seeds: int
+    combos: tuple[dict[str, Any], ...]
+    text: str
+    path: Path
+    first_seed: int = 0
+
+    @property
+    def all_seeds(self) -> range:
+        """The seeds of every combination."""
+        return range(self.first_seed, self.first_seed + self.seeds)
+
+    @property
+    def total(self) -> int:
+        """Number of runs."""
+        return self.seeds * len(self.combos)
+
+    def runs_by_task(self) -> dict[str, int]:
+        """How many of the runs are of which task."""
+        tasks = Counter(str(combo.get("task", FIELDS["task"].default)) for combo in self.combos)
+        return {task: count * self.seeds for task, count in tasks.items()}
+
+
+def load_sweep(path: str | Path) -> Sweep:
+    """Read a sweep file, or a shipped one by its name; SpecError that begins with ``file:line:`` for whatever is wrong in it."""
+    path = sweep_file(path)
+    return parse_sweep(read_text(path), path)
+
+
+def parse_sweep(text: str, path: Path) -> Sweep:
+    """The sweep that a file's text describes; ``path`` is for messages."""
+    root = parse_yaml(text, path)
+    places = _places(root)
+    parts = Parts()
+    for name, (_key, value) in places.items():
+        _READERS[name](parts, value)
+    parts.keys = _check_once(places)
+    _check_tasks(parts)
+    combos = combinations(root, parts)
+    _check_default_task(root, parts, combos)
+    check_size(parts.seeds * len(combos), places["seeds"][1] if "seeds" in places else root)
+    _check_seeds(root, parts, places)
+    return Sweep(parts.name, parts.robot, parts.seeds, tuple(combos.values()), text, path, parts.first_seed)
+
+
+def _places(root: Located) -> dict[str, tuple[Located, Located]]:
+    places = {}
+    for name, key, value in root.items("a sweep file"):
+        if name not in KEYS:
+            moved = f" {name!r} is a parameter: it belongs under fixed or grid." if name in PARAMETERS else ""
+            key.fail(unknown_name("key", name, KEYS) + moved)
+        places[name] = key, value
+    for name in ("name", "robot"):
+        if name not in places:
+            root.fail(f"the key {name!r} is missing. A sweep file needs 'name' and 'robot'.")
+    return places
+
+
+def _read_name(parts: Parts, value: Located) -> None:
+    name = value.value()
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        value.fail(
+            f"name is {name!r}; it must begin with a letter and have only letters, digits, '-' and "
+            "'_', because it becomes the name of a folder."
+        )
+    if len(name) > _LONGEST_NAME:
+        value.fail(f"name has {len(name)} characters; it may have {_LONGEST_NAME} at most. Shorten it.")
+    if name in RESERVED:
+        value.fail(f"the name {name!r} is kept for the single runs of 'bns run'. Give the sweep another name.")
+    parts.name = name
+
+
+def _read_robot(parts: Parts, value: Located) -> None:
+    robot = value.value()
+    try:
+        load_robot(str(robot))
+    except SpecError as unknown:
+        value.fail(str(unknown))
+    parts.robot = robot
+
+
+def _read_seeds(parts: Parts, value: Located) -> None:
+    seeds = value.value()
+    if not isinstance(seeds, int) or isinstance(seeds, bool) or not 1 <= seeds <= _SEEDS:
+        value.fail(f"seeds is {seeds!r}; it must be a whole number from 1 to {_SEEDS}: how many, from first_seed on.")
+    parts.seeds = seeds
+
+
+def _read_first_seed(parts: Parts, value: Located) -> None:
+    first = value.value()
+    if not isinstance(first, int) or isinstance(first, bool) or not 0 <= first < _SEEDS:
+        value.fail(f"first_seed is {first!r}; it must be a whole number from 0 to {_SEEDS - 1}.")
+    parts.first_seed = first
+
+
+def _check_seeds(root: Located, parts: Parts, places: Mapping[str, tuple[Located, Located]]) -> None:
+    if parts.first_seed + parts.seeds > _SEEDS:
+        place = places["first_seed"][1] if "first_seed" in places else root
+        place.fail(
+            f"{parts.seeds} seeds from {parts.first_seed} on go beyond the last seed, {_SEEDS - 1}. Begin with a smaller one."
+        )
+
+
+def _read_fixed(parts: Parts, value: Located) -> None:
+    parts.fixed = _mapping(parts, value, "fixed")
+
+
+def _read_grid(parts: Parts, value: Located) -> None:
+    parts.grid = _lists(parts, value, "grid")
+
+
+def _read_zip(parts: Parts, value: Located) -> None:
+    parts.zip = _lists(parts, value, "zip")
+    lengths = {name: len(values) for name, values in parts.zip.items()}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        value.fail(f"the lists under zip are taken in step and must be equally long, but {listed}.")
+
+
+def _read_include(parts: Parts, value: Located) -> None:
+    for each in value.elements("include"):
+        parts.include.append((each, _mapping(parts, each, "an element of include")))
+
+
+def _read_exclude(parts: Parts, value: Located) -> None:
+    for each in value.elements("exclude"):
+        parts.exclude.append((each, _mapping(parts, each, "an element of exclude")))
+        if not parts.exclude[-1][1]:
+            each.fail("an element of exclude is empty and would leave everything out. Give a parameter.")
+
+
+_READERS: Mapping[str, Callable[[Parts, Located], None]] = {
+    "name": _read_name,
+    "robot": _read_robot,
+    "seeds": _read_seeds,
+    "first_seed": _read_first_seed,
+    "fixed": _read_fixed,
+    "grid": _read_grid,
+    "zip": _read_zip,
+    "include": _read_include,
+    "exclude": _read_exclude,
+}
+
+
+def _mapping(parts: Parts, value: Located, what: str) -> dict[str, Any]:
+    return {name: _checked(parts, name, key, each) for name, key, each in value.items(what)}
+
+
+def _lists(parts: Parts, value: Located, what: str) -> dict[str, list[Any]]:
+    lists = {}
+    for name, key, each in value.items(what):
+        _check_parameter(name, key)
+        elements = each.elements(f"{name} under {what}")
+        lists[name] = [_checked(parts, name, key, element) for element in elements]
+    return lists
+
+
+def _check_parameter(name: str, key: Located) -> None:
+    if name in _ELSEWHERE:
+        key.fail(_ELSEWHERE[name])
+    if name not in PARAMETERS:
+        key.fail(unknown_name("parameter", name, PARAMETERS))
+
+
+def _checked(parts: Parts, name: str, key: Located, value: Located) -> Any:
+    _check_parameter(name, key)
+    given = value.value()
+    try:
+        result = checked(name, given)
+    except SpecError as fault:
+        hint = f" Lists belong under grid: '{name}: {given!r}' there." if isinstance(given, list) else ""
+        value.fail(f"{fault}{hint}")
+    if name == "task":
+        parts.tasks.append((value, result))
+    return result
+
+
+def _check_once(places: Mapping[str, tuple[Located, Located]]) -> dict[str, Located]:
+    """Key of every parameter; in two of fixed, grid and zip it would silently lose one of its values."""
+    seen: dict[str, tuple[str, Located]] = {}
+    for part in ("fixed", "grid", "zip"):
+        if part not in places:
+            continue
+        for name, key, _value in places[part][1].items(part):
+            if name in seen:
+                other, former = seen[name]
+                key.fail(f"{name!r} is given under {part} and, on line {former.line}, under {other}. Keep one.")
+            seen[name] = part, key
+    return {name: key for name, (_part, key) in seen.items()}
+
+
+def _check_tasks(parts: Parts) -> None:
+    valid = task_names(parts.robot)
+    for place, task in parts.tasks:
+        if task not in valid:
+            place.fail(unknown_name(f"task of robot {parts.robot!r}", task, valid))
+
+
+def _check_default_task(root: Located, parts: Parts, combos: Iterable[RunSpec]) -> None:
+    """Tasks that were given are checked already: this is about the default, which is another robot's."""
+    valid = task_names(parts.robot)
+    for spec in combos:
+        if spec.task not in valid:
+            root.fail(
+                f"no task is given, and robot {parts.robot!r} has no task {spec.task!r}. "
+                f"Give 'task' under fixed or grid. Valid: {', '.join(valid)}."
+            )

@@ -1,0 +1,1 @@
+"""What a worker is handed and how: jobs, batches, pools of processes, Dask, memory and cores."""
