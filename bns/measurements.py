@@ -22,6 +22,8 @@ SESSION = "session_s"
 """Time since the session began, where it was logged."""
 BEFORE = ("before_left_m_s", "before_right_m_s")
 """Wheel speeds before the trial's first row, where it began in motion; the trial's first value counts, none is rest."""
+DISCARDED = "discarded"
+"""1 of a drive that whoever watched it did not keep; it is judged by nobody."""
 RUN_UP = "run_up"
 """1 in rows that a trial takes along from before it begins: they hold commands and no poses, and their t_s is below 0."""
 COLUMNS = ("trial", "t_s", *COMMANDS, *POSE)

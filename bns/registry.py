@@ -136,8 +136,8 @@ def _by_name(parts: Iterable[Part]) -> dict[str, tuple[Part, ...]]:
 
 EFFECTS = Registry("effect", "effects", "bns.physics.effects", "EFFECT = ", "EFFECT", ("name", "stage", "apply"), ModelError)
 JOINT_EFFECTS = Registry(
-    "effect of a body on joints", "joint_effects", "bns.physics.jointed.effects", "EFFECT = ", "EFFECT", ("name", "stage", "apply"),
-    ModelError,
+    "effect of a body on joints", "joint_effects", "bns.physics.jointed.effects", "EFFECT = ", "EFFECT",
+    ("name", "stage", "apply"), ModelError,
 )  # fmt: skip
 WORLDS = Registry("world", "worlds", "bns.worlds", r"def build\(", "", ("build",), SpecError)
 ROBOTS = Registry("robot", "robots", "bns.robots", "ROBOT = ", "ROBOT", ("name", "networks", "bounds"), SpecError)

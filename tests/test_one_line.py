@@ -13,7 +13,7 @@ import bns.__main__ as entry
 from bns.cli import streams
 from bns.engine import jit
 from bns.errors import ClusterError
-from bns.sweep import trackers
+from bns.sweep.jobs import trackers
 
 
 class RaisesAtImport:

@@ -10,15 +10,18 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.prepared import Prepared, prepared, with_effects
+from bns.api.common.progress import Progress, silent
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.common.shown import Shown, drawn
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
 from bns.diagnose.adding import ExtendedModel, Memory, add_effects, effect_from
 from bns.diagnose.predict.paired_errors import noise_json
 from bns.diagnose.report.figures import error_by_step_axes
 from bns.diagnose.report.text import extension_text
+from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.settings.chosen import in_force
 from bns.diagnose.values import numbers_of
 from bns.errors import ModelError
 from bns.physics.effect import Effect
@@ -111,28 +114,38 @@ def add(
     if term is not None and len(wanted) != 1:
         names = ", ".join(map(_name, wanted))
         raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
-    ready = prepared(log, model)
-    chosen = [_effect(each, term, on, ready.predictor.tracks.extra) for each in wanted]
+    robot = with_effects(model)
+    ready = prepared(log, robot)
+    columns = getattr(ready.predictor.tracks, "extra", ())
+    chosen = [_effect(each, robot, term, on, columns) for each in wanted]
     given = [effect.name for effect, _ in chosen]
     twice = next((name for name in given if given.count(name) > 1), None)
     if twice is not None:
         raise ModelError(f"{twice} is given {given.count(twice)} times; a model has each effect once: leave the others out.")
-    ticks(progress)("fitting")
-    return added(ready, chosen, per_trial)
+    return added(ready, chosen, per_trial, progress=progress)
 
 
+@in_force(DEFAULTS)
 def added(
     ready: Prepared,
     effects: Sequence[tuple[Effect, Mapping[str, str]]],
     per_trial: bool = False,
     memory: Memory | None = None,
+    progress: Progress | None = None,
 ) -> AddResult:
     """As `add`, for effects and data that are there; ``memory`` keeps fits from one call to the next."""
-    return AddResult(ready, add_effects(ready.predictor, ready.model, effects, ready.measured, per_trial, memory))
+    told = progress or silent
+    extended = add_effects(
+        ready.predictor, ready.model, effects, ready.measured, per_trial, memory, told
+    )
+    told(1.0, "done")
+    return AddResult(ready, extended)
 
 
-def _effect(wanted: Wanted, term: str | None, on: str, columns: Iterable[str]) -> tuple[Effect, Mapping[str, str]]:
-    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), term, on, columns)
+def _effect(
+    wanted: Wanted, model: Model, term: str | None, on: str, columns: Iterable[str]
+) -> tuple[Effect, Mapping[str, str]]:
+    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), model, term, on, columns)
 
 
 def _name(wanted: Wanted) -> str:

@@ -5,28 +5,39 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import html
+import re
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
 from bns.errors import ModelError, unknown_name
 from bns.physics import model as physics
+from bns.physics.jointed.mechanism import machine
+from bns.physics.jointed.model import JointedModel
+from bns.physics.jointed.model_files import is_body, load_body
 from bns.physics.model import BASES, load_model
 
 Given = str | PathLike[str] | physics.Model
+_BODY = re.compile(r"^base:\s*[\"']?mujoco", re.MULTILINE)
 
 
 class Model(physics.Model):
-    """A differential drive with the effects that are switched on.
+    """A robot with the effects that are switched on: a differential drive, or a body on joints.
 
-    ``Model("khepera")`` is a model of the package, ``Model("mine.yaml")`` one of a file, ``Model(wheelbase_m=0.2)`` (or
-    ``Model("differential-drive", wheelbase_m=0.2)``) a plain drive. Fields given by name replace those of the model:
-    wheelbase_m (m), dt_s (s), jitter_relative (share of the commanded speed), noise_position_m (m), noise_heading_rad (rad).
+    ``Model("snake")`` is the snake in MuJoCo, ``Model("robot.xml", sites=["head"])`` any MJCF file with position servos and
+    tracked sites (`BodyModel`). ``Model("khepera")`` is a drive of the package, ``Model("mine.yaml")`` one of a file,
+    ``Model(wheelbase_m=0.2)`` (or ``Model("differential-drive", wheelbase_m=0.2)``) a plain drive. Fields given by name replace
+    those of the model: wheelbase_m (m), dt_s (s), jitter_relative (share of the commanded speed), noise_position_m (m),
+    noise_heading_rad (rad).
     A model never changes; `with_effect`, `without` and the like give another.
 
     Raises:
         ModelError: there is no such model, or a number is out of bounds; the message says what is allowed.
     """
+
+    def __new__(cls, given: Given | None = None, /, **fields: Any) -> Model:
+        """A body on joints where one is named, else a drive."""
+        return object.__new__(BodyModel if cls is Model and _names_a_body(given) else cls)
 
     def __init__(self, given: Given | None = None, /, **fields: Any) -> None:
         known = [field.name for field in dataclasses.fields(physics.Model)]
@@ -77,6 +88,51 @@ class Model(physics.Model):
 
     def _repr_html_(self) -> str:
         return f"<pre>{html.escape(self.summary())}</pre>"
+
+
+class BodyModel(Model, JointedModel):
+    """A body on joints in MuJoCo with the effects that are switched on; made by `bns.Model`.
+
+    For an MJCF file also: sites (names of those that are tracked; by default all), tether (the link that carries one), and what
+    MJCF does not know of servos: dead_band_rad (rad), delay_s (s), tether_drag_n (N).
+    """
+
+    def __init__(self, given: Given | None = None, /, **fields: Any) -> None:
+        own = {field.name for field in dataclasses.fields(JointedModel)}
+        if given is None:
+            JointedModel.__init__(self, **fields)
+            return
+        settings = {name: fields.pop(name) for name in list(fields) if name not in own}
+        if isinstance(given, JointedModel):
+            body = given
+        else:
+            body = load_body(fspath(given), **settings) if is_body(fspath(given)) else _of_file(fspath(given))  # type: ignore[arg-type]
+        JointedModel.__init__(self, **{**{name: getattr(body, name) for name in own}, **fields})
+
+    def summary(self) -> str:
+        """The body, then one effect a line."""
+        effects, joints = super().summary().split("\n")[1:], len(machine(self.mechanism).joints)
+        head = f"model {self.name}: {self.base}, {joints} joints, tracked: {', '.join(self.mechanism.sites)}"
+        return "\n".join([head, *effects])
+
+    def __repr__(self) -> str:
+        names = ", ".join(active.effect.name for active in self.effects)
+        return f"<Model: {self.name}, {len(machine(self.mechanism).joints)} joints, effects: {names or 'none'}>"
+
+
+def _names_a_body(given: Given | None) -> bool:
+    if given is None or isinstance(given, physics.Model):
+        return isinstance(given, JointedModel)
+    path = Path(given)
+    if is_body(fspath(given)):
+        return True
+    return path.suffix in {".yaml", ".yml"} and path.is_file() and _BODY.search(path.read_text(errors="replace")) is not None
+
+
+def _of_file(path: str) -> JointedModel:
+    model = load_model(path)
+    assert isinstance(model, JointedModel)  # its base says so
+    return model
 
 
 def checked_target(path: Path) -> Path:

@@ -12,7 +12,8 @@ from typing import Any, Unpack
 
 from matplotlib.axes import Axes
 
-from bns.api.common.shown import Progress, Shown
+from bns.api.common.progress import Progress
+from bns.api.common.shown import Shown
 from bns.api.measurements import Measurements
 from bns.api.run import Parameters, Row, RunResult, spec_of, telling
 from bns.errors import HardwareError, SpecError

@@ -73,6 +73,13 @@ class Diagnosis:
     calibration: Fit | None = None
     """Of single relative motions: all numbers of robot and sensor fitted together (`calibrated`)."""
 
+    def slim(self) -> Diagnosis:
+        """Without the innovations and Jacobians of what was only tried: numbers, intervals and losses of these stay."""
+        if self.selection is None:
+            return self
+        steps = tuple(replace(s, ranking=tuple(_slim(c) for c in s.ranking)) for s in self.selection.steps)
+        return replace(self, selection=replace(self.selection, steps=steps))
+
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the accepted effects, in the order in which they were found."""
@@ -161,6 +168,11 @@ class Diagnosis:
         }
 
 
+def _slim(candidate: Candidate) -> Candidate:
+    nothing = np.zeros((0, 3))
+    return replace(candidate, fit=replace(candidate.fit, whitened=nothing, jacobian=np.zeros((0, 3, len(candidate.fit.free)))))
+
+
 @one_thread_each()
 def diagnose(
     predictor: Predictor,
@@ -228,10 +240,11 @@ def _diagnosed(
     with_terms = _errors_with_terms(selection, model, found) if found and terms else None
     lowered = with_terms is None or with_terms.falls
     tick("longer explanations")
+    tried = {c.name for step in selection.steps for c in step.ranking}
     others = [
         effect
         for name, effect in listed(selection.nominal.model, extra, predictor.tracks, barred).items()
-        if name not in selection.accepted
+        if name in tried and name not in selection.accepted
     ]
     pairs = [] if left else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
     return Diagnosis(
@@ -290,7 +303,8 @@ def too_little(tracks: Tracks, fewest: int) -> str:
         return (
             "Most trials have a single tracked pose; a displacement needs two: log the pose before and after commands."
         )
-    if not ((np.abs(tracks.left_m_s) + np.abs(tracks.right_m_s)) * tracks.duration_s).any():
+    on_wheels = tracks.duration_s.shape[1] > 0
+    if on_wheels and not ((np.abs(tracks.left_m_s) + np.abs(tracks.right_m_s)) * tracks.duration_s).any():
         return "The robot was never told to move; give it commands of different speeds."
     ends = [tracks.pose[a:b, :2] for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
     if max(float(np.ptp(p, axis=0).max()) for p in ends if len(p)) < 5e-3:

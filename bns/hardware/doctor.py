@@ -13,7 +13,7 @@ from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.khepera import BAUD, KheperaIII, RobotLostError, check_battery
+from bns.hardware.khepera import BAUD, KheperaIII, check_battery
 from bns.hardware.khepera_settings import khepera_settings
 from bns.hardware.platforms.snake import open_chain
 from bns.hardware.rig import Rig
@@ -24,6 +24,7 @@ from bns.hardware.tracking.calibration import WORST_RMS_PX, load_calibration
 from bns.hardware.tracking.evdev import CLASS, input_devices
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.wii import KERNEL_NAME
+from bns.hardware.wheel_drive import RobotLostError
 
 with extra("robot"):
     from serial.tools.list_ports import comports

@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
@@ -37,6 +37,8 @@ class HardwareLog:
         self._descriptor: int | None = None
         self._held = bytearray()
         self._fault: OSError | None = None
+        self.listeners: list[Callable[[str, Mapping[str, Any]], None]] = []
+        """Told the kind and content of every event."""
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._seals = Seals(_drop_torn_line(path))
@@ -44,6 +46,8 @@ class HardwareLog:
 
     def note(self, kind: str, **what: Any) -> None:
         """Append one event; never raises because of the file."""
+        for listener in self.listeners:
+            listener(kind, what)
         if self._descriptor is not None and self._fault is None:
             event = {"t_s": round(self._clock.now_s(), 6), "wall_s": round(time.time(), 6), "kind": kind, **what}
             self._held += self._seals.line(json.dumps(event, separators=(",", ":"), allow_nan=False)).encode()

@@ -17,6 +17,7 @@ from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.reply_time import ReplyTime
 from bns.hardware.serial_link import NoReplyError
 from bns.hardware.stop import Stop
+from bns.hardware.wheel_drive import RobotLostError
 
 BAUD = 115200
 ATTEMPTS = 4
@@ -43,6 +44,9 @@ class Exchange(Protocol):
     def exchange(self, request: bytes, timeout_s: float, again: bool = False) -> bytes:
         """The line that answers; NoReplyError if none does in that time. `again`: one to what was asked before will do."""
 
+    def close(self) -> None:
+        """Give it free."""
+
 
 @dataclass(frozen=True)
 class Firmware:
@@ -59,10 +63,6 @@ def firmware(version: int, revision: int) -> Firmware:
     if version < 3:
         return Firmware(version, revision, 144_010.0, 0.1288 / 2764)
     return Firmware(version, revision, 218_720.0, 0.03068e-3)
-
-
-class RobotLostError(Exception):
-    """The robot does not answer any more."""
 
 
 class KheperaIII:
@@ -87,6 +87,10 @@ class KheperaIII:
         units = [max(-HIGHEST_UNITS, min(HIGHEST_UNITS, round(v * scale))) for v in (left, right)]
         self._ask(b"D,l%d,l%d" % tuple(units), "d")
         return units[0] / scale, units[1] / scale
+
+    def close(self) -> None:
+        """Give the link free."""
+        self._link.close()
 
     def speed_m_s(self) -> tuple[float, float]:
         """Speeds of the wheels' surfaces as the robot measures them, m/s."""

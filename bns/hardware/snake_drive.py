@@ -12,7 +12,7 @@ from bns.hardware.ax12_table import RAD_PER_STEP
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.safety import OutOfSight, Watch
-from bns.hardware.servo_chain import ServoChain, StrainWatch
+from bns.hardware.servo_chain import ServoChain, StrainWatch, StuckServoError
 from bns.hardware.snake_settings import SnakeSettings
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight
@@ -29,7 +29,7 @@ _NOTHING = dict.fromkeys(("cycle", *PARAMETERS, "stable"), math.nan)
 
 class SnakeDrive:
     """Rows and observations are gathered as it goes on. A cycle that ends out of sight counts as unstable: a robot on its back
-    hides its markers."""
+    hides its markers. So does one that ends with a servo stuck: links that press against each other hold it."""
 
     def __init__(
         self, chain: ServoChain, eye: Eye, watch: Watch, settings: SnakeSettings, clock: Clock, journal: HardwareLog
@@ -100,7 +100,7 @@ class SnakeDrive:
             for target in angles[1:]:
                 self._posture(target)
             after_s, stable = self._in_sight(), not self._strain.stalled
-        except OutOfSight:
+        except (OutOfSight, StuckServoError):
             self._over(cycle, (before_s, self._clock.now_s()), False, began_s, first)
             raise
         finally:

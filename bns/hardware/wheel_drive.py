@@ -15,10 +15,12 @@ from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight
 
 _TICK_S, _POLL_S = 0.1, 0.01
-_HEARTBEATS = 5
-"""Every so many looks the robot is asked for its speed: a dead link is noticed within half a second, not at the next command."""
 _SAME_S = 1e-4
 """Two times closer than this are one."""
+
+
+class RobotLostError(Exception):
+    """The robot does not answer any more."""
 
 
 class Wheels(Protocol):
@@ -40,7 +42,10 @@ class Order(NamedTuple):
 
 
 class WheelDrive:
-    """`start` (3,) is where the robot stands. Times of poses are those at which they were filmed."""
+    """`start` (3,) is where the robot stands. Times of poses are those at which they were filmed.
+
+    Every `heartbeat_looks` looks the robot is asked for its speed: a dead link is noticed soon, not at the next command.
+    """
 
     def __init__(
         self,
@@ -51,9 +56,10 @@ class WheelDrive:
         clock: Clock,
         journal: HardwareLog,
         start: np.ndarray,
+        heartbeat_looks: int = 5,
     ) -> None:
         self._wheels, self._eye, self._watch, self._clock, self._journal = wheels, eye, watch, clock, journal
-        self._agreement, self._start = agreement, start
+        self._agreement, self._start, self._heartbeat_looks = agreement, start, heartbeat_looks
         self._orders: list[Order] = []
         self._ends_s: list[float] = []
         self._seen: list[tuple[float, np.ndarray]] = []
@@ -72,7 +78,7 @@ class WheelDrive:
             self._clock.sleep(_TICK_S)
             self._look()
             looks += 1
-            if looks % _HEARTBEATS == 0:
+            if looks % self._heartbeat_looks == 0:
                 self._agreement.measured(self._clock.now_s(), *self._wheels.speed_m_s())
         self._clock.sleep(end_s - self._clock.now_s())
         while self._look() is None:

@@ -113,9 +113,8 @@ def value_of(term: str, names: Mapping[str, Any]) -> Array:
     """The value of a term for given numbers and arrays, one for each of its names; ModelError if it is no formula."""
     _, code = _parsed("term", term)
     with np.errstate(all="ignore"):
-        return np.asarray(
-            eval(code, {"__builtins__": {}}, {**FUNCTIONS, **names}), dtype=np.float64
-        )  # checked by _parsed
+        value = eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **names})  # checked by _parsed
+    return np.asarray(value, dtype=np.float64)
 
 
 def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | None) -> tuple[list[str], list[str]]:
@@ -136,14 +135,25 @@ def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | N
     return logged, unknown
 
 
-def _parsed(name: str, term: str) -> tuple[set[str], Any]:
+class Compiled:
+    """A checked term, ready to be calculated; pickled as its text."""
+
+    def __init__(self, name: str, term: str) -> None:
+        self._made_of = name, term
+        self.code = compile(checked_formula(f"formula {name}", term, FUNCTIONS), name, "eval")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Compiled, self._made_of
+
+
+def _parsed(name: str, term: str) -> tuple[set[str], Compiled]:
     tree = checked_formula(f"formula {name}", term, FUNCTIONS)
     called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
     names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - called
-    return names, compile(tree, name, "eval")
+    return names, Compiled(name, term)
 
 
-def _apply(name: str, code: Any, on: str, logged: list[str], body: Body, **numbers: float) -> Body:
+def _apply(name: str, code: Compiled, on: str, logged: list[str], body: Body, **numbers: float) -> Body:
     if body.place is None and _needs(code, on):
         return body  # first round of a simulation: nobody knows yet where the robot goes
     values = {**_values(body, code), **{column: body.logged[column] for column in logged}, **numbers}
@@ -163,12 +173,12 @@ def _apply(name: str, code: Any, on: str, logged: list[str], body: Body, **numbe
     return body.with_drift(on, added * body.moving, body.place[..., 2])
 
 
-def _added(name: str, code: Any, values: Mapping[str, Any], body: Body) -> Array:
+def _added(name: str, code: Compiled, values: Mapping[str, Any], body: Body) -> Array:
     """The term's value in every step, (batch, steps)."""
     numbers = {key: value for key, value in values.items() if isinstance(value, float)}
     try:
         with np.errstate(all="ignore"):
-            added = np.asarray(eval(code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
+            added = np.asarray(eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
     except (ArithmeticError, TypeError, ValueError) as fault:  # of numbers that are fitted: k / (k - k), (-k)**0.5
         raise ModelError(
             f"formula {name} cannot be calculated with {numbers}: {fault}. Write it in another way."
@@ -186,11 +196,11 @@ def _added(name: str, code: Any, values: Mapping[str, Any], body: Body) -> Array
     return out
 
 
-def _needs(code: Any, on: str) -> bool:
-    return on in {"east", "north"} or bool(_PLACE & set(code.co_names))
+def _needs(code: Compiled, on: str) -> bool:
+    return on in {"east", "north"} or bool(_PLACE & set(code.code.co_names))
 
 
-def _values(body: Body, code: Any) -> dict[str, Any]:
+def _values(body: Body, code: Compiled) -> dict[str, Any]:
     begin = body.session_s[:, :1]
     values: dict[str, Any] = {
         "v": body.forward_m_s,
@@ -204,19 +214,19 @@ def _values(body: Body, code: Any) -> dict[str, Any]:
     }
     if body.place is not None:
         values |= {"x": body.place[..., 0], "y": body.place[..., 1], "heading": body.place[..., 2]}
-    if "swing" in code.co_names:
+    if "swing" in code.code.co_names:
         values["swing"] = swing(body)
     return values
 
 
-def _of_wheel(body: Body, speed: Array, code: Any) -> dict[str, Array]:
+def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Array]:
     """`OF_A_WHEEL` of the wheel with this speed; only what the term names."""
     made: dict[str, Callable[[], Array]] = {
         "u": lambda: speed,
         "since": lambda: since_reversal(speed, _step_s(body)),
         "fresh": lambda: speed - first_order(speed, _step_s(body), RECENT_S),
     }
-    return {name: make() for name, make in made.items() if name in code.co_names}
+    return {name: make() for name, make in made.items() if name in code.code.co_names}
 
 
 def swing(body: Body) -> Array:

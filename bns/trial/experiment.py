@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from bns.console import live_view
 from bns.errors import HardwareError, SpecError
 from bns.hardware.rig import surface_text
 from bns.hardware.safety import Stopping
@@ -21,8 +22,9 @@ from bns.trial.folder import (
     measured,
     measurements_however_it_ends,
     past_evaluations,
+    stuck_before,
 )
-from bns.trial.session import TrialSetup, open_rig
+from bns.trial.session import PICTURE, TrialSetup, open_rig
 
 _START = ("start_x_m", "start_y_m", "start_heading_rad")
 
@@ -92,15 +94,22 @@ def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journa
     columns = load_robot(how.rig.robot).measured_columns
     done = _driven_before(journal, [commands for commands, _ in trials], how.resume)
     try:
+        stuck = stuck_before(journal)
         with (
             measurements_however_it_ends(journal, columns),
             Stopping() as stopping,
             open_rig(how, seed, journal, stopping) as opened,
         ):
-            driver = TrialDriver(opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log)
-            for number, (commands, start) in enumerate(trials[done:], done + 1):
-                driver.start = start
-                driver.evaluate(number, commands)
+            picture = journal.with_name(PICTURE)
+            driver = TrialDriver(
+                opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log, picture, stuck=stuck
+            )
+            with live_view(None, now=driver.underway.text) as show:
+                driver.suspended = show.suspended
+                for number, (commands, start) in enumerate(trials[done:], done + 1):
+                    driver.start = start
+                    if driver.evaluate(number, commands).skipped:
+                        driver.skipped(number, commands, 0)
     except HardwareError:
         forget_unless(journal, "driven")
         raise

@@ -17,7 +17,7 @@ from bns.errors import BnsError, HardwareError, StoreError, TrialFileError
 from bns.hardware.hardware_log import events
 from bns.measurements import write_measurements
 from bns.spec import RunSpec
-from bns.trial.driver import REPEATED
+from bns.trial.driver import REPEATED, Stuck
 from bns.trial.evaluation import Evaluation
 
 JOURNAL, MEASUREMENTS, REPEATS = "journal.jsonl", "measurements.csv", "repeats.csv"
@@ -83,12 +83,12 @@ def spec_of(journal: Path) -> RunSpec:
 
 def past_evaluations(journal: Path) -> list[Evaluation]:
     """Evaluations of a journal in order. One that was driven again counts as driven last, up to the first that is missing."""
-    return _evaluations(events(journal, "driven", "marked", "evaluated", "discarded"), 1)
+    return _evaluations(events(journal, "driven", "marked", "evaluated", "discarded", "skipped"), 1)
 
 
 def past_repeats(journal: Path, evaluation: int) -> list[Evaluation]:
     """The further drives of an evaluation's controller in a journal, in order, the second drive first."""
-    kinds = (REPEATED + kind for kind in ("driven", "marked", "discarded"))
+    kinds = (REPEATED + kind for kind in ("driven", "marked", "discarded", "skipped"))
     return _evaluations(
         (
             event | {"kind": event["kind"].removeprefix(REPEATED), "evaluation": event["repeat"]}
@@ -99,6 +99,15 @@ def past_repeats(journal: Path, evaluation: int) -> list[Evaluation]:
     )
 
 
+def stuck_before(journal: Path) -> list[Stuck]:
+    """The drives of a journal that were stuck, and where: what is stuck there again is not driven a third time."""
+    found: list[Stuck] = []
+    for event in events(journal, "stuck", REPEATED + "stuck") if journal.exists() else ():
+        numbers = tuple((name, event[name]) for name in ("evaluation", "repeat") if name in event)
+        found.append((event["kind"].removesuffix("stuck"), numbers, event["what"]))
+    return found
+
+
 def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation]:
     driven: dict[int, dict] = {}
     rounds: dict[int, int] = {}
@@ -106,7 +115,7 @@ def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation
     for event in noted:
         number = event["evaluation"]
         rounds.pop(number, None)
-        if event["kind"] == "driven":
+        if event["kind"] in {"driven", "skipped"}:
             driven[number] = event
             unstable.pop(number, None)
         elif event["kind"] == "marked":
@@ -118,6 +127,10 @@ def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation
     found: list[Evaluation] = []
     while (number := first + len(found)) in driven:
         event = driven[number]
+        if event["kind"] == "skipped":
+            picked = np.asarray(event["picked"], np.float32)
+            found.append(Evaluation(picked, picked[:0], np.empty((0, 3)), event["rounds"], skipped=True))
+            continue
         picked, commands = (np.asarray(event[name], np.float32) for name in ("picked", "commands"))
         poses = np.asarray(event["poses"], np.float64)
         found.append(Evaluation(picked, commands, poses, rounds.get(number), unstable.get(number, ())))
@@ -125,9 +138,13 @@ def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation
 
 
 def measured(journal: Path) -> pd.DataFrame:
-    """The measurements of every drive in a journal, discarded ones too; `trial` counts the drives."""
+    """The measurements of every drive in a journal; `trial` counts the drives, `discarded` is 1 of one that is not to count."""
     tables: list[pd.DataFrame] = []
-    for event in events(journal, "driven", "marked"):
+    for event in events(journal, "driven", "marked", "discarded"):
+        if event["kind"] == "discarded":
+            if tables and tables[-1]["evaluation"].iloc[0] == event["evaluation"]:
+                tables[-1]["discarded"] = 1
+            continue
         if event["kind"] == "marked":
             led_here = tables[-1]["cycle"].shift(1)
             tables[-1].loc[led_here.isin(event["unstable"]), "stable"] = 0.0
@@ -137,7 +154,7 @@ def measured(journal: Path) -> pd.DataFrame:
         table = pd.DataFrame(event["rows"]).astype(float)
         table.insert(0, "trial", len(tables) + 1)
         table["evaluation"], table["session_s"] = event["evaluation"], event["session_s"] + table["t_s"]
-        tables.append(table.assign(**event["readings"]))
+        tables.append(table.assign(**event["readings"], discarded=0))
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 

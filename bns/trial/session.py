@@ -14,7 +14,7 @@ from typing import Any
 
 from bns.bootstrap.loop import Progress, run
 from bns.console import live_view
-from bns.errors import BnsError, HardwareError
+from bns.errors import BnsError, HardwareError, TrialPausedError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.guard.client import Guard, GuardedClock, GuardedPlatform
@@ -40,13 +40,14 @@ from bns.trial.folder import (
     measurements_however_it_ends,
     robot_stands,
     spec_event,
+    stuck_before,
 )
 from bns.trial.operator import EmulatedHands, Operator, TerminalOperator, UnattendedOperator
 from bns.trial.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
 from bns.trial.report import TrialResult, report
 from bns.worlds.robot import RobotWorld
 
-GUARD_LOG = "guard.jsonl"
+GUARD_LOG, PICTURE = "guard.jsonl", "last-drive.png"
 SWEEP, SWEEP_EMULATED = "trials", "trials-emulated"
 MOST_ROUNDS = 50
 
@@ -111,8 +112,12 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         stack.callback(platform.close)
         stack.enter_context(StopsAtTheEnd(platform.stop))
         yield OpenedRig(
-            platform, hands or (UnattendedOperator() if how.yes else TerminalOperator(stopping.ask)), clock, log
+            platform, hands or _somebody(how, stopping), clock, log
         )
+
+
+def _somebody(how: TrialSetup, stopping: Stopping) -> Operator:
+    return UnattendedOperator(stopping.check) if how.yes else TerminalOperator(stopping.ask, stopping.check)
 
 
 def _guard(rig: Rig, module: PlatformModule, journal: Path | None, stack: ExitStack) -> Guard | None:
@@ -153,6 +158,7 @@ def _driven(
     started, robot = datetime.now(UTC), load_robot(spec.robot)
     start = on_floor(robot, robot.start_pose())[0]
     try:
+        stuck = stuck_before(folder.journal)
         with (
             measurements_however_it_ends(folder.journal, robot.measured_columns),
             Stopping() as stopping,
@@ -160,7 +166,10 @@ def _driven(
         ):
             opened.log.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
             opened.log.sync()
-            driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log)
+            goals_m, picture = load_task(spec.robot, spec.task).goals_m, folder.path / PICTURE
+            driver = TrialDriver(
+                opened.platform, opened.operator, how.rig, start, opened.clock, opened.log, picture, goals_m, stuck
+            )
             result = _looped(spec, how, driver, past, started, on_evaluation)
             _repeated(spec, how, driver, folder, result)
             opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
@@ -182,15 +191,19 @@ def _looped(
     robot = load_robot(spec.robot)
     world = RobotWorld("robot-emulated" if how.emulated else "robot")
     with (
-        live_view(spec, driver.live_text) as show,
+        live_view(spec, driver.live_text, driver.underway.text) as show,
         BackgroundDriver(robot, driver, past, how.most_rounds, how.until_success) as background,
     ):
+
+        driver.suspended = getattr(show, "suspended", driver.suspended)
 
         def tell(row: Mapping[str, Any]) -> None:
             show(row)
             on_evaluation(row)
 
         result = run(spec, tell, world, background)
+    if "evals" not in result.tables:
+        raise TrialPausedError(f"all {spec.evaluations} evaluations were skipped: there is nothing to keep")
     wall_s = (datetime.now(UTC) - started).total_seconds()
     return TrialResult(result, driver.stops_s, driver.ends, background.waited_share, background.rounds, started, wall_s)
 

@@ -176,7 +176,7 @@ def test_a_run_of_the_snake_leaves_measurements_that_networks_are_held_against(t
     assert main([*run, "--measurements", str(rows), "--save-snn", str(nets)]) == 0
     assert tuple(pd.read_csv(rows).columns) == COLUMNS
     capsys.readouterr()
-    for model in (str(nets), "snake"):
+    for model in (str(nets), "snake-networks"):
         assert main(["compare", str(rows), "--model", model, "--json", "--figures", str(tmp_path)]) == 0
         answer = json.loads(capsys.readouterr().out)
         assert set(answer["error"]) == {"cycle", "change", "3 cycles", "trial"}
@@ -184,7 +184,7 @@ def test_a_run_of_the_snake_leaves_measurements_that_networks_are_held_against(t
     assert (tmp_path / "comparison.png").stat().st_size > 10_000
     assert main(["compare", str(rows), "--model", "khepera"]) == 2
     assert "holds cycles and markers, and the model khepera drives wheels" in capsys.readouterr().err
-    assert main(["diagnose", str(rows), "--model", "snake"]) == 2
+    assert main(["diagnose", str(rows), "--model", "snake-networks"]) == 2
     assert "can be compared, not diagnosed" in capsys.readouterr().err
 
 

@@ -108,6 +108,26 @@ def test_a_robot_stands_when_its_trial_is_there_and_does_nothing(tmp_path, nurse
 
 
 @pytest.mark.parametrize(
+    ("cause", "link", "why"),
+    [
+        ("camera frozen (scene)", "serial", "the picture shows it where it was"),
+        ("camera frozen (scene)", "bus", "the picture shows both markers where they were"),
+    ],
+)
+def test_a_camera_that_hangs_under_a_running_clock_pauses_the_trial(tmp_path, nursery, cause, link, why):
+    seen = outlive.outlived(nursery, link, cause, tmp_path)
+    assert seen.ended == 3
+    assert why in seen.said
+
+
+@pytest.mark.parametrize("link", ["serial", "bridge"])
+def test_a_camera_that_sends_its_last_picture_again_stops_the_robot(tmp_path, nursery, link):
+    seen = outlive.outlived(nursery, link, "camera frozen (bits)", tmp_path)
+    assert seen.ended == 0  # the drive is over before its commands are
+    assert seen.events == []
+
+
+@pytest.mark.parametrize(
     ("cause", "link", "said"),
     [("Ctrl-Z", "bridge", "suspended"), ("Ctrl-\\", "bus", "quit"), ("terminal closed", "serial", "the terminal was closed")],
 )
@@ -135,7 +155,7 @@ def test_a_driver_that_does_not_know_cannot_go_on(held):
     robot.until(False)
     until(guard.tripped)
     with pytest.raises(NoReplyError):
-        driver._link.exchange(b"D,l20000,l20000\n")
+        driver._link.exchange(b"D,l20000,l20000\n", 0.3)
     assert not robot.moves()
     assert driver.stop(HANGS_S).confirmed
     assert driver.battery_v() > 7

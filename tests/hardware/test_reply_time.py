@@ -11,7 +11,7 @@ from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.emulators.khepera import KheperaEmulator
 from bns.hardware.emulators.terminal import PseudoTerminal
 from bns.hardware.hardware_log import HardwareLog, events
-from bns.hardware.khepera import BAUD, KheperaIII, RobotLostError, firmware
+from bns.hardware.khepera import BAUD, KheperaIII, firmware
 from bns.hardware.khepera_settings import khepera_settings
 from bns.hardware.platforms import khepera as platform
 from bns.hardware.reply_time import ReplyLimits, ReplyTime
@@ -19,6 +19,7 @@ from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
 from bns.hardware.serial_link import SerialLink
 from bns.hardware.tracking.sight import Sight
+from bns.hardware.wheel_drive import RobotLostError
 from bns.trial.session import TrialSetup, open_rig
 
 from .robots_on_the_line import DistantRobot
@@ -35,7 +36,10 @@ def test_the_time_out_is_that_of_the_rfc():
     assert time.timeout_s == pytest.approx(0.2 + 4 * 0.1)
     time.measured(0.1)
     assert time.deviation_s == pytest.approx(0.75 * 0.1 + 0.25 * 0.1)
-    assert time.smoothed_s == pytest.approx(0.875 * 0.2 + 0.125 * 0.1)
+    assert time.smoothed_s == pytest.approx(0.1875)
+    time.measured(0.1)
+    assert time.deviation_s == pytest.approx(0.75 * 0.1 + 0.25 * 0.0875)
+    assert time.smoothed_s == pytest.approx(0.875 * 0.1875 + 0.125 * 0.1)
 
 
 def test_a_steady_link_is_waited_for_little_longer_than_it_takes():
@@ -143,7 +147,7 @@ def test_a_rigs_settings_reach_link_and_driver(tmp_path, monkeypatch):
     driver = {"first_reply_s": 0.5, "least_reply_s": 0.21, "most_reply_s": 0.7, "stop_s": 0.6}
     rig = replace(shipped_rig("khepera"), port=str(robot.path), driver=driver)
     with Stopping() as stopping, open_rig(TrialSetup(rig, yes=True), 0, None, stopping) as opened:
-        link = opened.platform._platform._link
+        link = opened.platform._platform._driver._link
         assert link.times.limits == ReplyLimits(0.5, 0.21, 0.7)
         assert link.times.timeout_s == 0.21
         opened.platform._platform._driver._link.times.measured(0.02)

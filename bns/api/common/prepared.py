@@ -8,29 +8,38 @@ from pathlib import Path
 
 from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
-from bns.diagnose.data.cycles import CycleTracks
+from bns.diagnose.data.cycles import CycleTracks, marker_noise_m
+from bns.diagnose.data.joints import JointTracks, check_names
 from bns.diagnose.data.load import Measured
+from bns.diagnose.data.stretches import stretches_of_cycles, stretches_of_joints
+from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.check_robot import check_named_robot, check_same_robot
+from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.predict.saved_networks import network_predictor, networks_file
-from bns.diagnose.predict.wheels import WheelPredictor, predictor_for_search
+from bns.diagnose.predict.wheels import predictor_for_search
 from bns.errors import DataError, ModelError
 from bns.physics import model as physics
+from bns.physics.jointed.mechanism import machine
+from bns.physics.jointed.model import JointedModel
+from bns.physics.jointed.model_files import SNAKE
 from bns.physics.model import model_names
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A model on wheels over the poses that are used. ``measured`` has the same poses."""
+    """A model with effects over the poses that are used. ``measured`` has the same poses."""
 
     log: Measurements
     measured: Measured
-    predictor: WheelPredictor
+    predictor: Predictor
     model: Model
 
     @property
     def thinned(self) -> str:
         """How many of the poses are used, in words; "" for all."""
+        if isinstance(self.predictor, JointedPredictor):
+            return _used_in_words(self.log.measured.tracks, self.predictor)
         used, there = len(self.predictor.tracks.t_s), len(self.log.measured.tracks.t_s)
         return f"{used} of {there} poses are used, evenly chosen; all commands are" if used < there else ""
 
@@ -51,22 +60,64 @@ def prepared(log: Log, model: Given) -> Prepared:
         ModelError: no such model, or networks, which have no effects.
         DataError: measurements that cannot be used, or of another robot.
     """
-    if _networks(model) is not None:
-        raise ModelError(f"{_name(model)} holds networks, which have no effects: they can be compared, not diagnosed.")
-    robot = as_model(model)
+    robot = with_effects(model)
     read = as_measurements(log)
     measured = read.measured
     check_named_robot(measured.robot, robot)
+    if isinstance(robot, JointedModel):
+        return _prepared_body(read, robot)
     if isinstance(measured.tracks, CycleTracks):
         raise DataError(
-            f"{measured.path} holds cycles and markers, and the model {robot.name} drives wheels; "
-            "compare them with networks: --model snake, or a file (.safetensors) of bns run --robot snake --save-snn FILE."
+            f"{measured.path} holds cycles and markers, and the model {robot.name} drives wheels; give the model of the robot "
+            "that was driven in cycles: --model snake."
         )
     predictor = predictor_for_search(measured.tracks)
     if len(predictor.tracks.t_s) < len(measured.tracks.t_s):
         measured = replace(measured, tracks=predictor.tracks)
     check_same_robot(predictor, robot)
     return Prepared(read, measured, predictor, robot)
+
+
+def with_effects(model: Given) -> Model:
+    """The model that is given; ModelError if these are networks."""
+    if _networks(model) is not None:
+        raise ModelError(f"{_name(model)} holds networks, which have no effects: they can be compared, not diagnosed.")
+    return as_model(model)
+
+
+def _prepared_body(read: Measurements, model: Model) -> Prepared:
+    """A body on joints over cycles of it."""
+    measured = read.measured
+    assert isinstance(model, JointedModel)
+    tracks = measured.tracks
+    if not isinstance(tracks, CycleTracks | JointTracks):
+        raise DataError(
+            f"{measured.path} holds wheel speeds and poses, and the model {model.name} is a body on joints; give the model of a "
+            "drive: --model khepera, or --model differential-drive --wheelbase METRES."
+        )
+    body = machine(model.mechanism)
+    if isinstance(tracks, CycleTracks):
+        if model.name != SNAKE and model.written.get("body") != SNAKE:
+            raise DataError(f"{measured.path} holds cycles of the snake, and {model.name} is another body; give --model snake.")
+        if not tracks.stable.any():
+            raise DataError(f"{measured.path}: no cycle is stable, and only stable ones are compared with a simulated body.")
+        stretches = stretches_of_cycles(tracks, model.mechanism, len(body.joints))
+        predictor = JointedPredictor(stretches, model, "cycle", marker_noise_m(tracks))
+    else:
+        check_names(tracks, body.joints, model.mechanism.sites)
+        predictor = JointedPredictor(stretches_of_joints(tracks, model.mechanism, body.joints), model, "stretch")
+    return Prepared(read, replace(measured, tracks=predictor.tracks), predictor, model)
+
+
+def _used_in_words(tracks: Tracks, predictor: JointedPredictor) -> str:
+    """Which stretches are compared."""
+    used, wild = len(predictor.windows(predictor.near)[0]), predictor.left_out
+    unstable = int((~tracks.stable).sum()) if isinstance(tracks, CycleTracks) else 0
+    what, more = f"{predictor.near}s", f"{unstable} were not stable, and " if unstable else ""
+    return (
+        f"{used} of {used + wild + unstable} {what} are compared; {more}{wild} nobody can foresee: a little luck moves the robot "
+        "far in them"
+    )
 
 
 def prepared_networks(log: Log, model: Given) -> PreparedNetworks | None:
@@ -85,7 +136,7 @@ def are_networks(model: Given) -> bool:
 
 
 def _networks(model: Given) -> tuple[Path, str] | None:
-    return None if isinstance(model, physics.Model) else networks_file(fspath(model), model_names())
+    return None if isinstance(model, physics.Model) else networks_file(fspath(model), [*model_names(), SNAKE])
 
 
 def _name(model: Given) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import tempfile
 from contextlib import ExitStack
@@ -41,7 +42,8 @@ def calibrated(options: argparse.Namespace) -> str:
     if options.wii:
         return _hung(options)
     if options.delay:
-        return in_words(measured_delay(trial_setup(options.robot, options.rig, emulated=options.emulated)))
+        how = trial_setup(options.robot, options.rig, emulated=options.emulated, speed=math.inf if options.emulated else None)
+        return in_words(measured_delay(how))
     if not 5.0 <= options.square_mm <= 1000.0:
         raise HardwareError(f"--square-mm is {options.square_mm:g}; measure the printed square, 5 to 1000 mm.")
     board = Board(square_m=options.square_mm / 1000, marker_m=0.75 * options.square_mm / 1000)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -33,6 +33,8 @@ class CycleTracks(Tracks):
     gait: Array
     stable: NDArray[np.bool_]
     number: NDArray[np.int64]
+    between: tuple[tuple[Array, Array], ...] = ()
+    """Of each cycle, what a camera saw between its begin and its end: times since its begin (n,), s, and markers (n, 2, 2)."""
 
     @property
     def gap_m(self) -> Array:
@@ -41,34 +43,11 @@ class CycleTracks(Tracks):
         return np.asarray(np.hypot(line[:, 0], line[:, 1]), dtype=np.float64)
 
 
-def only_cycles(tracks: CycleTracks, chosen: NDArray[np.int64]) -> CycleTracks:
-    """Some of the cycles, each a stretch of its own: what happens between two is not looked at. Trials without any are left out."""
-    frames = np.repeat(2 * chosen, 2) + np.tile([0, 1], len(chosen))
-    kept, counts = np.unique(tracks.trial[frames], return_counts=True)
-    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    jumped = np.tile([True, False], len(chosen))
-    jumped[first[:-1]] = False
-    return replace(
-        tracks,
-        names=tuple(tracks.names[i] for i in kept),
-        first=first,
-        t_s=tracks.t_s[frames],
-        pose=tracks.pose[frames],
-        left_m_s=tracks.left_m_s[kept],
-        right_m_s=tracks.right_m_s[kept],
-        duration_s=tracks.duration_s[kept],
-        start_s=tracks.start_s[kept],
-        jumped=jumped,
-        markers_m=tracks.markers_m[frames],
-        gait=tracks.gait[chosen],
-        stable=tracks.stable[chosen],
-        number=tracks.number[chosen],
-    )
-
-
 def marker_noise_m(tracks: CycleTracks) -> float | None:
-    """Noise of one marker's coordinate: a stable cycle ends in the posture in which it began, so what the markers' distance differs
-    by is the camera's; None where there are too few."""
+    """Noise of one marker's coordinate; None where there are too few.
+
+    A stable cycle ends in the posture in which it began, so what the markers' distance differs by is the camera's.
+    """
     differ = np.abs(tracks.gap_m[1::2] - tracks.gap_m[::2])[tracks.stable]
     if len(differ) < _FEW:
         return None
@@ -130,6 +109,7 @@ def cycle_tracks(cycles: pd.DataFrame) -> CycleTracks:
         gait=np.array(cycles["gait"].tolist()),
         stable=cycles["stable"].to_numpy(bool),
         number=cycles["cycle"].to_numpy(np.int64),
+        between=tuple(cycles["between"]),
     )
 
 
@@ -160,7 +140,12 @@ def _cycle(trial: str, number: int, rows: pd.DataFrame, findings: list[Finding])
                 f"cycle {number}: the markers are {100 * stretched:+.0f} cm further apart at its end; mistaken?",
             )
         )
+    inner = rows.iloc[1:-1].dropna(subset=list(MARKERS))
     return {
+        "between": (
+            inner["t_s"].to_numpy(float) - float(begin["t_s"]),
+            inner[list(MARKERS)].to_numpy(float).reshape(-1, 2, 2),
+        ),
         "begin_s": begin["t_s"],
         "end_s": end["t_s"],
         "gait": begin[list(GAIT)].to_numpy(float),

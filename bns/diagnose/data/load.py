@@ -14,12 +14,13 @@ import pandas as pd
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import Finding, checked
 from bns.diagnose.data.cycles import are_cycles, checked_cycles, cycle_tracks
+from bns.diagnose.data.joints import are_joints, joint_tracks
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracks import Tracks, tracks_of
 from bns.errors import DataError
-from bns.measurements import POSE
+from bns.measurements import DISCARDED, POSE
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def load_measured(path: str | Path, robot: str | None = None, more: Sequence[Pat
 def measured_table(table: pd.DataFrame, path: Path, digest: str = "", robot: str | None = None) -> Measured:
     """Check a table that was read and mapped already. ``path`` names it; ``digest``: by default that of its values."""
     with naming(path):
-        table = _of_one_robot(table, robot)
+        table = _kept(_of_one_robot(table, robot))
     of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
     with naming(path):
         tracks, findings = _tracks(table)
@@ -93,6 +94,8 @@ def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:
     if are_cycles(table):
         cycles, findings = checked_cycles(table)
         return cycle_tracks(cycles), findings
+    if are_joints(table):
+        return joint_tracks(table)
     usable, findings = checked(table)
     tracks = tracks_of(usable)
     return without_faults(tracks), [*findings, *_jump_findings(tracks, usable)]
@@ -141,6 +144,16 @@ def naming(path: Path) -> Iterator[None]:
         if str(path) in str(error):
             raise
         raise DataError(f"{path}: {error}") from error
+
+
+def _kept(table: pd.DataFrame) -> pd.DataFrame:
+    """Without the rows of drives that whoever watched them discarded."""
+    if DISCARDED not in table.columns:
+        return table
+    kept = ~(pd.to_numeric(table[DISCARDED], errors="coerce") > 0)
+    if not kept.any():
+        raise DataError(f"All drives are marked as {DISCARDED}; there is nothing to judge by. Drive again.")
+    return table[kept]
 
 
 def _of_one_robot(table: pd.DataFrame, robot: str | None) -> pd.DataFrame:

@@ -52,6 +52,11 @@ class Tracks:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def timed(self) -> bool:
+        """Are frames seen at times of their own, so that a clock can be wrong?"""
+        return True
+
     @cached_property
     def own_s(self) -> Array:
         """Time of every frame since its trial itself began, (frames,): what is shown to people."""

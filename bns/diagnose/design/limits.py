@@ -39,7 +39,7 @@ def arena_of(
     if begin is None and together:
         turn = np.angle(np.exp(1j * begins[:, 2]).mean())
         begin = (float(middle[0]), float(middle[1]), float(turn))
-    if size is not None and len(size) == 4:
+    if isinstance(size, list | tuple) and len(size) == 4:
         low, high = _checked_sides(size)
     elif size is not None:
         centre = np.array(begin[:2]) if begin is not None else (low + high) / 2

@@ -33,7 +33,12 @@ def listed(
     """
     barred = {active.effect.name for active in model.effects} | set(without)
     unfit = ("track" if tracks.relative else "motions") if tracks is not None else None
-    catalogue = {name: fitting(e, model, tracks) for name, e in model.catalogue().items() if e.needs != unfit}
+    stopped = tracks is not None and not tracks.timed
+    catalogue = {
+        name: fitting(e, model, tracks)
+        for name, e in model.catalogue().items()
+        if e.needs != unfit and not (stopped and e.stage == "clock")
+    }
     return {name: effect for name, effect in {**catalogue, **(extra or {})}.items() if name not in barred}
 
 

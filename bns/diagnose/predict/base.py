@@ -30,10 +30,10 @@ class Steps:
 class Predictor(Protocol):
     """Tracks with all that can be worked out of them once.
 
-    ``way_m`` (frames,): how far the robot was driven since the frame before (or how strongly its drive scatters, in metres).
-    ``horizons``: names of the times over which predictions are judged; ``near``: the one of them that curves and worst moments are about. ``tracking``: noise of a tracked
-    position (m) and heading (rad), where the tracks tell it by themselves; None: it is estimated under a model. ``counted``
-    (frames,): what each frame counts in a fit; None: all of them 1.
+    ``way_m`` (frames,): how far the robot was driven since the frame before, or how strongly its drive scatters, in metres.
+    ``horizons``: names of the times over which predictions are judged; ``near``: the one of them that curves and worst moments
+    are about. ``tracking``: noise of a tracked position (m) and heading (rad), where the tracks tell it by themselves; None: it
+    is estimated under a model. ``counted`` (frames,): what each frame counts in a fit; None: all of them 1.
     """
 
     tracks: Tracks

@@ -136,4 +136,3 @@ class Responses:
             model = replace(self._bare, effects=(ActiveEffect(effect, values),))
             known[value] = np.clip(self._simulate(model) - self._sound, -_CLIPPED_M, _CLIPPED_M)
         return known[value]
-

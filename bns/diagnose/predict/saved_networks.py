@@ -19,14 +19,19 @@ from bns.robots.snake.table import COLUMNS as OF_CYCLES
 from bns.spec import robot_and_options
 
 ENDING = ".safetensors"
+OF_ROBOT = "-networks"
 
 
 def networks_file(model: str, models: list[str]) -> tuple[Path, str] | None:
     """The file that ``--model`` means, and the robot if it says one: the file itself, or the static simulator of a robot (its
-    options may follow) that ``models`` of wheels do not name."""
+    options may follow). Where ``models`` with effects have the robot's name, its networks are called ROBOT-networks."""
     if model.endswith(ENDING):
         return Path(model), ""
-    robot = robot_and_options(model)[0]
+    if model.endswith(OF_ROBOT) and model.removesuffix(OF_ROBOT) in robot_names():
+        robot = model.removesuffix(OF_ROBOT)
+        return static_path(robot), robot
+    robot = robot_and_options(model)[0] if "+" in model else model
+    models = [name for name in models if "+" not in model]
     return (static_path(robot), model) if robot in robot_names() and robot not in models else None
 
 

@@ -55,6 +55,7 @@ class WheelPredictor:
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
         way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[0][:, 0]
         self.way_m = self._since_previous(way)
+        self._no_drift = np.zeros((len(tracks.t_s), 2))
         self._of_horizon = lru_cache(partial(windows, tracks))
         self._starts: dict[tuple[str, float], tuple[tuple[float, ...], ...]] = {}
         # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
@@ -216,7 +217,7 @@ class WheelPredictor:
         """
         flow = flow_of(model)
         if (flow.x_m_s, flow.y_m_s, flow.return_per_s) == (0.0, 0.0, 0.0):
-            return np.zeros((len(path), 2))
+            return self._no_drift
         time_s, *where = self._since_previous(sums).T
         way, before, seen = self._since_previous(path), np.roll(path, 1, axis=0), self.tracks.pose
         bent = np.stack(where, axis=1) - time_s[:, None] * (before + way / 2)[:, :2]

@@ -20,7 +20,7 @@ from bns.diagnose.comparison import Comparison, compare
 from bns.diagnose.data.load import Measured
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.diagnosis import Diagnosis
-from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.predict.base import Predictor
 from bns.diagnose.report import tables
 from bns.diagnose.report.figures import comparison_figure, diagnosis_figure, error_by_step_figure
 from bns.diagnose.report.plain_language import certainty, headline, numbers_in_words
@@ -50,7 +50,7 @@ class Material:
 
 def gathered(
     measured: Measured,
-    predictor: WheelPredictor,
+    predictor: Predictor,
     model: Model,
     d: Diagnosis,
     proposed: Callable[[], Proposal],

@@ -17,7 +17,7 @@ from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.values import numbers_of
 
 Table = dict[str, list[Any]]
-AHEAD = {"command": "one command", "1s": "1 second", "5s": "5 seconds", "trial": "the whole trial"}
+AHEAD = {"command": "one command", "1s": "1 second", "5s": "5 seconds", "trial": "the whole trial", "cycle": "one cycle"}
 
 
 def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
@@ -66,8 +66,11 @@ def improvement_text(d: Diagnosis) -> str:
     """What adding the effects does to the error, in a sentence; "" where nothing was added."""
     if d.errors is None or not d.effects:
         return ""
-    e = d.errors.horizons["1s"] if d.errors.horizons["1s"].windows else d.errors.horizons["command"]
-    ahead = "a second" if e.horizon == "1s" else "a command"
+    shown = [e for h in ("1s", "command", "cycle") for e in [d.errors.horizons.get(h)] if e is not None and e.windows]
+    if not shown:
+        return ""
+    e = shown[0]
+    ahead = {"1s": "a second", "command": "a command", "cycle": "a cycle"}[e.horizon]
     known = "With it" if d.verdict != "unlisted" else "With the known effects alone"
     noise = f" (tracking noise alone: {_mm(e.noise_floor_m)} mm)" if np.isfinite(e.noise_floor_m) else ""
     before, after = _mm(e.models[0].rms_m), _mm(e.models[-1].rms_m)

@@ -16,7 +16,6 @@ from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, ties_of
 from bns.physics.decoys import DECOYS
-from bns.physics.effects import all_effects
 
 _VERDICTS = {
     "none": "Nothing is missing that these measurements could show.",
@@ -66,16 +65,19 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
 
 
 def _numbers(d: Diagnosis) -> Iterator[str]:
-    yield from _intervals(d.numbers, equations=True)
+    assert d.selection is not None
+    yield from _intervals(d.numbers, d.selection.fit.model.catalogue())
 
 
-def _intervals(values: Mapping[str, Mapping[str, Mapping[str, Any]]], *, equations: bool = False) -> Iterator[str]:
+def _intervals(
+    values: Mapping[str, Mapping[str, Mapping[str, Any]]], catalogue: Mapping[str, Any] | None = None
+) -> Iterator[str]:
     for effect, numbers in values.items():
         for name, n in numbers.items():
             if n["low"] is not None and n["high"] is not None:
                 yield f"  {effect}: {name} = {n['value']:.5g} {n['unit']} (95 %: {n['low']:.5g} to {n['high']:.5g})"
-        if equations and effect in all_effects():
-            yield f"    {all_effects()[effect].equation}"
+        if catalogue and effect in catalogue:
+            yield f"    {catalogue[effect].equation}"
 
 
 def _errors(errors: PairedErrors | None) -> Iterator[str]:

@@ -74,7 +74,7 @@ def _smooth(effect: Effect) -> bool:
 def _columns(problem: Problem, base: Model, whitened: Array, root: Array, effect: Effect) -> Iterator[Array]:
     neutral = tuple(effect.neutral.values())
     for index, p in enumerate(effect.parameters):
-        small = _SMALL * (p.plausible[1] - p.plausible[0])
+        small = _SMALL * (p.plausible[1] - p.plausible[0]) * (-1 if p.neutral >= p.high else 1)
         values = tuple(v + small * (i == index) for i, v in enumerate(neutral))
         yield ((problem.whitened(base.with_active(effect, values)) - whitened) / small * root).ravel()
 

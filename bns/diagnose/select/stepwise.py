@@ -21,6 +21,7 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.plausibility import at_bound, implausible
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
+from bns.diagnose.select.screening import screened, worth_a_fit
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
@@ -49,6 +50,7 @@ class StepwiseSelection:
         self.predictor, self.model, self.tick = predictor, model.arranged(), tick
         self._extra, self._barred = extra, barred
         self.catalogue = listed(self.model, extra, predictor.tracks, barred)
+        self._worth = dict(self.catalogue) if predictor.screening is None else {}
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
         self._all_believed = False
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
@@ -74,6 +76,7 @@ class StepwiseSelection:
         given = self.model
         self.model = self._bare_with_clocks(clocks.fit.model, given)
         added = self.catalogue.pop(_per_trial_effect(self.model), None)
+        self._worth.pop(_per_trial_effect(self.model), None)
         self._exchanged = None
         result = self._select()
         still = compare_clocks(result.problem, result.problem.fit(with_shared_clock(result.fit.model)), result.fit)
@@ -146,7 +149,7 @@ class StepwiseSelection:
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
     ) -> tuple[SelectionStep, Problem, Fit]:
         """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in."""
-        left = [effect for name, effect in self.catalogue.items() if name not in accepted]
+        left = self._worth_a_fit(problem, fit, accepted)
         tried = each(partial(self._tried, problem, fit), [*DECOYS, *left])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
         ranking = sorted(tried[len(DECOYS) :], key=lambda c: -c.paired_comparison.elpd_diff)
@@ -166,6 +169,14 @@ class StepwiseSelection:
             passed_over.append(ranking[index])
         best = passed_over[0].name if passed_over else ""
         return SelectionStep(tuple(ranking), decoy_threshold, "", best), problem, fit
+
+    def _worth_a_fit(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[Effect]:
+        """What is fitted beside the accepted effects: where fits are costly, all that the screening ever found promising."""
+        if self.predictor.screening is not None:
+            self.tick("screening")
+            left = [effect for name, effect in self.catalogue.items() if name not in accepted]
+            self._worth |= {effect.name: effect for effect in worth_a_fit(screened(problem, fit, left))}
+        return [effect for name, effect in self._worth.items() if name not in accepted]
 
     def _rejected(self, fit: Fit, name: str, bounds: bool = True) -> str:
         """Why an effect may not be taken; where all numbers are believed, only for one at a bound."""
@@ -235,7 +246,7 @@ class StepwiseSelection:
             model = fit.model.without(name)
             loose = problem_for(self.predictor, model)
             lacking, reached = loose.fit(model), loose.loss(fit.model)
-            others = [effect for other, effect in self.catalogue.items() if other not in accepted]
+            others = [effect for other, effect in self._worth.items() if other not in accepted]
             fits = each(partial(self._in_place, problem, fit, loose, lacking, reached), others)
             result += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
         self._exchanged = (problem, accepted, result)

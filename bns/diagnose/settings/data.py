@@ -73,6 +73,15 @@ class Data:
         "m",
         f"Markers further apart than this are in centimetres or millimetres (they are 0.65 m apart); {BY_HAND}.",
     )
+    stretch_s: float = setting(
+        2.0,
+        "s",
+        "Tracks of a robot whose joints are told positions are cut into stretches of this length, each simulated from where the "
+        "robot was seen: long enough to move, short enough to be foreseen.",
+    )
+    stretch_variables: int = setting(
+        4, "joints", "Residuals are looked at along the set points of so many joints at most: each costs chance."
+    )
     cycle_stretched_m: float = setting(
         0.10,
         "m",

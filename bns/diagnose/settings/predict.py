@@ -65,7 +65,10 @@ class Predict:
         "1",
         f"A model this near to a simulated one (sum over its numbers, in plausible ranges) is not simulated again; {BY_HAND}.",
     )
-    screening_cycles: int = setting(120, "cycles", f"So many cycles, evenly chosen, screen the effects of a body; {BY_HAND}.")
+    screening_cycles: int = setting(80, "cycles", f"So many cycles, evenly chosen, screen the effects of a body; {BY_HAND}.")
+    look_s: float = setting(
+        0.04, "s", f"A simulated body is looked at this often; what a camera sees in between lies on the chord; {BY_HAND}."
+    )
     wild_m: float = setting(
         0.06, "m", f"Cycles that a little luck (`still_m`) moves farther than this cannot be foreseen: left out; {BY_HAND}."
     )

@@ -40,6 +40,18 @@ class Select:
         "effects",
         f"Effects that a search accepts at most: beyond, each mends what the others left of a seventh; {BY_HAND}.",
     )
+    screen_most: int = setting(
+        8, "effects", f"Where fits are costly, so many effects at most are fitted after each step of a search; {BY_HAND}."
+    )
+    screen_chance: float = setting(
+        0.2, "1", f"And only those that luck alone does not make look as good in one case of five, on few cycles; {BY_HAND}."
+    )
+    screen_share: float = setting(
+        0.6,
+        "1",
+        "The slope along a number is taken from neutral to this share of what is plausible: limits do nothing at first; "
+        f"{BY_HAND}.",
+    )
     tie_z: float = setting(
         2.0,
         "standard errors",

@@ -20,7 +20,7 @@ from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
-from bns.hardware.servo_chain import ServoChain, ServoError
+from bns.hardware.servo_chain import ServoChain, ServoError, StuckServoError
 from bns.hardware.snake_drive import SnakeDrive
 from bns.hardware.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
@@ -79,7 +79,7 @@ class SnakePlatform:
     def drive(self, commands: np.ndarray) -> Driven:
         """Straighten the robot, then drive the cycles one after the other."""
         drive, ended = SnakeDrive(self._chain, self._eye, self._watch, self._settings, self._clock, self._journal), ""
-        guard = StopsAtTheEnd(self.stop)
+        guard, stuck = StopsAtTheEnd(self.stop), ""
         began_s = self._clock.now_s()
         self._watch.begin()
         with guard:
@@ -91,10 +91,12 @@ class SnakePlatform:
             except DriveEnded as end:
                 ended = str(end)
             except ServoError as error:
-                raise TrialPausedError(f"the servos failed: {error}") from error
+                if not isinstance(error, StuckServoError) or not len(drive.done()):  # straightening is no gait
+                    raise TrialPausedError(f"the servos failed: {error}") from error
+                ended, stuck = str(error), f"servo {error.number}"
         assert guard.last is not None
         seconds = self._clock.now_s() - began_s
-        return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, drive.spans_s)
+        return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, drive.spans_s, stuck)
 
 
 def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: HardwareLog) -> ServoChain:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 from bns.physics.effect import Effect
+from bns.physics.effects import effect_named
 from bns.physics.jointed.catalogue_parts import PerJoint, PerSite
 from bns.registry import JOINT_EFFECTS
 
@@ -14,7 +15,8 @@ from bns.registry import JOINT_EFFECTS
 def catalogue(joints: tuple[str, ...], sites: tuple[str, ...], free: bool) -> dict[str, Effect]:
     """Name -> effect of a body with these joints and tracked sites; what the floor does only to one that lies on it."""
     listed = (effect for name in JOINT_EFFECTS.names() for effect in _members(JOINT_EFFECTS.load(name), joints, sites))
-    return {effect.name: effect for effect in listed if free or effect.name not in OF_THE_FLOOR}
+    clocks = (effect_named(name) for name in ("clock-offset", "clock-drift"))
+    return {e.name: e for e in (*listed, *clocks) if free or e.name not in OF_THE_FLOOR}
 
 
 OF_THE_FLOOR = ("floor-friction", "friction-anisotropy", "floor-slope", "tether-pull", "tether-drag")

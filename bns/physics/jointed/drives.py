@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,8 @@ from bns.physics.jointed.plant import Array
 class Drive:
     """A stretch of a trial.
 
-    ``set_points`` (steps, joints), rad; ``frames``: after how many steps each frame is seen, ascending. ``begin`` (3,): where the
-    robot was seen at the first of them: x_m, y_m, heading_rad.
+    ``set_points`` (steps, joints), rad; ``frames``: after how many steps the robot is looked at, ascending. ``begin`` (3,): where
+    it was seen at the first of them: x_m, y_m, heading_rad.
     """
 
     set_points: Array
@@ -25,28 +26,48 @@ class Drive:
     begin: Array
 
 
-def through_postures(
-    mechanism: Mechanism, postures: Array, dt_s: float, begin: Array, seen: int = 1, between_s: Sequence[float] = ()
-) -> Drive:
+def through_postures(mechanism: Mechanism, postures: Array, dt_s: float, begin: Array, looks: int = 2) -> Drive:
     """From posture (postures, joints) to posture: every servo at the same speed, all wait for the last.
 
-    Frames: in the posture number ``seen``, after it at the times ``between_s``, and in the last posture.
+    Looked at so many times, evenly spaced, from the second posture to the last.
     """
     q = mechanism.resolution_rad
     targets = np.round(postures / q) * q if q else postures
     parts, furthest = [targets[:1]], mechanism.joint_speed_rad_s * dt_s
-    for start, target in zip(targets[:-1], targets[1:], strict=True):
+    for start, target in pairwise(targets):
         way = target - start
         steps = int(np.ceil((np.abs(way).max() / mechanism.joint_speed_rad_s + mechanism.settle_s) / dt_s))
         reach = furthest * np.arange(1, steps + 1)[:, None]
         parts.append(start + np.clip(way, -reach, reach))
     ends = np.cumsum([len(part) for part in parts])
-    first, last = int(ends[seen]), int(ends[-1])
-    inner = np.clip(first + np.round(np.asarray(between_s, np.float64) / dt_s), first, last)
-    return Drive(np.concatenate(parts), np.concatenate([[first], inner, [last]]).astype(np.int64), begin)
+    return Drive(np.concatenate(parts), _looks(int(ends[1]), int(ends[-1]), looks), begin)
+
+
+def at_times(
+    t_s: Array, set_points: Array, seen_s: tuple[float, float], dt_s: float, begin: Array, looks: int = 2
+) -> Drive:
+    """Set points (n, joints), each from its time t_s (n,) on, until the robot is seen for the last time."""
+    from_s, to_s = seen_s
+    start = max(from_s - RUN_UP_S, float(t_s[0]))
+    before = max(round((from_s - start) / dt_s), 1)
+    steps = before + max(round((to_s - from_s) / dt_s), 1)
+    at = np.searchsorted(t_s, start + np.arange(steps) * dt_s + 1e-9, side="right") - 1
+    return Drive(set_points[np.maximum(at, 0)], _looks(before, steps, looks), begin)
+
+
+RUN_UP_S = 1.0
+"""Set points of this long before a stretch bring the joints to where they are when it begins."""
+
+
+def _looks(first: int, last: int, looks: int) -> NDArray[np.int64]:
+    return np.linspace(first, last, looks).round().astype(np.int64)
 
 
 def told_speed_rad_s(drives: Sequence[Drive], dt_s: float) -> float:
-    """The fastest that set points move, but for the quickest hundredth of the steps."""
-    rates = [np.abs(np.diff(d.set_points, axis=0)).max(axis=1) for d in drives if len(d.set_points) > 1]
-    return float(np.quantile(np.concatenate(rates), 0.99)) / dt_s if rates else 0.0
+    """The fastest that set points move over a twentieth of a second, but for the quickest hundredth."""
+    k = max(round(_OVER_S / dt_s), 1)
+    ways = [np.abs(d.set_points[k:] - d.set_points[:-k]).max(axis=1) for d in drives if len(d.set_points) > k]
+    return float(np.quantile(np.concatenate(ways), 0.99)) / (k * dt_s) if ways else 0.0
+
+
+_OVER_S = 0.05

@@ -25,7 +25,7 @@ class Mechanism:
     """A body as text and numbers.
 
     ``xml``: MJCF with position servos; ``sites``: names of the tracked sites. A servo within ``dead_band_rad`` of where it is
-    told to be does nothing, and follows ``delay_s`` late. ``tether``: the link whose motion ``tether_drag_n`` brakes ("": the root).
+    told to be does nothing, and follows ``delay_s`` late. ``tether``: the link that ``tether_drag_n`` brakes ("": the root).
     ``joint_speed_rad_s``, ``settle_s``, ``resolution_rad``: of a robot that goes from posture to posture, how (0: it is told
     positions at times).
     """
@@ -151,7 +151,9 @@ def _pair_with_floor(spec: Any, plain: Any) -> None:
     for floor, other in _floor_pairs(plain):
         a, b = plain.geom(floor), plain.geom(other)
         if not a.name or not b.name:
-            raise ModelError(f"Geom {other if a.name else floor} of the body has no name; name every geom that touches the floor.")
+            raise ModelError(
+                f"Geom {other if a.name else floor} of the body has no name; name every geom that touches the floor."
+            )
         sliding, spin, rolling = np.maximum(plain.geom_friction[floor], plain.geom_friction[other])
         spec.add_pair(
             geomname1=a.name,
@@ -179,7 +181,9 @@ def _check(model: Any) -> None:
         raise ModelError("The body has no actuators; each joint that is told a position needs a <position> actuator.")
     for k in range(model.nu):
         on_joint = model.actuator_trntype[k] == mujoco.mjtTrn.mjTRN_JOINT
-        servo = model.actuator_biasprm[k, 1] < 0 and np.isclose(model.actuator_gainprm[k, 0], -model.actuator_biasprm[k, 1])
+        servo = model.actuator_biasprm[k, 1] < 0 and np.isclose(
+            model.actuator_gainprm[k, 0], -model.actuator_biasprm[k, 1]
+        )
         if not (on_joint and servo):
             raise ModelError(
                 f"Actuator {model.actuator(k).name or k} of the body is no position servo on a joint; "
@@ -187,4 +191,6 @@ def _check(model: Any) -> None:
             )
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
     if len(free) > 1 or (len(free) and (free[0] != 0 or model.nmocap)):
-        raise ModelError("The body has free joints beside its root; one robot, free at its root or fixed, can be diagnosed.")
+        raise ModelError(
+            "The body has free joints beside its root; one robot, free at its root or fixed, can be diagnosed."
+        )

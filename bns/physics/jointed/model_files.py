@@ -74,7 +74,9 @@ def _body(settings: Mapping[str, Any], name: str, folder: Path) -> JointedModel:
     given = str(settings["body"])
     for key in settings:
         if key not in _TOP:
-            raise ModelError(unknown_name("setting of a body", key, [k for k in _TOP if k not in {"base", "effects", "provenance"}]))
+            raise ModelError(
+                unknown_name("setting of a body", key, [k for k in _TOP if k not in {"base", "effects", "provenance"}])
+            )
     if given == SNAKE:
         _only(settings, ("body", "parameters"), given)
         own = settings.get("parameters")
@@ -101,7 +103,9 @@ def _of_mjcf(path: Path, settings: Mapping[str, Any], name: str) -> JointedModel
         raise ModelError(f"MuJoCo does not read {path}: {error}; give an MJCF file that its viewer opens.") from error
     sites = settings.get("sites", [site.name for site in spec.sites if site.name])
     if isinstance(sites, str) or not isinstance(sites, Sequence) or not sites:
-        raise ModelError(f"model {name}: sites is {shown(sites)}; give the names of the sites that are tracked, at least one.")
+        raise ModelError(
+            f"model {name}: sites is {shown(sites)}; give the names of the sites that are tracked, at least one."
+        )
     numbers = {key: number(f"model {name}: {key}", settings.get(key, 0.0), 0.0, 10.0) for key in NUMBERS}
     tether = str(settings.get("tether", ""))
     mechanism = Mechanism(xml, tuple(map(str, sites)), tether=tether, **numbers)

@@ -73,7 +73,9 @@ class Simulator:
         begin = np.array([d.begin for d in self.drives])
         if not self.machine.free:
             return Rest(settled, nothing, np.zeros((len(held), 2)), np.zeros((len(held), 2)))
-        first = Simulator(self.machine, [Drive(d.set_points, d.frames[:1], d.begin) for d in self.drives], self._threads)
+        first = Simulator(
+            self.machine, [Drive(d.set_points, d.frames[:1], d.begin) for d in self.drives], self._threads
+        )
         seen = first.sightings(self.machine.plant, replace_state(rest, settled)).point_m
         middle, heading = _poses(seen)
         return Rest(settled, begin[:, 2] - heading, middle, begin[:, :2])
@@ -130,7 +132,14 @@ class Simulator:
                 control[:n, 0, : model.nu] = servos.control(step, q)
                 floor.push(control[:n, 0, model.nu :], sensed[:n])
                 after, now = threads.rollout(
-                    model, datas, state[:n], control[:n], control_spec=spec, nstep=1, initial_warmstart=warm[:n], skip_checks=False
+                    model,
+                    datas,
+                    state[:n],
+                    control[:n],
+                    control_spec=spec,
+                    nstep=1,
+                    initial_warmstart=warm[:n],
+                    skip_checks=False,
                 )
                 warm[:n] = (after[:, 0, speeds] - state[:n, speeds]) / self._dt_s
                 state[:n], sensed[:n] = after[:, 0], now[:, 0]
@@ -152,7 +161,9 @@ def replace_state(rest: Rest, state: Array) -> Rest:
 class _Servos:
     """The position that each servo's actuator is given in each step, so that it pulls as the plant says."""
 
-    def __init__(self, machine: Machine, plant: Plant, set_points: Sequence[Array], dt_s: float, told_rad_s: float) -> None:
+    def __init__(
+        self, machine: Machine, plant: Plant, set_points: Sequence[Array], dt_s: float, told_rad_s: float
+    ) -> None:
         p, m = plant, machine
         self._wanted = _delayed(set_points, max(1.0, (m.mechanism.delay_s + p.delay_s) / dt_s)) + p.zero_rad
         self._band = m.mechanism.dead_band_rad + p.dead_band_rad

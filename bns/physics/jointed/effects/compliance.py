@@ -20,7 +20,7 @@ EFFECT = Effect(
         Parameter("stiffness", "1", 0.1, 6.0, (0.3, 3.0), 1.0, "stiffness of the servos, as a multiple of the model's"),
     ),
     equation="torque = stiffness * k * error",
-    residuals="Lifted parts sag and the markers' distance differs from the posture's; the more so, the higher the body is lifted.",
+    residuals="Lifted parts sag and the markers' distance differs from the posture's; the more, the higher the body is lifted.",
     lookalikes=("torque-limit", "supply-sag", "dead-band"),
     sentence="the joints are not as stiff as assumed",
     measurement="hang a known weight on an arm that a servo holds level, and measure by how much it sinks",

@@ -16,7 +16,9 @@ def apply(plant: Plant, band_rad: float) -> Plant:
 EFFECT = Effect(
     name="dead-band",
     stage="mechanics",
-    parameters=(Parameter("band_rad", "rad", -0.01, 0.4, (0.0, 0.15), 0.0, "dead band of the servos beyond the model's"),),
+    parameters=(
+        Parameter("band_rad", "rad", -0.01, 0.4, (0.0, 0.15), 0.0, "dead band of the servos beyond the model's"),
+    ),
     equation="torque = 0 while |error| < band",
     residuals="Small amplitudes move less than foreseen, large ones by nearly the same.",
     lookalikes=("compliance",),

@@ -19,7 +19,9 @@ def apply(plant: Plant, factor: float) -> Plant:
 EFFECT = Effect(
     name="floor-friction",
     stage="mechanics",
-    parameters=(Parameter("factor", "1", 0.1, 5.0, (0.4, 2.5), 1.0, "friction of the floor, as a multiple of the model's"),),
+    parameters=(
+        Parameter("factor", "1", 0.1, 5.0, (0.4, 2.5), 1.0, "friction of the floor, as a multiple of the model's"),
+    ),
     equation="mu' = factor * mu",
     residuals="Cycles that press links sideways go farther or less far; still postures fit.",
     lookalikes=("friction-anisotropy", "torque-limit", "compliance"),

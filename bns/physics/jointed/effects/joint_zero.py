@@ -16,7 +16,11 @@ EFFECT = PerJoint(
     Effect(
         name="joint-zero",
         stage="mechanics",
-        parameters=(Parameter("offset_rad", "rad", -0.8, 0.8, (-0.4, 0.4), 0.0, "where the joint is when it believes to be at 0"),),
+        parameters=(
+            Parameter(
+                "offset_rad", "rad", -0.8, 0.8, (-0.4, 0.4), 0.0, "where the joint is when it believes to be at 0"
+            ),
+        ),
         equation="angle' = angle + offset of one joint",
         residuals="The robot curves to one side, or lies bent, in every cycle alike.",
         lookalikes=("weak-joint", "marker-offset"),

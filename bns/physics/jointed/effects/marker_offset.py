@@ -21,7 +21,9 @@ EFFECT = PerSite(
         name="marker-offset",
         stage="sight",
         parameters=(
-            Parameter("along_m", "m", -0.2, 0.2, (-0.08, 0.08), 0.0, "how far the marker sits ahead of where the model has it"),
+            Parameter(
+                "along_m", "m", -0.2, 0.2, (-0.08, 0.08), 0.0, "how far the marker sits ahead of where the model has it"
+            ),
             Parameter("left_m", "m", -0.2, 0.2, (-0.08, 0.08), 0.0, "how far it sits to the left"),
         ),
         equation="p' = p + along * a + left * l, a and l the link's axes",

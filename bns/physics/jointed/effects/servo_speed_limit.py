@@ -17,7 +17,9 @@ EFFECT = Effect(
     name="servo-speed-limit",
     stage="mechanics",
     parameters=(
-        Parameter("share", "1", 0.1, 1.0, (0.3, 1.0), 1.0, "highest speed of a servo, as a share of the fastest it is told"),
+        Parameter(
+            "share", "1", 0.1, 1.0, (0.3, 1.0), 1.0, "highest speed of a servo, as a share of the fastest it is told"
+        ),
     ),
     equation="|d set point / dt| <= share * told",
     residuals="Wide cycles move less than foreseen, small ones fit; postures are not reached.",

@@ -16,7 +16,9 @@ def apply(plant: Plant, sag: float) -> Plant:
 EFFECT = Effect(
     name="supply-sag",
     stage="mechanics",
-    parameters=(Parameter("sag", "1", 0.0, 1.0, (0.0, 0.95), 0.0, "share of stiffness and torque lost under full load"),),
+    parameters=(
+        Parameter("sag", "1", 0.0, 1.0, (0.0, 0.95), 0.0, "share of stiffness and torque lost under full load"),
+    ),
     equation="torque' = torque * (1 - sag * mean load)",
     residuals="Cycles in which many joints work hard reach less than foreseen.",
     lookalikes=("compliance", "torque-limit"),

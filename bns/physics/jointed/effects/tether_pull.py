@@ -20,7 +20,15 @@ EFFECT = Effect(
     parameters=(
         Parameter("east_n", "N", -5.0, 5.0, (-1.0, 1.0), 0.0, "pull towards east where the camera's origin is"),
         Parameter("north_n", "N", -5.0, 5.0, (-1.0, 1.0), 0.0, "pull towards north there"),
-        Parameter("return_n_m", "N/m", -5.0, 5.0, (-1.0, 1.0), 0.0, "what the pull grows by with every metre away from its place"),
+        Parameter(
+            "return_n_m",
+            "N/m",
+            -5.0,
+            5.0,
+            (-1.0, 1.0),
+            0.0,
+            "what the pull grows by with every metre away from its place",
+        ),
     ),
     equation="F = (east, north) - return * (x, y) on the tether's link; it vanishes at (east, north) / return",
     residuals="The end that carries the tether is drawn to one place.",

@@ -21,7 +21,15 @@ EFFECT = Effect(
     name="tilted-camera",
     stage="sight",
     parameters=(
-        Parameter("east_1_m", "1/m", -0.3, 0.3, (-0.1, 0.1), 0.0, "by what share the picture grows with every metre towards east"),
+        Parameter(
+            "east_1_m",
+            "1/m",
+            -0.3,
+            0.3,
+            (-0.1, 0.1),
+            0.0,
+            "by what share the picture grows with every metre towards east",
+        ),
         Parameter("north_1_m", "1/m", -0.3, 0.3, (-0.1, 0.1), 0.0, "the same towards north"),
     ),
     equation="p' = p (1 + east x + north y)",

@@ -16,7 +16,11 @@ def apply(plant: Plant, factor: float) -> Plant:
 EFFECT = Effect(
     name="torque-limit",
     stage="mechanics",
-    parameters=(Parameter("factor", "1", 0.05, 2.0, (0.1, 1.0), 1.0, "torque limit of the servos, as a multiple of the model's"),),
+    parameters=(
+        Parameter(
+            "factor", "1", 0.05, 2.0, (0.1, 1.0), 1.0, "torque limit of the servos, as a multiple of the model's"
+        ),
+    ),
     equation="|torque| <= factor * limit",
     residuals="Cycles that lift the body high are not reached; flat ones fit.",
     lookalikes=("compliance", "supply-sag", "servo-speed-limit"),

@@ -19,7 +19,9 @@ EFFECT = Effect(
     name="uneven-mass",
     stage="mechanics",
     parameters=(
-        Parameter("gradient", "1", -0.95, 0.95, (-0.8, 0.8), 0.0, "share by which the last link is heavier, the first lighter"),
+        Parameter(
+            "gradient", "1", -0.95, 0.95, (-0.8, 0.8), 0.0, "share by which the last link is heavier, the first lighter"
+        ),
     ),
     equation="m' = m * (1 + gradient * s), s from -1 at the first link to 1 at the last",
     residuals="One end moves less than foreseen and the other more: heavy links stay where they are.",

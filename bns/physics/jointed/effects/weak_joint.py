@@ -16,7 +16,9 @@ EFFECT = PerJoint(
     Effect(
         name="weak-joint",
         stage="mechanics",
-        parameters=(Parameter("strength", "1", 0.0, 1.0, (0.0, 1.0), 1.0, "strength of the joint's servo; 0 is silent"),),
+        parameters=(
+            Parameter("strength", "1", 0.0, 1.0, (0.0, 1.0), 1.0, "strength of the joint's servo; 0 is silent"),
+        ),
         equation="torque' = strength * torque of one joint",
         residuals="The markers' distance and the direction of motion differ in the cycles that need this joint.",
         lookalikes=("joint-zero", "compliance"),

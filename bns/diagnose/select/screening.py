@@ -1,0 +1,66 @@
+"""Which effects are worth a fit where a fit is costly: a score test of each on few of the tracks.
+
+Nothing is fitted: the slope of the residuals along an effect's numbers, where it does nothing, says how hard the tracks pull on
+it, and how rarely luck pulls so hard (Rao's score test, with the sign flips of `significance` for its distribution).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.fit import Fit, Problem, chance
+from bns.diagnose.estimate.noise import filter_for
+from bns.diagnose.settings import DEFAULTS
+from bns.physics.effect import Effect
+
+MOST = DEFAULTS.select.screen_most
+CHANCE = DEFAULTS.select.screen_chance
+_SHARE = DEFAULTS.select.screen_share
+
+
+@dataclass(frozen=True)
+class Screened:
+    """An effect, by how much its numbers could lower the loss to first order, and the chance of such a pull by luck."""
+
+    effect: Effect
+    gain: float
+    p_value: float
+
+
+def screened(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> list[Screened]:
+    """Every effect on the predictor's few tracks, the one that could lower the loss most first."""
+    light = problem.predictor.screening
+    assert light is not None
+    few = Problem(light, filter_for(light, light.steps(fit.model), problem.pose_filter.noise))
+    base = few.fit(fit.model, rounds=0)
+    return sorted((_scored(few, base, effect) for effect in effects), key=lambda s: -s.gain)
+
+
+def worth_a_fit(found: Sequence[Screened]) -> list[Effect]:
+    """The first `MOST` that luck does not explain at once."""
+    return [s.effect for s in found if s.p_value < CHANCE][:MOST]
+
+
+def _scored(few: Problem, base: Fit, effect: Effect) -> Screened:
+    columns = np.stack([_column(few, base, effect, index) for index in range(len(effect.parameters))], axis=2)
+    columns = columns[..., np.abs(columns).max(axis=(0, 1)) > 0]
+    if not columns.shape[2]:
+        return Screened(effect, 0.0, 1.0)
+    equations = few.normal_equations(np.concatenate([base.jacobian, columns], axis=2), base.whitened)
+    gradient, curvature = equations.gradients.sum(axis=0), equations.curvatures.sum(axis=0)
+    gain = float(gradient @ np.linalg.pinv(curvature, hermitian=True) @ gradient) / 2
+    return Screened(effect, gain, chance(equations, base.jacobian.shape[2]))
+
+
+def _column(few: Problem, base: Fit, effect: Effect, index: int) -> Array:
+    """What a unit of one number changes in the whitened innovations, from neutral to well inside of what is plausible."""
+    p = effect.parameters[index]
+    ends = [p.plausible[1] - p.neutral, p.plausible[0] - p.neutral]
+    change = _SHARE * max(ends, key=abs)
+    values = tuple(q.neutral + (change if q is p else 0.0) for q in effect.parameters)
+    moved: Array = (few.whitened(base.model.with_active(effect, values)) - base.whitened) / change
+    return moved
