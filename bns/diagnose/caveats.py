@@ -10,6 +10,7 @@ from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import Unexplained
+from bns.diagnose.residuals.worst_trials import WithoutWorst
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
@@ -27,11 +28,14 @@ def notes_on(
     longer: Sequence[tuple[str, ...]] = (),
     withdrawn: Sequence[str] = (),
     imitating: Sequence[str] = (),
+    terms: Sequence[str] = (),
+    lowered: bool = True,
 ) -> Iterator[str]:
     """All notes, one sentence or two each.
 
     ``longer``: explanations with one effect more that fit as well; ``withdrawn``: effects with which the error does not fall;
-    ``imitating``: those that earn nothing beside a flexible term.
+    ``imitating``: those that earn too little beside flexible terms; ``terms``: these in words;
+    ``lowered``: the error falls with them.
     """
     for name, why in selection.implausible.items():
         yield f"{name} fits best, and implausibly: {why}. No other set predicts as well: check it by an independent measurement."
@@ -40,7 +44,7 @@ def notes_on(
     if imitating:
         yield (
             f"{' and '.join(imitating)} would lower the error, but only by imitating what no listed effect explains: beside a "
-            "flexible term for that, nothing is left for it to explain."
+            "flexible term for that, too little is left to explain."
         )
     if withdrawn:
         yield (
@@ -51,15 +55,29 @@ def notes_on(
     for names in longer:
         yield f"{' with '.join(names)} would explain as much, with one effect more."
     yield from _on_rest(rest, tracks)
-    if formula is not None:
+    if formula is not None and not formula.signal:
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
         yield f"A candidate for it: {formula.on} + {formula.term} with {values}."
+    yield from (f"What no effect explains looks like this: {words}." for words in terms)
+    if terms and not lowered:
+        yield "Predictions of trials held out get no better with that for certain: it describes, and need not be added."
     if hint is not None:
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
         yield f"{hint.name} may be missing, but {len(tracks)} trials do not settle it; about {more} more would."
     for c in selection.steps[0].ranking:
         if c.rejected_because and c.paired_comparison.elpd_diff > NOTABLE * float(selection.nominal.losses.mean()):
             yield f"{c.name} was not considered: {c.rejected_because}."
+
+
+def on_worst(both: WithoutWorst) -> str:
+    """What becomes of a verdict with and without trials that are unlike the rest."""
+    those = f"{'trial' if len(both.trials) == 1 else 'trials'} {', '.join(both.trials)}"
+    begun = f"Unlike all others as a whole: {those}. They count nothing in what is fitted, and are part of the errors shown"
+    if both.same:
+        return f"{begun}; the verdict is the same with them. Look what happened there; `--without` leaves them out."
+    verdict, effects = both.with_them
+    said = f"{verdict} ({', '.join(effects)})" if effects else verdict
+    return f"{begun}; with them the verdict would be {said}. Look what happened there; `--without` leaves them out."
 
 
 def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from bns.diagnose.caveats import notes_on
+from bns.diagnose.caveats import notes_on, on_worst
 from bns.diagnose.data.tracks import Tracks
-from bns.diagnose.estimate.calibration import calibrated
+from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set
@@ -19,11 +19,15 @@ from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
-from bns.diagnose.residuals.beside_flexible import surviving
+from bns.diagnose.residuals.established import Established, established, left_over
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
+from bns.diagnose.residuals.words import in_words
+from bns.diagnose.residuals.worst_trials import WithoutWorst, standing_out
 from bns.diagnose.select.equivalents import equivalent_pairs
+from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
 from bns.diagnose.settings import DEFAULTS
@@ -38,6 +42,8 @@ _HINT = DEFAULTS.verdict.hint
 
 WITH_EFFECTS = "with the effects"
 """The name of the refitted model in tables of errors."""
+WITH_TERMS = "and what is left, too"
+"""Of the model with the terms that describe what no effect explains, as well."""
 
 NOTHING_LEFT = Unexplained((), None, ())
 
@@ -51,9 +57,19 @@ class Diagnosis:
     residual_dependence: tuple[ResidualDependence, ...] = ()
     rest: Unexplained = NOTHING_LEFT
     formula: Formula | None = None
+    """The first of the terms; where there are none, a formula that is fitted to the effects and earns something."""
+    terms: tuple[Formula, ...] = ()
+    """What no effect explains, as terms that can be added one after the other; their fit has the effects and all of them."""
+    terms_in_words: tuple[str, ...] = ()
+    imitating: tuple[str, ...] = ()
+    """Effects that a search without the terms accepts, and that earn too little beside them."""
     errors: PairedErrors | None = None
     """Of the model as given and, where effects were accepted, of the model with them: on trials held out."""
+    errors_with_terms: PairedErrors | None = None
+    """The same, and of the model with effects and terms."""
     notes: tuple[str, ...] = ()
+    without_worst: WithoutWorst | None = None
+    """Where trials stand out as a whole: what is said with them and without them. What is presented is said without them."""
     calibration: Fit | None = None
     """Of single relative motions: all numbers of robot and sensor fitted together (`calibrated`)."""
 
@@ -81,18 +97,62 @@ class Diagnosis:
             "verdict": self.verdict,
             "effects": list(self.effects),
             "implausible": selection.implausible if selection else {},
-            "parameters": numbers_of(selection.fit) if selection else {},
+            "parameters": self.numbers,
+            "imitating": list(self.imitating),
             "ties": ties_of(selection) if selection else [],
             "explanations": [list(selection.accepted), *map(list, selection.competing_models)] if selection else [],
             "ranking": [ranked_values(c) for c in (selection.steps[0].ranking if selection else ())],
             "error": before_and_after(self.errors) if self.errors else {},
             "tracking_noise": noise_json(self.errors) if self.errors else None,
             "formula": self._formula(),
+            "terms": self._terms(),
+            "error_with_terms": before_and_after(self.errors_with_terms) if self.errors_with_terms else {},
             "residual_dependence": [dependence_values(p) for p in self.residual_dependence],
+            "without_worst": self._without_worst(),
             "outliers": [vars(o) for o in self.rest.outliers],
             "notes": list(self.notes),
             "calibration": numbers_of(self.calibration) if self.calibration else {},
+            "wheel_sizes": {
+                side: {"value": value, "low": low, "high": high}
+                for side, (value, low, high) in (wheel_sizes(self.calibration) if self.calibration else {}).items()
+            },
         }
+
+    @property
+    def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """The numbers of the effects: where terms were found, as fitted beside these, which keep them from being biased.
+
+        Of single relative motions: as calibrated together, since an effect that was not accepted has a number there, too.
+        """
+        if self.selection is None:
+            return {}
+        if self.calibration is not None and not self.terms:
+            together = numbers_of(self.calibration)
+            return {name: together.get(name, values) for name, values in numbers_of(self.selection.fit).items()}
+        fit = self.terms[0].fit if self.terms else self.selection.fit
+        own = {term.name for term in self.terms}
+        return {name: values for name, values in numbers_of(fit).items() if name not in own}
+
+    def _without_worst(self) -> dict[str, Any] | None:
+        if self.without_worst is None:
+            return None
+        one = self.without_worst
+        said = {"with_them": one.with_them, "without": one.without}
+        return {"trials": list(one.trials), **{k: {"verdict": v, "effects": list(e)} for k, (v, e) in said.items()}}
+
+    def _terms(self) -> list[dict[str, Any]]:
+        return [
+            {
+                "name": term.name,
+                "on": term.on,
+                "term": term.term,
+                "signal": term.signal,
+                "in_words": words,
+                "values": {k: plain(v) for k, v in term.values.items()},
+                "elpd_diff": plain(term.paired_comparison.elpd_diff),
+            }
+            for term, words in zip(self.terms, self.terms_in_words, strict=True)
+        ]
 
     def _formula(self) -> dict[str, Any] | None:
         if self.formula is None:
@@ -124,8 +184,29 @@ def diagnose(
 ) -> Diagnosis:
     """What the model lacks on these tracks, effects named in ``barred`` aside.
 
-    A set of effects with which the held-out error does not fall is withdrawn.
+    A set of effects with which the held-out error does not fall is withdrawn. A few trials that are unlike the rest count nothing
+    in the fits of a second search, whose end is presented; errors are always those of all trials.
     """
+    found = _diagnosed(predictor, model, extra, tick, barred)
+    if found.selection is None or not isinstance(predictor, WheelPredictor) or predictor.tracks.relative:
+        return found
+    wild = standing_out(found.selection.problem, found.selection.fit)
+    if not len(wild):
+        return found
+    without = _diagnosed(predictor.not_counting(wild.tolist()), model, extra, tick, barred)
+    names = tuple(predictor.tracks.names[i] for i in wild)
+    both = WithoutWorst(names, (found.verdict, found.effects), (without.verdict, without.effects))
+    return replace(without, without_worst=both, notes=(on_worst(both), *without.notes))
+
+
+def _diagnosed(
+    predictor: Predictor,
+    model: Model,
+    extra: Mapping[str, Effect] | None,
+    tick: Callable[[str], None],
+    barred: Collection[str],
+) -> Diagnosis:
+    """One search, and what it leaves."""
     search = StepwiseSelection(predictor, model, extra, tick, barred)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
@@ -139,22 +220,25 @@ def diagnose(
         errors = errors_before_and_after(selection, model)
     tick("what is left")
     dependence, rest = _left(selection)
-    imitating: tuple[str, ...] = ()
-    if rest.residual_dependence and selection.fit.model.per_trial_effect is None:
-        standing = surviving(selection.problem, selection.fit, selection.accepted, rest.residual_dependence)
-        imitating = tuple(name for name in selection.accepted if name not in standing)
-        if imitating:
-            selection = refitted(selection.only(standing), predictor, model)
+    found = _established(selection, predictor, rest)
+    imitating = tuple(name for name in selection.accepted if name not in found.names) if found else ()
+    if imitating and found:
+        selection = refitted(selection.only(found.names), predictor, model)
+        errors = errors_before_and_after(selection, model)
+        if selection.accepted and not errors.falls:
+            withdrawn, selection = selection.accepted, selection.withdrawn()
             errors = errors_before_and_after(selection, model)
-            if selection.accepted and not errors.falls:
-                withdrawn, selection = selection.accepted, selection.withdrawn()
-                errors = errors_before_and_after(selection, model)
-            dependence, rest = _left(selection)
+        dependence, rest = _left(selection)
+    terms = found.terms if found else ()
     # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
     guesses = rest.residual_dependence or (tuple(dependence[:1]) if rest.outliers else ())
-    formula = best_formula(selection.problem, selection.fit, guesses) if guesses else None
+    formula = terms[0] if terms else best_formula(selection.problem, selection.fit, guesses) if guesses else None
     hint = _hint(selection, len(predictor.tracks))
-    verdict = _verdict(selection, rest.any, hint)
+    left = rest.any or bool(terms)
+    verdict = _verdict(selection, left, hint)
+    words = tuple(in_words(term, predictor) for term in terms)
+    with_terms = _errors_with_terms(selection, model, found) if found and terms else None
+    lowered = with_terms is None or with_terms.falls
     tick("longer explanations")
     tried = {c.name for step in selection.steps for c in step.ranking}
     others = [
@@ -162,17 +246,43 @@ def diagnose(
         for name, effect in listed(selection.nominal.model, extra, predictor.tracks, barred).items()
         if name in tried and name not in selection.accepted
     ]
-    pairs = [] if rest.any else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
+    pairs = [] if left else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
     return Diagnosis(
         verdict,
         selection,
         tuple(dependence[:12]),
         rest,
         formula,
+        terms,
+        words,
+        imitating,
         errors,
-        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, imitating)),
-        calibrated(predictor, model, barred),
+        with_terms,
+        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, imitating, words, lowered)),
+        calibration=calibrated(predictor, model, barred),
     )
+
+
+def _established(selection: SelectionResult, predictor: Predictor, rest: Unexplained) -> Established | None:
+    """The search with flexible terms, where anything is left; None where nothing is, or trials have clocks of their own.
+
+    Single relative motions are calibrated with all numbers free instead (`calibrated`).
+    """
+    wheeled = isinstance(predictor, WheelPredictor)
+    if not wheeled or selection.fit.model.per_trial_effect is not None or predictor.tracks.relative:
+        return None
+    if not rest.any and not left_over(selection.problem, selection.fit):
+        return None
+    known = known_effects(selection)
+    return established(predictor, selection.nominal.model, {name: known[name] for name in selection.accepted})
+
+
+def _errors_with_terms(selection: SelectionResult, given: Model, found: Established) -> PairedErrors:
+    """Of the model as given, with the effects, and with the terms beside them, on the same windows."""
+    predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
+    after = [Judged(WITH_EFFECTS, selection.fit.model, pose_filter)] if selection.accepted else []
+    after.append(Judged(WITH_TERMS, found.fit.model, found.problem.pose_filter))
+    return judged_errors(predictor, pose_filter, given, after)
 
 
 def _left(selection: SelectionResult) -> tuple[list[ResidualDependence], Unexplained]:

@@ -18,10 +18,21 @@ from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, Parameter
 from bns.physics.formula_check import checked_formula
 from bns.physics.order import FORMULAS
-from bns.physics.signals import Array, Body
+from bns.physics.signals import CREEP_M_S, Array, Body
+from bns.physics.wheels.scans import first_order, reversed_since, trailing
 
-ON: Mapping[str, str] = {"v": "forward_m_s", "s": "sideways_m_s", "w": "yaw_rad_s", "east": "east", "north": "north"}
-"""What a term can be added to: forward, sideways (to the right) and turning velocity, and velocity in the world's frame."""
+SHARE, WHEELS = "share", "wheels"
+ON: Mapping[str, str] = {
+    "v": "forward_m_s",
+    "s": "sideways_m_s",
+    "w": "yaw_rad_s",
+    "east": "east",
+    "north": "north",
+    SHARE: SHARE,
+    WHEELS: WHEELS,
+}
+"""What a term can be added to: forward, sideways (to the right) and turning velocity, velocity in the world's frame, the factor
+of all velocities (`SHARE`), and the speed of each wheel, worked out for the left and for the right one (`WHEELS`)."""
 VARIABLES: Mapping[str, str] = {
     "v": "forward velocity, m/s",
     "w": "turn rate, rad/s, left positive",
@@ -34,7 +45,16 @@ VARIABLES: Mapping[str, str] = {
     "y": "position north, m",
     "heading": "heading, rad",
     "moving": "1 while a wheel turns, else 0",
+    "swing": "how far the motion's direction is from that of the last half wheelbase of way: 0 the same, 1 the opposite",
 }
+OF_A_WHEEL: Mapping[str, str] = {
+    "u": "speed of this wheel, m/s",
+    "since": "way of this wheel since it last changed direction, m; 1000 before",
+    "fresh": "speed of this wheel less its mean over the last 0.15 s (fading exponentially), m/s",
+}
+"""Further names in a term on `WHEELS`."""
+RECENT_S = 0.15
+NEVER_M = 1e3
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "abs": np.abs,
     "sign": np.sign,
@@ -46,6 +66,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "tanh": np.tanh,
     "min": np.minimum,
     "max": np.maximum,
+    "round": np.round,
 }
 _PLACE = {"x", "y", "heading"}
 _NUMBER = re.compile(r"[A-Za-z]\d*|k_\w+")
@@ -68,7 +89,8 @@ def formula_effect(
     if on not in ON:
         raise ModelError(f"formula {name}: " + unknown_name("velocity to add to (on)", on, ON))
     names, code = _parsed(name, term)
-    logged, unknown = _sorted(name, names - set(VARIABLES), set(columns), None if numbers is None else set(numbers))
+    known = set(VARIABLES) | (set(OF_A_WHEEL) if on == WHEELS else set())
+    logged, unknown = _sorted(name, names - known, set(columns), None if numbers is None else set(numbers))
     if not unknown:
         raise ModelError(f"formula {name}: {term!r} has no number to fit; multiply it by one, as in k * ({term}).")
     return Effect(
@@ -85,6 +107,14 @@ def formula_effect(
         after=FORMULAS,
         needs_place=bool(names & _PLACE) or on in {"east", "north"},
     )
+
+
+def value_of(term: str, names: Mapping[str, Any]) -> Array:
+    """The value of a term for given numbers and arrays, one for each of its names; ModelError if it is no formula."""
+    _, code = _parsed("term", term)
+    with np.errstate(all="ignore"):
+        value = eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **names})  # checked by _parsed
+    return np.asarray(value, dtype=np.float64)
 
 
 def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | None) -> tuple[list[str], list[str]]:
@@ -126,33 +156,53 @@ def _parsed(name: str, term: str) -> tuple[set[str], Compiled]:
 def _apply(name: str, code: Compiled, on: str, logged: list[str], body: Body, **numbers: float) -> Body:
     if body.place is None and _needs(code, on):
         return body  # first round of a simulation: nobody knows yet where the robot goes
-    values = {**_values(body), **{column: body.logged[column] for column in logged}, **numbers}
+    values = {**_values(body, code), **{column: body.logged[column] for column in logged}, **numbers}
+    if on == WHEELS:
+        left, right = (
+            _added(name, code, {**values, **_of_wheel(body, speed, code)}, body)
+            for speed in (body.left_m_s, body.right_m_s)
+        )
+        turned = body.with_added("yaw_rad_s", (right - left) / body.wheelbase_m)
+        return turned.with_added("forward_m_s", (left + right) / 2.0)
+    added = _added(name, code, values, body)
+    if on == SHARE:
+        return body.scaled(1.0 + added)
+    if on not in {"east", "north"}:
+        return body.with_added(ON[on], added)
+    assert body.place is not None
+    return body.with_drift(on, added * body.moving, body.place[..., 2])
+
+
+def _added(name: str, code: Compiled, values: Mapping[str, Any], body: Body) -> Array:
+    """The term's value in every step, (batch, steps)."""
+    numbers = {key: value for key, value in values.items() if isinstance(value, float)}
     try:
         with np.errstate(all="ignore"):
             added = np.asarray(eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
     except (ArithmeticError, TypeError, ValueError) as fault:  # of numbers that are fitted: k / (k - k), (-k)**0.5
-        raise ModelError(f"formula {name} cannot be calculated with {numbers}: {fault}. Write it in another way.") from fault
-    if added.dtype.kind == "c":
-        raise ModelError(f"formula {name} is no real number with {numbers}: a root of what is below 0. Write it in another way.")
-    added = np.broadcast_to(added, body.forward_m_s.shape) * (body.moving if on in {"east", "north"} else 1.0)
-    if not np.isfinite(added).all():
         raise ModelError(
-            f"formula {name} is {added[~np.isfinite(added)][0]} somewhere on these trials: a pole, a root or logarithm of "
+            f"formula {name} cannot be calculated with {numbers}: {fault}. Write it in another way."
+        ) from fault
+    if added.dtype.kind == "c":
+        raise ModelError(
+            f"formula {name} is no real number with {numbers}: a root of what is below 0. Write it in another way."
+        )
+    out: Array = np.broadcast_to(added, body.forward_m_s.shape)
+    if not np.isfinite(out).all():
+        raise ModelError(
+            f"formula {name} is {out[~np.isfinite(out)][0]} somewhere on these trials: a pole, a root or logarithm of "
             "what is not positive. Write it so that it is finite for every speed, at rest too."
         )
-    if on not in {"east", "north"}:
-        return body.with_added(ON[on], added)
-    assert body.place is not None
-    return body.with_drift(on, added, body.place[..., 2])
+    return out
 
 
 def _needs(code: Compiled, on: str) -> bool:
     return on in {"east", "north"} or bool(_PLACE & set(code.code.co_names))
 
 
-def _values(body: Body) -> dict[str, Array]:
+def _values(body: Body, code: Compiled) -> dict[str, Any]:
     begin = body.session_s[:, :1]
-    values = {
+    values: dict[str, Any] = {
         "v": body.forward_m_s,
         "w": body.yaw_rad_s,
         "l": body.left_m_s,
@@ -164,4 +214,38 @@ def _values(body: Body) -> dict[str, Array]:
     }
     if body.place is not None:
         values |= {"x": body.place[..., 0], "y": body.place[..., 1], "heading": body.place[..., 2]}
+    if "swing" in code.code.co_names:
+        values["swing"] = swing(body)
     return values
+
+
+def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Array]:
+    """`OF_A_WHEEL` of the wheel with this speed; only what the term names."""
+    made: dict[str, Callable[[], Array]] = {
+        "u": lambda: speed,
+        "since": lambda: since_reversal(speed, _step_s(body)),
+        "fresh": lambda: speed - first_order(speed, _step_s(body), RECENT_S),
+    }
+    return {name: make() for name, make in made.items() if name in code.code.co_names}
+
+
+def swing(body: Body) -> Array:
+    """How far the motion's direction is from that of the last half wheelbase of way, 0 to 1, in every step."""
+    ahead, side = (body.left_m_s + body.right_m_s) / 2.0, (body.right_m_s - body.left_m_s) / 2.0
+    speed = np.hypot(ahead, side)
+    way = np.where(speed > CREEP_M_S, speed * _step_s(body), 0.0)
+    out: Array = (1.0 - np.cos(trailing(np.arctan2(side, ahead), way, body.wheelbase_m / 2.0))) / 2.0
+    return out
+
+
+def since_reversal(speed: Array, step_s: Array) -> Array:
+    """Way (m) of a wheel since it last changed direction, in the middle of each step; `NEVER_M` before it first does."""
+    out = reversed_since(speed, step_s)
+    return np.where(out < 0.0, NEVER_M, out)
+
+
+def _step_s(body: Body) -> Array:
+    """The length of every step, from the times in their middles."""
+    if body.step_s is not None:
+        return body.step_s
+    return np.diff(body.session_s, axis=1, prepend=body.session_s[:, :1])

@@ -10,7 +10,7 @@ from typing import Any
 
 from bns.errors import ModelError, unknown_name
 
-LONGEST, MOST_PIECES, DEEPEST = 2_000, 400, 60
+LONGEST, MOST_PIECES, DEEPEST = 2_000, 600, 60
 """Characters; numbers, names, operators and calls; levels of one within the other."""
 LARGEST = 1e12
 """The largest number, also of those that follow from others."""
@@ -29,6 +29,7 @@ _FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "sign": lambda x: math.copysign(1.0, x) if x else 0.0,
     "min": min,
     "max": max,
+    "round": lambda x: float(round(x)),
     **{name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tanh")},
 }
 
@@ -40,7 +41,9 @@ def checked_formula(where: str, term: str, functions: Iterable[str]) -> ast.Expr
     alone must be a number of at most `LARGEST`.
     """
     if not isinstance(term, str) or not 0 < len(term.strip()) <= LONGEST:
-        raise ModelError(f"{where} is {str(term)[:40]!r}; it must be a text of 1 to {LONGEST} characters: k * v * abs(w).")
+        raise ModelError(
+            f"{where} is {str(term)[:40]!r}; it must be a text of 1 to {LONGEST} characters: k * v * abs(w)."
+        )
     try:
         tree = ast.parse(term.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError) as fault:
@@ -85,7 +88,9 @@ class _Check:
         wanted = _ARGUMENTS.get(node.func.id, 1)
         if len(node.args) != wanted or node.keywords:
             given = len(node.args) + len(node.keywords)
-            raise ModelError(f"{self._where}: {_short(ast.unparse(node))} has {given} arguments; {node.func.id} takes {wanted}.")
+            raise ModelError(
+                f"{self._where}: {_short(ast.unparse(node))} has {given} arguments; {node.func.id} takes {wanted}."
+            )
         return node.func.id
 
     def _of(self, node: ast.AST, function: Callable[..., Any], arguments: list[ast.expr]) -> float | None:

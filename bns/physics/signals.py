@@ -129,6 +129,10 @@ class Body:
     session_s: Array
     place: Array | None = None
     """Where the robot is in each step, (batch, steps, 3): x_m, y_m, heading_rad; None while nobody knows."""
+    wheelbase_m: float = 1.0
+    """Of the wheels as they drive, effects on it included."""
+    step_s: Array | None = None
+    """How long each step lasts, (batch, steps)."""
     conditions: Conditions = NO_CONDITIONS
 
     @property

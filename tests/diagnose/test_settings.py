@@ -16,6 +16,7 @@ from bns.physics.model import load_model
 DIAGNOSE = Path(bns.__file__).parent / "diagnose"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 NO_SETTINGS = {
+    ("residuals/grammar.py", "_SMALL"): "step of a difference quotient of a linear term",
     ("data/mapping.py", "UNITS"): "factors between units, by definition",
     ("data/tracking_noise.py", "_NORMAL"): "the median of a standard normal number's size",
     ("estimate/fit.py", "_LATELY"): "the size of a cache: the answers are the same for any",
@@ -24,6 +25,8 @@ NO_SETTINGS = {
     ("report/page.py", "_PIXELS_IN_POINT"): "layout",
     ("report/plain_language.py", "_UNITS"): "factors between units, by definition",
     ("residuals/outliers.py", "_NORMAL"): "the median of a standard normal number's size",
+    ("residuals/worst_trials.py", "_NORMAL"): "the median of a standard normal number's size",
+    ("residuals/words.py", "_POINTS"): "points at which a curve is evaluated to be put in words",
 }
 """Numbers that stand in a module, and why they decide nothing that could be decided otherwise."""
 

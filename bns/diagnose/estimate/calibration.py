@@ -9,6 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+import numpy as np
+
+from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.starts import listed
@@ -26,3 +29,27 @@ def calibrated(predictor: Predictor, model: Model, barred: Collection[str] = ())
     there = listed(model, None, predictor.tracks, barred)
     effects = [there[name] for name in CALIBRATED if name in there]
     return fit_set(predictor, model, effects)[1] if effects else None
+
+
+def wheel_sizes(fit: Fit) -> dict[str, tuple[float, float, float]]:
+    """Size of the left and the right wheel over the drawing's: value and 95 % interval; empty where the fit has not both numbers.
+
+    From the mean size g and the ratio r of right to left: left = 2g/(1 + r), right = r·left; intervals to first order.
+    """
+    at = {(n.effect, n.parameter.name): i for i, n in enumerate(fit.free)}
+    pair = [at.get(("speed-gain", "gain")), at.get(("wheel-mismatch", "ratio"))]
+    if None in pair:
+        return {}
+    chosen = np.array(pair, dtype=int)
+    g, r = fit.values[chosen]
+    covariance: Array = fit.covariance[np.ix_(chosen, chosen)]
+    left, right = 2 * g / (1 + r), 2 * g * r / (1 + r)
+    slopes = {"left": (left / g, -left / (1 + r)), "right": (right / g, right / (r * (1 + r)))}
+    low, high = fit.interval(int(chosen[0]))
+    widths = (high - low) / 2 / max(fit.se(int(chosen[0])), 1e-300)
+    out = {}
+    for side, value in (("left", float(left)), ("right", float(right))):
+        slope = np.array(slopes[side])
+        half = widths * float(np.sqrt(slope @ covariance @ slope))
+        out[side] = (value, value - half, value + half)
+    return out

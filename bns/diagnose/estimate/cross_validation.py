@@ -34,7 +34,8 @@ def held_out_steps(predictor: Predictor, pose_filter: Filter, model: Model) -> S
     held_out = [(fold == one)[predictor.tracks.trial] for one in np.unique(fold)]
 
     def predicted(frames: NDArray[np.bool_]) -> Steps:
-        fitted = Problem(predictor, pose_filter, (~frames).astype(float)).fit(model).model
+        counted = (~frames).astype(float) * (1.0 if predictor.counted is None else predictor.counted)
+        fitted = Problem(predictor, pose_filter, counted).fit(model).model
         return steps_of(predictor, pose_filter, fitted)
 
     body, drift = np.zeros((len(predictor.tracks.t_s), 3)), np.zeros((len(predictor.tracks.t_s), 2))

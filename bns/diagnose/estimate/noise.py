@@ -72,10 +72,11 @@ def _scatter(apart_m: Array | None) -> Array | None:
 def estimate_noise(predictor: Predictor, steps: Steps, start: Array | None = None) -> Array:
     """Most likely noise, as `filter_gains` takes it: position m, heading rad, and the drive's scatter three ways.
 
-    From at most `_ENOUGH` trials, evenly chosen: five numbers need no more.
+    From at most `_ENOUGH` trials that count, evenly chosen: five numbers need no more.
     """
-    tracks = predictor.tracks
-    chosen = np.unique(np.linspace(0, len(tracks) - 1, min(len(tracks), _ENOUGH)).round().astype(int))
+    tracks, counted = predictor.tracks, predictor.counted
+    usable = np.arange(len(tracks)) if counted is None else np.unique(tracks.trial[counted > 0])
+    chosen = usable[np.unique(np.linspace(0, len(usable) - 1, min(len(usable), _ENOUGH)).round().astype(int))]
     frames = np.concatenate([np.arange(tracks.first[i], tracks.first[i + 1]) for i in chosen])
     body, drift, pose = steps.body[frames], steps.drift_m[frames], tracks.pose[frames]
     is_first, way_m = tracks.is_first[frames], predictor.way_m[frames]

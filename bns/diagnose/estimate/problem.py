@@ -13,4 +13,4 @@ def problem_for(predictor: Predictor, model: Model, start: Array | None = None) 
     """The problem of fitting models like this one: its noise is estimated under it."""
     predictor.anchor(model)
     steps = predictor.steps(model)
-    return Problem(predictor, filter_for(predictor, steps, estimate_noise(predictor, steps, start)))
+    return Problem(predictor, filter_for(predictor, steps, estimate_noise(predictor, steps, start)), predictor.counted)

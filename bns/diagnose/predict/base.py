@@ -33,7 +33,7 @@ class Predictor(Protocol):
     ``way_m`` (frames,): how far the robot was driven since the frame before, or how strongly its drive scatters, in metres.
     ``horizons``: names of the times over which predictions are judged; ``near``: the one of them that curves and worst moments
     are about. ``tracking``: noise of a tracked position (m) and heading (rad), where the tracks tell it by themselves; None: it
-    is estimated under a model.
+    is estimated under a model. ``counted`` (frames,): what each frame counts in a fit; None: all of them 1.
     """
 
     tracks: Tracks
@@ -41,6 +41,7 @@ class Predictor(Protocol):
     horizons: tuple[str, ...]
     near: str
     tracking: tuple[float, float] | None
+    counted: Array | None
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Frames at which the windows of a horizon begin and end."""

@@ -46,7 +46,7 @@ class CyclePredictor:
         self._moved = robot.displacements(outputs)
         self._changes = robot.changes(tracks.gait) if robot.with_changes else None
         self._networks = self._driven()
-        self.tracking = self._tracking()
+        self.tracking, self.counted = self._tracking(), None
         self.way_m = np.hypot(*self._since_previous(tracks.pose)[:, :2].T)
         self._at = np.arange(len(tracks.t_s)) - tracks.first[:-1][tracks.trial]
         self._step_s = self._on_grid(np.diff(tracks.t_s, append=tracks.t_s[-1]), fill=0.0)

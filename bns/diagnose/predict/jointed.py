@@ -39,6 +39,8 @@ class JointedPredictor:
     known. ``screening``: the same for some of the stretches, to see which effects are worth more; None: this is it.
     """
 
+    counted: Array | None = None
+
     def __init__(
         self, tracks: StretchTracks, model: JointedModel, near: str = "cycle", tracking_m: float | None = None
     ) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
@@ -41,6 +42,7 @@ class WheelPredictor:
     horizons: tuple[str, ...] = HORIZONS
     near = "1s"
     tracking: tuple[float, float] | None = None
+    counted: Array | None = None
     screening = None
 
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
@@ -63,6 +65,12 @@ class WheelPredictor:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.tracks, self._dt_s)  # what it remembers is worked out again
+
+    def not_counting(self, trials: Collection[int]) -> WheelPredictor:
+        """The same tracks, of which these trials count nothing in a fit; what is predicted of them is judged all the same."""
+        out = copy(self)
+        out.counted = (~np.isin(self.tracks.trial, list(trials))).astype(np.float64)
+        return out
 
     def steps(self, model: Model) -> Steps:
         """Displacement of the tracked point since the frame before, in the frame of the robot there."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
 from bns.diagnose.diagnosis import Diagnosis
-from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, ties_of
@@ -43,18 +44,21 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
     yield f"verdict: {d.verdict}"
     yield _VERDICTS[d.verdict].format(effects=" and ".join(d.effects) or "nothing listed")
     if d.selection is not None:
+        yield from (f"It looks like this: {words}." for words in d.terms_in_words)
         yield from _numbers(d)
         for group in ties_of(d.selection):
             yield "cannot be told apart: " + ", ".join(group)
-        yield from _errors(d.errors)
+        yield from _errors(d.errors_with_terms or d.errors)
         yield from _ranking(d)
     if d.calibration is not None:
         yield "\nrobot and sensor calibrated together, each number with all others free:"
-        yield from _intervals(d.calibration)
-    if d.formula is not None:
-        values = ", ".join(f"{name} = {value:.4g}" for name, value in d.formula.values.items())
-        yield f"\ncandidate term: {d.formula.term}   added to {d.formula.on}; {values}"
-        yield f"  bns add DATA unlisted --term '{d.formula.term}' --on {d.formula.on} … adds it"
+        yield from _intervals(numbers_of(d.calibration))
+        for side, (value, low, high) in wheel_sizes(d.calibration).items():
+            yield f"  {side} wheel: {value:.5g} of the drawing's size (95 %: {low:.5g} to {high:.5g})"
+    for term in d.terms or ((d.formula,) if d.formula else ()):
+        values = ", ".join(f"{name} = {value:.4g}" for name, value in term.values.items())
+        yield f"\ncandidate term: {term.term}   added to {term.on}; {values}"
+        yield f"  bns add DATA {term.name} --term '{term.term}' --on {term.on} … adds it"
     if d.notes:
         yield "\nnotes:"
         yield from (f"  - {note}" for note in d.notes)
@@ -62,16 +66,18 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
 
 def _numbers(d: Diagnosis) -> Iterator[str]:
     assert d.selection is not None
-    yield from _intervals(d.selection.fit, equations=True)
+    yield from _intervals(d.numbers, d.selection.fit.model.catalogue())
 
 
-def _intervals(fit: Fit, *, equations: bool = False) -> Iterator[str]:
-    for effect, numbers in numbers_of(fit).items():
+def _intervals(
+    values: Mapping[str, Mapping[str, Mapping[str, Any]]], catalogue: Mapping[str, Any] | None = None
+) -> Iterator[str]:
+    for effect, numbers in values.items():
         for name, n in numbers.items():
             if n["low"] is not None and n["high"] is not None:
                 yield f"  {effect}: {name} = {n['value']:.5g} {n['unit']} (95 %: {n['low']:.5g} to {n['high']:.5g})"
-        if equations and effect in fit.model.catalogue():
-            yield f"    {fit.model.catalogue()[effect].equation}"
+        if catalogue and effect in catalogue:
+            yield f"    {catalogue[effect].equation}"
 
 
 def _errors(errors: PairedErrors | None) -> Iterator[str]:

@@ -52,7 +52,7 @@ def residual_dependence(problem: Problem, fit: Fit) -> list[ResidualDependence]:
 
     def compare_clocks(tried: tuple[str, list[Array], str]) -> ResidualDependence:
         variable, basis, channel = tried
-        earned = _earned(problem, fit, _columns(problem, fit, channel, basis, headings))
+        earned = earned_by_columns(problem, fit, _columns(problem, fit, channel, basis, headings))
         return ResidualDependence(variable, channel, earned, earned.elpd_diff / usual)
 
     tried = [(v, basis, c) for v, basis in curves(variables) for c in (*CHANNELS, *(WORLD if v == "place" else ()))]
@@ -151,7 +151,8 @@ def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headi
     return out
 
 
-def _earned(problem: Problem, fit: Fit, columns: Array) -> PairedComparison:
+def earned_by_columns(problem: Problem, fit: Fit, columns: Array) -> PairedComparison:
+    """What a linear addition (frames, 3, k) to a fitted model earns on trials held out, at the better penalty."""
     joint = np.concatenate([fit.jacobian, columns], axis=2)
     equations = problem.normal_equations(joint, fit.whitened)
     elpd_diff, dse = max(

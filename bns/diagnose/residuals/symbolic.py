@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 from sklearn.linear_model import orthogonal_mp
@@ -22,6 +23,7 @@ from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import ModelError
 from bns.physics.effect import Effect
+from bns.physics.formula import SHARE as SHARED
 from bns.physics.formula import formula_effect
 from bns.physics.model import Model
 
@@ -46,6 +48,8 @@ _SHAPES = {
     "way_m": ("d", "exp(-d)", "d**2"),
     "place": ("x", "y", "x*y", "x**2", "y**2"),
 }
+PATCH_SIDE = DEFAULTS.residuals.patch_side
+PATCH_RADII = DEFAULTS.residuals.patch_radii
 _TERMS_AT_MOST = DEFAULTS.residuals.formula_terms
 
 
@@ -57,11 +61,14 @@ class Formula:
     term: str
     fit: Fit
     paired_comparison: PairedComparison
+    name: str = NAME
+    signal: str = ""
+    """What it is a function of, in words."""
 
     @property
     def values(self) -> dict[str, float]:
         """The fitted numbers of the formula."""
-        return self.fit.model.values_of(NAME)
+        return self.fit.model.values_of(self.name)
 
 
 def best_formula(problem: Problem, fit: Fit, dependence: Sequence[ResidualDependence]) -> Formula | None:
@@ -79,7 +86,7 @@ def _tried(problem: Problem, fit: Fit, pattern: ResidualDependence) -> list[Form
     terms = [f"{c} * {shape}" for c in _CARRIERS[on] for shape in _SHAPES.get(pattern.variable, ())]
     tried = [_sparse(problem, fit, on, [*_CARRIERS[on], *terms])] if terms else []
     if pattern.variable == "place":
-        tried.append(_bump(problem, fit, on))
+        tried.append(patch(problem, fit, SHARED if pattern.channel == SHARE else on))
     return [f for f in tried if f is not None]
 
 
@@ -100,7 +107,7 @@ def _sparse(problem: Problem, fit: Fit, on: str, terms: Sequence[str]) -> Formul
     target, best = -_weighted(fit, fit.whitened), None
     for count in range(1, min(_TERMS_AT_MOST, len(usable)) + 1):
         chosen = [usable[i] for i in np.flatnonzero(orthogonal_mp(matrix, target, n_nonzero_coefs=count))]
-        formula = _fitted(problem, fit, on, " + ".join(f"k{i} * {t}" for i, t in enumerate(chosen)))
+        formula = fitted(problem, fit, on, " + ".join(f"k{i} * {t}" for i, t in enumerate(chosen)))
         if formula is None or (
             best is not None and formula.paired_comparison.elpd_diff < 1.1 * best.paired_comparison.elpd_diff
         ):
@@ -109,46 +116,51 @@ def _sparse(problem: Problem, fit: Fit, on: str, terms: Sequence[str]) -> Formul
     return best
 
 
-def _bump(problem: Problem, fit: Fit, on: str) -> Formula | None:
-    """A round patch of floor: where, how wide, how strong."""
+def patch(problem: Problem, fit: Fit, on: str, name: str = NAME) -> Formula | None:
+    """A round patch of floor with a soft rim: where, how wide, how strong; None if it runs away from where the robot was."""
     pose = problem.predictor.tracks.pose
     (x0, x1), (y0, y1) = np.quantile(pose[:, 0], [0.05, 0.95]), np.quantile(pose[:, 1], [0.05, 0.95])
+    carrier = f"{_CARRIERS[on][0]} * " if on in _CARRIERS else ""
     best, left = None, _weighted(fit, fit.whitened)
-    for cx in np.linspace(x0, x1, 5):
-        for cy in np.linspace(y0, y1, 5):
-            for width in (0.1, 0.3):
-                term = f"k * {_CARRIERS[on][0]} * exp(-((x - {cx:.3g})**2 + (y - {cy:.3g})**2) / {2 * width**2:.3g})"
-                column = _weighted(fit, _column(problem, fit, formula_effect(NAME, term, on)))
-                pull, size = float(column @ left), max(float(column @ column), 1e-300)
-                if best is None or pull**2 / size > best[0]:
-                    best = (pull**2 / size, -pull / size, cx, cy, width)
+    for cx, cy in product(np.linspace(x0, x1, PATCH_SIDE), np.linspace(y0, y1, PATCH_SIDE)):
+        for width in np.array(PATCH_RADII) * np.hypot(x1 - x0, y1 - y0):
+            shape = _disc(f"(x - {cx:.3g})", f"(y - {cy:.3g})", f"{width:.3g}").replace("- -", "+ ")
+            column = _weighted(fit, _column(problem, fit, formula_effect(name, f"k * {carrier}{shape}", on)))
+            pull, size = float(column @ left), max(float(column @ column), 1e-300)
+            if best is None or pull**2 / size > best[0]:
+                best = (pull**2 / size, -pull / size, cx, cy, width)
     assert best is not None
-    term = f"k * {_CARRIERS[on][0]} * exp(-((x - a)**2 + (y - b)**2) / (2 * c**2))"
-    effect = formula_effect(NAME, term, on)
+    term = f"k * {carrier}{_disc('(x - a)', '(y - b)', 'c')}"
+    effect = formula_effect(name, term, on)
     start = dict(zip("kabc", best[1:], strict=True))
     model = fit.model.with_active(effect, tuple(start[p.name] for p in effect.parameters))
     try:
-        added = problem.fit(_written(model, term, on))
+        added = problem.fit(_written(model, term, on, name))
     except ModelError:
         return None
-    formula = Formula(on, term, added, problem.paired_comparison(fit, added))
-    # a patch that has run away from where the robot was is none
+    formula = Formula(on, term, added, problem.paired_comparison(fit, added), name, "place")
     inside = x0 <= formula.values["a"] <= x1 and y0 <= formula.values["b"] <= y1
     return formula if inside else None
 
 
-def _fitted(problem: Problem, fit: Fit, on: str, term: str) -> Formula | None:
-    effect = formula_effect(NAME, term, on)
-    model = _written(fit.model.with_active(effect, (0.0,) * len(effect.parameters)), term, on)
+def _disc(x: str, y: str, radius: str) -> str:
+    """1 inside, 0 outside, from 0.9 to 0.1 within a seventh of the radius either way."""
+    return f"(1 / (1 + (({x}**2 + {y}**2) / {radius}**2)**8))"
+
+
+def fitted(problem: Problem, fit: Fit, on: str, term: str, name: str = NAME, signal: str = "") -> Formula | None:
+    """The model with a term whose numbers begin at 0, all numbers fitted; None where it cannot be calculated."""
+    effect = formula_effect(name, term, on)
+    model = _written(fit.model.with_active(effect, (0.0,) * len(effect.parameters)), term, on, name)
     try:
         added = problem.fit(model)
     except ModelError:
         return None
-    return Formula(on, term, added, problem.paired_comparison(fit, added))
+    return Formula(on, term, added, problem.paired_comparison(fit, added), name, signal)
 
 
-def _written(model: Model, term: str, on: str) -> Model:
-    effects = tuple(replace(a, written={"term": term, "on": on}) if a.effect.name == NAME else a for a in model.effects)
+def _written(model: Model, term: str, on: str, name: str = NAME) -> Model:
+    effects = tuple(replace(a, written={"term": term, "on": on}) if a.effect.name == name else a for a in model.effects)
     return replace(model, effects=effects)
 
 

@@ -54,16 +54,81 @@ class Residuals:
         f"Whitened residuals are cut here, so that one mistaken marker decides nothing; {BY_HAND}.",
     )
     flexible_terms: int = setting(
-        2,
+        3,
         "terms",
-        "Flexible terms put beside the effects at most, each along another variable: two fields have 50 numbers, as "
-        "many as trials.",
+        "Flexible terms put beside the effects at most: they have some ten numbers each, together half as many as trials.",
     )
-    majority_chance: float = setting(
-        0.05,
+    clearly_better: float = setting(
+        0.0015,
         "1",
-        "An effect that acts everywhere helps more than half of the trials; by luck alone so many are helped with this chance: "
-        "the usual level.",
+        "A free curve takes the place of a listed effect if it leaves less by this share of the loss (that of `least`) and by "
+        "`min_z` standard errors: else the effect, which has fewer numbers and a name, is preferred.",
+    )
+    kept_share: float = setting(
+        0.2,
+        "1",
+        "Beside flexible terms an accepted effect must earn this share of what it earns without them: motor-lag kept 8 % beside "
+        "the term for play in gears, which it had imitated.",
+    )
+    kept_share_of_term: float = setting(
+        0.1,
+        "1",
+        "And a term beside all accepted effects this share of what it earned when it came in: 25 % is the least that was kept by "
+        "one that was right (play in gears beside the lag that imitates it), nothing by one that two effects explain.",
+    )
+    large: float = setting(
+        0.02,
+        "1",
+        "A term that earns this share of the loss may be earned in fewer trials (`large_z`): a motor heats up in the first few "
+        "trials of a session, and a patch of floor is crossed by a few.",
+    )
+    large_z: float = setting(
+        1.5, "standard errors", "Of a term that is large: 1.65 and 1.8 for heating, 1.6 to 2.3 for patches of floor."
+    )
+    rounding_steps: tuple[int, int] = setting(
+        (240, 41),
+        "steps",
+        "Steps of speed that are tried, then again around the best: speeds are then rounded right but for one in a hundred.",
+    )
+    whole_rounding: float = setting(
+        0.2,
+        "1",
+        "Speeds come in steps if the rounding that is fitted is whole within this: 0.9995 where they do; 0.47 was fitted to a "
+        "robot that drives few different speeds.",
+    )
+    rounding_range: tuple[float, float] = setting(
+        (3.0, 40.0), "steps", f"Into so many parts the fastest speed is taken to be divided; {BY_HAND}."
+    )
+    speed_knots: tuple[float, ...] = setting(
+        (0.0, 0.04, 0.1, 0.2, 0.35, 0.6, 1.0),
+        "of the fastest speed",
+        "Bends of a free curve along a wheel's own speed, closer where friction acts; it is nothing at rest.",
+    )
+    session_knots: tuple[float, ...] = setting(
+        (0.0, 0.01, 0.03, 0.07, 0.15, 0.35, 0.65, 1.0),
+        "of the session",
+        f"Bends of a free curve along the session, closer where it begins: motors warm up within a few trials; {BY_HAND}.",
+    )
+    time_knots: tuple[float, ...] = setting(
+        (0.0, 0.04, 0.1, 0.22, 0.45, 1.0),
+        "of the longest trial",
+        "Bends of a curve along the time in a trial, closer where it begins: what warms up or settles is fastest there; it is "
+        "nothing at the last one.",
+    )
+    reversal_knots: tuple[float, ...] = setting(
+        (0.0, 0.03, 0.08, 0.16, 0.4),
+        "wheelbases",
+        "Bends of a curve along a wheel's way since it changed direction: play in gears is a few hundredths of a wheelbase; "
+        "it is nothing at the last one.",
+    )
+    swing_knots: tuple[float, ...] = setting(
+        (0.0, 0.1, 0.3, 0.6, 1.0),
+        "1",
+        "Bends of a curve along how far the motion's direction is from that of the last half wheelbase of way (1: reversed); "
+        "it is nothing at the first one.",
+    )
+    floor_side: int = setting(
+        4, "bumps", f"A field over the floor that is written down has so many bumps a side; {BY_HAND}."
     )
     outlier_frames: int = setting(
         12,
@@ -80,6 +145,15 @@ class Residuals:
         "trials",
         "So many trials at least must have such a window: a robot that was kicked once tells nothing of its model.",
     )
+    worst_share: float = setting(
+        0.03, "1", f"So many trials at most may be set aside as unlike the rest, rounded up: more are a phenomenon; {BY_HAND}."
+    )
+    worst_far: float = setting(
+        6.0,
+        "standard deviations",
+        "A trial stands out whose loss a frame (its logarithm) lies so far above the median of all: of 60 honest ones the worst "
+        "reached 3.2 (8 worlds), trials with another wheelbase (by a quarter to two fifths) 9 to 20.",
+    )
     fault_jump: float = setting(
         20.0,
         "standard deviations",
@@ -91,6 +165,12 @@ class Residuals:
     )
     fault_turn: float = setting(
         100.0, "standard deviations", f"A heading off by more within a frame is a mistaken marker; {BY_HAND}."
+    )
+    patch_side: int = setting(
+        7, "places", f"A round patch of floor is first sought at so many places a side; {BY_HAND}."
+    )
+    patch_radii: tuple[float, ...] = setting(
+        (0.06, 0.12, 0.2, 0.3), "of the floor's diagonal", f"Radii that a patch is first sought with; {BY_HAND}."
     )
     formula_terms: int = setting(
         3, "terms", f"Terms of a formula at most: it should be short enough to be read; {BY_HAND}."

@@ -25,9 +25,7 @@ class Arcs:
     moving_s: Array
 
 
-def body_motion(
-    model: Model, grid: Grid, conditions: Conditions = NO_CONDITIONS, place: Array | None = None
-) -> Body:
+def body_motion(model: Model, grid: Grid, conditions: Conditions = NO_CONDITIONS, place: Array | None = None) -> Body:
     """Velocities of the body under the model's ``wheel`` and ``body`` effects; ``place`` as in `Body`."""
     return with_body_effects(model, replace(wheel_motion(model, grid, conditions), place=place))
 
@@ -81,5 +79,7 @@ def _body(wheels: Wheels) -> Body:
         left_m_s=left,
         right_m_s=right,
         session_s=wheels.session_s,
+        wheelbase_m=wheels.wheelbase_m,
+        step_s=wheels.step_s,
         conditions=wheels.conditions,
     )

@@ -131,6 +131,25 @@ def played(target: Array, step_s: Array, gap: float) -> Array:
 
 
 @exact
+def reversed_since(speed: Array, step_s: Array) -> Array:
+    """Way since the speed last changed its sign, in the middle of each step; -1 before it first does."""
+    out = np.zeros_like(speed)
+    for row in range(speed.shape[0]):
+        way, sign = -1.0, 0.0
+        for k in range(speed.shape[1]):
+            now = np.sign(speed[row, k])
+            if now * sign < 0.0:
+                way = 0.0
+            if now != 0.0:
+                sign = now
+            moved = abs(speed[row, k]) * step_s[row, k]
+            out[row, k] = way if way < 0.0 else way + moved / 2.0
+            if way >= 0.0:
+                way += moved
+    return out
+
+
+@exact
 def trailing(angle: Array, way: Array, trail: float) -> Array:
     """By how much an angle is off one that follows it the short way round, with the way: d(follower) = off·d(way)/trail.
 

@@ -1,0 +1,200 @@
+"""Which accepted effects stand, where something is left that no effect of the list explains; and what that looks like.
+
+What is left biases all that is fitted without it, and listed effects are accepted because they imitate it. So the search is
+done again with flexible terms (`grammar`) as candidates beside the accepted effects, on equal terms: whatever predicts trials
+held out best comes in first; an effect is preferred to a free curve only if the curve is not better for certain. In the end every
+effect must earn its place beside the terms, at the level that all candidates share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
+from bns.diagnose.estimate.starts import fit_with
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.residuals.grammar import (
+    NAME,
+    PLACE,
+    STEPPED,
+    Earned,
+    Family,
+    certain,
+    families,
+    ranked,
+    rounding,
+    significant,
+)
+from bns.diagnose.residuals.symbolic import Formula, fitted, patch
+from bns.diagnose.settings import DEFAULTS
+from bns.physics.effect import Effect
+from bns.physics.formula import SHARE
+from bns.physics.model import Model
+
+FALSE_ALARM = DEFAULTS.select.false_alarm
+MIN_GAIN = DEFAULTS.select.min_gain
+TERMS = DEFAULTS.residuals.flexible_terms
+KEPT = DEFAULTS.residuals.kept_share
+KEPT_TERM = DEFAULTS.residuals.kept_share_of_term
+WHOLE = DEFAULTS.residuals.whole_rounding
+CLEARLY = DEFAULTS.residuals.clearly_better
+
+
+@dataclass(frozen=True)
+class Established:
+    """Effects that stand beside the terms, the terms, and the fit with all of them."""
+
+    names: tuple[str, ...]
+    terms: tuple[Formula, ...]
+    problem: Problem
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class _State:
+    problem: Problem
+    fit: Fit
+    names: tuple[str, ...] = ()
+    terms: tuple[Formula, ...] = ()
+
+    def settled(self, predictor: Predictor, fit: Fit) -> _State:
+        """The same with a larger fit, its noise estimated again."""
+        problem = problem_for(predictor, fit.model, self.problem.pose_filter.noise)
+        return replace(self, problem=problem, fit=problem.fit(fit.model))
+
+
+def established(predictor: Predictor, given: Model, accepted: Mapping[str, Effect]) -> Established:
+    """The search with flexible terms; ``accepted``: the effects that a search without them ended in."""
+    problem = problem_for(predictor, given)
+    state, left = _State(problem, problem.fit(given)), dict(accepted)
+    grammar = families(predictor, given.wheelbase_m)
+    level = FALSE_ALARM / max(len(left) + len(grammar), 1)
+    for _ in range(len(accepted) + TERMS):
+        following = _step(predictor, state, left, grammar, level)
+        if following is None:
+            break
+        state = following
+        left = {name: effect for name, effect in left.items() if name not in state.names}
+    state = _pruned(predictor, state, level)
+    state = _without_needless_terms(predictor, state, accepted, level)
+    state = _pruned(predictor, state, level, _alone(predictor, given, state))
+    terms = tuple(replace(term, fit=state.fit) for term in state.terms)
+    return Established(state.names, terms, state.problem, state.fit)
+
+
+def left_over(problem: Problem, fit: Fit) -> bool:
+    """Is there a family that earns something beside a fitted model?"""
+    return bool(_curves(problem, fit, families(problem.predictor, fit.model.wheelbase_m), ()))
+
+
+def _step(
+    predictor: Predictor, state: _State, left: Mapping[str, Effect], grammar: Sequence[Family], level: float
+) -> _State | None:
+    """The best effect or term added; None where neither earns anything."""
+    problem, fit = state.problem, state.fit
+    tried = {name: fit_with(problem, fit, effect) for name, effect in left.items()}
+    earned = {name: one for name, one in tried.items() if _earns(problem.paired_comparison(fit, one), fit, level)}
+    best = min(earned, key=lambda name: float(earned[name].held_out.sum()), default="")
+    curves = _curves(problem, fit, grammar, state.terms)
+    for curve in curves:
+        if best and not _clearly_better(curve, earned[best], fit):
+            break
+        term = _written_out(problem, fit, curve.family, len(state.terms))
+        if term is not None and _term_earns(term.paired_comparison, fit, level):
+            return replace(state.settled(predictor, term.fit), terms=(*state.terms, term))
+    if not best:
+        return None
+    return replace(state.settled(predictor, earned[best]), names=(*state.names, best))
+
+
+def _curves(problem: Problem, fit: Fit, grammar: Sequence[Family], terms: Sequence[Formula]) -> list[Earned]:
+    """Families that are significant beside a model and its terms, the best first."""
+    if len(terms) >= TERMS or not grammar:
+        return []
+    used = {(term.signal, term.on) for term in terms}
+    left = [*grammar, rounding(problem, fit)]
+    return significant(ranked(problem, fit, [family for family in left if (family.signal, family.on) not in used]))
+
+
+def _written_out(problem: Problem, fit: Fit, family: Family, number: int) -> Formula | None:
+    """The family as a term; a round patch where it is a field over the floor and that does better."""
+    name = NAME if not number else f"{NAME}-{number + 1}"
+    free = fitted(problem, fit, family.on, family.term, name, family.signal)
+    round_patch = patch(problem, fit, family.on, name) if family.signal == PLACE and family.on == SHARE else None
+    found = [term for term in (free, round_patch) if term is not None and _whole(term)]
+    return max(found, key=lambda term: term.paired_comparison.elpd_diff, default=None)
+
+
+def _whole(term: Formula) -> bool:
+    """Speeds come in steps or do not: half a rounding is something else."""
+    return term.signal != STEPPED or abs(term.values["k0"] - 1.0) < WHOLE
+
+
+def _clearly_better(curve: Earned, effect: Fit, fit: Fit) -> bool:
+    gain, se = paired_elpd_diff(effect.held_out, curve.losses)
+    share = gain / float(fit.held_out.mean())
+    return share > CLEARLY and certain(PairedComparison(gain, se, 0.0), share)
+
+
+def _term_earns(comparison: PairedComparison, before: Fit, level: float) -> bool:
+    share = comparison.elpd_diff / float(before.held_out.mean())
+    return comparison.p_value < level and share > MIN_GAIN and certain(comparison, share)
+
+
+def _earns(comparison: PairedComparison, before: Fit, level: float) -> bool:
+    least = MIN_GAIN * float(before.held_out.mean())
+    return comparison.p_value < level and comparison.z > MIN_Z and comparison.elpd_diff > least
+
+
+def _without_needless_terms(
+    predictor: Predictor, state: _State, accepted: Mapping[str, Effect], level: float
+) -> _State:
+    """Without the terms that several accepted effects together do as well: a curve came in before it could be known."""
+    for term in state.terms:
+        model = state.fit.model.without(term.name)
+        for effect in (effect for name, effect in accepted.items() if name not in state.names):
+            loose = problem_for(predictor, model)
+            model = fit_with(loose, loose.fit(model), effect).model
+        problem = problem_for(predictor, model, state.problem.pose_filter.noise)
+        without = problem.fit(model)
+        again = fitted(problem, without, term.on, term.term, term.name, term.signal)
+        kept = again.paired_comparison.elpd_diff if again is not None else 0.0
+        if kept < KEPT_TERM * term.paired_comparison.elpd_diff:
+            terms = tuple(one for one in state.terms if one.name != term.name)
+            state = _pruned(predictor, _State(problem, without, tuple(accepted), terms), level)
+    return state
+
+
+def _alone(predictor: Predictor, given: Model, state: _State) -> dict[str, float]:
+    """What each effect earns in a model with the effects alone, without terms."""
+    if not state.terms or not state.names:
+        return {}
+    model = state.fit.model
+    for term in state.terms:
+        model = model.without(term.name)
+    problem = problem_for(predictor, model)
+    fit = problem.fit(model)
+    return {name: paired_elpd_diff(problem.fit(model.without(name)).held_out, fit.held_out)[0] for name in state.names}
+
+
+def _pruned(predictor: Predictor, state: _State, level: float, alone: Mapping[str, float] | None = None) -> _State:
+    """Without the effects that no longer earn their place beside what came in later, the least first.
+
+    ``alone``: what each earns without terms; little beside them is then not enough (`KEPT`).
+    """
+    while state.names:
+        lacking = {
+            name: state.problem.fit(state.fit.model.without(name), nearby=state.fit.jacobian_by_parameter)
+            for name in state.names
+        }
+        worth = {name: state.problem.paired_comparison(one, state.fit) for name, one in lacking.items()}
+        kept = {n: worth[n].elpd_diff / max(alone[n], 1e-9) if alone else worth[n].elpd_diff for n in state.names}
+        least = min(kept, key=lambda name: kept[name])
+        if _earns(worth[least], lacking[least], level) and not (alone and kept[least] < KEPT):
+            break
+        names = tuple(name for name in state.names if name != least)
+        state = replace(state.settled(predictor, lacking[least]), names=names)
+    return state

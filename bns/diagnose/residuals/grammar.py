@@ -1,0 +1,199 @@
+"""A small typed grammar of terms that may stand for what no listed effect explains: signals, a nonlinearity, a memory.
+
+A family is a velocity that is added to and a few functions whose sum, each with a number of its own, is a free curve of one
+signal (a wheel's own speed, its way since it last changed direction, the time in a trial), a field over the floor, or a short
+polynomial of speed and turn. All are written as formulas: whatever a family turns out to be can be added to a model file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.noise import weights
+from bns.diagnose.estimate.parallel import each
+from bns.diagnose.estimate.significance import MIN_Z, PairedComparison
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.residuals.along_variables import earned_by_columns, losses_with_columns
+from bns.diagnose.settings import DEFAULTS
+from bns.physics.formula import SHARE, WHEELS, formula_effect
+
+NAME = "unlisted"
+PLACE, STEPPED = "place", "speed in steps"
+CHANCE = DEFAULTS.residuals.chance
+LEAST = DEFAULTS.residuals.least
+LARGE, LARGE_Z = DEFAULTS.residuals.large, DEFAULTS.residuals.large_z
+STEPS, FINER = DEFAULTS.residuals.rounding_steps
+STEPS_A_RANGE = DEFAULTS.residuals.rounding_range
+SPEED_KNOTS = DEFAULTS.residuals.speed_knots
+SESSION_KNOTS = DEFAULTS.residuals.session_knots
+TIME_KNOTS = DEFAULTS.residuals.time_knots
+REVERSAL_KNOTS = DEFAULTS.residuals.reversal_knots
+SWING_KNOTS = DEFAULTS.residuals.swing_knots
+FLOOR_SIDE = DEFAULTS.residuals.floor_side
+_SMALL = 1e-4
+
+
+@dataclass(frozen=True)
+class Family:
+    """Functions (formulas without their numbers) of a ``signal``, added to the velocity ``on`` (`bns.physics.formula.ON`)."""
+
+    signal: str
+    on: str
+    functions: tuple[str, ...]
+
+    @property
+    def term(self) -> str:
+        """The family as one formula with a number for each function."""
+        return " + ".join(f"k{i} * {function}" for i, function in enumerate(self.functions))
+
+
+@dataclass(frozen=True)
+class Earned:
+    """What a family would earn on trials held out, as a linear addition to a fitted model; and its share of the loss."""
+
+    family: Family
+    paired_comparison: PairedComparison
+    share: float
+    losses: Array
+    """Held-out losses (trials,) with it."""
+
+
+def families(predictor: Predictor, wheelbase_m: float) -> list[Family]:
+    """All families that these tracks can speak of."""
+    seen = predictor.variables()
+    if "left_m_s" not in seen:
+        return []
+    wheels = np.concatenate([seen["left_m_s"].ravel(), seen["right_m_s"].ravel()])
+    found = [
+        Family("speed of each wheel", WHEELS, _of_speed(float(np.abs(wheels).max()), bool((wheels < 0.0).any()))),
+        Family("speed and turn", "v", ("v * w", "v * w**2", "v * abs(v)", "v**3", "moving * abs(w)")),
+        Family("speed and turn", "w", ("w * abs(w)", "w * abs(v)", "w**3", "w * v**2", "w * v", "v * abs(w)")),
+        Family("speed and turn", "s", ("v * w * abs(w)", "v * w * abs(v)", "w")),
+        Family("side of the turn", "v", ("v * max(w, 0)", "v * min(w, 0)", "moving * max(w, 0)", "moving * min(w, 0)")),
+    ]
+    return [*found, *_of_tracks(predictor, seen, wheelbase_m)] if not predictor.tracks.relative else found
+
+
+def _of_speed(fastest_m_s: float, reverses: bool) -> tuple[str, ...]:
+    """A free curve of a wheel's own speed that is nothing at rest, odd but for a share of backward speeds."""
+    hats = _hats("abs(u)", [share * fastest_m_s for share in SPEED_KNOTS])[1:]
+    return (*(f"sign(u) * {h}" for h in hats), *(("min(u, 0)",) if reverses else ()))
+
+
+def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
+    """Families of what single motions have not: times, memories, places."""
+    yield Family(
+        "changes of speed of each wheel", WHEELS, ("fresh", "max(fresh, 0)", "fresh * abs(fresh)", "fresh * abs(u)")
+    )
+    if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0:
+        ways = [share * wheelbase_m for share in REVERSAL_KNOTS]
+        yield Family("way since each wheel reversed", WHEELS, tuple(f"u * {h}" for h in _hats("since", ways)[:-1]))
+    yield Family("direction of motion", SHARE, tuple(_hats("swing", SWING_KNOTS)[1:]))
+    longest = float(seen["time_in_trial_s"].max())
+    times = [share * longest for share in TIME_KNOTS]
+    yield Family("time in the trial", SHARE, tuple(_hats("tau", times)[:-1]))
+    began = seen["session_s"]
+    if predictor.tracks.start_known:
+        first, last = float(began.min()), float(began.max())
+        times = [first + share * (last - first) for share in SESSION_KNOTS]
+        yield Family("time of the session", SHARE, tuple(_hats("t", times)))
+    turns = ("cos(heading)", "sin(heading)", "cos(2*heading)", "sin(2*heading)")
+    yield Family("heading", "v", tuple(f"v * {t}" for t in turns))
+    yield Family("heading", "w", tuple(f"moving * {t}" for t in turns))
+    (x0, x1), (y0, y1) = (np.quantile(predictor.tracks.pose[:, i], [0.02, 0.98]) for i in (0, 1))
+    yield Family(PLACE, SHARE, tuple(_bumps(x0, x1, y0, y1)))
+    x, y = f"(x - {(x0 + x1) / 2:.3g})", f"(y - {(y0 + y1) / 2:.3g})"
+    bends = (x, y, f"{x}**2", f"{x} * {y}", f"{y}**2")
+    askew = [f"v * {b} * {t}" for b in bends for t in turns[2:]]
+    yield Family(PLACE, "v", (*(f"v * {b}" for b in bends), *askew))
+    yield Family(PLACE, "s", tuple(askew))
+
+
+def ranked(problem: Problem, fit: Fit, tried: Sequence[Family]) -> list[Earned]:
+    """What each family would earn beside a fitted model, the best first."""
+    usual = float(fit.losses.mean())
+
+    def earned(family: Family) -> Earned:
+        columns = columns_of(problem, fit, family)
+        comparison = earned_by_columns(problem, fit, columns)
+        return Earned(family, comparison, comparison.elpd_diff / usual, losses_with_columns(problem, fit, columns))
+
+    return sorted(each(earned, list(tried)), key=lambda e: -e.paired_comparison.elpd_diff)
+
+
+def significant(earned: Sequence[Earned]) -> list[Earned]:
+    """Those that cannot be luck (the chance shared out over all that were tried), are earned in many trials, and matter."""
+    level = CHANCE / max(len(earned), 1)
+    return [
+        e
+        for e in earned
+        if e.paired_comparison.p_value < level and e.share > LEAST and certain(e.paired_comparison, e.share)
+    ]
+
+
+def certain(comparison: PairedComparison, share: float) -> bool:
+    """Is a gain earned in many trials; or, where it is a large ``share`` of the loss, in some?"""
+    return comparison.z > (LARGE_Z if share > LARGE else MIN_Z)
+
+
+def rounding(problem: Problem, fit: Fit) -> Family:
+    """Each wheel's speed rounded to the step that explains most, of many in `STEPS_A_RANGE` parts of the fastest."""
+    fastest = float(np.abs(problem.predictor.variables()["left_m_s"]).max())
+    root = np.sqrt(weights(fit.whitened))[:, None]
+    left = (fit.whitened * root).ravel()
+
+    def pull(step: float) -> float:
+        column = (columns_of(problem, fit, _rounded(step))[..., 0] * root).ravel()
+        return float((column @ left) ** 2 / max(float(column @ column), 1e-300))
+
+    coarse = fastest / np.linspace(*STEPS_A_RANGE, STEPS)
+    best = _best(pull, coarse)
+    near = np.clip([best - 1, best + 1], 0, STEPS - 1)
+    fine = np.linspace(coarse[near[1]], coarse[near[0]], FINER)
+    return _rounded(float(fine[_best(pull, fine)]))
+
+
+def _best(score: Callable[[float], float], values: Array) -> int:
+    return int(np.argmax(each(score, [float(v) for v in values])))
+
+
+def _rounded(step: float) -> Family:
+    return Family(STEPPED, WHEELS, (f"({step:.5g} * round(u / {step:.5g}) - u)",))
+
+
+def columns_of(problem: Problem, fit: Fit, family: Family) -> Array:
+    """Change of the whitened innovations for each number of a family, (frames, 3, functions)."""
+    out = np.empty((*fit.whitened.shape, len(family.functions)))
+    for i, function in enumerate(family.functions):
+        effect = formula_effect(NAME, f"k * {function}", family.on)
+        out[..., i] = (problem.whitened(fit.model.with_active(effect, (_SMALL,))) - fit.whitened) / _SMALL
+    return out
+
+
+def _hats(signal: str, knots: Sequence[float]) -> list[str]:
+    """Piecewise linear functions of a signal, one a knot; they sum to 1 and stay as they are beyond the ends."""
+    out = []
+    for i, at in enumerate(knots):
+        sides = []
+        if i:
+            sides.append(f"({signal} - {knots[i - 1]:.4g}) / {at - knots[i - 1]:.4g}")
+        if i + 1 < len(knots):
+            sides.append(f"({knots[i + 1]:.4g} - {signal}) / {knots[i + 1] - at:.4g}")
+        inner = f"min({sides[0]}, {sides[1]})" if len(sides) == 2 else f"min({sides[0]}, 1)"
+        out.append(f"max({inner}, 0)")
+    return [text.replace("- -", "+ ") for text in out]
+
+
+def _bumps(x0: float, x1: float, y0: float, y1: float) -> Iterator[str]:
+    """Gaussian bumps on a grid over the floor."""
+    wide, high = (0.6 * (top - low) / (FLOOR_SIDE - 1) + 1e-9 for low, top in ((x0, x1), (y0, y1)))
+    for cx in np.linspace(x0, x1, FLOOR_SIDE):
+        for cy in np.linspace(y0, y1, FLOOR_SIDE):
+            yield f"exp(-(((x - {cx:.3g}) / {wide:.3g})**2 + ((y - {cy:.3g}) / {high:.3g})**2) / 2)".replace(
+                "- -", "+ "
+            )

@@ -1,0 +1,129 @@
+"""What a flexible term looks like, in words of physics: how much, when, where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.residuals.symbolic import Formula
+from bns.physics.formula import NEVER_M, SHARE, value_of
+
+_POINTS = 400
+
+
+def in_words(term: Formula, predictor: Predictor) -> str:
+    """One sentence without its full stop."""
+    if term.signal == "place" and "c" in term.values:
+        v = term.values
+        return f"{_slower(-v['k'])} within {abs(v['c']):.3g} m of ({v['a']:.3g}, {v['b']:.3g}) m"
+    said = _SAID.get((term.signal, term.on))
+    return (
+        said(term, predictor)
+        if said
+        else f"{_VELOCITIES[term.on]} depends on {term.signal} ({_largest(term, predictor)})"
+    )
+
+
+_VELOCITIES = {
+    "v": "forward velocity",
+    "w": "turning velocity",
+    "s": "sideways velocity",
+    "east": "velocity east",
+    "north": "velocity north",
+    "share": "the share of the commanded motion that is driven",
+    "wheels": "the speed of each wheel",
+}
+
+
+def _slower(share: float) -> str:
+    return f"{'slower' if share >= 0 else 'faster'} by {abs(share):.2%}"
+
+
+def _curve(term: Formula, name: str, grid: Array, **others: float) -> Array:
+    out: Array = np.broadcast_to(value_of(term.term, {**term.values, name: grid, **others}), grid.shape)
+    return out
+
+
+def _along(term: Formula, name: str, grid: Array, what: str) -> str:
+    """A share of all velocities along a signal, where it is lowest and highest."""
+    share = _curve(term, name, grid)
+    low, high = int(share.argmin()), int(share.argmax())
+    return f"{_slower(-share[low])} at {grid[low]:.3g} s {what}, {_slower(-share[high])} at {grid[high]:.3g} s"
+
+
+def _time_in_trial(term: Formula, predictor: Predictor) -> str:
+    longest = float(predictor.variables()["time_in_trial_s"].max())
+    return _along(term, "tau", np.linspace(0, longest, _POINTS), "of a trial")
+
+
+def _session(term: Formula, predictor: Predictor) -> str:
+    t_s = predictor.variables()["session_s"]
+    return _along(term, "t", np.linspace(float(t_s.min()), float(t_s.max()), _POINTS), "of the session")
+
+
+def _reversal(term: Formula, _: Predictor) -> str:
+    way = np.linspace(0.0, 1.0, 10 * _POINTS)
+    lost = -float(np.trapezoid(_curve(term, "since", way, u=1.0), way))
+    verb = "loses" if lost >= 0 else "gains"
+    return f"a wheel {verb} {1e3 * abs(lost):.3g} mm of its way whenever it changes direction"
+
+
+def _swing(term: Formula, _: Predictor) -> str:
+    back, across = _curve(term, "swing", np.array([1.0, 0.5]))
+    return (
+        f"{_slower(-back)} while the motion's direction is opposite to that of the last half wheelbase of way, "
+        f"{_slower(-across)} while it is square to it"
+    )
+
+
+def _speed(term: Formula, predictor: Predictor) -> str:
+    seen = predictor.variables()
+    fastest = float(max(np.abs(seen["left_m_s"]).max(), np.abs(seen["right_m_s"]).max()))
+    at = fastest * np.array([0.1, 0.3, 1.0])
+    got = at + _curve(term, "u", at, since=NEVER_M)
+    pairs = ", ".join(f"{a:.3g} m/s gives {b:.3g} m/s" for a, b in zip(at, got, strict=True))
+    return f"a wheel's speed is no multiple of what it is told: {pairs}"
+
+
+def _steps(term: Formula, _: Predictor) -> str:
+    speeds = np.linspace(0.0, 1.0, 100 * _POINTS)
+    jumps = np.flatnonzero(np.diff(_curve(term, "u", speeds)) > 0)
+    step = float(np.median(np.diff(speeds[jumps]))) if len(jumps) > 1 else float("nan")
+    return f"wheels' speeds come in steps of {step:.3g} m/s"
+
+
+def _changes(term: Formula, _: Predictor) -> str:
+    jump = np.array([0.1])
+    rest = float(_curve(term, "fresh", jump, u=0.1)[0] / jump[0])
+    return f"of a fresh change of speed wheels {'lack' if rest < 0 else 'add'} {abs(rest):.0%}, fading within 0.15 s"
+
+
+def _largest(term: Formula, predictor: Predictor) -> str:
+    """The largest change of the velocity over speeds, turns, headings and places that were seen."""
+    seen = predictor.variables()
+    left, right = seen["left_m_s"].ravel(), seen["right_m_s"].ravel()
+    names = {
+        "v": (left + right) / 2,
+        "w": (right - left) / term.fit.model.wheelbase_m,
+        "l": left,
+        "r": right,
+        "moving": np.ones_like(left),
+    }
+    places = {n: seen[m].ravel() for n, m in (("x", "x_m"), ("y", "y_m"), ("heading", "heading_rad")) if m in seen}
+    change = np.abs(np.broadcast_to(value_of(term.term, {**term.values, **names, **places}), left.shape))
+    size = float(np.quantile(change[np.isfinite(change)], 0.95))
+    return f"by up to {size:.2%}" if term.on == SHARE else f"by up to {size:.3g} {'rad/s' if term.on == 'w' else 'm/s'}"
+
+
+_SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
+    ("time in the trial", "share"): _time_in_trial,
+    ("time of the session", "share"): _session,
+    ("way since each wheel reversed", "wheels"): _reversal,
+    ("direction of motion", "share"): _swing,
+    ("speed of each wheel", "wheels"): _speed,
+    ("speed in steps", "wheels"): _steps,
+    ("changes of speed of each wheel", "wheels"): _changes,
+}

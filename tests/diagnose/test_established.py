@@ -1,0 +1,87 @@
+"""Effects stand only beside what describes the rest; what describes it is a term that can be added, in words of physics."""
+
+import re
+
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.starts import listed
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.established import established, left_over
+from bns.diagnose.residuals.grammar import families, ranked, rounding, significant
+from bns.diagnose.residuals.words import in_words
+from bns.physics.formula import formula_effect
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+BOTH_WAYS = (-0.2, 0.2)
+
+
+def predictor_of(model, **how):
+    return WheelPredictor(tracks_of(measured(model, **{"trials": 20, "seed": 11} | how)))
+
+
+def stands(predictor, *names):
+    catalogue = listed(NOMINAL, None, predictor.tracks)
+    return established(predictor, NOMINAL, {name: catalogue[name] for name in names})
+
+
+def warming(**effects):
+    """A robot that is slower when a trial begins, by a rule that no list holds, and has listed effects as well."""
+    return hidden(**effects).with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (-0.15,))
+
+
+def test_an_effect_that_is_there_stands_and_one_that_imitates_the_rest_does_not():
+    predictor = predictor_of(warming(wheelbase={"factor": 1.06}))
+    found = stands(predictor, "wheelbase", "speed-gain")
+    assert found.names == ("wheelbase",)
+    assert [term.signal for term in found.terms] == ["time in the trial"]
+    low, high = found.fit.interval([f.effect for f in found.fit.free].index("wheelbase"))
+    assert low < 1.06 < high
+
+
+def test_what_is_there_stands_where_nothing_is_left():
+    predictor = predictor_of(hidden(wheelbase={"factor": 1.06}, speed_gain={"gain": 0.96}))
+    found = stands(predictor, "speed-gain", "wheelbase")
+    assert set(found.names) == {"speed-gain", "wheelbase"}
+    assert found.terms == ()
+    assert not left_over(found.problem, found.fit)
+
+
+def test_an_effect_that_keeps_little_of_its_gain_beside_the_term_is_out():
+    predictor = predictor_of(hidden(backlash={"gap_m": 0.005}), speeds=BOTH_WAYS, commands=8, trials=30)
+    found = stands(predictor, "motor-lag")
+    assert found.names == ()
+    assert found.terms[0].signal == "way since each wheel reversed"
+    lost_mm = float(re.fullmatch(r"a wheel loses ([\d.]+) mm .*", in_words(found.terms[0], predictor)).group(1))
+    assert lost_mm == pytest.approx(5.0, rel=0.15)
+
+
+def test_a_diagnosis_lists_what_imitates_apart_and_offers_the_term_with_its_error():
+    table = measured(warming(), trials=24, seed=3)
+    answer = diagnose(WheelPredictor(tracks_of(table)), NOMINAL, barred=("warm-up",)).as_json()
+    assert (answer["verdict"], answer["effects"], answer["parameters"]) == ("unlisted", [], {})
+    assert answer["imitating"]
+    assert re.match(r"slower by 1\d\.\d+% at 0 s of a trial", answer["terms"][0]["in_words"])
+    assert answer["formula"]["term"] == answer["terms"][0]["term"]
+    error = answer["error_with_terms"]["trial"]
+    assert error["change_high"] < 0
+    assert error["after"] < 0.6 * error["before"]
+
+
+def test_steps_of_speed_are_found():
+    predictor = predictor_of(hidden(command_quantisation={"step_m_s": 0.015, "share": 1.0}), trials=20)
+    problem = problem_for(predictor, NOMINAL)
+    family = rounding(problem, problem.fit(NOMINAL))
+    assert float(family.functions[0].split(" ")[0].lstrip("(")) == pytest.approx(0.015, rel=5e-3)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_honest_robots_leave_nothing(seed):
+    predictor = predictor_of(NOMINAL, seed=seed, speeds=BOTH_WAYS)
+    problem = problem_for(predictor, NOMINAL)
+    fit = problem.fit(NOMINAL)
+    tried = families(predictor, NOMINAL.wheelbase_m)
+    assert len(tried) > 10
+    assert significant(ranked(problem, fit, [*tried, rounding(problem, fit)])) == []

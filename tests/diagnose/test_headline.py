@@ -1,0 +1,64 @@
+"""What a verdict presents lowers the error, and what fits best is shown, however hard it is to believe."""
+
+from dataclasses import replace
+
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.plain_language import headline
+from bns.diagnose.select.stepwise import StepwiseSelection
+from bns.physics.effects import effect_named
+from bns.physics.model import Model
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+SKID_STEER = Model(wheelbase_m=0.4, name="skid-steer")
+SKID_SPEEDS = (-0.3, 0.5)
+
+
+def found_with(monkeypatch, predictor, name):
+    """The diagnosis of a search that accepts this effect, whatever the tracks say."""
+    honest = StepwiseSelection.run
+
+    def run(self):
+        problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named(name)])
+        return replace(honest(self), problem=problem, fit=fit, accepted=(name,))
+
+    monkeypatch.setattr(StepwiseSelection, "run", run)
+    return diagnose(predictor, NOMINAL)
+
+
+def test_a_set_with_which_the_held_out_error_does_not_fall_is_withdrawn(monkeypatch):
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=14, seed=11)))
+    found = found_with(monkeypatch, predictor, "yaw-bias")
+    assert (found.verdict, found.effects) == ("none", ())
+    assert found.model.values_of("yaw-bias") == {} if found.model.effects else found.model == NOMINAL.arranged()
+    assert any("yaw-bias would fit better by likelihood" in note for note in found.notes)
+    assert all(error["after"] == error["before"] for error in found.as_json()["error"].values())
+
+
+def test_a_set_with_which_it_falls_stays(monkeypatch):
+    predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": 0.05}), trials=14, seed=11)))
+    found = found_with(monkeypatch, predictor, "yaw-bias")
+    assert (found.verdict, found.effects) == ("effects", ("yaw-bias",))
+    assert found.errors.falls
+
+
+@pytest.mark.parametrize(("factor", "plausible"), [(1.6, True), (2.6, False), (0.55, False)])
+def test_a_skid_steer_that_turns_as_if_it_were_wider_is_shown_so(factor, plausible):
+    """1.6 times the drawing is usual for skid-steered robots; 2.6 times is not, and is the headline nevertheless."""
+    true = SKID_STEER.with_effect("wheelbase", factor=factor).with_effect("marker-offset", forward_m=-0.05, left_m=0.0)
+    table = measured(true, trials=14, seed=5, speeds=SKID_SPEEDS, noise=(0.003, 0.005))
+    found = diagnose(WheelPredictor(tracks_of(table)), SKID_STEER)
+    assert (found.verdict, set(found.effects)) == ("effects", {"wheelbase", "marker-offset"})
+    said = found.as_json()
+    number = said["parameters"]["wheelbase"]["factor"]
+    assert number["low"] < factor < number["high"]
+    assert "wheels stand closer together or further apart" in headline(found)
+    assert set(said["implausible"]) == (set() if plausible else {"wheelbase"})
+    assert any(note.startswith("wheelbase fits best, and implausibly") for note in found.notes) is not plausible
+    for error in said["error"].values():
+        assert error["change_high"] < 0
+        assert error["after"] < 0.2 * error["before"]

@@ -1,0 +1,62 @@
+"""A few bad trials do not turn a verdict, and are named."""
+
+import pandas as pd
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.worst_trials import most_left_out, standing_out
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def with_bad(good, bad, trials=36, of_them=2):
+    """Trials of one robot, and of another named 100, 101, ..."""
+    odd = measured(bad, trials=of_them, seed=3)
+    return pd.concat([measured(good, trials=trials, seed=2), odd.assign(trial=odd.trial + 100)], ignore_index=True)
+
+
+def wild_of(table):
+    predictor = WheelPredictor(tracks_of(table))
+    problem = problem_for(predictor, NOMINAL)
+    return [predictor.tracks.names[i] for i in standing_out(problem, problem.fit(NOMINAL))]
+
+
+def test_two_bad_trials_of_38_hide_nothing_and_are_named():
+    good, bad = hidden(wheelbase={"factor": 1.04}), hidden(wheelbase={"factor": 0.6})
+    predictor = WheelPredictor(tracks_of(with_bad(good, bad)))
+    found = diagnose(predictor, NOMINAL)
+    assert (found.verdict, found.effects) == ("effects", ("wheelbase",))
+    answer = found.as_json()
+    number = answer["parameters"]["wheelbase"]["factor"]
+    assert number["low"] < 1.04 < number["high"]
+    assert set(answer["without_worst"]["trials"]) == {"100", "101"}
+    assert answer["without_worst"]["with_them"] != answer["without_worst"]["without"]
+    assert any("Unlike all others" in note and "with them the verdict would be" in note for note in found.notes)
+    assert answer["error"]["trial"]["windows"] == 38
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_honest_trials_are_alike(seed):
+    assert wild_of(measured(NOMINAL, trials=40, seed=seed, jitter=0.01)) == []
+
+
+def test_more_than_the_worst_few_are_a_phenomenon():
+    assert most_left_out(36) == 2
+    assert most_left_out(120) == 4
+    bad = hidden(wheelbase={"factor": 0.6})
+    assert wild_of(with_bad(NOMINAL, bad, trials=30, of_them=1)) == ["100"]
+    assert wild_of(with_bad(NOMINAL, bad, trials=30, of_them=4)) == []
+
+
+def test_what_does_not_count_bends_no_number_and_is_judged():
+    predictor = WheelPredictor(tracks_of(with_bad(NOMINAL, hidden(wheelbase={"factor": 0.6}), trials=12)))
+    apart = predictor.not_counting([12, 13])
+    model = NOMINAL.with_effect("wheelbase", factor=1.0)
+    problem = problem_for(apart, model)
+    fit = problem.fit(model)
+    assert fit.values[0] == pytest.approx(1.0, abs=0.004)
+    assert (fit.losses[12:] == 0).all()
+    assert predictor.counted is None
+    assert (apart.windows("trial")[0] == predictor.windows("trial")[0]).all()
