@@ -13,7 +13,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint dist sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap
+.PHONY: help setup test lint dist docs sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -36,8 +36,11 @@ lint: setup ## style and types
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
+docs: setup ## the documentation site, into site/: open site/index.html (no network is needed)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+
 clean: ## remove the virtual environment and caches (never the results)
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build dist *.egg-info
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build dist site *.egg-info
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 SWEEP = $(BIN)/bns sweep $(if $(BUDGET),--budget "$(BUDGET)") $(if $(JOBS),--jobs "$(JOBS)") --results "$(RESULTS)"
@@ -95,6 +98,10 @@ soak: setup ## 200 emulated trials of each robot with faults at random: how they
 fuzz: setup ## files that nobody would write, for every reader of users' files, and damages to result files: five minutes
 	BNS_FUZZ_EXAMPLES=1500 $(BIN)/python -m pytest -q tests/fuzz
 	$(BIN)/python -m tests.store.damages 60
+
+mutants: setup ## small faults planted in the rooms where numbers are made: do the tests notice? MINUTES=20; writes docs/mutants.md
+	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[mutants]'
+	$(BIN)/python -m tests.mutants --minutes $(or $(MINUTES),20)
 
 soak-dask: setup ## twenty minutes of a sweep on Dask whose workers are killed: what it costs, and that no run is lost
 	$(BIN)/python tests/sweep/soak_dask.py

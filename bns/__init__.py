@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         SpecError,
         StopNotConfirmedError,
         StoreError,
+        TrialFileError,
         TrialPausedError,
     )
     from bns.physics.effect import Effect, Parameter
@@ -70,6 +71,7 @@ __all__ = [
     "StoreError",
     "Sweep",
     "SweepResult",
+    "TrialFileError",
     "TrialPausedError",
     "TrialResult",
     "__version__",
@@ -101,7 +103,7 @@ _HOMES = {
     "app.explore": ("Explorer", "explore"),
     "errors": (
         *("BnsError", "ClusterError", "DataError", "DeviceError", "HardwareError", "ModelError", "SpecError"),
-        *("StopNotConfirmedError", "StoreError", "TrialPausedError"),
+        *("StopNotConfirmedError", "StoreError", "TrialFileError", "TrialPausedError"),
     ),
     "physics.effect": ("Effect", "Parameter"),
     "store.read.reader": ("load", "query"),

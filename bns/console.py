@@ -6,25 +6,62 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from bns.spec import RADII_CM, RunSpec
 
 
 @contextmanager
 def live_view(
-    spec: RunSpec, more: Callable[[], Mapping[str, str]] = dict
-) -> Iterator[Callable[[Mapping[str, Any]], None]]:
-    """A table on stderr that follows the evaluations; nothing where stderr is no terminal. `more`: further headings and texts."""
+    spec: RunSpec | None, more: Callable[[], Mapping[str, str]] = dict, now: Callable[[], str] = str
+) -> Iterator[LiveView]:
+    """A table on stderr that follows the evaluations; nothing where stderr is no terminal.
+
+    `more`: further headings and texts, asked for at each evaluation; `now`: lines beneath, asked for again and again.
+    """
     console = Console(stderr=True)
+    shown = LiveView(spec, more, now)
     if not console.is_terminal:
-        yield lambda row: None
+        yield shown
         return
-    with Live(console=console, refresh_per_second=4) as live:
-        yield lambda row: live.update(view(spec, row, more()))
+    shown.live = Live(console=console, refresh_per_second=4, get_renderable=shown.picture)
+    with shown.live:
+        yield shown
+
+
+class LiveView:
+    """Is called with each evaluation's row. Without a terminal it has no `live` and shows nothing."""
+
+    def __init__(self, spec: RunSpec | None, more: Callable[[], Mapping[str, str]], now: Callable[[], str]) -> None:
+        self._spec, self._more, self._now = spec, more, now
+        self._table: Table | str = ""
+        self.live: Live | None = None
+
+    def __call__(self, row: Mapping[str, Any]) -> None:
+        """Show the table as it stands after this evaluation."""
+        if self.live is not None and self._spec is not None:
+            self._table = view(self._spec, row, self._more())
+            self.live.refresh()
+
+    def picture(self) -> Group:
+        """What stands on the terminal."""
+        return Group(self._table, Text(self._now()))
+
+    @contextmanager
+    def suspended(self) -> Iterator[None]:
+        """The terminal is somebody else's: a question is not drawn over."""
+        if self.live is None:
+            yield
+            return
+        self.live.stop()
+        try:
+            yield
+        finally:
+            self.live.start()
 
 
 def view(spec: RunSpec, row: Mapping[str, Any], more: Mapping[str, str]) -> Table:

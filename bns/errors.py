@@ -40,6 +40,25 @@ class StopNotConfirmedError(BnsError):
     exit_code = 4
 
 
+class TrialFileError(BnsError):
+    """A file of a trial that cannot be written; the robot stands, confirmed, and the trial can be gone on with."""
+
+    exit_code = 5
+
+    @classmethod
+    def of(cls, path: object, error: Exception) -> TrialFileError:
+        """That ``path`` could not be written because of ``error``, and what to do."""
+        return cls(f"cannot write {path}: {getattr(error, 'strerror', None) or error}. {_STANDS}")
+
+    @classmethod
+    def after(cls, error: Exception) -> TrialFileError:
+        """What went wrong with a file once the robot had been driven; ``error`` names it."""
+        return cls(f"{error} {_STANDS}")
+
+
+_STANDS = "The robot stands; evaluations noted before that are in the journal. When there is room again, go on with --resume."
+
+
 class ClusterError(BnsError):
     """Other machines that cannot be used as asked: a scheduler, its workers, a batch system."""
 

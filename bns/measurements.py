@@ -22,6 +22,10 @@ SESSION = "session_s"
 """Time since the session began, where it was logged."""
 BEFORE = ("before_left_m_s", "before_right_m_s")
 """Wheel speeds before the trial's first row, where it began in motion; the trial's first value counts, none is rest."""
+DISCARDED = "discarded"
+"""1 of a drive that whoever watched it did not keep; it is judged by nobody."""
+RUN_UP = "run_up"
+"""1 in rows that a trial takes along from before it begins: they hold commands and no poses, and their t_s is below 0."""
 COLUMNS = ("trial", "t_s", *COMMANDS, *POSE)
 """A robot on two wheels. trial: number; t_s: since the trial began; wheel-surface speeds; heading counter-clockwise from x."""
 
@@ -67,8 +71,12 @@ def write_measurements(table: pd.DataFrame, path: str | Path, columns: Sequence[
         )
     check_table_name(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    if path.suffix == ".csv":
-        table.to_csv(unfinished, index=False)
-    else:
-        table.to_parquet(unfinished, index=False)
-    unfinished.replace(path)
+    try:
+        if path.suffix == ".csv":
+            table.to_csv(unfinished, index=False)
+        else:
+            table.to_parquet(unfinished, index=False)
+        unfinished.replace(path)
+    except BaseException:  # a part of a table would take the space that is missing
+        unfinished.unlink(missing_ok=True)
+        raise

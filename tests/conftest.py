@@ -8,6 +8,7 @@ import matplotlib as mpl
 import pytest
 
 mpl.use("Agg")
+os.environ["BNS_CACHE"] = "off"  # a test that changes a number in memory must not be answered from before
 
 
 @pytest.fixture

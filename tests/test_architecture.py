@@ -35,7 +35,9 @@ FRONT = "__init__.py"
 
 
 def modules():
-    return sorted(str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob("*.py"))
+    """Without the package of a user's that `bns example robot` copies: it stands above all of ours."""
+    found = (path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py"))
+    return sorted(str(path) for path in found if path.parts[:2] != ("examples", "robot"))
 
 
 def room_of(module: str) -> str:

@@ -88,7 +88,7 @@ def test_the_metadata_say_what_is_needed_and_where_it_runs(built):
         [name] = [name for name in file.namelist() if name.endswith(".dist-info/METADATA")]
         said = message_from_string(file.read(name).decode())
         [entry] = [name for name in file.namelist() if name.endswith("entry_points.txt")]
-        assert "bns = bns.cli.main:main" in file.read(entry).decode()
+        assert "bns = bns.__main__:main" in file.read(entry).decode()
     assert said["Version"] == bns.__version__ == "0.2.0"
     assert said["License-Expression"] == "MIT"
     assert said["Author"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
@@ -11,14 +11,17 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from bns.api.common.prepared import Prepared, prepared, with_effects
+from bns.api.common.progress import Progress, silent
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.common.shown import Shown, drawn
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
 from bns.diagnose.adding import ExtendedModel, Memory, add_effects, effect_from
 from bns.diagnose.predict.paired_errors import noise_json
 from bns.diagnose.report.figures import error_by_step_axes
 from bns.diagnose.report.text import extension_text
+from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.settings.chosen import in_force
 from bns.diagnose.values import numbers_of
 from bns.errors import ModelError
 from bns.physics.effect import Effect
@@ -96,7 +99,8 @@ def add(
         log: a file, a table, or `bns.Measurements`.
         effects: names of listed effects (`bns.effects`), Python files with an ``EFFECT``, `bns.Effect`, or several of these.
         model: `bns.Model`, or the name or file of one.
-        term: makes the one name given a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w, s, east or north.
+        term: makes the one name given a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w, s, east or north. It may
+            use the log's further columns by name (docs/formulas.md).
         per_trial: an effect that may differ from trial to trial (clock-offset) has a value of its own in each.
         progress: told what is being done.
 
@@ -111,28 +115,37 @@ def add(
         names = ", ".join(map(_name, wanted))
         raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
     robot = with_effects(model)
-    chosen = [_effect(each, robot, term, on) for each in wanted]
+    ready = prepared(log, robot)
+    columns = getattr(ready.predictor.tracks, "extra", ())
+    chosen = [_effect(each, robot, term, on, columns) for each in wanted]
     given = [effect.name for effect, _ in chosen]
     twice = next((name for name in given if given.count(name) > 1), None)
     if twice is not None:
         raise ModelError(f"{twice} is given {given.count(twice)} times; a model has each effect once: leave the others out.")
-    ready = prepared(log, robot)
-    ticks(progress)("fitting")
-    return added(ready, chosen, per_trial)
+    return added(ready, chosen, per_trial, progress=progress)
 
 
+@in_force(DEFAULTS)
 def added(
     ready: Prepared,
     effects: Sequence[tuple[Effect, Mapping[str, str]]],
     per_trial: bool = False,
     memory: Memory | None = None,
+    progress: Progress | None = None,
 ) -> AddResult:
     """As `add`, for effects and data that are there; ``memory`` keeps fits from one call to the next."""
-    return AddResult(ready, add_effects(ready.predictor, ready.model, effects, ready.measured, per_trial, memory))
+    told = progress or silent
+    extended = add_effects(
+        ready.predictor, ready.model, effects, ready.measured, per_trial, memory, told
+    )
+    told(1.0, "done")
+    return AddResult(ready, extended)
 
 
-def _effect(wanted: Wanted, model: Model, term: str | None, on: str) -> tuple[Effect, Mapping[str, str]]:
-    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), model, term, on)
+def _effect(
+    wanted: Wanted, model: Model, term: str | None, on: str, columns: Iterable[str]
+) -> tuple[Effect, Mapping[str, str]]:
+    return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), model, term, on, columns)
 
 
 def _name(wanted: Wanted) -> str:

@@ -8,9 +8,11 @@ from typing import Any, cast
 import pandas as pd
 from matplotlib.axes import Axes
 
-from bns.api.common.prepared import prepared, prepared_networks
+from bns.api.common.cache import remembered
+from bns.api.common.prepared import Prepared, prepared, prepared_networks
+from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.common.shown import Shown, drawn
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.comparison import Comparison
@@ -20,7 +22,12 @@ from bns.diagnose.report.figures import curve_axes, curves_of
 from bns.diagnose.report.network_text import network_errors_text
 from bns.diagnose.report.text import ahead, comparison_text
 from bns.diagnose.residuals.network_errors import NetworkErrors, why_wrong
+from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.settings.chosen import in_force
 from bns.errors import DataError
+
+PHASES = {"noise": 0.0, "errors": 0.3, "what explains them": 0.5, "curves": 0.9}
+"""What share of a comparison is done when it tells so."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -89,13 +96,17 @@ class CompareResult(Shown):
         return f"{c.model} on {self.log.name}: {error}, {ahead(c.near)} ahead, {c.trials} trials"
 
 
-def compare(log: Log, model: Given, *, progress: Progress | None = None) -> CompareResult:
+@in_force(DEFAULTS)
+def compare(
+    log: Log, model: Given, *, fresh: bool = False, progress: Progress | None = None
+) -> CompareResult:
     """Hold a model as it is against measurements; nothing is fitted.
 
     Args:
         log: a file, a table, or `bns.Measurements`.
         model: `bns.Model`, the name or file of one, networks (.safetensors), or a robot's static simulator (``snake``).
-        progress: told what is being done.
+        fresh: work it out again even where the same was asked before (`bns.api.common.cache`).
+        progress: told the share that is done (0 to 1) and what is being done.
 
     Raises:
         DataError: measurements that cannot be used, or of another robot.
@@ -103,9 +114,15 @@ def compare(log: Log, model: Given, *, progress: Progress | None = None) -> Comp
     """
     networks = prepared_networks(log, model)
     ready = networks or prepared(log, model)
-    ticks(progress)("comparing")
-    result = held_against(ready.predictor, ready.model)
+    meter = Meter(progress, PHASES, pace=1)
+
+
+    def work() -> Comparison:
+        return held_against(ready.predictor, ready.model, tick=meter)
+
+    result = remembered("compare", ready, (), work, Comparison, fresh) if isinstance(ready, Prepared) else work()
     kept = isinstance(ready.predictor, NetworkPredictor) and ready.predictor.learned_from.size > 0
     causes = why_wrong(cast("NetworkPredictor", ready.predictor)) if kept else None
     of_networks = isinstance(ready.predictor, NetworkPredictor)
+    meter.done()
     return CompareResult(ready.log, ready.model, result, causes, of_networks)

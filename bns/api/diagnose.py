@@ -11,15 +11,19 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 from matplotlib.axes import Axes
 
+from bns.api.common.cache import remembered
 from bns.api.common.prepared import Prepared, prepared, with_effects
+from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Progress, Shown, drawn, ticks
-from bns.api.measurements import Log
+from bns.api.common.shown import Shown, drawn
+from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.diagnosis import diagnose as find
 from bns.diagnose.report.figures import ranking_axes
 from bns.diagnose.report.text import diagnosis_text
+from bns.diagnose.settings import DEFAULTS, Settings
+from bns.diagnose.settings.chosen import Chosen, changes_text, in_force, settings_of
 from bns.errors import DataError
 from bns.physics.effect import Effect
 from bns.physics.effects import effect_in_file
@@ -31,6 +35,10 @@ if TYPE_CHECKING:
     Explorer = Any
     """`bns.Explorer`: it stands on a higher floor."""
 
+PHASES = {"errors on trials held out": 0.7, "what is left": 0.8, "longer explanations": 0.9}
+"""What share of a diagnosis is done when it tells so; before that every effect is tried."""
+STEPS = 2.0
+"""How often each effect is tried in most searches: once for every effect that is found, and once more."""
 RANKING = ("rank", "elpd_diff", "dse", "p_value", "rejected_because")
 
 
@@ -40,6 +48,7 @@ class DiagnoseResult(Shown):
 
     ready: Prepared
     diagnosis: Diagnosis
+    settings: Settings = DEFAULTS
 
     @property
     def verdict(self) -> str:
@@ -104,11 +113,11 @@ class DiagnoseResult(Shown):
 
     def summary(self) -> str:
         """Verdict first; then numbers, errors, ranking, notes."""
-        return diagnosis_text(self.diagnosis)
+        return changes_text(self.settings) + diagnosis_text(self.diagnosis)
 
     def to_json(self) -> dict[str, Any]:
         """One object of plain values, the same that `bns diagnose --json` prints."""
-        return {**self.diagnosis.as_json(), "provenance": provenance(self.ready.model, self.ready.log.sha256)}
+        return {**self.diagnosis.as_json(), "provenance": provenance(self.ready.model, self.ready.log.sha256, self.settings)}
 
     def plot(self, ax: Axes | None = None, most: int = 12) -> Axes:
         """What each effect earns on trials held out, with 95 % intervals. DataError where there was too little to search."""
@@ -145,6 +154,8 @@ def diagnose(
     *,
     also: Iterable[Effect | str | PathLike[str]] = (),
     without_effects: Iterable[str] = (),
+    settings: Chosen | None = None,
+    fresh: bool = False,
     progress: Progress | None = None,
 ) -> DiagnoseResult:
     """Find what a model lacks.
@@ -154,16 +165,46 @@ def diagnose(
         model: `bns.Model`, or the name or file of one.
         also: effects of your own, tried beside the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
         without_effects: names of listed effects that are not to be tried.
-        progress: told what is being looked at; the share that is done is not known (None).
+        settings: thresholds that differ from the default (docs/settings.md): a mapping of room -> name -> value, a YAML file of
+            one, or `bns.diagnose.settings.Settings`. What differs is in the summary and the provenance.
+        fresh: work it out again even where the same was asked before (`bns.api.common.cache`).
+        progress: told the share that is done (0 to 1, an estimate that never falls) and what is being looked at.
 
     Raises:
         DataError: measurements that cannot be used, or of another robot.
         ModelError: no such model, or an effect's file that cannot be used.
     """
+    chosen = settings_of(settings)
+    with in_force(chosen):
+        return _found(_checked_again(log, chosen), model, also, without_effects, chosen, fresh, progress)
+
+
+def _checked_again(log: Log, settings: Settings) -> Log:
+    """Measurements that were read under the default settings, checked under these."""
+    if settings.data == DEFAULTS.data or not isinstance(log, Measurements):
+        return log
+    return Measurements(log.measured.table)
+
+
+def _found(
+    log: Log,
+    model: Given,
+    also: Iterable[Effect | str | PathLike[str]],
+    without_effects: Iterable[str],
+    settings: Settings,
+    fresh: bool,
+    progress: Progress | None,
+) -> DiagnoseResult:
     own = [each if isinstance(each, Effect) else effect_in_file(Path(each)) for each in also]
     robot = with_effects(model)
     barred = [robot.effect_named(name).name for name in without_effects]
     ready = prepared(log, robot)
     extra = {effect.name: effect for effect in own}
-    found = find(ready.predictor, ready.model, extra=extra, tick=ticks(progress), barred=barred)
-    return DiagnoseResult(ready, found)
+    meter = Meter(progress, PHASES, pace=STEPS * (len(ready.model.catalogue()) + len(extra)))
+
+    def work() -> Diagnosis:
+        return find(ready.predictor, ready.model, extra=extra, tick=meter, barred=barred).slim()
+
+    found = work() if own else remembered("diagnose", ready, sorted(barred), work, Diagnosis, fresh, settings)
+    meter.done()
+    return DiagnoseResult(ready, found, settings)

@@ -16,8 +16,9 @@ from matplotlib.axes import Axes
 from bns.api.common.shown import Shown, drawn
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.cycles import CycleTracks
-from bns.diagnose.data.load import Measured, load_measured, measured_table, read_table, table_sha256
+from bns.diagnose.data.load import Measured, load_measured, measured_table, table_sha256
 from bns.diagnose.data.mapping import checked_mapping, load_mapping
+from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.predict.check_robot import suggested_wheelbase_m
 from bns.diagnose.report.text import findings_text
 from bns.errors import DataError
@@ -64,7 +65,8 @@ class Measurements(Shown):
         table = pd.DataFrame({"trial": tracks.names, "poses": np.diff(tracks.first)})
         if not isinstance(tracks, CycleTracks):
             lasts = tracks.duration_s
-            table["commands"], table["duration_s"] = (lasts > 0).sum(axis=1), lasts.sum(axis=1)
+            lead = 0.0 if tracks.lead_s is None else tracks.lead_s
+            table["commands"], table["duration_s"] = (lasts > 0).sum(axis=1), lasts.sum(axis=1) - lead
         return table
 
     @property

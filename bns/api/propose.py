@@ -13,22 +13,27 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
+from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Progress, Shown, drawn, ticks
+from bns.api.common.shown import Shown, drawn
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log
 from bns.api.model import Given
 from bns.diagnose.design.limits import arena_of, bounds_of
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.design.proposal import propose as search
+from bns.diagnose.design.search import GENERATIONS
 from bns.diagnose.report.proposal_figure import trial_axes
 from bns.diagnose.report.proposal_text import proposal_text
+from bns.diagnose.settings.chosen import in_force
 from bns.errors import DataError
 from bns.physics.effect import Effect
 from bns.physics.jointed.model import JointedModel
 from bns.store.disk.files import publish
 
 MOST_MINUTES = 600.0
+PHASES = {"competing models": 0.0, "random trials": 0.15, "random commands, for comparison": 0.75, "power": 0.9}
+"""What share of the planning is done when it tells so."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,7 +76,7 @@ class ProposeResult(Shown):
     def to_json(self) -> dict[str, Any]:
         """One object of plain values, the same that `bns propose --json` prints."""
         ready = self.diagnosis.ready
-        return {**self.proposal.as_json(), "provenance": provenance(ready.model, ready.log.sha256)}
+        return {**self.proposal.as_json(), "provenance": provenance(ready.model, ready.log.sha256, self.diagnosis.settings)}
 
     def plot(self, ax: Axes | None = None, trial: int = 0) -> Axes:
         """One proposed trial (by its number from 0) in the arena, as each explanation foresees it. DataError if there is none."""
@@ -90,10 +95,11 @@ def propose(
     model: Given,
     *,
     minutes: float = 10.0,
-    arena: tuple[float, float] | None = None,
+    arena: tuple[float, ...] | None = None,
     start: tuple[float, float, float] | None = None,
     speeds: tuple[float, float] | None = None,
     also: Iterable[Effect | str | PathLike[str]] = (),
+    fresh: bool = False,
     progress: Progress | None = None,
 ) -> ProposeResult:
     """Diagnose, then find the experiment that tells the remaining explanations apart.
@@ -102,25 +108,28 @@ def propose(
         log: a file, a table, or `bns.Measurements`.
         model: `bns.Model`, or the name or file of one.
         minutes: of driving, above 0 and at most 600.
-        arena: width and height (m) of where the robot may be; by default where it was seen.
+        arena: where the robot may be: (width, height) in m around the start, or (lowest x, highest x, lowest y, highest y) in m;
+            by default where it was seen.
         start: x_m, y_m (m) and heading_rad (rad, counter-clockwise from x) of the start of every trial; by default as before.
         speeds: lowest and highest of a wheel (m/s); by default the robot's own and those seen.
         also: effects of your own, tried beside the listed ones.
-        progress: told what is being worked out.
+        fresh: work out the diagnosis again even where the same was asked before.
+        progress: told the share that is done (0 to 1) and what is being worked out.
 
     Raises:
         DataError: as `bns.diagnose`; limits that make no sense; or there are no two explanations to tell apart.
     """
     checked_minutes(minutes)
-    found = diagnose(log, model, also=also, progress=progress)
-    return proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=progress)
+    found = diagnose(log, model, also=also, fresh=fresh, progress=part(progress, 0.0, 0.5))
+    rest = part(progress, 0.5, 1.0)
+    return proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
 
 
 def proposed(
     found: DiagnoseResult,
     *,
     minutes: float = 10.0,
-    arena: tuple[float, float] | None = None,
+    arena: tuple[float, ...] | None = None,
     start: tuple[float, float, float] | None = None,
     speeds: tuple[float, float] | None = None,
     progress: Progress | None = None,
@@ -134,7 +143,11 @@ def proposed(
         )
     tracks = found.ready.predictor.tracks
     inside, bounds = arena_of(tracks, arena, start), bounds_of(tracks, found.ready.model, speeds)
-    return ProposeResult(found, search(found.diagnosis, inside, bounds, minutes, tick=ticks(progress)))
+    meter = Meter(progress, PHASES, pace=GENERATIONS)
+    with in_force(found.settings):
+        result = ProposeResult(found, search(found.diagnosis, inside, bounds, minutes, tick=meter))
+    meter.done()
+    return result
 
 
 def checked_minutes(minutes: float) -> None:

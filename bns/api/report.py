@@ -9,14 +9,19 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 
-from bns.api.common.shown import Progress, Shown, ticks
+from bns.api.common.progress import Meter, Progress, part
+from bns.api.common.shown import Shown
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log
 from bns.api.model import Given
 from bns.api.propose import checked_minutes, checked_output, proposed
 from bns.diagnose.report.page import gathered, report_html
+from bns.diagnose.settings.chosen import in_force
 from bns.physics.effect import Effect
 from bns.store.disk.files import publish
+
+PHASES = {"where the model fails": 0.0, "the error, step by step": 0.1, "the next experiment": 0.3, "paths": 0.9}
+"""What share of the page is done when it tells so."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,6 +64,7 @@ def report(
     start: tuple[float, float, float] | None = None,
     speeds: tuple[float, float] | None = None,
     also: Iterable[Effect | str | PathLike[str]] = (),
+    fresh: bool = False,
     progress: Progress | None = None,
 ) -> ReportResult:
     """Diagnose, propose the next experiment, and write both as one page that needs no other file and no network.
@@ -71,8 +77,9 @@ def report(
     """
     checked_minutes(minutes)
     checked_output(Path(path), "The report", ".html")
-    found = diagnose(log, model, also=also, progress=progress)
-    return reported(found, path, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=progress)
+    found = diagnose(log, model, also=also, fresh=fresh, progress=part(progress, 0.0, 0.4))
+    rest = part(progress, 0.4, 1.0)
+    return reported(found, path, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
 
 
 def reported(
@@ -89,16 +96,20 @@ def reported(
     """The page of a diagnosis that is there. ``command``: words (data, model) that the commands shown on the page repeat."""
     checked_minutes(minutes)
     target, ready = checked_output(Path(path), "The report", ".html"), found.ready
-    material = gathered(
-        ready.measured,
-        ready.predictor,
-        ready.model,
-        found.diagnosis,
-        lambda: proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=progress).proposal,
-        ticks(progress),
-    )
-    page = report_html(material, command or repeated(fspath(ready.measured.path), ready.model.name)).encode()
+    meter = Meter(progress, PHASES, pace=1)
+    planning = part(progress, PHASES["the next experiment"], PHASES["paths"])
+    with in_force(found.settings):
+        material = gathered(
+            ready.measured,
+            ready.predictor,
+            ready.model,
+            found.diagnosis,
+            lambda: proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=planning).proposal,
+            meter,
+        )
+        page = report_html(material, command or repeated(fspath(ready.measured.path), ready.model.name)).encode()
     publish(page, target.with_name(f".{target.name}.part"), target)
+    meter.done()
     return ReportResult(target, found, len(page))
 
 

@@ -15,7 +15,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from bns.api.common.shown import Progress, Shown, drawn, silent
+from bns.api.common.progress import Progress, silent
+from bns.api.common.shown import Shown, drawn
 from bns.approaches import check_networked
 from bns.bootstrap import loop
 from bns.errors import ModelError, SpecError, unknown_name

@@ -13,7 +13,8 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from bns.api.common.shown import Progress, Shown, plain, silent
+from bns.api.common.progress import Progress, silent
+from bns.api.common.shown import Shown, plain
 from bns.errors import SpecError
 from bns.sweep.budget import Budget
 from bns.sweep.confirm import confirmation
@@ -90,6 +91,8 @@ class Sweep(Shown):
         robot: khepera or snake, with options (snake+changes).
         grid: parameter -> its values; the product of all.
         zip: parameter -> its values, taken in step; multiplied with the grid.
+        sample: combinations drawn from ranges, multiplied with the grid: ``{"lhs": 40, "ranges": {"mutation_rate": [0.02,
+            0.3]}}``; in place of lhs: sobol, random.
         fixed: parameter -> the one value.
         exclude: combinations of the product with all these values are left out.
         include: further combinations, on top of ``fixed``.
@@ -109,6 +112,7 @@ class Sweep(Shown):
         *,
         grid: Combos | None = None,
         zip: Combos | None = None,
+        sample: Mapping[str, Any] | None = None,
         fixed: Mapping[str, Any] | None = None,
         exclude: Iterable[Mapping[str, Any]] | None = None,
         include: Iterable[Mapping[str, Any]] | None = None,
@@ -116,7 +120,7 @@ class Sweep(Shown):
         first_seed: int = 0,
     ) -> None:
         tree: dict[str, Any] = {"name": name, "robot": robot, "seeds": seeds, "first_seed": first_seed}
-        parts = {"fixed": fixed, "grid": grid, "zip": zip, "exclude": exclude, "include": include}
+        parts = {"fixed": fixed, "grid": grid, "zip": zip, "sample": sample, "exclude": exclude, "include": include}
         tree |= {key: _plain_part(part) for key, part in parts.items() if part is not None}
         self._described = _parsed(tree)
 

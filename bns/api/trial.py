@@ -12,7 +12,8 @@ from typing import Any, Unpack
 
 from matplotlib.axes import Axes
 
-from bns.api.common.shown import Progress, Shown
+from bns.api.common.progress import Progress
+from bns.api.common.shown import Shown
 from bns.api.measurements import Measurements
 from bns.api.run import Parameters, Row, RunResult, spec_of, telling
 from bns.errors import HardwareError, SpecError
@@ -99,6 +100,7 @@ def trial(
     Raises:
         HardwareError: a port, robot, camera or plan that cannot be used; nothing has moved.
         TrialPausedError: stopped with the robot confirmed still; ``resume=True`` goes on.
+        TrialFileError: a file could not be written; the robot stands, ``resume=True`` goes on.
         StopNotConfirmedError: the robot may still be moving.
         SpecError: a parameter that there is none of, or whose value is not allowed.
     """

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import threading
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from bns.api.diagnose import DiagnoseResult
 from bns.api.measurements import Log
 from bns.api.model import Given
 from bns.app.background import Background
+from bns.app.results.study import Study, is_store
+from bns.app.session import is_session, opened
 from bns.app.tab import FIRST_MODEL, Tab, Tabs
 from bns.extras import require
 
@@ -17,12 +20,14 @@ from bns.extras import require
 class Explorer:
     """A page that is being served; ``address`` opens it in a browser on this machine."""
 
-    def __init__(self, tabs: Tabs, port: int = 0) -> None:
+    def __init__(self, shown: Tabs | Study, port: int = 0) -> None:
         require("app", "panel", "bokeh")
-        from bns.app.page import page  # noqa: PLC0415  # needs Panel
-        from bns.app.server import PageServer  # noqa: PLC0415
+        from bns.app.page import ICON, page  # noqa: PLC0415  # needs Panel
+        from bns.app.results.page import results_page  # noqa: PLC0415
+        from bns.app.web.server import PageServer  # noqa: PLC0415
 
-        self._server = PageServer(lambda: page(tabs), port)  # Panel would show a partial, not call it
+        made = (lambda: results_page(shown, ICON)) if isinstance(shown, Study) else (lambda: page(shown))
+        self._server = PageServer(made, port)  # Panel would show a partial, not call it
         self.address = self._server.address
         self._thread: threading.Thread | None = None
 
@@ -55,22 +60,34 @@ def explore(
     """Open the page and go on; ``.stop()`` ends it.
 
     Args:
-        log: measurements, or what `bns.diagnose` found; without any, the page offers sample logs.
+        log: measurements, what `bns.diagnose` found, or the file of a saved session; or a folder of results, whose runs are shown
+            then; without any, the page offers sample logs.
         model: `bns.Model`, or the name or file of one; a diagnosis brings its own.
         port: of this machine, by default any that is free.
         browser: open it in the user's browser.
 
     Raises:
-        DataError, ModelError: measurements or a model that cannot be used.
+        DataError, ModelError, StoreError: measurements, a model or results that cannot be used.
         MissingExtraError: the extra ``app`` is not installed.
     """
-    return Explorer(tabs_of(log, model), port).start(browser)
+    return Explorer(shown_of(log, model), port).start(browser)
+
+
+def shown_of(
+    log: Log | DiagnoseResult | None, model: Given, data_words: str = "", model_words: tuple[str, ...] = ()
+) -> Tabs | Study:
+    """A store's runs, or what every tab begins with."""
+    if isinstance(log, str | PathLike) and is_store(Path(log)):
+        return Study(Path(log))
+    return tabs_of(log, model, data_words, model_words)
 
 
 def tabs_of(
     log: Log | DiagnoseResult | None, model: Given, data_words: str = "", model_words: tuple[str, ...] = ()
 ) -> Tabs:
     """What every tab begins with."""
+    if isinstance(log, str | PathLike) and is_session(Path(log)):
+        return Tabs(opened(Path(log)))
     first, kept = Tab(), None
     if isinstance(log, DiagnoseResult):
         kept, model, log = Background(log), log.ready.model, log.ready.log

@@ -6,22 +6,25 @@ import secrets
 import shutil
 import tempfile
 import weakref
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from bns.api.compare import CompareResult, compare
-from bns.api.diagnose import diagnose
+from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model, as_model
+from bns.api.propose import ProposeResult
+from bns.api.run import RunResult
 from bns.app.background import Background
 from bns.app.switches import History, Switches
 from bns.app.workbench import Workbench
-from bns.diagnose.data.guess_mapping import drafted
-from bns.diagnose.data.load import read_table
+from bns.diagnose.data.guess.mapping import drafted
+from bns.diagnose.data.sources.read import read_table
 from bns.errors import DataError, ModelError
 
 FIRST_MODEL = "khepera"
@@ -34,17 +37,23 @@ MOST_TABS = 16
 class Tab:
     """``log``: all trials as read; ``left_out``: names of trials that take no part; ``bench`` is None until a log is open.
 
-    ``data_words``, ``model_words``: what to write for them on a command line.
+    ``data_words``, ``model_words``: what to write for them on a command line; ``files``: where the log lies; ``mapping``: how its
+    columns were read, where the user wrote that; ``snapshots``: states of the switches that the user named.
     """
 
     log: Measurements | None = None
     data_words: str = ""
+    files: tuple[str, ...] = ()
+    mapping: Mapping[str, Any] | None = None
     left_out: tuple[str, ...] = ()
     model: Model = field(default_factory=lambda: Model(FIRST_MODEL))
     model_words: tuple[str, ...] = (FIRST_MODEL,)
     bench: Workbench | None = None
     history: History = field(default_factory=History)
-    diagnosis: Background = field(default_factory=Background)
+    snapshots: dict[str, Switches] = field(default_factory=dict)
+    diagnosis: Background[DiagnoseResult] = field(default_factory=Background)
+    evolution: Background[RunResult] = field(default_factory=Background)
+    experiment: Background[ProposeResult] = field(default_factory=Background)
     why_no_bench: str = ""
     _folder: Path | None = None
     _compared: dict[Any, CompareResult] = field(default_factory=dict)
@@ -57,19 +66,33 @@ class Tab:
             weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         return self._folder
 
-    def open(self, log: Log, words: str, mapping: Mapping[str, Any] | None = None) -> None:
-        """Another log; DataError if it cannot be used, and everything stays as it was."""
-        self.log, self.data_words, self.left_out = Measurements(log, mapping=mapping), words, ()
+    def open(self, log: Log, words: str, mapping: Mapping[str, Any] | None = None, files: Sequence[str] = ()) -> None:
+        """Another log, which lies in ``files`` if it is read already. DataError: it cannot be used, and all stays as it was."""
+        self.log = log if isinstance(log, Measurements) else Measurements(log, mapping=mapping)
+        self.data_words, self.left_out, self.mapping = words, (), mapping
+        self.files = tuple(files) or _files_of(log)
         self._lay_on()
 
-    def upload(self, files: Mapping[str, bytes]) -> None:
-        """Files of the browser, by their names: logs, and mappings that belong beside them."""
-        for name, content in files.items():
-            (self.folder / Path(name).name).write_bytes(content)
-        logs = [self.folder / Path(n).name for n in files if not n.endswith((".yaml", ".yml"))]
+    def keep(self, files: Mapping[str, bytes]) -> list[Path]:
+        """Files of the browser, by their names, written where the tab keeps them."""
+        paths = [self.folder / Path(name).name for name in files]
+        for path, content in zip(paths, files.values(), strict=True):
+            path.write_bytes(content)
+        return paths
+
+    def upload(self, files: Sequence[Path]) -> None:
+        """Open files that were kept: logs, and mappings that belong beside them."""
+        logs = [path for path in files if path.suffix not in {".yaml", ".yml"}]
         if not logs:
             raise DataError("There is no log among these files; give a .csv or .parquet file of measurements.")
         self.open(list(map(str, logs)), logs[0].name)
+
+    def become(self, other: Tab) -> None:
+        """All that another tab is about; its own folder stays."""
+        self.diagnosis.stop()
+        for each in fields(self):
+            if each.name != "_folder":
+                setattr(self, each.name, getattr(other, each.name))
 
     def leave_out(self, trials: tuple[str, ...]) -> None:
         """Other trials take no part. DataError if none would be left."""
@@ -111,8 +134,11 @@ class Tab:
 
     def _lay_on(self) -> None:
         """Log and model on the bench, all switches off; why that cannot be is kept in words."""
-        self.diagnosis.stop()
-        self.bench, self.history, self.diagnosis = None, History(), Background()
+        for work in (self.diagnosis, self.evolution, self.experiment):
+            work.stop()
+        self.bench, self.history = None, History()
+        self.diagnosis, self.evolution, self.experiment = Background(), Background(), Background()
+        self.snapshots.clear()
         self._compared.clear()
         self.why_no_bench = ""
         if self.used is None:
@@ -121,6 +147,14 @@ class Tab:
             self.bench = Workbench(self.used, self.model)
         except (DataError, ModelError) as fault:
             self.why_no_bench = str(fault)
+
+
+def _files_of(log: Log) -> tuple[str, ...]:
+    """Absolute paths of a log that is files; none where it is a table in memory."""
+    given = [log] if isinstance(log, str | PathLike) else log
+    if not isinstance(given, list | tuple) or not all(isinstance(one, str | PathLike) for one in given):
+        return ()
+    return tuple(str(Path(one).absolute()) for one in given)
 
 
 def mapping_of(text: str) -> dict[str, Any]:
@@ -156,11 +190,14 @@ class Tabs:
             return name, tab
         name, tab = secrets.token_urlsafe(6), Tab()
         if self.first is not None and self.first.log is not None:
-            tab.log, tab.data_words, tab.model = self.first.log, self.first.data_words, self.first.model
-            tab.model_words = self.first.model_words
+            tab.log, tab.data_words, tab.files = self.first.log, self.first.data_words, self.first.files
+            tab.model, tab.model_words, tab.mapping = self.first.model, self.first.model_words, self.first.mapping
+            tab.left_out = self.first.left_out
             tab._lay_on()
             if self.first.diagnosis.result is not None:
                 tab.diagnosis = self.first.diagnosis
+            tab.history.to(self.first.now)
+            tab.snapshots.update(self.first.snapshots)
         self.known[name] = tab
         while len(self.known) > MOST_TABS:
             self.known.pop(next(iter(self.known))).diagnosis.stop()

@@ -119,12 +119,17 @@ class Workbench:
         errors = paired_errors(predictor, list(zip([*fitted.names, BY_HAND], steps, strict=True)))
         return replace(fitted, switches=switches, model=model, errors=errors, steps=steps)
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The log's further columns, which a formula may use."""
+        return tuple(self.ready.predictor.tracks.extra)
+
     def effect(self, switches: Switches, name: str) -> tuple[Effect, Mapping[str, str]]:
         """A listed effect or a formula, and how a model file writes it. The same object each time: fits are known by it."""
         for term in switches.terms:
             if term.name == name:
                 if term not in self._formulas:
-                    self._formulas[term] = formula_effect(term.name, term.term, term.on)
+                    self._formulas[term] = formula_effect(term.name, term.term, term.on, self.columns)
                 return self._formulas[term], {"term": term.term, "on": term.on}
         return self.catalogue[name], {}
 
@@ -137,7 +142,7 @@ class Workbench:
         """Times (frames,) and poses (frames, 3) of a trial."""
         tracks = self.ready.predictor.tracks
         rows = slice(tracks.first[trial], tracks.first[trial + 1])
-        return tracks.t_s[rows], tracks.pose[rows]
+        return tracks.own_s[rows], tracks.pose[rows]
 
     def windows(self, steps: Steps, horizon: str) -> pd.DataFrame:
         """The judged windows, a row each: trial, number (of the trial), t_s (of its end), x_m, y_m (measured there), error_mm,
@@ -148,8 +153,8 @@ class Workbench:
             {
                 "trial": np.array(tracks.names, dtype=object)[errors.trial],
                 "number": errors.trial,
-                "from_s": tracks.t_s[errors.start],
-                "t_s": tracks.t_s[errors.end],
+                "from_s": tracks.own_s[errors.start],
+                "t_s": tracks.own_s[errors.end],
                 "x_m": tracks.pose[errors.end, 0],
                 "y_m": tracks.pose[errors.end, 1],
                 "error_mm": 1e3 * errors.position_m,

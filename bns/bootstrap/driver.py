@@ -23,6 +23,8 @@ class Drive:
     commands: np.ndarray
     poses: np.ndarray
     rounds: int = 0
+    skipped: bool = False
+    """Somebody passed over this evaluation: nothing is learned from it, and it has no row."""
 
 
 class Driver(Protocol):

@@ -64,6 +64,8 @@ def run(
         # 1. A controller is picked and driven in the world.
         foretold_by, controller = approach.simulator, approach.pick(evaluation)
         drive = driver.drive(evaluation, controller, approach.advance)
+        if drive.skipped:
+            continue
         recorder.add_evaluated(evaluation, drive, foretold_by)
         # 2. The approach takes in what it did.
         approach.learn(drive.commands, drive.poses, evaluation)

@@ -24,18 +24,18 @@ from bns.cli.options.option_types import add_spec_options, duration, positive
 from bns.cli.options.sweep_options import DEVICES
 from bns.cli.options.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.cli.parser import SHELLS, Completion, Parser, add_results, add_trust, take_trust
+from bns.cli.streams import usable_streams
 from bns.errors import BnsError
 from bns.spec import FIELDS, RunSpec
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _NO_PLACE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.EACCES, errno.EPERM, errno.EROFS}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of ``bns``. Exit codes: 0 done, 1 some runs failed, 2 bad input, 130 interrupted, 143 terminated."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by whoever called
-            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115  # for the life of the process
+    usable_streams()
     warnings.showwarning = _show_warning
     options = _parser().parse_args(arguments)
     try:
@@ -54,9 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("bns: out of memory; use a smaller population or fewer jobs", file=sys.stderr)
         return BnsError.exit_code
     except OSError as error:
-        if error.errno == errno.ENOSPC:
+        if error.errno in _FULL:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            print(f"bns: cannot write the output: {error.strerror}", file=sys.stderr)
+            print(f"bns: cannot write {error.filename or 'the output'}: {error.strerror}", file=sys.stderr)
         elif error.errno in _NO_PLACE and error.filename is not None:
             print(
                 f"bns: cannot use {error.filename}: {error.strerror}. Name another place, or mend that one.",
@@ -160,7 +160,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def trial(options: argparse.Namespace) -> int:
-    """A run whose world is a robot; codes 0 done, 2 bad input, 3 paused, 4 a robot that may still be moving."""
+    """A run whose world is a robot; codes 0 done, 2 bad input, 3 paused, 4 it may still be moving, 5 a file cannot be written."""
     from bns.extras import require
 
     if options.replay is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -15,7 +15,7 @@ import yaml
 from bns.diagnose.data.load import Measured
 from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
-from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.fit_set import Tried, fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fitting
@@ -55,11 +55,14 @@ Memory = dict[tuple[str, bool, frozenset[Effect]], tuple[Judged, Fit]]
 
 
 def effect_from(
-    text: str, model: Model, term: str | None = None, on: str | None = None
+    text: str, model: Model, term: str | None = None, on: str | None = None, columns: Iterable[str] = ()
 ) -> tuple[Effect, dict[str, str]]:
-    """The effect of a name that the model can lack, of a Python file, or of a formula; and how a model file says so."""
+    """The effect of a name that the model can lack, of a Python file, or of a formula; and how a model file says so.
+
+    ``columns``: of the log, which a formula may use.
+    """
     if term is not None:
-        return formula_effect(text, term, on or "v"), {"term": term, "on": on or "v"}
+        return formula_effect(text, term, on or "v", columns), {"term": term, "on": on or "v"}
     if text.endswith(".py"):
         return effect_in_file(Path(text)), {"file": str(Path(text).resolve())}
     return model.effect_named(text), {}
@@ -73,11 +76,12 @@ def add_effects(
     measured: Measured,
     per_trial: bool = False,
     memory: Memory | None = None,
+    told: Callable[[float, str], None] = lambda _share, _text: None,
 ) -> ExtendedModel:
     """Add effects one after the other, each fitted with all before it; ModelError if the model has one already.
 
     ``per_trial``: an effect that may differ from trial to trial does. ``memory``: fits of earlier calls with the same predictor;
-    those of this one are added.
+    those of this one are added. ``told``: the share that is done (0 to 1), and what is being fitted.
     """
     if per_trial and not any(effect.per_trial_allowed for effect, _ in effects):
         able = ", ".join(e.name for e in model.catalogue().values() if e.per_trial_allowed) or "none of this robot"
@@ -90,7 +94,10 @@ def add_effects(
             )
     effects = [(fitting(effect, model, predictor.tracks), written) for effect, written in effects]
     memory = {} if memory is None else memory
-    judged = [_judged(predictor, model, effects[: k + 1], per_trial, memory) for k in range(len(effects))]
+    judged, tried = [], Tried()
+    for k, (effect, _) in enumerate(effects):  # the k-th fit is of k effects, and takes about k times as long
+        told(k * (k + 1) / (len(effects) * (len(effects) + 1)), f"fitting with {effect.name}")
+        judged.append(_judged(predictor, model, effects[: k + 1], per_trial, memory, tried))
     first = steps_of(predictor, problem_for(predictor, model).pose_filter, model)
     steps = (first, *(one.held_out(predictor) for one, _ in judged))
     names = (AS_GIVEN, *(effect.name for effect, _ in effects))
@@ -105,21 +112,26 @@ def _judged(
     effects: Sequence[tuple[Effect, Mapping[str, str]]],
     per_trial: bool,
     memory: Memory,
+    tried: Tried,
 ) -> tuple[Judged, Fit]:
     """The model with these effects, fitted and predicted on trials held out; from ``memory`` where the set is known there."""
     key = (model.canonical_json(), per_trial, frozenset(effect for effect, _ in effects))
     if key not in memory:
-        problem, fit = _step(predictor, model, effects, per_trial)
+        problem, fit = _step(predictor, model, effects, per_trial, tried)
         steps = held_out_steps(predictor, problem.pose_filter, fit.model)
         memory[key] = Judged("", fit.model, problem.pose_filter, steps), fit
     return memory[key]
 
 
 def _step(
-    predictor: Predictor, model: Model, effects: Sequence[tuple[Effect, Mapping[str, str]]], per_trial: bool
+    predictor: Predictor,
+    model: Model,
+    effects: Sequence[tuple[Effect, Mapping[str, str]]],
+    per_trial: bool,
+    tried: Tried,
 ) -> tuple[Problem, Fit]:
     """The model with these effects, all numbers fitted."""
-    problem, fit, _ = fit_set(predictor, model, [effect for effect, _ in effects])
+    problem, fit, _ = fit_set(predictor, model, [effect for effect, _ in effects], tried=tried)
     written = fit.model
     for effect, how in effects:
         written = _written(written, effect.name, how)

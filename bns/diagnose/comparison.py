@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,19 +97,25 @@ class Comparison:
 
 
 @one_thread_each()
-def compare(predictor: Predictor, model: Model, seed: int = 0) -> Comparison:
-    """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands."""
+def compare(
+    predictor: Predictor, model: Model, seed: int = 0, tick: Callable[[str], None] = lambda _: None
+) -> Comparison:
+    """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands; ``tick`` is told what is being done."""
     tracks = predictor.tracks
     if not (np.diff(tracks.first) > 1).any():
         raise DataError(
             "No trial has two tracked poses, and a displacement needs two: log the pose before and after commands."
         )
+    tick("noise")
     problem = problem_for(predictor, model)
+    tick("errors")
     fit = _as_is(problem, model)
     steps = steps_of(predictor, problem.pose_filter, fit.model)
     judged = paired_errors(predictor, [(model.name, steps)])
     errors = {h: judged_windows(predictor, steps, h) for h in predictor.horizons}
+    tick("what explains them")
     dependence = residual_dependence(problem, fit)
+    tick("curves")
     return Comparison(
         model.name,
         len(tracks),
@@ -142,7 +148,7 @@ def _worst(predictor: Predictor, errors: Errors, most: int = 5) -> list[Moment]:
             out.append(
                 Moment(
                     tracks.names[trial],
-                    float(tracks.t_s[errors.start[i]]),
+                    float(tracks.own_s[errors.start[i]]),
                     float(errors.position_m[i]),
                     float(errors.heading_rad[i]),
                 )

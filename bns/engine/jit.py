@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
+import stat
 import tempfile
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -28,11 +32,7 @@ def cache_folder() -> Path:
     Numba looks only at the date of the file a kernel stands in, not at the helpers it inlines from others; so the
     folder is named after the text of all of them, and a change anywhere begins a new one.
     """
-    digest = hashlib.sha256()
-    for folder in _WITH_KERNELS:
-        for file in sorted((_PACKAGE / folder).rglob("*.py")):
-            digest.update(file.read_bytes())
-    name = f"kernels-{digest.hexdigest()[:12]}"
+    name = _text_name()
     home = os.environ.get("XDG_CACHE_HOME") or str(Path("~/.cache").expanduser())
     for place in (_PACKAGE / "__pycache__" / name, Path(home) / "bns" / name):
         try:
@@ -41,8 +41,46 @@ def cache_folder() -> Path:
             continue
         if os.access(place.parent, os.W_OK):
             return place
-    user = f"bns-{os.getuid()}" if hasattr(os, "getuid") else "bns"  # on Windows each user has a folder for these
-    return Path(tempfile.gettempdir()) / user / name
+    return _in_temporary_folder(name)
+
+
+def _text_name() -> str:
+    digest = hashlib.sha256()
+    for folder in _WITH_KERNELS:
+        for file in sorted((_PACKAGE / folder).rglob("*.py")):
+            digest.update(file.read_bytes())
+    return f"kernels-{digest.hexdigest()[:12]}"
+
+
+def _in_temporary_folder(name: str) -> Path:
+    """A folder that nobody else can write into: what lies in a cache of kernels is run.
+
+    Everybody knows the name of the lasting one. One that is somebody else's is not used: a new one is made, which the processes
+    started from here share through the environment, and the kernels are compiled again next time.
+    """
+    shared = Path(tempfile.gettempdir())
+    if not hasattr(os, "getuid"):  # on Windows each user has a temporary folder
+        return shared / "bns" / name
+    place = shared / f"bns-{os.getuid()}"
+    with suppress(OSError):
+        place.mkdir(mode=0o700, exist_ok=True)
+        if is_private(place):
+            return place / name
+    warnings.warn(
+        f"{place} is not this user's own folder: compiled kernels are not taken from there but compiled for this process alone. "
+        "Remove it, or set XDG_CACHE_HOME to a folder of yours.",
+        stacklevel=2,
+    )
+    place = Path(tempfile.mkdtemp(prefix="bns-"))
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
+    os.environ["NUMBA_CACHE_DIR"] = str(place / name)
+    return place / name
+
+
+def is_private(folder: Path) -> bool:
+    """Whether a folder (not a link to one) belongs to this user, and nobody else may write into it. POSIX only."""
+    found = folder.lstat()
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 
 def _configure() -> None:
@@ -60,7 +98,7 @@ _configure()
 
 def _mark(robot: str, world: str) -> Path:
     # One for each text of the kernels, numba and kind of processor: what another has compiled is of no use.
-    return Path(_config.CACHE_DIR) / f"{cache_folder().name}-{robot}-{world}-{numba.__version__}-{llvm.get_host_cpu_name()}"
+    return Path(_config.CACHE_DIR) / f"{_text_name()}-{robot}-{world}-{numba.__version__}-{llvm.get_host_cpu_name()}"
 
 
 def compiled(robot: str, world: str) -> bool:

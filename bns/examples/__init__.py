@@ -8,6 +8,7 @@ from pathlib import Path
 from bns.errors import BnsError
 
 FOLDER = Path(__file__).resolve().parent / "files"
+ROBOT = Path(__file__).resolve().parent / "robot"
 FILES = ("README.md", "khepera-log.csv", "khepera-log.csv.import.yaml", "my-sweep.yaml", "example.py")
 
 
@@ -17,10 +18,23 @@ def copy_example(folder: str | Path) -> list[Path]:
     Raises:
         BnsError: ``folder`` is no folder, or not empty: nothing is written over.
     """
+    folder = _emptied(folder)
+    return [Path(shutil.copy(FOLDER / name, folder / name)) for name in FILES]
+
+
+def copy_robot(folder: str | Path) -> list[Path]:
+    """Copy the package of a robot of one's own likewise: README first, then all other files."""
+    folder = _emptied(folder)
+    shutil.copytree(ROBOT, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+    return sorted((file for file in folder.rglob("*") if file.is_file()), key=lambda file: (file.name != "README.md", str(file)))
+
+
+def _emptied(folder: str | Path) -> Path:
+    """The folder, made if it is missing; BnsError if it cannot be begun in."""
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
         raise BnsError(f"{folder} is a file; give a folder that is new or empty.")
     if folder.is_dir() and any(folder.iterdir()):
         raise BnsError(f"the folder {folder} is not empty, and nothing is written over; give one that is new or empty.")
     folder.mkdir(parents=True, exist_ok=True)
-    return [Path(shutil.copy(FOLDER / name, folder / name)) for name in FILES]
+    return folder

@@ -13,7 +13,8 @@ from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.khepera import BAUD, KheperaIII, RobotLostError, check_battery
+from bns.hardware.khepera import BAUD, KheperaIII, check_battery
+from bns.hardware.khepera_settings import khepera_settings
 from bns.hardware.platforms.snake import open_chain
 from bns.hardware.rig import Rig
 from bns.hardware.serial_link import SerialLink
@@ -23,6 +24,7 @@ from bns.hardware.tracking.calibration import WORST_RMS_PX, load_calibration
 from bns.hardware.tracking.evdev import CLASS, input_devices
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.wii import KERNEL_NAME
+from bns.hardware.wheel_drive import RobotLostError
 
 with extra("robot"):
     from serial.tools.list_ports import comports
@@ -133,7 +135,7 @@ def servos_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
 def khepera_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
     """Firmware, speeds and battery of a Khepera."""
     journal = HardwareLog(None, clock)
-    link = SerialLink(rig.port, BAUD, clock, journal)
+    link = SerialLink(rig.port, BAUD, clock, journal, khepera_settings(rig.driver).reply)
     try:
         robot = KheperaIII(link, clock, journal)
         made = robot.firmware
@@ -143,6 +145,8 @@ def khepera_of(rig: Rig, clock: Clock) -> Iterator[Finding]:
         yield Finding(True, f"battery {volts:.2f} V")
         still = max(abs(v) for v in robot.speed_m_s())
         yield Finding(still < 0.005, f"wheels at {still:.3f} m/s", "" if still < 0.005 else "bns trial stops it when it opens it")
+        trip_s, timeout_s = link.times.smoothed_s or 0.0, link.times.timeout_s
+        yield Finding(True, f"answers come after {1000 * trip_s:.0f} ms, and are waited for {1000 * timeout_s:.0f} ms")
         nearer = "bring it nearer" if robot.retries else ""
         yield Finding(not robot.retries, f"{robot.retries} questions had to be asked again", nearer)
     except RobotLostError as error:

@@ -40,11 +40,7 @@ class Ax12Chain:
         self.retries = 0
         self._limits_of: dict[int, tuple[int, int]] = {}
         self._port, self._packets = ClockedPort(port, clock), PacketHandler(1.0)
-        try:
-            opened = self._port.setBaudRate(BAUD)
-        except (OSError, ValueError) as error:  # the SDK lets pyserial's faults through
-            raise HardwareError(f"{port} cannot be opened: {error}. Is the adapter plugged in? Try: bns doctor") from error
-        if not opened:
+        if not self._port.setBaudRate(BAUD):
             raise HardwareError(f"{port} cannot be set to {BAUD} baud; another adapter may be needed.")
         self._check()
 
@@ -90,7 +86,7 @@ class Ax12Chain:
             except IndexError:  # the SDK reads past the end of a status packet that is too short
                 value, result, bits = 0, COMM_RX_CORRUPT, 0
                 problem = "corrupt status packet"
-            except (OSError, TerminalError) as error:
+            except (OSError, TerminalError, HardwareError) as error:
                 self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             finally:
@@ -214,7 +210,7 @@ class Ax12Chain:
     def _all_off(self) -> None:
         """Take the torque off all servos at once; nobody answers that."""
         self._port.is_using = False
-        with suppress(OSError, TerminalError):
+        with suppress(OSError, TerminalError, HardwareError):
             self._reopen()
             self._packets.write1ByteTxOnly(self._port, BROADCAST, REGISTERS["torque_enable"].address, 0)
             self._port.is_using = False

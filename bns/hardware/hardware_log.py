@@ -5,6 +5,10 @@ checksum (`bns.hardware.sealed_lines`).
 
 `t_s` is the trial's clock, `wall_s` the computer's (seconds since 1970). A line that a kill cut in two is dropped when the
 file is opened again; evaluations are synced to the disk before the next one begins.
+
+A log that cannot be written does not raise where something is noted: a driver that is stopping its robot notes things too,
+and must not take a full disk for a lost link. The fault is kept, nothing more is written (what stands is whole but for its last
+line), and `check` and `sync` raise it.
 """
 
 from __future__ import annotations
@@ -12,50 +16,87 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Self, TextIO
+from typing import Any, Self
 
-from bns.errors import HardwareError
+from bns.errors import HardwareError, TrialFileError
 from bns.hardware.clock import Clock
 from bns.hardware.sealed_lines import Seals, checked_lines
+
+_HELD = 1 << 13
+"""Bytes that are kept back before they are written."""
 
 
 class HardwareLog:
     """An open log of one trial; events are appended. Without a path nothing is kept."""
 
     def __init__(self, path: Path | None, clock: Clock) -> None:
-        self._clock = clock
-        self._file: TextIO | None = None
+        self._clock, self._path = clock, path
+        self._descriptor: int | None = None
+        self._held = bytearray()
+        self._fault: OSError | None = None
+        self.listeners: list[Callable[[str, Mapping[str, Any]], None]] = []
+        """Told the kind and content of every event."""
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._seals = Seals(_drop_torn_line(path))
-            self._file = path.open("a", encoding="utf-8")
+            self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
 
     def note(self, kind: str, **what: Any) -> None:
-        """Append one event."""
-        if self._file is not None:
+        """Append one event; never raises because of the file."""
+        for listener in self.listeners:
+            listener(kind, what)
+        if self._descriptor is not None and self._fault is None:
             event = {"t_s": round(self._clock.now_s(), 6), "wall_s": round(time.time(), 6), "kind": kind, **what}
-            self._file.write(self._seals.line(json.dumps(event, separators=(",", ":"), allow_nan=False)))
+            self._held += self._seals.line(json.dumps(event, separators=(",", ":"), allow_nan=False)).encode()
+            if len(self._held) > _HELD:
+                self._write()
+
+    def check(self) -> None:
+        """TrialFileError if something that was noted could not be written."""
+        if self._fault is not None:
+            raise TrialFileError.of(str(self._path), self._fault) from self._fault
 
     def sync(self) -> None:
-        """What was noted so far survives a loss of power."""
-        if self._file is not None:
-            self._file.flush()
-            os.fsync(self._file.fileno())
+        """What was noted so far survives a loss of power; TrialFileError."""
+        if self._descriptor is not None and self._fault is None:
+            self._write(durably=True)
+        self.check()
 
     def close(self) -> None:
-        """Sync and close."""
-        self.sync()
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        """Sync and close; TrialFileError, once it is closed."""
+        if self._descriptor is None:
+            return
+        try:
+            self.sync()
+        finally:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def _write(self, durably: bool = False) -> None:
+        """Write what is held back; a fault is kept."""
+        assert self._descriptor is not None
+        try:
+            rest = memoryview(bytes(self._held))
+            while rest:
+                rest = rest[os.write(self._descriptor, rest) :]
+            if durably:
+                os.fsync(self._descriptor)
+        except OSError as error:
+            self._fault = error
+        self._held.clear()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_error: object) -> None:
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_error: object) -> None:
+        if kind is None:
+            self.close()
+            return
+        with suppress(TrialFileError):  # what is under way says more than that the log has failed, too
+            self.close()
 
 
 def events(path: Path, *kinds: str) -> Iterator[dict[str, Any]]:

@@ -14,32 +14,38 @@ from typing import Protocol
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.reply_time import ReplyTime
 from bns.hardware.serial_link import NoReplyError
 from bns.hardware.stop import Stop
+from bns.hardware.wheel_drive import RobotLostError
 
 BAUD = 115200
 ATTEMPTS = 4
-"""How often a question is asked before the robot counts as lost."""
+"""How often a question is asked, waited for twice as long each time, before the robot counts as lost."""
 STILL_M_S = 0.005
 """A wheel slower than this stands still: three quanta of the speed reading, and less than half a millimetre to coast."""
 _READINGS = 2
 """The protocol has no checksum: one reading can be garbled into a zero, two in a row hardly."""
 _OBEYS_S = 0.2
 """An order to stop that shows no effect for so long is given again."""
+WHEELBASE_M = 0.0884
+"""Between the wheels, published."""
 HIGHEST_UNITS = 43_000
 """End of the range that the firmware regulates."""
 _FLAT_V = 6.0
+_SPEEDS = r"e,(-?\d+),(-?\d+)"
 
 
 class Exchange(Protocol):
     """What the driver asks of a link."""
 
-    def exchange(self, request: bytes, hurry: bool = False) -> bytes:
-        """The line that answers; NoReplyError if none does in the link's time-out, or in `hurry` in the time that answers use to
-        take, and then one that was late for the question before is an answer too."""
+    times: ReplyTime
 
-    def forget(self) -> None:
-        """Drop answers that came too late."""
+    def exchange(self, request: bytes, timeout_s: float, again: bool = False) -> bytes:
+        """The line that answers; NoReplyError if none does in that time. `again`: one to what was asked before will do."""
+
+    def close(self) -> None:
+        """Give it free."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +65,11 @@ def firmware(version: int, revision: int) -> Firmware:
     return Firmware(version, revision, 218_720.0, 0.03068e-3)
 
 
-class RobotLostError(Exception):
-    """The robot does not answer any more."""
-
-
 class KheperaIII:
     """Driver. Opening asks for the firmware and the battery and makes sure that the wheels stand still."""
 
-    def __init__(self, link: Exchange, clock: Clock, journal: HardwareLog) -> None:
-        self._link, self._clock, self._journal = link, clock, journal
+    def __init__(self, link: Exchange, clock: Clock, journal: HardwareLog, stop_s: float = 5.0) -> None:
+        self._link, self._clock, self._journal, self._stop_s = link, clock, journal, stop_s
         self.retries = 0
         self.firmware = self._identified()
 
@@ -86,9 +88,13 @@ class KheperaIII:
         self._ask(b"D,l%d,l%d" % tuple(units), "d")
         return units[0] / scale, units[1] / scale
 
+    def close(self) -> None:
+        """Give the link free."""
+        self._link.close()
+
     def speed_m_s(self) -> tuple[float, float]:
         """Speeds of the wheels' surfaces as the robot measures them, m/s."""
-        left, right = self._ask(b"E", r"e,(-?\d+),(-?\d+)")
+        left, right = self._ask(b"E", _SPEEDS)
         return int(left) / self.firmware.units_per_m_s, int(right) / self.firmware.units_per_m_s
 
     def encoders_m(self) -> tuple[float, float]:
@@ -101,22 +107,23 @@ class KheperaIII:
         whole, fraction = self._ask(b"V,0", r"v,(\d+),(\d+)")
         return float(f"{whole}.{fraction:0>4}")
 
-    def stop(self, patience_s: float = 5.0) -> Stop:
+    def stop(self, patience_s: float | None = None) -> Stop:
         """Set both speeds to zero until the robot acknowledges it and reads back still wheels; what came of it. Never raises.
 
-        Nothing is waited for but answers, and for these no longer than they use to take: one that comes later than that still
-        counts. Once acknowledged, the order is given again only if the wheels go on turning: what is lost on the way back takes
-        nothing away from it.
+        Nothing is waited for but answers, and for these no longer than this link makes necessary: one that comes later than that
+        still counts. Once acknowledged, the order is given again only if the wheels go on turning: what is lost on the way back
+        takes nothing away from it. It is tried for `patience_s`, or as long as the rig says.
         """
         began_s, acknowledged_s, ordered_s, still = self._clock.now_s(), None, -math.inf, 0
-        self._link.forget()
+        patience_s = self._stop_s if patience_s is None else patience_s
         while True:
+            timeout_s = self._link.times.timeout_s
             try:
-                if self._clock.now_s() - ordered_s > _OBEYS_S:
-                    self._once(b"D,l0,l0", "d", hurry=True)
+                if self._clock.now_s() - ordered_s > max(_OBEYS_S, 2.0 * timeout_s):
+                    self._once(b"D,l0,l0", "d", timeout_s, again=True)
                     ordered_s = self._clock.now_s()
                     acknowledged_s = acknowledged_s or ordered_s - began_s
-                still, problem = (still + 1 if self._stands() else 0), "the wheels still turn"
+                still, problem = (still + 1 if self._stands(timeout_s) else 0), "the wheels still turn"
             except NoReplyError as error:
                 problem = str(error)
             lasted_s = self._clock.now_s() - began_s
@@ -125,8 +132,8 @@ class KheperaIII:
             if lasted_s > patience_s:
                 return self._stopped(Stop(False, lasted_s, acknowledged_s, problem))
 
-    def _stands(self) -> bool:
-        speeds = (int(v) / self.firmware.units_per_m_s for v in self._once(b"E", r"e,(-?\d+),(-?\d+)", hurry=True))
+    def _stands(self, timeout_s: float) -> bool:
+        speeds = (int(v) / self.firmware.units_per_m_s for v in self._once(b"E", _SPEEDS, timeout_s, again=True))
         return max(abs(v) for v in speeds) <= STILL_M_S
 
     def _stopped(self, stop: Stop) -> Stop:
@@ -135,17 +142,18 @@ class KheperaIII:
 
     def _ask(self, command: bytes, answer: str) -> tuple[str, ...]:
         """The groups of the robot's answer; asked again when nothing or nonsense comes back."""
-        problem = ""
-        for attempt in range(ATTEMPTS):
+        problem, times, began_s, attempt = "", self._link.times, self._clock.now_s(), 0
+        patience_s = times.patience_s
+        while attempt < ATTEMPTS and (left_s := began_s + patience_s - self._clock.now_s()) > 0:
             self.retries += attempt > 0
             try:
-                return self._once(command, answer)
+                return self._once(command, answer, min(times.timeout_s * 2**attempt, left_s), attempt > 0)
             except NoReplyError as error:
-                problem = str(error)
-        raise RobotLostError(f"{problem}; asked {ATTEMPTS} times")
+                problem, attempt = str(error), attempt + 1
+        raise RobotLostError(f"{problem}; asked {attempt} times")
 
-    def _once(self, command: bytes, answer: str, hurry: bool = False) -> tuple[str, ...]:
-        line = self._link.exchange(command + b"\n", hurry).decode("latin-1")
+    def _once(self, command: bytes, answer: str, timeout_s: float, again: bool = False) -> tuple[str, ...]:
+        line = self._link.exchange(command + b"\n", timeout_s, again).decode("latin-1")
         match = re.fullmatch(answer, line)
         if match is None:
             raise NoReplyError(f"the answer to {command.decode()} was {line!r}")

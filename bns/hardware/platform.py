@@ -19,7 +19,8 @@ class Driven:
     commands (k, components): those carried out, with what was really sent and how long it really lasted; poses (k + 1,
     columns): as the robot's module has them, tracked, in the world frame, the first at the start, the others at the end of each
     command; rows: measurements, a row a look; ended: why it was over before its end, or nothing; seconds it took; spans_s: when
-    each command was under way, of a robot whose commands can be unstable.
+    each command was under way, of a robot whose commands can be unstable; stuck: what would not move any more, where that ended
+    it.
     """
 
     commands: np.ndarray
@@ -29,6 +30,7 @@ class Driven:
     ended: str = ""
     seconds: float = 0.0
     spans_s: Sequence[tuple[float, float]] = ()
+    stuck: str = ""
 
 
 class Platform(Protocol):

@@ -15,8 +15,11 @@ from bns.hardware.safety import Limits, Surface
 from bns.registry import PLATFORMS, TRACKERS
 from bns.safe_yaml import Lines, read_yaml, shown, text_of
 
+PLACED_RAD = 0.35
+"""Twenty degrees: as hands place a robot, and no further."""
 _NEEDED = ("robot", "port", "surface_m", "tracker")
-_KEYS = (*_NEEDED, "lost_s", "late_s", "silent_s", "placed_within_m", "placed_within_rad", "driver")
+_TIMES = ("lost_s", "picture_s", "disagree_s", "late_s", "silent_s", "gives_up_s")
+_KEYS = (*_NEEDED, *_TIMES, "placed_within_m", "placed_within_rad", "driver")
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Rig:
     limits: Limits
     placed_within_m: float = 0.1
     driver: Mapping[str, Any] = field(default_factory=dict)
-    placed_within_rad: float = math.pi
+    placed_within_rad: float = PLACED_RAD
 
     def check_task(self, goals_m: np.ndarray) -> None:
         """HardwareError if a goal lies off the surface."""
@@ -83,10 +86,10 @@ def _rig(content: Mapping[str, Any], where: str, lines: Lines) -> Rig:
         raise HardwareError(
             f"{at['tracker']}: tracker is {shown(tracker)}; it needs a kind ({', '.join(TRACKERS.names())}) and its settings."
         )
-    numbers = {name: _positive(at[name], name, content[name]) for name in ("lost_s", "late_s", "silent_s") if name in content}
+    numbers = {name: _positive(at[name], name, content[name]) for name in _TIMES if name in content}
     limits = Limits(_surface(at["surface_m"], content["surface_m"]), **numbers)
     near_m = _positive(at.get("placed_within_m", where), "placed_within_m", content.get("placed_within_m", 0.1))
-    near_rad = _positive(at.get("placed_within_rad", where), "placed_within_rad", content.get("placed_within_rad", math.pi))
+    near_rad = _positive(at.get("placed_within_rad", where), "placed_within_rad", content.get("placed_within_rad", PLACED_RAD))
     driver = content.get("driver") or {}
     if not isinstance(driver, dict):
         raise HardwareError(

@@ -43,12 +43,20 @@ class Surface:
 @dataclass(frozen=True)
 class Limits:
     """What a drive must keep: the surface, how long the robot may be out of sight, how late a look may come, and how long the
-    guard of its port may hear nothing from the trial."""
+    guard of its port may hear nothing from the trial.
+
+    No new picture for `picture_s` stops the robot; poses that do not follow the orders for `disagree_s` pause the trial.
+    After a trial that is gone, its guard tries to stop the robot until that has not answered for `gives_up_s`: four hours, in
+    which the battery of a robot that drives should be empty.
+    """
 
     surface: Surface
     lost_s: float = 0.5
+    picture_s: float = 0.25
+    disagree_s: float = 0.5
     late_s: float = 1.0
     silent_s: float = 0.3
+    gives_up_s: float = 4 * 3600.0
 
 
 class Watch:
@@ -60,20 +68,25 @@ class Watch:
 
     def begin(self) -> None:
         """A drive begins: the robot has just been seen."""
-        self._seen_s = self._looked_s = self._clock.now_s()
+        self._began_s = self._seen_s = self._looked_s = self._clock.now_s()
 
-    def check(self, sight: Sight | None) -> None:
-        """DriveEnded or TrialPausedError if the drive must not go on."""
+    def check(self, sight: Sight | None, picture_s: float | None = None) -> None:
+        """DriveEnded or TrialPausedError if the drive must not go on; `picture_s`: when the newest picture came, if known."""
         now_s = self._clock.now_s()
         self._stopping.check()
         late_s, self._looked_s = now_s - self._looked_s, now_s
         if late_s > self._limits.late_s:
-            raise TrialPausedError(f"the computer was too busy to look at the robot for {late_s:.1f} s; end other programs.")
+            raise TrialPausedError(
+                f"nobody looked at the robot for {late_s:.1f} s: the computer is too busy, or the robot answers too slowly. "
+                "End other programs, bring the robot nearer, or allow more late_s in the rig."
+            )
         if sight is not None:
             self._seen_s = max(self._seen_s, sight.t_s)
             x_m, y_m = float(sight.pose[0]), float(sight.pose[1])
             if not self._limits.surface.holds(x_m, y_m):
                 raise DriveEnded(f"the robot left the surface at ({x_m:.2f}, {y_m:.2f}) m")
+        if picture_s is not None and now_s - max(picture_s, self._began_s) > self._limits.picture_s:
+            raise DriveEnded(f"the camera has sent no new picture for {now_s - picture_s:.2f} s")
         if now_s - self._seen_s > self._limits.lost_s:
             raise OutOfSight(f"the tracker has not seen the robot for {now_s - self._seen_s:.1f} s")
 

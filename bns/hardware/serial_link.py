@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -13,6 +12,7 @@ from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.reply_time import GRANULARITY_S, ReplyLimits, ReplyTime
 from bns.hardware.terminal_error import TerminalError
 
 with extra("robot"):
@@ -20,9 +20,8 @@ with extra("robot"):
     from serial.tools.list_ports import comports
 
 _LONGEST_LINE = 256
-_SLICE_S = 0.01
-_REMEMBERED = 20
-"""Answers whose times say what is usual."""
+_OWED_S = 3.0
+"""An answer that has not come after so long was lost."""
 
 
 class NoReplyError(Exception):
@@ -32,55 +31,68 @@ class NoReplyError(Exception):
 class SerialLink:
     """Asks with a line, takes the line that comes back. One exchange at a time.
 
-    A port that vanishes (a Bluetooth link that breaks) is opened again at the next exchange.
+    A port that vanishes (a Bluetooth link that breaks) is opened again at the next exchange. `times` is how long answers take.
     """
 
-    def __init__(self, port: str, baud: int, clock: Clock, journal: HardwareLog, timeout_s: float = 0.1) -> None:
+    def __init__(
+        self, port: str, baud: int, clock: Clock, journal: HardwareLog, limits: ReplyLimits | None = None
+    ) -> None:
         self.port, self._baud, self._clock, self._journal = port, baud, clock, journal
-        self._timeout_s = timeout_s
-        self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
+        self.times = ReplyTime(limits)
+        self._owed: list[tuple[float, bytes]] = []
+        """When questions were asked whose answers have not come and may still do so."""
         self._serial: serial.Serial | None = None
         self._serial = open_port(port, baud)
 
-    def exchange(self, request: bytes, hurry: bool = False) -> bytes:
-        """Send `request`, return the line that answers without its end; NoReplyError if none does in the link's time-out.
+    def exchange(self, request: bytes, timeout_s: float, again: bool = False) -> bytes:
+        """Send `request`, return the line that answers without its end; NoReplyError if none does within `timeout_s`.
 
-        In `hurry` the time-out is what answers use to take, and one that was late for the question before is not thrown away.
+        Answers begin with the letter of their question. One to an older question is passed over, but a question asked `again` may
+        be answered by what is on its way since it was asked before.
         """
-        began_s, timeout_s = self._clock.now_s(), self._usual_s if hurry else self._timeout_s
+        began_s = self._clock.now_s()
+        self._owed = [(asked_s, what) for asked_s, what in self._owed if began_s - asked_s < _OWED_S]
         try:
             if self._serial is None:
-                self._serial = open_port(self.port, self._baud)
-            if not hurry:
-                self._serial.reset_input_buffer()  # an answer that came too late belongs to no question
+                self._serial, self._owed = open_port(self.port, self._baud), []
+            if not again:
+                self.forget()
             self._journal.note("sent", data=request.decode("latin-1"))
             in_vain = self._clock.in_vain(timeout_s)
             self._serial.write(request)
             line = self._line(in_vain)
+            while self._is_older(line, request, began_s):
+                self._journal.note("passed-over", data=line.decode("latin-1"))
+                line = self._line(in_vain)
         except (serial.SerialException, OSError, TerminalError, HardwareError) as error:
             self._lose(error)
             self._wait_out(began_s + timeout_s)
             raise NoReplyError(f"the port {self.port} is gone ({error})") from error
         self._journal.note("received", data=line.decode("latin-1"))
         took_s = self._clock.now_s() - began_s
-        late = took_s > timeout_s + _SLICE_S and not hurry
-        if late or not line.endswith(b"\n"):
+        if not line.endswith(b"\n"):
+            self._owed.append((began_s, request))
             self._wait_out(began_s + timeout_s)
             raise NoReplyError(f"no answer to {request!r} within {timeout_s:.2g} s")
-        if not hurry:
-            self._took_s.append(took_s)
+        if not any(what == request for _, what in self._owed):  # else nobody knows which one was answered
+            self.times.measured(took_s)
+        self._owed = [(asked_s, what) for asked_s, what in self._owed if what != request]
         return line.strip(b"\r\n")
+
+    def _is_older(self, line: bytes, request: bytes, began_s: float) -> bool:
+        """Whether a line answers a question from before: another letter, or the same one sooner than any answer has ever come."""
+        older = [pair for pair in self._owed if pair[1] != request and pair[1][:1].lower() == line[:1]]
+        too_soon = self._clock.now_s() - began_s < 0.5 * self.times.quickest_s
+        if not older or (line[:1] == request[:1].lower() and not too_soon):
+            return False
+        self._owed.remove(older[0])
+        return True
 
     def forget(self) -> None:
         """Drop answers that came too late."""
         with suppress(serial.SerialException, OSError, TerminalError):  # then there are none
             if self._serial is not None:
                 self._serial.reset_input_buffer()
-
-    @property
-    def _usual_s(self) -> float:
-        """After so long an answer is later than all of the last were, by one look at the port."""
-        return min(self._timeout_s, max(self._took_s, default=self._timeout_s) + _SLICE_S)
 
     def _line(self, in_vain: Callable[[], bool]) -> bytes:
         assert self._serial is not None
@@ -109,7 +121,7 @@ def open_port(port: str, baud: int) -> serial.Serial:
     if not Path(port).exists():
         raise HardwareError(no_port(port))
     try:
-        return serial.Serial(port, baud, timeout=_SLICE_S, write_timeout=1.0, exclusive=True)
+        return serial.Serial(port, baud, timeout=GRANULARITY_S, write_timeout=1.0, exclusive=True)
     except serial.SerialException as error:
         raise HardwareError(why_not_opened(port, error)) from error
 

@@ -16,6 +16,14 @@ class ServoError(Exception):
     """A servo that does not answer, or answers with an alarm."""
 
 
+class StuckServoError(ServoError):
+    """A servo that has been at the limit of its torque for too long: something holds its joint, most often the body itself."""
+
+    def __init__(self, number: int, load: float, lasted_s: float) -> None:
+        super().__init__(f"servo {number} has used {load:.0%} of its torque for {lasted_s:.1f} s; is it stuck?")
+        self.number = number
+
+
 @dataclass(frozen=True)
 class Health:
     """What a servo says of itself; load is a share of the highest torque, with the sign of its direction."""
@@ -88,12 +96,11 @@ class StrainWatch:
         """Whether a servo did not follow any more since this was last set to False."""
 
     def look(self, found: Mapping[int, Health], now_s: float) -> None:
-        """Take in what the servos say; ServoError if one has been stuck for too long."""
+        """Take in what the servos say; StuckServoError if one has been stuck for too long."""
         strained = [n for n, health in found.items() if abs(health.load) > self._limits.load * self._limits.torque]
         self._since_s = {number: self._since_s.get(number, now_s) for number in strained}
         for number, since_s in self._since_s.items():
             lasted_s = now_s - since_s
             self.stalled |= lasted_s > self._limits.stalled_s
             if lasted_s > self._limits.stuck_s:
-                load = abs(found[number].load)
-                raise ServoError(f"servo {number} has used {load:.0%} of its torque for {lasted_s:.1f} s; is it stuck?")
+                raise StuckServoError(number, abs(found[number].load), lasted_s)

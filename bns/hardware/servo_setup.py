@@ -60,11 +60,7 @@ class ServoBus:
 
     def at(self, baud: int) -> None:
         """Go on at this rate; HardwareError if the port cannot be opened or set to it."""
-        try:
-            opened = self._line.setBaudRate(baud)
-        except (OSError, ValueError, TerminalError) as error:
-            raise HardwareError(f"{self.port} cannot be opened: {error}. Is it used by another program?") from error
-        if not opened:
+        if not self._line.setBaudRate(baud):
             raise HardwareError(f"{self.port} cannot be set to {baud} baud; another adapter may be needed.")
 
     def scan(self, bauds: Sequence[int] = (BAUD,), numbers: Sequence[int] | None = None) -> Iterator[OnTheBus]:

@@ -7,11 +7,12 @@ import math
 import numpy as np
 
 from bns.errors import TrialPausedError
+from bns.hardware.agreement import SameScene
 from bns.hardware.ax12_table import RAD_PER_STEP
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.safety import OutOfSight, Watch
-from bns.hardware.servo_chain import ServoChain, StrainWatch
+from bns.hardware.servo_chain import ServoChain, StrainWatch, StuckServoError
 from bns.hardware.snake_settings import SnakeSettings
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight
@@ -19,6 +20,8 @@ from bns.physics.snake.gait import PARAMETERS, cycle_angles
 
 _TICK_S = 0.15
 _STRAIGHTENING_RAD_S = 0.5
+_FROZEN_RAD = 0.35
+"""Joints that turn so far move the ends of the body by centimetres."""
 _MARKERS = ("yellow", "green")
 _PLACES = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
 _NOTHING = dict.fromkeys(("cycle", *PARAMETERS, "stable"), math.nan)
@@ -26,7 +29,7 @@ _NOTHING = dict.fromkeys(("cycle", *PARAMETERS, "stable"), math.nan)
 
 class SnakeDrive:
     """Rows and observations are gathered as it goes on. A cycle that ends out of sight counts as unstable: a robot on its back
-    hides its markers."""
+    hides its markers. So does one that ends with a servo stuck: links that press against each other hold it."""
 
     def __init__(
         self, chain: ServoChain, eye: Eye, watch: Watch, settings: SnakeSettings, clock: Clock, journal: HardwareLog
@@ -34,11 +37,14 @@ class SnakeDrive:
         self._chain, self._eye, self._watch, self._settings = chain, eye, watch, settings
         self._clock, self._journal = clock, journal
         self._strain = StrainWatch(settings.limits)
+        self._scene, self._turned_rad = SameScene(), 0.0
+        self._joints_rad: np.ndarray | None = None
         self._angles = np.zeros(len(settings.ids))
         self._markers = np.full(4, math.nan)
         self._began_s = 0.0
         self._cycles: list[np.ndarray] = []
-        self._observations: list[np.ndarray] = []
+        self._seen: list[tuple[float, np.ndarray]] = []
+        self._observed: list[tuple[float, float, float]] = []
         self.rows: list[dict[str, float]] = []
         self.spans_s: list[tuple[float, float]] = []
         """When each cycle began and ended, by the trial's clock."""
@@ -49,7 +55,22 @@ class SnakeDrive:
 
     def observed(self) -> np.ndarray:
         """(k + 1, 9): the markers at the start, then at the begin and end of each cycle, and whether it was stable."""
-        return np.array(self._observations).reshape(-1, 9)
+        if not self._seen:
+            return np.empty((0, 9))
+        start = self._seen[0][1]
+        cycles = [np.concatenate([self._at(a), self._at(b), [stable]]) for a, b, stable in self._observed]
+        return np.array([np.concatenate([start, start, [1.0]]), *cycles])
+
+    def _at(self, t_s: float) -> np.ndarray:
+        """The markers (4,) then: between the two times around it at which they were filmed."""
+        times, places = np.array([t for t, _ in self._seen]), np.array([place for _, place in self._seen])
+        return np.array([np.interp(t_s, times, column) for column in places.T])
+
+    def finish(self) -> None:
+        """The last posture is held until it has been filmed."""
+        while self._observed and self._seen[-1][0] < self._observed[-1][1]:
+            self._clock.sleep(_TICK_S / 2)
+            self._look()
 
     def straighten(self) -> None:
         """Torque on, slowly straight; where the markers are then is where the drive starts."""
@@ -62,8 +83,8 @@ class SnakeDrive:
         self._watch.begin()
         self._began_s = self._clock.now_s()
         self._markers = np.concatenate([start.points[name] for name in _MARKERS])
-        self.rows = [self._row()]
-        self._observations = [np.concatenate([self._markers, self._markers, [1.0]])]
+        self.rows = [self._row(self._began_s)]
+        self._seen = [(self._began_s, self._markers)]
 
     def carry_out(self, cycle: np.ndarray) -> None:
         """One cycle: up to its first posture, then through it; ServoError, DriveEnded, TrialPausedError."""
@@ -72,25 +93,23 @@ class SnakeDrive:
         self._journal.note("command", **commanded)
         first = len(self.rows)
         self.rows[-1] |= {"cycle": float(len(self._cycles) + 1), **commanded}
-        self._strain.stalled, before = False, self._markers
+        self._strain.stalled, before_s = False, began_s
         try:
             self._posture(angles[0])
-            before = self._seen()
+            before_s = self._in_sight()
             for target in angles[1:]:
                 self._posture(target)
-            after, stable = self._seen(), not self._strain.stalled
-        except OutOfSight:
-            self._over(cycle, before, self._markers, False, began_s, first)
+            after_s, stable = self._in_sight(), not self._strain.stalled
+        except (OutOfSight, StuckServoError):
+            self._over(cycle, (before_s, self._clock.now_s()), False, began_s, first)
             raise
         finally:
             self.rows[-1] |= dict.fromkeys(("cycle", *PARAMETERS), math.nan)  # nothing is in force any more
-        self._over(cycle, before, after, stable, began_s, first)
+        self._over(cycle, (before_s, after_s), stable, began_s, first)
 
-    def _over(
-        self, cycle: np.ndarray, before: np.ndarray, after: np.ndarray, stable: bool, began_s: float, first: int
-    ) -> None:
+    def _over(self, cycle: np.ndarray, between_s: tuple[float, float], stable: bool, began_s: float, first: int) -> None:
         self._cycles.append(cycle)
-        self._observations.append(np.concatenate([before, after, [float(stable)]]))
+        self._observed.append((*between_s, float(stable)))
         self.spans_s.append((began_s, self._clock.now_s()))
         for row in self.rows[first:]:
             row["stable"] = float(stable)
@@ -115,22 +134,36 @@ class SnakeDrive:
 
     def _look(self) -> Sight | None:
         """Look at servos and markers; a row if there is something new to see."""
-        self._strain.look(self._chain.health(), self._clock.now_s())
+        healths = self._chain.health()
+        self._strain.look(healths, self._clock.now_s())
         sight = self._eye.look()
         if sight is not None:
             self._markers = np.concatenate([sight.points[name] for name in _MARKERS])
-            if self.rows:
+            self._follow(np.array([health.position_rad for health in healths.values()]))
+            if self._seen and sight.t_s > self._seen[-1][0]:
+                self._seen.append((sight.t_s, self._markers))
+            if self.rows and sight.t_s - self._began_s > self.rows[-1]["t_s"]:
                 here = {name: self.rows[-1][name] for name in ("cycle", *PARAMETERS)}
-                self.rows.append(self._row() | here)
-        self._watch.check(sight)
+                self.rows.append(self._row(sight.t_s) | here)
+        self._watch.check(sight, self._eye.picture_s)
         return sight
 
-    def _seen(self) -> np.ndarray:
-        """Where the markers are now; if they are not seen just then, the posture is held until they are, or the drive ends."""
+    def _follow(self, joints_rad: np.ndarray) -> None:
+        """TrialPausedError if the joints turn on and on and the markers stay where they were."""
+        self._turned_rad += 0.0 if self._joints_rad is None else float(np.abs(joints_rad - self._joints_rad).max())
+        self._joints_rad = joints_rad
+        unseen_rad = self._scene.since_it_moved(self._markers.reshape(2, 2), self._turned_rad)
+        if self._seen and unseen_rad > _FROZEN_RAD:
+            raise TrialPausedError(
+                f"joints have turned by {math.degrees(unseen_rad):.0f}° and the picture shows both markers where they were: the "
+                "camera hangs or shows another scene. Look at it: bns track"
+            )
+
+    def _in_sight(self) -> float:
+        """Now; if the markers are not seen just then, the posture is held until they are, or the drive ends."""
         while self._look() is None:
             self._clock.sleep(_TICK_S / 2)
-        return self._markers
+        return self._clock.now_s()
 
-    def _row(self) -> dict[str, float]:
-        t_s = self._clock.now_s() - self._began_s
-        return {"t_s": t_s, **_NOTHING, **dict(zip(_PLACES, self._markers.tolist(), strict=True))}
+    def _row(self, filmed_s: float) -> dict[str, float]:
+        return {"t_s": filmed_s - self._began_s, **_NOTHING, **dict(zip(_PLACES, self._markers.tolist(), strict=True))}

@@ -1,9 +1,14 @@
-"""An effect written as a formula, by people who would rather not write Python: ``term: k * v * abs(w)``, ``on: v``."""
+"""An effect written as a formula, by people who would rather not write Python: ``term: k * v * abs(w)``, ``on: v``.
+
+A name in it is one of `VARIABLES`, a column of the log, or a number to fit, which is a letter, perhaps with digits (k, a, b2),
+or begins with ``k_``. Any other name is an error: a misspelt column must not become a number.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -43,15 +48,27 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "max": np.maximum,
 }
 _PLACE = {"x", "y", "heading"}
-def formula_effect(name: str, term: str, on: str) -> Effect:
-    """The effect that adds ``term`` to the velocity ``on``; names that are no variable are its parameters.
+_NUMBER = re.compile(r"[A-Za-z]\d*|k_\w+")
 
-    ModelError if the term does not parse, uses anything but arithmetic, `FUNCTIONS` and `VARIABLES`, or has no parameter.
+
+def formula_effect(
+    name: str, term: str, on: str, columns: Iterable[str] = (), numbers: Iterable[str] | None = None
+) -> Effect:
+    """The effect that adds ``term`` to the velocity ``on``.
+
+    Args:
+        columns: names of the log's further columns, which the term may use.
+        numbers: names of its numbers where a model file lists them; all names that are neither these nor could be numbers are
+            columns then, to be found in whatever log the model is held against.
+
+    Raises:
+        ModelError: the term does not parse, uses anything but arithmetic, `FUNCTIONS` and names, has an unknown name (the message
+            lists all that there are) or no number to fit.
     """
     if on not in ON:
         raise ModelError(f"formula {name}: " + unknown_name("velocity to add to (on)", on, ON))
     names, code = _parsed(name, term)
-    unknown = sorted(names - set(VARIABLES))
+    logged, unknown = _sorted(name, names - set(VARIABLES), set(columns), None if numbers is None else set(numbers))
     if not unknown:
         raise ModelError(f"formula {name}: {term!r} has no number to fit; multiply it by one, as in k * ({term}).")
     return Effect(
@@ -64,26 +81,55 @@ def formula_effect(name: str, term: str, on: str) -> Effect:
         equation=f"{on}' = {on} + {term}",
         residuals="as the formula says",
         lookalikes=(),
-        apply=partial(_apply, name, code, on),
+        apply=partial(_apply, name, code, on, logged),
         after=FORMULAS,
         needs_place=bool(names & _PLACE) or on in {"east", "north"},
     )
 
 
-def _parsed(name: str, term: str) -> tuple[set[str], Any]:
+def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | None) -> tuple[list[str], list[str]]:
+    """Columns of the log and numbers to fit among the names that are no variables, in order."""
+    logged, unknown = [], []
+    for one in sorted(names):
+        if numbers is not None and one in numbers:
+            unknown.append(one)
+        elif one in columns:
+            logged.append(one)
+        elif _NUMBER.fullmatch(one):
+            unknown.append(one)
+        elif numbers is not None:
+            logged.append(one)
+        else:
+            known = unknown_name("name", one, [*VARIABLES, *columns])
+            raise ModelError(f"formula {name}: {known} A number to fit is a letter (k, a, b2) or begins with k_ (k_drag).")
+    return logged, unknown
+
+
+class Compiled:
+    """A checked term, ready to be calculated; pickled as its text."""
+
+    def __init__(self, name: str, term: str) -> None:
+        self._made_of = name, term
+        self.code = compile(checked_formula(f"formula {name}", term, FUNCTIONS), name, "eval")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Compiled, self._made_of
+
+
+def _parsed(name: str, term: str) -> tuple[set[str], Compiled]:
     tree = checked_formula(f"formula {name}", term, FUNCTIONS)
     called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
     names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - called
-    return names, compile(tree, name, "eval")
+    return names, Compiled(name, term)
 
 
-def _apply(name: str, code: Any, on: str, body: Body, **numbers: float) -> Body:
+def _apply(name: str, code: Compiled, on: str, logged: list[str], body: Body, **numbers: float) -> Body:
     if body.place is None and _needs(code, on):
         return body  # first round of a simulation: nobody knows yet where the robot goes
-    values = {**_values(body), **numbers}
+    values = {**_values(body), **{column: body.logged[column] for column in logged}, **numbers}
     try:
         with np.errstate(all="ignore"):
-            added = np.asarray(eval(code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
+            added = np.asarray(eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
     except (ArithmeticError, TypeError, ValueError) as fault:  # of numbers that are fitted: k / (k - k), (-k)**0.5
         raise ModelError(f"formula {name} cannot be calculated with {numbers}: {fault}. Write it in another way.") from fault
     if added.dtype.kind == "c":
@@ -100,8 +146,8 @@ def _apply(name: str, code: Any, on: str, body: Body, **numbers: float) -> Body:
     return body.with_drift(on, added, body.place[..., 2])
 
 
-def _needs(code: Any, on: str) -> bool:
-    return on in {"east", "north"} or bool(_PLACE & set(code.co_names))
+def _needs(code: Compiled, on: str) -> bool:
+    return on in {"east", "north"} or bool(_PLACE & set(code.code.co_names))
 
 
 def _values(body: Body) -> dict[str, Array]:

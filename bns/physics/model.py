@@ -258,7 +258,8 @@ def _effect(model: str, entry: Any, folder: Path, named: Callable[[str], Effect]
     where = f"an effect of model {model}"
     given = keys(where, entry, (*_EFFECT_KEYS, *_EFFECT_MAY), required=_EFFECT_KEYS)
     written: dict[str, str] = {str(key): str(given[key]) for key in ("term", "on", "file") if key in given}
-    effect = _written_effect(where, str(given["name"]), written, folder, named)
+    numbers = given["values"] if isinstance(given["values"], dict) else {}
+    effect = _written_effect(where, str(given["name"]), written, folder, named, map(str, numbers))
     names = tuple(p.name for p in effect.parameters)
     values = keys(f"values of {effect.name} in model {model}", given["values"], names)
     intervals = keys(f"intervals of {effect.name} in model {model}", given.get("intervals") or {}, names)
@@ -276,7 +277,12 @@ def _effect(model: str, entry: Any, folder: Path, named: Callable[[str], Effect]
 
 
 def _written_effect(
-    where: str, name: str, written: Mapping[str, str], folder: Path, named: Callable[[str], Effect]
+    where: str,
+    name: str,
+    written: Mapping[str, str],
+    folder: Path,
+    named: Callable[[str], Effect],
+    numbers: Iterable[str],
 ) -> Effect:
     """The effect of that name: from the catalogue, a formula, or a Python file with an ``EFFECT``."""
     if "file" in written:
@@ -287,7 +293,7 @@ def _written_effect(
         raise ModelError(f"{where}, {name}: a formula needs both term and on (term: k * v * abs(w), on: v).")
     if name in effect_names():
         raise ModelError(f"{where}: {name} is the name of a listed effect; give the formula another one.")
-    return formula_effect(name, written["term"], written["on"])
+    return formula_effect(name, written["term"], written["on"], numbers=numbers)
 
 
 def _group(model: str, top: Mapping[str, Any], key: str, lines: Lines) -> dict[str, Any]:

@@ -9,10 +9,13 @@ changes inside a step. Steps of length 0 pad short trials and must do nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bns.errors import ModelError, unknown_name
 
 Array = NDArray[np.float64]
 
@@ -21,17 +24,46 @@ CREEP_M_S = 1e-3
 begins to move, and with it what acts on it only while moving, is thus known to one step."""
 
 
+class Logged(Mapping[str, Array]):
+    """Every further number that was logged, by its column's name: (batch, steps), straight lines between what was logged.
+
+    A column is worked out when it is first asked for. ModelError for a name that was not logged, with those that were.
+    """
+
+    def __init__(self, names: Iterable[str] = (), of: Callable[[str], Array] | None = None) -> None:
+        self._names, self._of, self._known = tuple(names), of, dict[str, Array]()
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._names or self._of is None:
+            if not self._names:
+                raise ModelError(
+                    f"The column of the log {name!r} is asked for, and there is none: the measurements have no further "
+                    "columns, or the model is driven without a log."
+                )
+            raise ModelError(unknown_name("column of the log", name, self._names))
+        if name not in self._known:
+            self._known[name] = self._of(name)
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
 @dataclass(frozen=True)
 class Conditions:
     """What else was logged at each step, (batch, steps); None where it was not.
 
-    ``battery_drop_v`` is the voltage below the first one that was logged.
+    ``battery_drop_v`` is the voltage below the first one that was logged; ``logged``: any further column by its name.
     """
 
     session_s: Array | None = None
     battery_drop_v: Array | None = None
     seen: Array | None = None
     """Tracked x_m, y_m, heading_rad (unwrapped) between frames, (batch, steps, 3); NaN before the first and after the last."""
+    logged: Logged = field(default_factory=Logged)
 
 
 NO_CONDITIONS = Conditions()
@@ -53,6 +85,11 @@ class Wheels:
         if self.conditions.session_s is not None:
             return self.conditions.session_s
         return self.trial_s
+
+    @property
+    def logged(self) -> Logged:
+        """Further columns of the log by name, (batch, steps) each: ``wheels.logged["current_a"]``."""
+        return self.conditions.logged
 
     @property
     def trial_s(self) -> Array:
@@ -92,6 +129,12 @@ class Body:
     session_s: Array
     place: Array | None = None
     """Where the robot is in each step, (batch, steps, 3): x_m, y_m, heading_rad; None while nobody knows."""
+    conditions: Conditions = NO_CONDITIONS
+
+    @property
+    def logged(self) -> Logged:
+        """Further columns of the log by name, as `Wheels.logged`."""
+        return self.conditions.logged
 
     def with_added(self, velocity: str, values: Array) -> Body:
         """Something added to the velocity of that name."""

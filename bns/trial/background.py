@@ -32,6 +32,9 @@ class RobotDriver(Protocol):
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         """An evaluation is complete."""
 
+    def skipped(self, number: int, controller: np.ndarray, rounds: int) -> None:
+        """An evaluation was passed over."""
+
 
 class BackgroundDriver:
     """Implements `bns.bootstrap.driver.Driver`.
@@ -80,6 +83,10 @@ class BackgroundDriver:
         else:
             done, rounds = self._driven(evaluation, controller, advance)
         self.rounds += rounds
+        if done.skipped:
+            if evaluation > len(self._past):
+                self._robot_driver.skipped(evaluation, controller, rounds)
+            return Drive(done.commands, done.poses, rounds, skipped=True)
         poses = in_task_frame(self._robot, done.poses)
         if self._robot.marks_unstable:
             poses = self._robot.marked_unstable(poses, done.unstable)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +16,12 @@ from bns.errors import TrialPausedError
 from bns.hardware.clock import Clock
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Driven, Platform
-from bns.hardware.rig import Rig
+from bns.hardware.rig import Rig, surface_text
+from bns.robots import load_robot
 from bns.trial.evaluation import Evaluation
 from bns.trial.operator import Decision, Operator
+from bns.trial.picture import draw_drive
+from bns.trial.underway import Underway
 
 _MOST_VOID = 3
 """So many drives without a single finished command, one after the other, and the trial pauses."""
@@ -24,6 +29,10 @@ _MOST_VOID = 3
 
 REPEATED = "repeat-"
 """Before the kinds of events of a controller that is driven once more: they are no evaluation."""
+
+
+Stuck = tuple[str, tuple[tuple[str, int], ...], str]
+"""A drive that could not go on, as in the journal: before the kind of event, its numbers, what was stuck."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +45,34 @@ class _Purpose:
 
 
 class TrialDriver:
-    """Implements `bns.trial.background.RobotDriver`. `start` (3,) is where the task, or the next drive, begins."""
+    """Implements `bns.trial.background.RobotDriver`.
+
+    `start` (3,) is where the task, or the next drive, begins; `stuck` are drives of earlier attempts that could not go on.
+    """
 
     def __init__(
-        self, platform: Platform, operator: Operator, rig: Rig, start: np.ndarray, clock: Clock, log: HardwareLog
+        self,
+        platform: Platform,
+        operator: Operator,
+        rig: Rig,
+        start: np.ndarray,
+        clock: Clock,
+        log: HardwareLog,
+        picture: Path | None = None,
+        goals_m: np.ndarray | None = None,
+        stuck: Iterable[Stuck] = (),
     ) -> None:
         self._platform, self._operator, self._rig, self.start = platform, operator, rig, start
         self._clock, self._log = clock, log
         self._began_s = clock.now_s()
-        self._first = True
+        self._first, self._armed = True, False
+        self._picture, self._robot = picture, load_robot(rig.robot)
+        self.underway = Underway(clock, goals_m)
+        """What goes on at this moment, for a screen."""
+        log.listeners.append(self.underway.heard)
+        self.suspended: Callable[[], AbstractContextManager[None]] = nullcontext
+        """Entered while somebody is asked: a live view leaves the terminal alone."""
+        self._stuck = set(stuck)
         self.placing_s = 0.0
         self.readings: dict[str, float] = {}
         self.stops_s: list[float] = []
@@ -67,14 +95,25 @@ class TrialDriver:
         void = 0
         while True:
             self._ready(void)
+            self._arm(purpose, controller)
             driven = self._drive(purpose, controller)
+            if driven.stuck and self._stuck_anew(purpose, driven.stuck):
+                self._note(purpose, "discarded", why=driven.ended)
+                self._log.sync()
+                self._operator.place(self.start, driven.ended)
+                continue
             if not len(driven.commands):
                 void += 1
                 self._note(purpose, "discarded", why=driven.ended)
                 if void == _MOST_VOID:
                     raise TrialPausedError(f"{void} drives in a row ended before a command was over: {driven.ended}")
                 continue
-            decision = self._asked(purpose.text, controller, driven)
+            try:
+                decision = self._asked(purpose.text, controller, driven)
+            except TrialPausedError:
+                self._note(purpose, "discarded", why="paused")
+                self._log.sync()
+                raise
             if decision.answer == "next":
                 self.marked = len(decision.unstable) if driven.spans_s else None
                 if decision.unstable:
@@ -82,11 +121,28 @@ class TrialDriver:
                     self._log.sync()
                 return Evaluation(controller, driven.commands, driven.poses, unstable=decision.unstable)
             self._note(purpose, "discarded", why=decision.answer)
+            if decision.answer == "skip":
+                return Evaluation(controller, driven.commands[:0], driven.poses[:0], skipped=True)
+
+    def _stuck_anew(self, purpose: _Purpose, what: str) -> bool:
+        """Whether a controller was stuck there for the first time. At the second it is the controller's: what it did is kept."""
+        cause = (purpose.prefix, tuple(purpose.numbers.items()), what)
+        if cause in self._stuck:
+            return False
+        self._stuck.add(cause)
+        self._note(purpose, "stuck", what=what)
+        return True
 
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         """Note it, durably."""
         fitness = {name: row[name] for name in ("evaluated_fitness_world", "evaluated_goals_reached")}
         self._log.note("evaluated", evaluation=number, rounds=rounds, **fitness)
+        self._log.sync()
+
+    def skipped(self, number: int, controller: np.ndarray, rounds: int, again: int | None = None) -> None:
+        """Note that an evaluation, or its `again`-th drive, was passed over: it is not driven when the trial is gone on with."""
+        prefix, numbers = ("", {}) if again is None else (REPEATED, {"repeat": again})
+        self._log.note(prefix + "skipped", evaluation=number, **numbers, picked=controller.tolist(), rounds=rounds)
         self._log.sync()
 
     def live_text(self) -> dict[str, str]:
@@ -108,7 +164,11 @@ class TrialDriver:
     def _drive(self, purpose: _Purpose, controller: np.ndarray) -> Driven:
         self.readings = self._platform.readings()
         session_s = self._clock.now_s() - self._began_s
-        driven = self._platform.drive(controller)
+        self.underway.begins(len(controller), self._lasts_s(controller), self.readings)
+        try:
+            driven = self._platform.drive(controller)
+        finally:
+            self.underway.ends()
         self.stops_s.append(driven.stop.seconds)
         if driven.ended:
             self.ends.append(driven.ended)
@@ -126,10 +186,36 @@ class TrialDriver:
         self._log.sync()
         return driven
 
+    def _lasts_s(self, controller: np.ndarray) -> float:
+        return float(self._robot.driven_ms(controller)) / 1000.0
+
+    def _arm(self, purpose: _Purpose, controller: np.ndarray) -> None:
+        """Before the first drive of a session somebody agrees, and has time to step back."""
+        if self._armed:
+            return
+        began = time.perf_counter()
+        what = f"{purpose.text}: the robot will drive {len(controller)} commands in about {self._lasts_s(controller):.0f} s"
+        with self.suspended():
+            self._operator.arm(f"{what}, {surface_text(self._rig.limits.surface)}.")
+        self._armed = True
+        self.placing_s += time.perf_counter() - began
+
+    def _shown(self) -> str:
+        """What was driven: drawn in letters, and as a picture beside the journal."""
+        if not self._operator.wants_picture:
+            return ""
+        sketch = self.underway.sketch()
+        if self._picture is not None and self.underway.path:
+            with suppress(OSError):  # a full disk costs the picture alone
+                draw_drive(self.underway.path, self.underway.goals_m, self._rig.limits.surface, self._picture)
+                sketch += f"\n(as a picture: {self._picture})"
+        return f"{sketch}\n" if sketch else ""
+
     def _asked(self, text: str, controller: np.ndarray, driven: Driven) -> Decision:
         began = time.perf_counter()
         part = f"{len(driven.commands)} of {len(controller)} commands" + (f" ({driven.ended})" if driven.ended else "")
-        decision = self._operator.accept(f"{text}: {part} in {driven.seconds:.0f} s", driven.spans_s)
+        with self.suspended():
+            decision = self._operator.accept(f"{self._shown()}{text}: {part} in {driven.seconds:.0f} s", driven.spans_s)
         self.placing_s += time.perf_counter() - began
         return decision
 
@@ -141,7 +227,8 @@ class TrialDriver:
             if why is None:
                 break
             self._log.note("placing", why=why)
-            self._operator.place(self.start, why)
+            with self.suspended():
+                self._operator.place(self.start, why)
             void, self._first = 0, False
         else:
             raise TrialPausedError(f"the robot could not be brought to its start: {self._misplaced(0)}")

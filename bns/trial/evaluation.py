@@ -20,3 +20,5 @@ class Evaluation:
     poses: np.ndarray
     rounds: int | None = None
     unstable: tuple[int, ...] = ()
+    skipped: bool = False
+    """The operator passed over it: nothing of it counts."""

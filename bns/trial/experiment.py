@@ -7,15 +7,24 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from bns.console import live_view
 from bns.errors import HardwareError, SpecError
 from bns.hardware.rig import surface_text
 from bns.hardware.safety import Stopping
-from bns.measurements import write_measurements
 from bns.robots import load_robot
 from bns.robots.base import Robot, on_floor
 from bns.trial.driver import TrialDriver
-from bns.trial.folder import JOURNAL, MEASUREMENTS, forget_unless, measured, past_evaluations
-from bns.trial.session import TrialSetup, open_rig
+from bns.trial.folder import (
+    JOURNAL,
+    MEASUREMENTS,
+    forget_unless,
+    locked,
+    measured,
+    measurements_however_it_ends,
+    past_evaluations,
+    stuck_before,
+)
+from bns.trial.session import PICTURE, TrialSetup, open_rig
 
 _START = ("start_x_m", "start_y_m", "start_heading_rad")
 
@@ -69,32 +78,44 @@ def _starts(path: Path, table: pd.DataFrame, robot: Robot) -> np.ndarray:
 
 def drive_commands(path: Path, how: TrialSetup, results: Path, seed: int) -> str:
     """Drive every trial of a file, or those that are left of them; measurements beside the journal; the report in words."""
-    robot = load_robot(how.rig.robot)
-    trials = read_commands(path, robot)
-    folder = results / "trials" / f"experiment-{path.stem}{'-emulated' if how.emulated else ''}"
-    journal = folder / JOURNAL
-    done = _driven_before(journal, [commands for commands, _ in trials], how.resume)
+    trials = read_commands(path, load_robot(how.rig.robot))
     for _, (x_m, y_m, _heading) in trials:
         if not how.rig.limits.surface.holds(x_m, y_m):
             raise HardwareError(
                 f"{path} starts a trial at ({x_m:.2f}, {y_m:.2f}) m, off the surface {surface_text(how.rig.limits.surface)}; "
                 "change the start, or surface_m in the rig."
             )
+    folder = results / "trials" / f"experiment-{path.stem}{'-emulated' if how.emulated else ''}"
+    with locked(folder):
+        return _driven(trials, how, folder / JOURNAL, seed)
+
+
+def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journal: Path, seed: int) -> str:
+    columns = load_robot(how.rig.robot).measured_columns
+    done = _driven_before(journal, [commands for commands, _ in trials], how.resume)
     try:
-        with Stopping() as stopping, open_rig(how, seed, journal, stopping) as opened:
-            driver = TrialDriver(opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log)
-            for number, (commands, start) in enumerate(trials[done:], done + 1):
-                driver.start = start
-                driver.evaluate(number, commands)
+        stuck = stuck_before(journal)
+        with (
+            measurements_however_it_ends(journal, columns),
+            Stopping() as stopping,
+            open_rig(how, seed, journal, stopping) as opened,
+        ):
+            picture = journal.with_name(PICTURE)
+            driver = TrialDriver(
+                opened.platform, opened.operator, how.rig, trials[0][1], opened.clock, opened.log, picture, stuck=stuck
+            )
+            with live_view(None, now=driver.underway.text) as show:
+                driver.suspended = show.suspended
+                for number, (commands, start) in enumerate(trials[done:], done + 1):
+                    driver.start = start
+                    if driver.evaluate(number, commands).skipped:
+                        driver.skipped(number, commands, 0)
     except HardwareError:
         forget_unless(journal, "driven")
         raise
-    finally:
-        table = measured(journal) if journal.exists() else pd.DataFrame()
-        if len(table):
-            write_measurements(table, folder / MEASUREMENTS, robot.measured_columns)
     ended = f"; {len(driver.ends)} ended early" if driver.ends else ""
-    return f"{len(trials)} trials driven{ended}; {len(table)} rows of measurements in {folder / MEASUREMENTS}"
+    rows = len(measured(journal))
+    return f"{len(trials)} trials driven{ended}; {rows} rows of measurements in {journal.with_name(MEASUREMENTS)}"
 
 
 def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,37 +13,56 @@ import numpy as np
 import pandas as pd
 from filelock import FileLock, Timeout
 
-from bns.errors import HardwareError
+from bns.errors import BnsError, HardwareError, StoreError, TrialFileError
 from bns.hardware.hardware_log import events
 from bns.measurements import write_measurements
-from bns.robots import load_robot
 from bns.spec import RunSpec
-from bns.trial.driver import REPEATED
+from bns.trial.driver import REPEATED, Stuck
 from bns.trial.evaluation import Evaluation
 
 JOURNAL, MEASUREMENTS, REPEATS = "journal.jsonl", "measurements.csv", "repeats.csv"
 
 
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """One process drives the trial of a folder; HardwareError for the second. The lock goes with the process that has it."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(folder.with_suffix(".lock"))
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as error:
+        raise HardwareError(f"this trial is being driven by another process ({folder}); wait for it.") from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+@contextmanager
+def robot_stands(path: Path) -> Iterator[None]:
+    """A file that cannot be written once the robot has been driven, ``path`` or what the fault names, is a TrialFileError."""
+    try:
+        yield
+    except StoreError as error:
+        raise TrialFileError.after(error) from error
+    except OSError as error:
+        raise TrialFileError.of(error.filename or path, error) from error
+
+
 class TrialFolder:
-    """`results/trials/NAME`, locked while it is used."""
+    """`results/trials/NAME`, to be locked while it is used."""
 
     def __init__(self, results: Path, spec: RunSpec, emulated: bool) -> None:
         name = f"{spec.robot}-{spec.task}-{spec.seed}-{spec.run_id}" + ("-emulated" if emulated else "")
         self.path, self.spec = results / "trials" / name, spec
-        self._lock = FileLock(self.path.with_suffix(".lock"))
 
     @property
     def journal(self) -> Path:
         """Path of the journal."""
         return self.path / JOURNAL
 
-    def open(self, resume: bool) -> list[Evaluation]:
-        """Lock it; the evaluations it holds. HardwareError if it was begun and is not to be resumed, or the reverse."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            self._lock.acquire(timeout=0)
-        except Timeout as error:
-            raise HardwareError(f"this trial is being driven by another process ({self.path}); wait for it.") from error
+    def past(self, resume: bool) -> list[Evaluation]:
+        """The evaluations it holds. HardwareError if it was begun and is not to be resumed, or the reverse."""
         if self.journal.exists() and not resume:
             raise HardwareError(
                 f"this trial was begun before, in {self.path}. Go on with --resume, or begin another with --seed "
@@ -50,17 +71,6 @@ class TrialFolder:
         if resume and not self.journal.exists():
             raise HardwareError(f"there is nothing to go on with: no journal in {self.path}. Begin without --resume.")
         return past_evaluations(self.journal) if resume else []
-
-    def close(self) -> None:
-        """Unlock it."""
-        self._lock.release()
-
-    def write_measurements(self) -> int:
-        """Write the table of all drives in the journal; how many rows."""
-        table = measured(self.journal)
-        if len(table):
-            write_measurements(table, self.path / MEASUREMENTS, load_robot(self.spec.robot).measured_columns)
-        return len(table)
 
 
 def spec_of(journal: Path) -> RunSpec:
@@ -73,12 +83,12 @@ def spec_of(journal: Path) -> RunSpec:
 
 def past_evaluations(journal: Path) -> list[Evaluation]:
     """Evaluations of a journal in order. One that was driven again counts as driven last, up to the first that is missing."""
-    return _evaluations(events(journal, "driven", "marked", "evaluated", "discarded"), 1)
+    return _evaluations(events(journal, "driven", "marked", "evaluated", "discarded", "skipped"), 1)
 
 
 def past_repeats(journal: Path, evaluation: int) -> list[Evaluation]:
     """The further drives of an evaluation's controller in a journal, in order, the second drive first."""
-    kinds = (REPEATED + kind for kind in ("driven", "marked", "discarded"))
+    kinds = (REPEATED + kind for kind in ("driven", "marked", "discarded", "skipped"))
     return _evaluations(
         (
             event | {"kind": event["kind"].removeprefix(REPEATED), "evaluation": event["repeat"]}
@@ -89,6 +99,15 @@ def past_repeats(journal: Path, evaluation: int) -> list[Evaluation]:
     )
 
 
+def stuck_before(journal: Path) -> list[Stuck]:
+    """The drives of a journal that were stuck, and where: what is stuck there again is not driven a third time."""
+    found: list[Stuck] = []
+    for event in events(journal, "stuck", REPEATED + "stuck") if journal.exists() else ():
+        numbers = tuple((name, event[name]) for name in ("evaluation", "repeat") if name in event)
+        found.append((event["kind"].removesuffix("stuck"), numbers, event["what"]))
+    return found
+
+
 def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation]:
     driven: dict[int, dict] = {}
     rounds: dict[int, int] = {}
@@ -96,7 +115,7 @@ def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation
     for event in noted:
         number = event["evaluation"]
         rounds.pop(number, None)
-        if event["kind"] == "driven":
+        if event["kind"] in {"driven", "skipped"}:
             driven[number] = event
             unstable.pop(number, None)
         elif event["kind"] == "marked":
@@ -108,6 +127,10 @@ def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation
     found: list[Evaluation] = []
     while (number := first + len(found)) in driven:
         event = driven[number]
+        if event["kind"] == "skipped":
+            picked = np.asarray(event["picked"], np.float32)
+            found.append(Evaluation(picked, picked[:0], np.empty((0, 3)), event["rounds"], skipped=True))
+            continue
         picked, commands = (np.asarray(event[name], np.float32) for name in ("picked", "commands"))
         poses = np.asarray(event["poses"], np.float64)
         found.append(Evaluation(picked, commands, poses, rounds.get(number), unstable.get(number, ())))
@@ -115,9 +138,13 @@ def _evaluations(noted: Iterable[dict[str, Any]], first: int) -> list[Evaluation
 
 
 def measured(journal: Path) -> pd.DataFrame:
-    """The measurements of every drive in a journal, discarded ones too; `trial` counts the drives."""
+    """The measurements of every drive in a journal; `trial` counts the drives, `discarded` is 1 of one that is not to count."""
     tables: list[pd.DataFrame] = []
-    for event in events(journal, "driven", "marked"):
+    for event in events(journal, "driven", "marked", "discarded"):
+        if event["kind"] == "discarded":
+            if tables and tables[-1]["evaluation"].iloc[0] == event["evaluation"]:
+                tables[-1]["discarded"] = 1
+            continue
         if event["kind"] == "marked":
             led_here = tables[-1]["cycle"].shift(1)
             tables[-1].loc[led_here.isin(event["unstable"]), "stable"] = 0.0
@@ -127,8 +154,33 @@ def measured(journal: Path) -> pd.DataFrame:
         table = pd.DataFrame(event["rows"]).astype(float)
         table.insert(0, "trial", len(tables) + 1)
         table["evaluation"], table["session_s"] = event["evaluation"], event["session_s"] + table["t_s"]
-        tables.append(table.assign(**event["readings"]))
+        tables.append(table.assign(**event["readings"], discarded=0))
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+
+
+def keep_measurements(journal: Path, columns: Sequence[str]) -> pd.DataFrame:
+    """The measurements of a journal, written beside it where there are any, with these columns. TrialFileError."""
+    table = measured(journal) if journal.exists() else pd.DataFrame()
+    if len(table):
+        path = journal.with_name(MEASUREMENTS)
+        with robot_stands(path):
+            write_measurements(table, path, columns)
+    return table
+
+
+@contextmanager
+def measurements_however_it_ends(journal: Path, columns: Sequence[str]) -> Iterator[None]:
+    """Keep the measurements when a trial is over. A table that cannot be written does not hide the fault that ended the trial."""
+    try:
+        yield
+    except BaseException as cause:
+        try:
+            keep_measurements(journal, columns)
+        except BnsError as error:
+            if not isinstance(cause, TrialFileError):  # then one word of it is enough
+                print(f"bns: {error}", file=sys.stderr)
+        raise
+    keep_measurements(journal, columns)
 
 
 def forget_unless(journal: Path, kind: str) -> None:

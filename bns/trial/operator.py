@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
@@ -12,6 +13,7 @@ import numpy as np
 from bns.errors import TrialPausedError
 from bns.hardware.platform import Emulation
 
+_COUNTED = 3
 _PLACED_SD = np.array([0.005, 0.005, 0.03])
 
 
@@ -28,6 +30,12 @@ class Decision(NamedTuple):
 class Operator(Protocol):
     """Asked between drives, never during one."""
 
+    wants_picture: bool
+    """Whether it helps to see what was driven."""
+
+    def arm(self, what: str) -> None:
+        """The robot is about to move for the first time; TrialPausedError if it is not to."""
+
     def place(self, start: np.ndarray, why: str) -> None:
         """See to it that the robot stands at `start` (3,); TrialPausedError if that cannot be."""
 
@@ -35,11 +43,31 @@ class Operator(Protocol):
         """What to do with the evaluation just driven; `spans_s`: when each command was under way that can be unstable."""
 
 
-class TerminalOperator:
-    """Asks on the terminal. `ask` is `input` but in tests."""
+def count_down(check: Callable[[], None], sleep: Callable[[float], None] = time.sleep) -> None:
+    """Three seconds to step back in; `check` raises if the trial was asked to stop meanwhile."""
+    for left in range(_COUNTED, 0, -1):
+        print(f"the robot drives in {left}", file=sys.stderr, flush=True)
+        sleep(1.0)
+        check()
 
-    def __init__(self, ask: Callable[[str], str] = input) -> None:
-        self._ask = ask
+
+class TerminalOperator:
+    """Asks on the terminal. `ask` is `input` but in tests; `check` raises when a signal asked for a pause."""
+
+    wants_picture = True
+
+    def __init__(
+        self,
+        ask: Callable[[str], str] = input,
+        check: Callable[[], None] = lambda: None,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._ask, self._check, self._sleep = ask, check, sleep
+
+    def arm(self, what: str) -> None:
+        """Ask before the first drive, then count down."""
+        self._answer(f"{what}\nStand clear, a hand at its switch; then Enter (p: pause the trial): ", {"": "armed"})
+        count_down(self._check, self._sleep)
 
     def place(self, start: np.ndarray, why: str) -> None:
         """Ask for it, and wait."""
@@ -49,7 +77,7 @@ class TerminalOperator:
     def accept(self, summary: str, spans_s: Spans) -> Decision:
         """Ask what to do."""
         words = {"": "next", "r": "repeat", "s": "skip"}
-        asked = f"{summary}\nEnter: keep it; r: drive it again; s: skip it; p: pause the trial"
+        asked = f"{summary}\nEnter: keep it; discard it and r: drive it again; s: go on with the next; p: pause"
         if not spans_s:
             return Decision(self._answer(f"{asked}: ", words))
         answer = self._answer(f"{asked}; u: keep it, some cycles were unstable: ", words | {"u": "unstable"})
@@ -86,6 +114,16 @@ class TerminalOperator:
 class UnattendedOperator:
     """With `--yes`: nobody can put the robot back, so the trial pauses where it would have to be."""
 
+    wants_picture = False
+
+    def __init__(self, check: Callable[[], None] = lambda: None, sleep: Callable[[float], None] = time.sleep) -> None:
+        self._check, self._sleep = check, sleep
+
+    def arm(self, what: str) -> None:
+        """Nobody is asked; whoever is near hears of it in time."""
+        print(what, file=sys.stderr)
+        count_down(self._check, self._sleep)
+
     def place(self, start: np.ndarray, why: str) -> None:
         """Pause."""
         raise TrialPausedError(f"{why}, and with --yes nobody can put it back. Do so, then go on with --resume")
@@ -99,8 +137,13 @@ class EmulatedHands:
     """Puts an emulated robot down, within some millimetres and degrees as hands do; keeps every evaluation,
     and sees what was unstable."""
 
+    wants_picture = False
+
     def __init__(self, emulation: Emulation, seed: int) -> None:
         self._emulation, self._draw = emulation, np.random.default_rng([seed, 7])
+
+    def arm(self, what: str) -> None:
+        """Nobody can be hurt."""
 
     def place(self, start: np.ndarray, why: str) -> None:
         """Put it down."""

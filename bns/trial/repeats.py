@@ -35,8 +35,11 @@ def drive_repeats(driver: TrialDriver, journal: Path, evaluation: int, count: in
     own = past_evaluations(journal)[evaluation - 1]
     done = [own, *past_repeats(journal, evaluation)][:count]
     for again in range(len(done) + 1, count + 1):
-        done.append(driver.repeat(evaluation, again, own.picked))
-    return done
+        drive = driver.repeat(evaluation, again, own.picked)
+        if drive.skipped:
+            driver.skipped(evaluation, own.picked, 0, again)
+        done.append(drive)
+    return [drive for drive in done if not drive.skipped]
 
 
 def repeats_table(drives: Sequence[Evaluation], evaluation: int, robot: Robot, task: Task) -> pd.DataFrame:

@@ -34,6 +34,9 @@ class _NoRobot:
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         pass
 
+    def skipped(self, number: int, controller: np.ndarray, rounds: int) -> None:
+        pass
+
 
 def replayed(journal: Path, results: Path) -> str:
     """Run the evaluations of a journal again and store them; the report in words."""

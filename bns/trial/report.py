@@ -34,9 +34,10 @@ class TrialResult:
 def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
     """Lines for the terminal; `what` drove: a robot, or its emulator."""
     evals = result.run.tables["evals"]
-    firsts = [f"within {cm} cm {_first(evals[f'evaluated_success_{cm}cm'])}" for cm in RADII_CM]
+    numbers = evals["evaluation"]
+    firsts = [f"within {cm} cm {_first(evals[f'evaluated_success_{cm}cm'], numbers)}" for cm in RADII_CM]
     if evals[f"evaluated_success_{RADII_CM[0]}cm"][0] is None:  # goals are regions
-        firsts = [_first(evals["evaluated_success"])]
+        firsts = [_first(evals["evaluated_success"], numbers)]
     driven_min = float(np.sum(evals["driven_ms"])) / 60_000.0
     early = f"drives that ended early: {len(result.ends)}, the last because {result.ends[-1]}" if result.ends else ""
     return [
@@ -68,7 +69,7 @@ def _ms(seconds: float) -> str:
     return f"{1000 * seconds:.0f} ms"
 
 
-def _first(success: np.ndarray) -> str:
+def _first(success: np.ndarray, numbers: np.ndarray) -> str:
     if not success.any():
         return "never"
-    return f"first at evaluation {int(np.argmax(success)) + 1}, {success.mean():.0%} of them"
+    return f"first at evaluation {int(numbers[np.argmax(success)])}, {success.mean():.0%} of them"

@@ -14,10 +14,10 @@ from typing import Any
 
 from bns.bootstrap.loop import Progress, run
 from bns.console import live_view
-from bns.errors import BnsError, HardwareError
+from bns.errors import BnsError, HardwareError, TrialPausedError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
-from bns.hardware.guard import Guard, GuardedClock, GuardedPlatform
+from bns.hardware.guard.client import Guard, GuardedClock, GuardedPlatform
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Emulation, Platform, PlatformModule, platform_module, repeats_of
 from bns.hardware.rig import Rig
@@ -32,13 +32,22 @@ from bns.tasks import load_task
 from bns.trial.background import BackgroundDriver
 from bns.trial.driver import TrialDriver
 from bns.trial.evaluation import Evaluation
-from bns.trial.folder import REPEATS, TrialFolder, forget_unless, spec_event
+from bns.trial.folder import (
+    REPEATS,
+    TrialFolder,
+    forget_unless,
+    locked,
+    measurements_however_it_ends,
+    robot_stands,
+    spec_event,
+    stuck_before,
+)
 from bns.trial.operator import EmulatedHands, Operator, TerminalOperator, UnattendedOperator
 from bns.trial.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
 from bns.trial.report import TrialResult, report
 from bns.worlds.robot import RobotWorld
 
-GUARD_LOG = "guard.jsonl"
+GUARD_LOG, PICTURE = "guard.jsonl", "last-drive.png"
 SWEEP, SWEEP_EMULATED = "trials", "trials-emulated"
 MOST_ROUNDS = 50
 
@@ -90,6 +99,7 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
             guard = _guard(rig, module, journal, stack)
             clock = RealClock() if guard is None else GuardedClock(guard)
         log = stack.enter_context(HardwareLog(journal, clock))
+        stopping.causes.append(log.check)
         if isinstance(clock, EmulatedClock):
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bns-rig-")))
             emulation: Emulation = module.emulate(rig, folder, clock, how.plan, seed)
@@ -102,8 +112,12 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         stack.callback(platform.close)
         stack.enter_context(StopsAtTheEnd(platform.stop))
         yield OpenedRig(
-            platform, hands or (UnattendedOperator() if how.yes else TerminalOperator(stopping.ask)), clock, log
+            platform, hands or _somebody(how, stopping), clock, log
         )
+
+
+def _somebody(how: TrialSetup, stopping: Stopping) -> Operator:
+    return UnattendedOperator(stopping.check) if how.yes else TerminalOperator(stopping.ask, stopping.check)
 
 
 def _guard(rig: Rig, module: PlatformModule, journal: Path | None, stack: ExitStack) -> Guard | None:
@@ -112,7 +126,7 @@ def _guard(rig: Rig, module: PlatformModule, journal: Path | None, stack: ExitSt
     if recipe_of is None or os.name != "posix":  # Windows has no pseudo-terminals
         return None
     log = None if journal is None else journal.with_name(GUARD_LOG)
-    guard = Guard(rig.port, recipe_of(rig), rig.limits.silent_s, log)
+    guard = Guard(rig.port, recipe_of(rig), rig.limits.silent_s, log, rig.limits.gives_up_s)
     stack.callback(_let_go, guard)
     return guard
 
@@ -124,17 +138,17 @@ def _let_go(guard: Guard) -> None:
 
 
 def carry_out(spec: RunSpec, how: TrialSetup, results: Path, on_evaluation: Progress = lambda _row: None) -> KeptTrial:
-    """Carry out a trial, store it, draw its path. TrialPausedError, StopNotConfirmedError, HardwareError.
+    """Carry out a trial, store it, draw its path. TrialPausedError, StopNotConfirmedError, TrialFileError,
+    HardwareError.
 
     ``on_evaluation`` is called with each evaluation's row, those of a trial that is gone on with included.
     """
     how.rig.check_task(load_task(spec.robot, spec.task).goals_m)
     folder = TrialFolder(results, spec, how.emulated)
-    past = folder.open(how.resume)
-    try:
-        return _kept(spec, how, results, folder, _driven(spec, how, folder, past, on_evaluation))
-    finally:
-        folder.close()
+    with locked(folder.path):
+        result = _driven(spec, how, folder, folder.past(how.resume), on_evaluation)
+        with robot_stands(results):
+            return _kept(spec, how, results, folder, result)
 
 
 def _driven(
@@ -144,10 +158,18 @@ def _driven(
     started, robot = datetime.now(UTC), load_robot(spec.robot)
     start = on_floor(robot, robot.start_pose())[0]
     try:
-        with Stopping() as stopping, open_rig(how, spec.seed, folder.journal, stopping) as opened:
+        stuck = stuck_before(folder.journal)
+        with (
+            measurements_however_it_ends(folder.journal, robot.measured_columns),
+            Stopping() as stopping,
+            open_rig(how, spec.seed, folder.journal, stopping) as opened,
+        ):
             opened.log.note("trial", spec=spec_event(spec), emulated=how.emulated, resumed_after=len(past))
             opened.log.sync()
-            driver = TrialDriver(opened.platform, opened.operator, how.rig, start, opened.clock, opened.log)
+            goals_m, picture = load_task(spec.robot, spec.task).goals_m, folder.path / PICTURE
+            driver = TrialDriver(
+                opened.platform, opened.operator, how.rig, start, opened.clock, opened.log, picture, goals_m, stuck
+            )
             result = _looped(spec, how, driver, past, started, on_evaluation)
             _repeated(spec, how, driver, folder, result)
             opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
@@ -155,10 +177,6 @@ def _driven(
         if not past:  # nothing has moved: the next attempt is no resumption
             forget_unless(folder.journal, "trial")
         raise
-    except BaseException:
-        folder.write_measurements()
-        raise
-    folder.write_measurements()
     return result
 
 
@@ -173,15 +191,19 @@ def _looped(
     robot = load_robot(spec.robot)
     world = RobotWorld("robot-emulated" if how.emulated else "robot")
     with (
-        live_view(spec, driver.live_text) as show,
+        live_view(spec, driver.live_text, driver.underway.text) as show,
         BackgroundDriver(robot, driver, past, how.most_rounds, how.until_success) as background,
     ):
+
+        driver.suspended = getattr(show, "suspended", driver.suspended)
 
         def tell(row: Mapping[str, Any]) -> None:
             show(row)
             on_evaluation(row)
 
         result = run(spec, tell, world, background)
+    if "evals" not in result.tables:
+        raise TrialPausedError(f"all {spec.evaluations} evaluations were skipped: there is nothing to keep")
     wall_s = (datetime.now(UTC) - started).total_seconds()
     return TrialResult(result, driver.stops_s, driver.ends, background.waited_share, background.rounds, started, wall_s)
 
@@ -195,7 +217,8 @@ def _repeated(spec: RunSpec, how: TrialSetup, driver: TrialDriver, folder: Trial
     drives = drive_repeats(driver, folder.journal, evaluation, count)
     robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
     table = repeats_table(drives, evaluation, robot, task)
-    write_repeats(table, folder.path / REPEATS)
+    with robot_stands(folder.path / REPEATS):
+        write_repeats(table, folder.path / REPEATS)
     result.repeats.extend(bool(rows["success"].iloc[0]) for _, rows in table.groupby("repeat"))
 
 

@@ -191,6 +191,76 @@ def test_the_model_is_saved_as_it_is_shown(page, tmp_path, bench):
     shown(page, "next")
 
 
+def test_snapshots_stand_side_by_side_and_lead_back(page, bench):
+    go(page, "Effects", "#bns-errors")
+    page.get_by_label("Name of the snapshot").fill("with lag")
+    page.get_by_role("button", name="Keep a snapshot").click()
+    page.locator("#bns-snapshots").wait_for()
+    page.get_by_role("checkbox", name="motor-lag:").uncheck()
+    page.get_by_role("rowheader", name="+ motor-lag").wait_for(state="detached")
+    page.get_by_label("Name of the snapshot").fill("")
+    page.get_by_role("button", name="Keep a snapshot").click()
+    page.get_by_role("rowheader", name="as given", exact=True).nth(1).wait_for()
+    page.get_by_label("Snapshot", exact=True).select_option("with lag")
+    page.get_by_role("button", name="Go back to it").click()
+    after = error_of(page, "+ motor-lag")
+    kept = page.locator("#bns-snapshots tbody tr").filter(
+        has=page.get_by_role("rowheader", name="with lag", exact=True)
+    )
+    models = bench.shown(Switches().switched("motor-lag", True)).errors.horizons["1s"].models
+    assert [float(kept.locator("td").nth(1).inner_text()), after] == [round(1e3 * models[-1].rms_m, 2)] * 2
+    shown(page, "snapshots")
+
+
+def test_a_saved_session_opens_as_it_was(page, visit, tmp_path):
+    go(page, "Next", "#bns-commands")
+    with page.expect_download() as got:
+        page.get_by_role("link", name="Save the session").click()
+    saved = tmp_path / got.value.suggested_filename
+    got.value.save_as(saved)
+    other = visit.open()
+    other.get_by_label("Or a file of this machine").fill(str(saved))
+    other.get_by_role("button", name="Open the file").click()
+    other.locator("#bns-log").wait_for()
+    go(other, "Effects", "#bns-errors")
+    assert error_of(other, "+ motor-lag") == error_of_session(page)
+    other.locator("#bns-snapshots").wait_for()
+    other.close()
+
+
+def error_of_session(page):
+    go(page, "Effects", "#bns-errors")
+    return error_of(page, "+ motor-lag")
+
+
+def test_the_next_experiment_is_drawn_in_an_arena(page):
+    go(page, "Next", "#bns-commands")
+    page.get_by_role("link", name="Save the session").wait_for()  # what follows stands still from here on
+    picture = page.locator(".bk-Figure").first
+    picture.scroll_into_view_if_needed()
+    before = page.get_by_label("x from (m)").input_value()
+    box = picture.bounding_box()
+    page.mouse.move(box["x"] + 0.2 * box["width"], box["y"] + 0.25 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.85 * box["height"], steps=6)
+    page.mouse.up()
+    sync_api.expect(page.get_by_label("x from (m)")).not_to_have_value(before, timeout=SLOW_MS)
+    page.get_by_label("Minutes of driving").fill("2")
+    page.get_by_role("button", name="Propose the next experiment").click()
+    page.locator("#bns-pairs, .bns-error").first.wait_for()
+    shown(page, "experiment")
+    assert page.locator("#bns-pairs").count() == 1
+
+
+def test_controllers_are_evolved_in_the_model(page):
+    page.get_by_label("Evaluations").fill("3")
+    page.get_by_label("Evaluations").press("Enter")
+    page.get_by_role("button", name="Evolve in this model").click()
+    page.locator("#bns-evolved").wait_for()
+    assert "goals reached" in page.locator("#bns-evolved").inner_text()
+    shown(page, "evolved")
+
+
 def test_everything_can_be_read_on_a_narrow_screen(page, visit):
     page = visit.open(400, page.url)
     page.locator("#bns-errors").wait_for()

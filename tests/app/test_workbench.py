@@ -148,7 +148,7 @@ def test_tabs_do_not_share_their_switches():
 
 def test_a_diagnosis_in_the_background_can_be_stopped_and_begun_again():
     work = Background()
-    work.start(LOG, "khepera")
+    work.start("diagnosing", lambda tell: bns.diagnose(LOG, "khepera", progress=tell))
     assert work.at_work
     work.stop()
     work.wait(60)

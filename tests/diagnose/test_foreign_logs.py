@@ -11,10 +11,11 @@ import yaml
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import checked
-from bns.diagnose.data.guess_mapping import drafted
-from bns.diagnose.data.load import load_measured, read_table
+from bns.diagnose.data.guess.mapping import drafted
+from bns.diagnose.data.load import load_measured
 from bns.diagnose.data.mapping import load_mapping
-from bns.diagnose.data.split_trials import KEPT_S, split
+from bns.diagnose.data.sources.read import read_table
+from bns.diagnose.data.split_trials import KEPT_S, RUN_UP_S, split
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.check_robot import check_same_robot
 from bns.diagnose.predict.paired_errors import paired_errors
@@ -156,11 +157,16 @@ def test_a_long_log_is_cut_where_the_robot_stands_and_a_second_around_is_kept():
 def test_a_log_without_stops_is_cut_into_pieces_that_begin_in_motion():
     log = continuous(measured(NOMINAL, trials=4), pause_s=0.2)
     out = split(log, "lasting_s", 5.0)
-    lasts = out.groupby("trial")["t_s"].agg(lambda t: t.iloc[-1] - t.iloc[0])
-    assert lasts.iloc[:-1].between(4.8, 5.0).all()
-    for (_, before), (_, rows) in zip(list(out.groupby("trial"))[:-1], list(out.groupby("trial"))[1:], strict=True):
-        assert rows["before_left_m_s"].iloc[0] == before["left_m_s"].iloc[-1]
-    assert len(out) == len(log)
+    own = out[out["run_up"] == 0]
+    assert len(own) == len(log)
+    assert (own.groupby("trial")["t_s"].first() == 0).all()
+    assert own.groupby("trial")["t_s"].last().iloc[:-1].between(4.8, 5.0).all()
+    for trial, rows in out[out["trial"] > 0].groupby("trial"):
+        ahead = rows[rows["run_up"] == 1]
+        assert ahead["t_s"].between(-RUN_UP_S, -1e-9).all()
+        assert ahead["x_m"].isna().all()
+        there = log["t_s"].searchsorted(ahead["session_s"].to_numpy() - 1e-9)
+        assert (ahead["left_m_s"].to_numpy() == log["left_m_s"].to_numpy()[there]).all(), trial
 
 
 def test_gaps_cut_a_log_where_nothing_was_written():

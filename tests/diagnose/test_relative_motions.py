@@ -10,7 +10,8 @@ import pytest
 
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
-from bns.diagnose.data.load import load_measured, read_table
+from bns.diagnose.data.load import load_measured
+from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.estimate.calibration import calibrated
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import predictor_for_search

@@ -17,8 +17,9 @@ from hypothesis import HealthCheck, given, seed, settings
 
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
-from bns.diagnose.data.load import load_measured, read_table
+from bns.diagnose.data.load import load_measured
 from bns.diagnose.data.mapping import load_mapping
+from bns.diagnose.data.sources.read import read_table
 from bns.errors import BnsError
 from bns.hardware.emulators.faults import load_plan
 from bns.hardware.rig import load_rig

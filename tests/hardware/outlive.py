@@ -22,12 +22,14 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.guard import Guard
+from bns.hardware.guard.client import Guard
+from bns.hardware.guard.recipe import khepera_recipe
+from bns.hardware.khepera import KheperaIII
 from bns.hardware.platforms import khepera, snake
 from bns.hardware.rig import shipped_rig
-from bns.hardware.safety import Stopping
-from bns.hardware.stop_recipe import khepera_recipe
+from bns.hardware.safety import Stopping, Surface
 from bns.hardware.tracking.sight import Sight
+from bns.robots.khepera import UNITS_PER_M_S
 from bns.trial.session import TrialSetup, open_rig
 
 from .robots_on_the_line import LINKS, Robot, hold_terminal
@@ -46,30 +48,77 @@ class Seen(NamedTuple):
 
 
 class Glances:
-    """A tracker of a robot that goes about its business."""
+    """A tracker of a robot that goes about its business: a snake that wriggles, a Khepera on the circle that it was sent on.
 
-    def __init__(self, clock):
-        self._clock = clock
+    `frozen` is "bits" when the camera's last picture comes again and again, "scene" when only a clock in it goes on.
+    """
+
+    frozen = ""
+    sent_s = None
+
+    def __init__(self, clock, wheels):
+        self._clock, self._wheels, self._filmed_s, self._last = clock, wheels, 0.0, None
+
+    @property
+    def picture_s(self):
+        return self._last.t_s
 
     def look(self):
         now_s = self._clock.now_s()
-        wiggle = 0.05 * np.sin(3.0 * now_s)
-        points = {"yellow": np.array([wiggle, -0.3]), "green": np.array([wiggle, 0.3])}
-        return Sight(now_s, np.array([wiggle, 0.0, np.pi / 2]), 0.0, points)
+        if not self.frozen:
+            self._filmed_s = now_s
+        if self.frozen != "bits":
+            self._last = self._seen(now_s)
+        return self._last
+
+    def _seen(self, now_s):
+        if self._wheels is None:
+            wiggle = 0.05 * np.sin(5.0 * self._filmed_s)
+            points = {"yellow": np.array([wiggle, -0.3]), "green": np.array([wiggle, 0.3])}
+            return Sight(now_s, np.array([wiggle, 0.0, np.pi / 2]), 0.0, points)
+        left, right = self._wheels
+        turned = (right - left) / 0.0884 * (0.0 if Glances.sent_s is None else self._filmed_s - Glances.sent_s)
+        radius_m = 0.0884 / 2 * (right + left) / (right - left)
+        middle = np.array([-radius_m, 0.0])
+        place = middle + radius_m * np.array([np.cos(turned), np.sin(turned)])
+        return Sight(now_s, np.array([*place, np.pi / 2 + turned]))
 
     def close(self):
         pass
 
 
+def knowing_when(set_speed):
+    """The driver's order, noted when it was carried out."""
+
+    def ordered(self, left, right):
+        sent = set_speed(self, left, right)
+        Glances.sent_s = self._clock.now_s()
+        return sent
+
+    return ordered
+
+
+def freeze(what):
+    def freezes(*_):
+        Glances.frozen = what
+
+    return freezes
+
+
 def drive(link, port, journal):
     """The trial's process: drives for ever, and hangs when a signal says so."""
-    khepera.open_tracker = snake.open_tracker = lambda _settings, clock: Glances(clock)
     robot = "khepera" if link == "serial" else "snake"
+    wheels = np.array([15000.0, 20000.0]) / UNITS_PER_M_S if link == "serial" else None
+    khepera.open_tracker = snake.open_tracker = lambda _settings, clock: Glances(clock, wheels)
+    KheperaIII.set_speed_m_s = knowing_when(KheperaIII.set_speed_m_s)
     rig = shipped_rig(robot)
     settings = {} if robot == "khepera" else {**rig.driver, "wiring": link}
-    rig = replace(rig, port=port, driver=settings)
+    everywhere = replace(rig.limits, surface=Surface(-9.0, 9.0, -9.0, 9.0))
+    rig = replace(rig, port=port, driver=settings, limits=everywhere)
+    signal.signal(signal.SIGRTMIN, freeze("bits"))
+    signal.signal(signal.SIGRTMIN + 1, freeze("scene"))
     signal.signal(signal.SIGUSR1, lambda *_: time.sleep(3600))
-    commands = np.array([[20000.0, 15000.0, 1e6]] if robot == "khepera" else 999 * [[0.5, 0.3, 0.5, 0.5, 1.0]], np.float32)
+    commands = np.array([[15000.0, 20000.0, 1e6]] if robot == "khepera" else 999 * [[0.5, 0.3, 0.5, 0.5, 1.0]], np.float32)
     try:
         with Stopping() as stopping, open_rig(TrialSetup(rig, yes=True), 0, Path(journal), stopping) as opened:
             opened.platform.drive(commands)
@@ -193,9 +242,13 @@ CAUSES = {
     "Ctrl-Z": _typed(b"\x1a"),
     "terminal closed": _closed,
     "hang": _signalled(signal.SIGUSR1),
+    "camera frozen (bits)": _signalled(signal.SIGRTMIN),
+    "camera frozen (scene)": _signalled(signal.SIGRTMIN + 1),
     "link gone": _unplugged,
     "link gone, then SIGKILL": _killed_and_unplugged,
 }
+_ARMED_S = 4.0
+"""By then the servos have their torque and the body is straight; before, nothing depends on the camera."""
 SURVIVES = {"SIGSTOP", "hang"}
 GONE_S = {"link gone": 1.0, "link gone, then SIGKILL": 1.0}
 """How long the link stays away; the time until the robot stands counts from its return."""
@@ -224,7 +277,7 @@ def _befell(nursery, robot, cause, folder, gone_s):
     process, terminal = nursery.begin(robot.link, robot.path, folder / "journal.jsonl")
     try:
         robot.until(True, HANGS_S)
-        time.sleep(0.25)
+        time.sleep(_ARMED_S if cause.startswith("camera") and robot.link != "serial" else 0.25)
         began_s = time.monotonic()
         CAUSES[cause](robot, process, terminal)
         if cause in GONE_S:

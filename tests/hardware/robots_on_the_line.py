@@ -108,6 +108,55 @@ class Robot:
         self.clock.close()
 
 
+class DistantRobot(Robot):
+    """A Khepera whose link takes its time: `delay_s` there and back, `jitter` of that (an exponential tail), in order.
+
+    `loss` of the messages never arrive, either way.
+    """
+
+    def __init__(self, folder, delay_s, jitter, loss, seed=0):
+        self._delay_s, self._jitter, self._loss = delay_s, jitter, loss
+        self._draw = np.random.default_rng(seed)
+        self._due, self._turn, self._ends = [], threading.Condition(), False
+        self._last_s = {"there": 0.0, "back": 0.0}
+        super().__init__("serial", folder)
+        self._device._latency_s = 0.0
+        self._carrier = threading.Thread(target=self._carry, daemon=True)
+        self._carrier.start()
+
+    def receive(self, data):
+        self._send("there", data)
+        return b""
+
+    def _send(self, way, data):
+        with self._turn:
+            if self._draw.random() < self._loss:
+                return
+            late_s = self._delay_s / 2 + self._draw.exponential(self._jitter * self._delay_s / 2)
+            self._last_s[way] = max(time.monotonic() + late_s, self._last_s[way])
+            self._due.append((self._last_s[way], way, data))
+            self._due.sort(key=lambda one: one[0])
+            self._turn.notify()
+
+    def _carry(self):
+        while not self._ends:
+            with self._turn:
+                wait_s = self._due[0][0] - time.monotonic() if self._due else 0.1
+                if wait_s > 0:
+                    self._turn.wait(min(wait_s, 0.1))
+                    continue
+                _, way, data = self._due.pop(0)
+            if way == "back":
+                self.line.send(data)
+            elif answer := super().receive(data):
+                self._send("back", answer)
+
+    def close(self):
+        self._ends = True
+        self._carrier.join()
+        super().close()
+
+
 def hold_terminal(slave):
     """Make the terminal that of this process: for a child, after fork."""
     os.setsid()

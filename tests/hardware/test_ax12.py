@@ -102,7 +102,7 @@ def test_chains_that_cannot_be_used(chain, build, message):
 
 
 def test_no_such_port(clock):
-    with pytest.raises(HardwareError, match=r"/dev/nowhere cannot be opened.*bns doctor"):
+    with pytest.raises(HardwareError, match=r"there is no port /dev/nowhere.*bns doctor"):
         Ax12Chain("/dev/nowhere", IDS, clock, HardwareLog(None, clock))
 
 

@@ -2,25 +2,29 @@
 
 import fcntl
 import os
+import shutil
 import signal
 import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from bns.errors import HardwareError
-from bns.hardware import guard_process
 from bns.hardware.bridge import BridgeChain
 from bns.hardware.clock import RealClock
 from bns.hardware.dynamixel import Ax12Chain
 from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.guard import Guard, GuardedClock
+from bns.hardware.guard import client as guard_client
+from bns.hardware.guard import process as guard_process
+from bns.hardware.guard.client import Guard, GuardedClock
+from bns.hardware.guard.line import identity
+from bns.hardware.guard.recipe import ax12_recipe, bridge_recipe, khepera_recipe
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.khepera import BAUD, KheperaIII
 from bns.hardware.serial_link import NoReplyError, SerialLink
-from bns.hardware.stop_recipe import ax12_recipe, bridge_recipe, khepera_recipe
 
 from . import outlive
 from .robots_on_the_line import LINKS, Robot
@@ -104,6 +108,26 @@ def test_a_robot_stands_when_its_trial_is_there_and_does_nothing(tmp_path, nurse
 
 
 @pytest.mark.parametrize(
+    ("cause", "link", "why"),
+    [
+        ("camera frozen (scene)", "serial", "the picture shows it where it was"),
+        ("camera frozen (scene)", "bus", "the picture shows both markers where they were"),
+    ],
+)
+def test_a_camera_that_hangs_under_a_running_clock_pauses_the_trial(tmp_path, nursery, cause, link, why):
+    seen = outlive.outlived(nursery, link, cause, tmp_path)
+    assert seen.ended == 3
+    assert why in seen.said
+
+
+@pytest.mark.parametrize("link", ["serial", "bridge"])
+def test_a_camera_that_sends_its_last_picture_again_stops_the_robot(tmp_path, nursery, link):
+    seen = outlive.outlived(nursery, link, "camera frozen (bits)", tmp_path)
+    assert seen.ended == 0  # the drive is over before its commands are
+    assert seen.events == []
+
+
+@pytest.mark.parametrize(
     ("cause", "link", "said"),
     [("Ctrl-Z", "bridge", "suspended"), ("Ctrl-\\", "bus", "quit"), ("terminal closed", "serial", "the terminal was closed")],
 )
@@ -131,7 +155,7 @@ def test_a_driver_that_does_not_know_cannot_go_on(held):
     robot.until(False)
     until(guard.tripped)
     with pytest.raises(NoReplyError):
-        driver._link.exchange(b"D,l20000,l20000\n")
+        driver._link.exchange(b"D,l20000,l20000\n", 0.3)
     assert not robot.moves()
     assert driver.stop(HANGS_S).confirmed
     assert driver.battery_v() > 7
@@ -189,6 +213,7 @@ def test_a_computer_that_slept_stops_the_robot_when_it_wakes(tmp_path, monkeypat
     monkeypatch.setattr(guard_process, "slept_s", lambda: next(slept))
     near, far = socket.socketpair()
     setup = {"process": os.getpid(), "silent_s": HANGS_S, "log": None, "link": str(tmp_path / "x" / "y")}
+    setup |= {"port": "none", "sysfs": "/sys", "identity": None, "gives_up_s": HANGS_S}
     guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far)
     near.send(b"a")
     guard._turn(1.0)
@@ -236,8 +261,9 @@ def test_a_port_in_use_is_named(tmp_path):
 
 def test_a_guard_needs_no_package(tmp_path):
     """It starts with the standard library alone, in a process that has nothing to import from."""
-    code = f"import runpy; runpy.run_path({guard_process.__file__!r})"
-    subprocess.run([sys.executable, "-I", "-S", "-c", code], check=True, cwd=tmp_path)
+    folder = Path(guard_process.__file__).parent.parent
+    code = guard_client._CODE.replace("main()", "assert not [name for name in sys.modules if name.startswith('bns')]")
+    subprocess.run([sys.executable, "-I", "-S", "-c", code, str(folder)], check=True, cwd=tmp_path)
 
 
 def test_a_bus_is_stopped_by_the_same_bytes_as_its_driver_writes(held):
@@ -261,3 +287,66 @@ def test_bytes_pass_unchanged(tmp_path):
         os.close(near)
         guard.close()
     assert heard == sent
+
+
+def say_what_is_there(sysfs, port, serial, socket_name="1-1"):
+    """What Linux says of a USB adapter: /sys/class/tty/NAME/device leads into the folder of its socket."""
+    socket_folder = sysfs / f"devices-{serial}" / socket_name
+    (socket_folder / "interface").mkdir(parents=True)
+    for what, text in {"idVendor": "0403", "idProduct": "6014", "serial": serial}.items():
+        (socket_folder / what).write_text(f"{text}\n")
+    name = sysfs / "class" / "tty" / Path(os.path.realpath(port)).name
+    name.mkdir(parents=True, exist_ok=True)
+    (name / "device").unlink(missing_ok=True)
+    (name / "device").symlink_to(socket_folder / "interface")
+
+
+def test_devices_are_told_apart_by_serial_number_socket_or_address(tmp_path):
+    say_what_is_there(tmp_path, "/dev/ttyUSB0", "FT1234")
+    say_what_is_there(tmp_path, "/dev/ttyUSB1", "", "2-1.4")
+    bluetooth = tmp_path / "class" / "tty" / "rfcomm0"
+    bluetooth.mkdir()
+    (bluetooth / "address").write_text("00:12:6F:00:00:01\n")
+    (bluetooth / "channel").write_text("1\n")
+    found = [identity(f"/dev/{name}", str(tmp_path)) for name in ("ttyUSB0", "ttyUSB1", "rfcomm0", "ttyS0")]
+    assert found == ["usb 0403:6014 FT1234", "usb 0403:6014 2-1.4", "bluetooth 00:12:6F:00:00:01 1", None]
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_a_device_that_takes_the_ports_name_hears_nothing_unless_it_is_the_robots(tmp_path, same):
+    robot = Robot("serial", tmp_path)
+    say_what_is_there(tmp_path / "sys", robot.path, "FT1234")
+    sysfs = str(tmp_path / "sys")
+    guard = Guard(str(robot.path), RECIPES["serial"], HANGS_S, tmp_path / "guard.jsonl", gives_up_s=3.0, sysfs=sysfs)
+    guard.arm()
+    line = os.open(guard.path, os.O_RDWR | os.O_NOCTTY)
+    os.write(line, b"D,l20000,l20000\n")
+    robot.until(True)
+    os.close(line)
+    shutil.rmtree(tmp_path / "sys")
+    robot.line.cut()
+    guard._control.close()
+    before = len(robot.heard)
+    robot.plug_in()
+    say_what_is_there(tmp_path / "sys", robot.path, "FT1234" if same else "FT9999")
+    assert guard._process.wait(HANGS_S) == 0
+    kinds = [e["kind"] for e in outlive._events(tmp_path)]
+    assert kinds[-1] == ("stopped" if same else "gave-up")
+    assert robot.moves() is not same
+    if not same:
+        assert kinds.count("other-device") == 1
+        assert len(robot.heard) == before
+    robot.close()
+
+
+def test_a_guard_whose_port_never_comes_back_ends_after_the_time_that_the_rig_says(tmp_path):
+    robot = Robot("serial", tmp_path)
+    guard = Guard(str(robot.path), RECIPES["serial"], HANGS_S, tmp_path / "guard.jsonl", gives_up_s=1.5)
+    guard.arm()
+    robot.line.cut()
+    guard._control.close()
+    began_s = time.monotonic()
+    assert guard._process.wait(HANGS_S) == 0
+    assert time.monotonic() - began_s > 1.4
+    assert [e["kind"] for e in outlive._events(tmp_path)][-1] == "gave-up"
+    robot.close()

@@ -6,8 +6,9 @@ import pytest
 from bns.errors import HardwareError
 from bns.hardware.emulators.terminal import PseudoTerminal
 from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.khepera import ATTEMPTS, STILL_M_S, RobotLostError, check_battery, firmware
+from bns.hardware.khepera import ATTEMPTS, STILL_M_S, check_battery, firmware
 from bns.hardware.serial_link import SerialLink
+from bns.hardware.wheel_drive import RobotLostError
 
 
 def test_golden_bytes(bench):

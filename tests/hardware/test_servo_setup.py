@@ -113,13 +113,13 @@ def test_nobody_and_no_port(bus, capsys):
     assert said.out.startswith("nobody answers")
     code, said = call(capsys, "scan", "--port", "/dev/none")
     assert code == 2
-    assert "/dev/none cannot be opened" in said.err
+    assert "there is no port /dev/none" in said.err
 
 
 def test_one_process_a_bus(bus):
     _, port = bus(1)
     first = ServoBus(port, bus.clock)
-    with pytest.raises(HardwareError, match=r"cannot be opened.*used by another program"):
+    with pytest.raises(HardwareError, match=r"is in use by another program"):
         ServoBus(port, bus.clock)
     first.close()
     ServoBus(port, bus.clock).close()

@@ -392,7 +392,7 @@ def test_bad_commands_are_named_before_anything_moves(tmp_path, capsys, text, me
 def test_the_live_view_shows_robot_and_rig(tmp_path, monkeypatch):
     console, seen = Console(width=200, record=True, file=io.StringIO()), []
 
-    def watching(spec, more):
+    def watching(spec, more, _now):
         return nullcontext(lambda row: seen.append((spec, row, more())))
 
     monkeypatch.setattr("bns.trial.session.live_view", watching)

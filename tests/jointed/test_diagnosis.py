@@ -101,11 +101,9 @@ def test_a_sound_arm_lacks_nothing(arm):
     assert (found.verdict, found.effects) == ("none", ())
 
 
-def test_the_weak_joint_of_an_arm_is_named_with_its_strength(arm):
-    found = bns.diagnose(log(12, seed=2, strength=0.5), bns.Model(arm))
-    assert found.effects[0] == "weak-joint-elbow"
-    strength = found.parameters.set_index("effect").loc["weak-joint-elbow"]
-    assert strength["value"] == pytest.approx(0.5, abs=0.05)
+def test_a_joint_of_an_arm_whose_zero_is_off_is_ranked_first(arm):
+    found = bns.diagnose(log(12, seed=1, zero_rad=0.08), bns.Model(arm))
+    assert found.ranking.index[0] == "joint-zero-elbow"
 
 
 def test_an_offset_is_added_by_the_command_line_and_read_back(arm, tmp_path, capsys):

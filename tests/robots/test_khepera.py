@@ -185,3 +185,11 @@ def test_success_and_goals_reached_agree_on_the_goal_radius():
         assert ROBOT.successes(poses, CIRCLE)[0] == all_reached
         agreed += all_reached
     assert 5 < agreed < 295
+
+
+@pytest.mark.parametrize("away", [0.07, 0.10, 0.14, 0.20])
+def test_a_goal_is_reached_on_its_radius_and_not_beyond(away):
+    at, beyond = (np.array([[x, 0.0, 0.0]]) for x in (away, np.nextafter(away, 1.0)))
+    place = ROBOT.radii_m.index(away)
+    assert ROBOT.successes(at, task([0.0, 0.0]))[place]
+    assert not ROBOT.successes(beyond, task([0.0, 0.0]))[place]

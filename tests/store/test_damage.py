@@ -13,6 +13,7 @@ import pytest
 
 from bns.errors import StoreError
 from bns.store import StoreWarning, Writer, compact, connect, finished, load, query
+from bns.store.schema import SCHEMA_VERSION
 
 from .synthetic import failed, record, records
 
@@ -235,3 +236,15 @@ def test_unreadable_runs_are_warned_of_once(store):
     assert len(caught) == 1
     assert [moved.name for moved in compact(store).set_aside] == [path.name, path.name]
     assert len(finished(store, "s")) == 3
+
+
+def test_run_with_a_part_of_its_evaluations_does_not_count(store):
+    """In files from before digests, where nothing but the number of rows tells."""
+    evals = files(store, "evals")[0]
+    [runs] = [path for path in files(store, "runs") if path.name == evals.name]
+    for path in (evals, runs):
+        with_version(path, SCHEMA_VERSION)
+    assert len(finished(store, "s")) == 6
+    table = pq.read_table(evals, partitioning=None)
+    pq.write_table(table.slice(1), evals)  # the first evaluation of one run
+    assert set(finished(store, "s")) == {run.spec.run_id for run in records(6)} - {table["run_id"][0].as_py()}

@@ -13,8 +13,6 @@ from matplotlib.figure import Figure
 
 from bns.plotting.style import COLUMN_IN, style
 
-Progress = Callable[[float | None, str], None]
-"""Called as work goes on: the share that is done (0 to 1; None where nobody can know), and what is being done."""
 LONGEST_LINE = 200
 
 
@@ -60,16 +58,6 @@ def drawn(
         new: Axes = Figure(figsize=size_in).add_subplot(axes_class=NotebookAxes)
         draw(new)
     return new
-
-
-def silent(_share: float | None, _text: str) -> None:
-    """Progress that nobody wants to see."""
-
-
-def ticks(progress: Progress | None) -> Callable[[str], None]:
-    """For work of unknown length: a function of the text alone."""
-    told = progress or silent
-    return lambda text: told(None, text)
 
 
 def plain(value: Any) -> Any:

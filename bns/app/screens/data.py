@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import panel as pn
 
-from bns.app.figures import LogFigure
+from bns.app.figures.paths import LogFigure
 from bns.app.html import table
 from bns.app.jobs import Jobs
 from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
+from bns.app.session import is_session, opened
 from bns.app.tab import Tab, draft_for, mapping_of
 from bns.diagnose.data.cycles import CycleTracks
 from bns.examples import FOLDER
@@ -72,7 +73,14 @@ class DataScreen:
 
     def _read(self, path: Path) -> None:
         self._asked = path
-        self._jobs.run(f"reading {path.name}", lambda: self._tab.open(path, str(path)), self._done, self._failed)
+
+        def work() -> None:
+            if is_session(path):
+                self._tab.become(opened(path))
+            else:
+                self._tab.open(path, str(path))
+
+        self._jobs.run(f"reading {path.name}", work, self._done, self._failed)
 
     def _read_uploaded(self) -> None:
         if not self._file.value:
@@ -80,9 +88,17 @@ class DataScreen:
         contents = self._file.value if isinstance(self._file.value, list) else [self._file.value]
         names = self._file.filename if isinstance(self._file.filename, list) else [self._file.filename]
         files = dict(zip(names, contents, strict=True))
-        logs = [name for name in names if not name.endswith((".yaml", ".yml"))]
-        self._asked = self._tab.folder / Path(logs[0]).name if logs else None
-        self._jobs.run(f"reading {', '.join(names)}", lambda: self._tab.upload(files), self._done, self._failed)
+        kept = self._tab.keep(files)
+        self._asked = next((path for path in kept if path.suffix not in {".yaml", ".yml"}), None)
+        sessions = [path for path in kept if is_session(path)]
+
+        def work() -> None:
+            if sessions:
+                self._tab.become(opened(sessions[0]))
+            else:
+                self._tab.upload(kept)
+
+        self._jobs.run(f"reading {', '.join(names)}", work, self._done, self._failed)
 
     def _read_mapped(self) -> None:
         path = self._asked
@@ -147,7 +163,10 @@ class DataScreen:
             button("Open the sample", self._open_sample, "primary"),
             self._path,
             button("Open the file", self._open_path),
-            html("<p>Or drop files on the button: logs (.csv, .parquet), and FILE.import.yaml where one has it.</p>"),
+            html(
+                "<p>Or drop files on the button: logs (.csv, .parquet), FILE.import.yaml where one has it, "
+                "or a saved session with its log.</p>"
+            ),
             self._file,
             self._problem.view,
             self._map,

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from html import escape
-from typing import Any
 
 import panel as pn
 
-from bns.app.html import message
-from bns.app.parts import WIDE, button, heading, html, row
+from bns.api.diagnose import DiagnoseResult, diagnose
+from bns.app.parts import WIDE, button, heading
+from bns.app.screens.working import Working
 from bns.app.tab import Tab
 from bns.diagnose.report.plain_language import certainty, headline
-
-_EVERY_MS = 500
 
 
 class DiagnosisPart:
@@ -21,19 +19,14 @@ class DiagnosisPart:
 
     def __init__(self, tab: Tab, found: Callable[[], None], switch_on: Callable[[tuple[str, ...]], None]) -> None:
         self._tab, self._found, self._switch_to = tab, found, switch_on
-        self._said = html()
-        self._begin = button("Diagnose in the background", self._start, "primary")
-        self._stop = button("Stop", self._end)
+        self._work = Working("Diagnose in the background", self._start, lambda: tab.diagnosis, self._show)
         self._switch_on = button("Switch on what it found", self._take)
-        self._clock: Any = None
-        buttons = row(self._begin, self._stop, self._switch_on)
-        self.view = pn.Column(heading("What is missing?"), buttons, self._said, **WIDE)
+        self.view = pn.Column(heading("What is missing?"), self._work.buttons, self._switch_on, self._work.said, **WIDE)
 
     def enter(self) -> None:
         """As the tab has it: at work, done, or not begun."""
-        if self._tab.diagnosis.at_work and self._clock is None:
-            self._clock = pn.state.add_periodic_callback(self._look, period=_EVERY_MS)
-        self._look()
+        self._switch_on.disabled = True
+        self._work.enter()
 
     def alone(self, name: str) -> str:
         """What an effect earns when added alone, in words; "" while nobody knows."""
@@ -52,33 +45,18 @@ class DiagnosisPart:
         return [other for group in groups if name in group for other in group if other != name]
 
     def _start(self) -> None:
-        if self._tab.bench is not None:
-            self._tab.diagnosis.start(self._tab.bench.ready.log, self._tab.model)
-            self.enter()
-
-    def _end(self) -> None:
-        self._tab.diagnosis.stop()
-        self._look()
+        bench, model = self._tab.bench, self._tab.model
+        if bench is not None:
+            self._switch_on.disabled = True
+            self._tab.diagnosis.start("diagnosing", lambda tell: diagnose(bench.ready.log, model, progress=tell))
 
     def _take(self) -> None:
         result = self._tab.diagnosis.result
         if result is not None:
             self._switch_to(result.effects)
 
-    def _look(self) -> None:
-        work = self._tab.diagnosis
-        self._begin.disabled, self._stop.disabled = work.at_work, not work.at_work
-        result = work.result
-        self._switch_on.disabled = result is None or not result.effects
-        if work.at_work:
-            self._said.object = f"<p>{escape(work.progress)}</p>"
-            return
-        if self._clock is not None:
-            self._clock.stop()
-            self._clock = None
-        if result is not None:
-            said, sure = escape(headline(result.diagnosis)), escape(certainty(result.diagnosis))
-            self._said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}</p>"
-        else:
-            self._said.object = message(work.why)
+    def _show(self, result: DiagnoseResult) -> None:
+        self._switch_on.disabled = not result.effects
+        said, sure = escape(headline(result.diagnosis)), escape(certainty(result.diagnosis))
+        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}</p>"
         self._found()

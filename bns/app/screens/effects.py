@@ -7,12 +7,14 @@ from typing import Any
 
 import panel as pn
 
-from bns.app.figures import LadderFigure, PathFigure
+from bns.app.figures.errors import LadderFigure
+from bns.app.figures.paths import PathFigure
 from bns.app.html import error_list, message
 from bns.app.jobs import Jobs
 from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
 from bns.app.screens.diagnosis import DiagnosisPart
 from bns.app.screens.one_effect import OneEffect
+from bns.app.screens.snapshots import SnapshotsPart
 from bns.app.switches import Switches, Term
 from bns.app.tab import Tab
 from bns.app.workbench import Shown
@@ -40,6 +42,7 @@ class EffectsScreen:
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
         self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
         self._diagnosis = DiagnosisPart(tab, self._refresh_effects, self._switch_to)
+        self._snapshots = SnapshotsPart(tab, jobs, self._go_to, lambda: str(self._horizon.value))
         self._name = pn.widgets.TextInput(name="Name", value="mine", width=110)
         self._term = pn.widgets.TextInput(name="Formula", placeholder="k * v * abs(w)", width=220)
         self._on = pn.widgets.Select(name="Added to", options=list(ON), width=90)
@@ -66,6 +69,7 @@ class EffectsScreen:
             self._horizon.value = bench.ready.predictor.near
         self._problem.show("")
         self.update()
+        self._snapshots.enter()
         self._diagnosis.enter()
 
     def update(self) -> None:
@@ -98,6 +102,10 @@ class EffectsScreen:
         self._tab.history.to(state)
         self.update()
 
+    def _go_to(self, state: Switches) -> None:
+        self._tab.history.to(state)
+        self._after_walk()
+
     def _show_if_current(self, shown: Shown) -> None:
         if shown.switches.on == self._tab.now.on and not self._tab.now.by_hand:
             self._show(shown)
@@ -116,6 +124,11 @@ class EffectsScreen:
         self._show_paths()
         self._refresh_effects()
         self._sync_switches(self._tab.now)
+
+    def _show_horizon(self) -> None:
+        if self._shown is not None:
+            self._show(self._shown)
+            self._snapshots.enter()
 
     def _show_paths(self) -> None:
         bench, shown = self._tab.bench, self._shown
@@ -197,10 +210,10 @@ class EffectsScreen:
 
     def _check_term(self) -> bool:
         """Live: the library's own message, or nothing."""
-        text = self._term.value_input
+        text, bench = self._term.value_input, self._tab.bench
         try:
             if text:
-                formula_effect(self._name.value_input or "mine", text, self._on.value)
+                formula_effect(self._name.value_input or "mine", text, self._on.value, bench.columns if bench else ())
         except ModelError as fault:
             self._formula_problem.show(str(fault))
             return False
@@ -209,7 +222,7 @@ class EffectsScreen:
 
     def _watch(self) -> None:
         for widget, act in (
-            (self._horizon, lambda: self._show(self._shown) if self._shown else None),
+            (self._horizon, self._show_horizon),
             (self._trial, self._show_paths),
             (self._time, self._show_time),
             (self._on, self._check_term),
@@ -235,6 +248,7 @@ class EffectsScreen:
             self._warnings,
             beside(drawn(self._before.figure), drawn(self._after.figure), least=280),
             self._time,
+            self._snapshots.view,
             **WIDE,
         )
         return pn.Column(self._problem.view, beside(left, right, least=330, first=right), **WIDE)

@@ -9,6 +9,9 @@ import panel as pn
 from bns.app.jobs import Jobs
 from bns.app.parts import WIDE, Problem, beside, button, download, heading, html
 from bns.app.same_elsewhere import commands, python
+from bns.app.screens.evolve import EvolvePart
+from bns.app.screens.experiment import ExperimentPart
+from bns.app.session import ENDING, session_yaml
 from bns.app.tab import Tab
 from bns.app.workbench import Shown
 
@@ -24,12 +27,14 @@ class NextScreen:
         self._make = button("Make the report", self._begin_report)
         self._prepare = button("Prepare the measurements that took part", self._begin_table)
         self._summary, self._model, self._used, self._report = html(), html(), html(), html()
+        self._session = html()
         self._commands, self._python = html(), html()
         left = pn.Column(
             heading("Save"),
             self._problem.view,
             self._summary,
             self._model,
+            self._session,
             self._prepare,
             self._used,
             html("<p>The report diagnoses the log with the model as given, as <code>bns report</code> does.</p>"),
@@ -40,17 +45,20 @@ class NextScreen:
         )
         right = pn.Column(heading("The same on a command line"), self._commands, **WIDE)
         right.extend([heading("The same in Python"), self._python])
-        self.view = beside(left, right)
+        self._experiment, self._evolve = ExperimentPart(tab), EvolvePart(tab)
+        self.view = pn.Column(beside(left, right), self._experiment.view, self._evolve.view, **WIDE)
 
     def enter(self) -> None:
         """The words for what is on now."""
         tab, bench = self._tab, self._tab.bench
         self._make.disabled = self._prepare.disabled = bench is None
-        self._model.object = self._used.object = self._report.object = ""
+        self._model.object = self._used.object = self._report.object = self._session.object = ""
         if bench is None:
             self._problem.show(tab.why_no_bench or "Open a log first: the screen Data.")
             return
         self._problem.show("")
+        self._experiment.enter()
+        self._evolve.enter()
         state = tab.now
         self._jobs.run("fitting", lambda: bench.shown(state), self._fitted, self._problem.show)
         self._commands.object = _to_copy("\n".join(self._typed()), "bns-commands")
@@ -67,6 +75,12 @@ class NextScreen:
         self._summary.object = _to_copy(shown.model.summary(), "bns-saved")
         text = shown.model.to_yaml().encode()
         self._model.object = download("Save the model", "extended.yaml", text, "text/yaml")
+        if self._tab.files:
+            session = session_yaml(self._tab).encode()
+            link = download("Save the session", f"explore{ENDING}", session, "text/yaml")
+            self._session.object = (
+                f"{link} <p>It names the log and holds the model, the switches and the snapshots.</p>"
+            )
 
     def _begin_table(self) -> None:
         used = self._tab.used

@@ -9,7 +9,8 @@ import pandas as pd
 import panel as pn
 
 from bns.api.compare import CompareResult
-from bns.app.figures import PathFigure, WindowFigures
+from bns.app.figures.errors import WindowFigures
+from bns.app.figures.paths import PathFigure
 from bns.app.html import mm, table
 from bns.app.jobs import Jobs
 from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, row

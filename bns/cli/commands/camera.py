@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import tempfile
 from contextlib import ExitStack
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bns.api.trial import trial_setup
 from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
@@ -24,6 +26,7 @@ from bns.hardware.tracking.picture import SETTINGS as PICTURE
 from bns.hardware.tracking.wii import LEDS_M
 from bns.hardware.tracking.wii import open_tracker as open_wii
 from bns.hardware.tracking.wii_calibration import ON_THE_START, checked_tracker, hanging, look_at_lights
+from bns.trial.delay import in_words, measured_delay
 
 with extra("robot"):
     import cv2
@@ -38,6 +41,9 @@ def calibrated(options: argparse.Namespace) -> str:
     """Carry out `bns calibrate`; a report in words."""
     if options.wii:
         return _hung(options)
+    if options.delay:
+        how = trial_setup(options.robot, options.rig, emulated=options.emulated, speed=math.inf if options.emulated else None)
+        return in_words(measured_delay(how))
     if not 5.0 <= options.square_mm <= 1000.0:
         raise HardwareError(f"--square-mm is {options.square_mm:g}; measure the printed square, 5 to 1000 mm.")
     board = Board(square_m=options.square_mm / 1000, marker_m=0.75 * options.square_mm / 1000)

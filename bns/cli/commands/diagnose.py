@@ -5,28 +5,37 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bns.cli.parser import Parser, add_trust, data_first
-from bns.errors import DataError
 
 if TYPE_CHECKING:
     from bns.api.common.prepared import Prepared
-    from bns.api.common.shown import Progress
+    from bns.api.common.progress import Progress
     from bns.api.diagnose import DiagnoseResult
     from bns.api.measurements import Measurements
     from bns.api.model import Given
 
+SAYS_LITTLE = 0.03
+"""A share so small says nothing yet of how long the whole takes."""
 Adder = Callable[[str, Callable[[argparse.Namespace], int], str], Parser]
 
 
 def add_commands(command: Adder) -> None:
     """The parsers of these commands; ``command`` makes one of a name, a function and a text."""
     read = command("import", import_, "turn a log with other columns or units into a table of measurements")
-    read.add_argument("data", type=Path, metavar="LOG", help="a .csv, .parquet or .tuple file (one JSON object a line)")
+    read.add_argument(
+        "data",
+        type=Path,
+        nargs="+",
+        metavar="LOG",
+        help="a .csv, .tsv, .dat, .txt, .parquet or .tuple file, a recording of ROS (.bag, .mcap, .db3 or its folder); further "
+        "files are joined with the first by time",
+    )
     read.add_argument(
         "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml beside the log"
     )
@@ -62,6 +71,7 @@ def add_commands(command: Adder) -> None:
         add_model_options(one)
         one.add_argument("--figures", type=Path, metavar="DIR", help="also draw figures into this folder")
     add_effect_options(found)
+    add_fresh(held)
     for one in (held, more):
         add_trust(one, also=True)
 
@@ -88,6 +98,13 @@ def add_model_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_fresh(parser: argparse.ArgumentParser) -> None:
+    """Whether an answer from before may be shown."""
+    parser.add_argument(
+        "--fresh", action="store_true", help="work it out again, even where the same was asked before"
+    )
+
+
 def add_effect_options(parser: argparse.ArgumentParser) -> None:
     """What is tried beside the listed effects."""
     parser.add_argument(
@@ -104,6 +121,10 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="a listed effect that is not to be tried, say because it was measured apart",
     )
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE.yaml", help="thresholds that differ from the default (docs/settings.md)"
+    )
+    add_fresh(parser)
     add_trust(parser)
 
 
@@ -111,32 +132,21 @@ def import_(options: argparse.Namespace) -> int:
     """A log as a table of measurements; the mapping is kept beside it."""
     import yaml
 
-    from bns.diagnose.data.apply_mapping import applied
-    from bns.diagnose.data.checks import checked
-    from bns.diagnose.data.guess_mapping import drafted
-    from bns.diagnose.data.load import naming, read_table
-    from bns.diagnose.data.mapping import load_mapping, mapping_beside
+    from bns.diagnose.data.import_log import import_log
+    from bns.diagnose.data.mapping import load_mapping
     from bns.diagnose.report.text import findings_text
-    from bns.measurements import write_measurements
+    from bns.measurements import check_table_name, write_measurements
 
-    table = read_table(options.data)
-    mapping = load_mapping(options.map) if options.map else mapping_beside(options.data)
-    if mapping is None:
-        raise DataError(
-            f"There is no mapping beside {options.data}, which has the columns {', '.join(map(str, table.columns))}. Write "
-            f"{options.data.name}.import.yaml, or give such a file with --map; docs/logs.md has all that may stand in it. "
-            f"A beginning, guessed from the names, to be checked line by line:\n\n{drafted(table)}"
-        )
-    with naming(options.data):
-        table = applied(table, mapping, options.data.parent, read_table)
-        checked_table, findings = checked(table)
-    write_measurements(table, options.output)
+    check_table_name(options.output)
+    first = options.data[0]
+    found = import_log(options.data, load_mapping(options.map) if options.map else None)
+    write_measurements(found.table, options.output)
     if options.map:
-        beside = options.data.with_name(options.data.name + ".import.yaml")
+        beside = first.with_name(first.name + ".import.yaml")
         if not beside.exists():
-            beside.write_text(yaml.safe_dump(mapping, sort_keys=False), encoding="utf-8")
-    print(f"{len(table)} rows of {checked_table['trial'].nunique()} trials written to {options.output}")
-    print(findings_text(tuple(findings)))
+            beside.write_text(yaml.safe_dump(found.mapping, sort_keys=False), encoding="utf-8")
+    print(found.summary(str(options.output)))
+    print(findings_text(found.findings))
     return 0
 
 
@@ -148,7 +158,7 @@ def compare(options: argparse.Namespace) -> int:
 
     model, log = model_of(options), log_of(options)
     with ticking("comparing") as tick:
-        seen = held_against(log, model, progress=tick)
+        seen = held_against(log, model, fresh=options.fresh, progress=tick)
     if seen.of_networks and seen.causes is None:
         print(
             "bns: these networks come without their training patterns, so why they are wrong is not said",
@@ -179,7 +189,15 @@ def diagnosed(options: argparse.Namespace) -> DiagnoseResult:
 
     model, log = model_of(options), log_of(options)
     with ticking("diagnosing") as tick:
-        found = find(log, model, also=options.also, without_effects=options.without_effect, progress=tick)
+        found = find(
+            log,
+            model,
+            also=options.also,
+            without_effects=options.without_effect,
+            settings=options.settings,
+            fresh=options.fresh,
+            progress=tick,
+        )
     _say_thinned(found.ready)
     return found
 
@@ -247,13 +265,31 @@ def _drawn(options: argparse.Namespace, draw: Callable[[Path], Path]) -> None:
 
 @contextmanager
 def ticking(text: str) -> Iterator[Progress]:
-    """A line on stderr that says what is being looked at; nothing where stderr is no terminal."""
+    """A bar on stderr: the share that is done, the time left and what is being looked at; nothing where stderr is no terminal."""
     from rich.console import Console
-    from rich.status import Status
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn
+    from rich.progress import Progress as Bar
 
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda _share, _what: None
         return
-    with Status(text, console=console) as line:
-        yield lambda _share, what: line.update(f"{text}: {what}")
+    began = time.monotonic()
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[left]}"))
+    with Bar(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(text, total=1.0, left="")
+
+        def told(share: float | None, what: str) -> None:
+            done = bar.tasks[0].completed if share is None else share
+            left = time_left(time.monotonic() - began, done)
+            bar.update(task, completed=done, description=f"{text}: {what}", left=left)
+
+        yield told
+
+
+def time_left(lasted_s: float, share: float) -> str:
+    """What a piece of work will still take, by what it took so far; "" while that says too little."""
+    if share <= SAYS_LITTLE or lasted_s < 1.0:
+        return ""
+    left = lasted_s * (1.0 - share) / share
+    return f"{left:.0f} s left" if left < 90 else f"{left / 60:.0f} min left"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from bns.cli.commands.diagnose import Adder
 from bns.cli.options.option_types import as_json
@@ -13,8 +12,11 @@ def add_commands(command: Adder) -> None:
     """The parsers of these commands."""
     listed = command("effects", effects, "list the physical effects that a model can lack")
     listed.add_argument("--json", action="store_true", help="a list of JSON objects on stdout, one an effect")
-    begun = command("example", example, "copy a sample log, a sweep and a script to begin with into a new folder")
-    begun.add_argument("folder", type=Path, metavar="DIR", help="a folder that is new or empty")
+    what = "copy files to begin with into a new folder: a sample log, a sweep and a script, or a robot of one's own"
+    begun = command("example", example, what)
+    begun.add_argument(
+        "words", nargs="+", metavar="[robot] DIR", help="a folder that is new or empty; after robot: for a package of your own"
+    )
 
 
 def effects(options: argparse.Namespace) -> int:
@@ -33,9 +35,14 @@ def effects(options: argparse.Namespace) -> int:
 
 def example(options: argparse.Namespace) -> int:
     """The files, and what to type first."""
-    from bns.examples import copy_example
+    from bns.errors import SpecError
+    from bns.examples import copy_example, copy_robot
 
-    files = copy_example(options.folder)
+    *kind, folder = options.words
+    if kind not in ([], ["robot"]):
+        raise SpecError(f"bns example {' '.join(options.words)}: write bns example DIR, or bns example robot DIR.")
+    files = copy_robot(folder) if kind else copy_example(folder)
     print("\n".join(str(file) for file in files))
-    print(f"begin with {files[0]}: cd {options.folder}; bns diagnose khepera-log.csv --model khepera")
+    then = "pip install -e .; bns trial --robot my-robot --emulated" if kind else "bns diagnose khepera-log.csv --model khepera"
+    print(f"begin with {files[0]}: cd {folder}; {then}")
     return 0

@@ -15,7 +15,11 @@ def add_commands(command: Adder) -> None:
     """The parser of this command."""
     page = command("explore", explore, "a page in the browser: switch effects on and watch the error fall")
     page.add_argument(
-        "data", type=Path, nargs="*", metavar="DATA", help="measurements; without any, sample logs are offered"
+        "data",
+        type=Path,
+        nargs="*",
+        metavar="DATA",
+        help="measurements, a saved session, or a folder of results; without any: sample logs",
     )
     page.add_argument(
         "--model", default="khepera", metavar="M", help="khepera (default), differential-drive, a YAML file"
@@ -30,7 +34,7 @@ def add_commands(command: Adder) -> None:
 def explore(options: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C or SIGTERM, which is how it is meant to end: exit code 0."""
     from bns.api.model import Model
-    from bns.app.explore import Explorer, tabs_of
+    from bns.app.explore import Explorer, shown_of
     from bns.extras import require
 
     require("app", "panel", "bokeh")
@@ -38,7 +42,8 @@ def explore(options: argparse.Namespace) -> int:
     given = {} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}
     words = (options.model, *(["--wheelbase", f"{options.wheelbase:g}"] if given else []))
     files = [str(file) for file in options.data]
-    explorer = Explorer(tabs_of(files or None, Model(options.model, **given), " ".join(files), words), options.port)
+    log = files[0] if len(files) == 1 else files or None
+    explorer = Explorer(shown_of(log, Model(options.model, **given), " ".join(files), words), options.port)
     print(explorer.address, flush=True)
     print("open this address in a browser on this machine; Ctrl-C ends the page", flush=True)
     explorer.serve(browser=not options.no_browser)

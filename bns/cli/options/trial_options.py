@@ -60,7 +60,12 @@ def add_looking_options(
     source.add_argument(
         "--wii", action="store_true", help="find how the Wii remote of --rig hangs: mirror, orientation, place, view"
     )
-    calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii")
+    source.add_argument(
+        "--delay", action="store_true", help="have the robot of --rig turn about, and find how late its tracker is"
+    )
+    calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii and --delay")
+    calibrating.add_argument("--robot", default="khepera", help="for --delay (default: khepera)")
+    calibrating.add_argument("--emulated", action="store_true", help="with --delay: the emulated rig")
     calibrating.add_argument(
         "--floor",
         type=Path,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.mapping import UNITS
-from bns.diagnose.data.merge_topics import held, merged, wheels_from_body
+from bns.diagnose.data.merge_topics import held, merged, named_topics, of_topics, wheels_from_body
 from bns.diagnose.data.relative_motions import relative_motions
 from bns.diagnose.data.split_trials import split
 from bns.errors import DataError, unknown_name
@@ -28,10 +29,13 @@ def applied(
     ``folder`` and ``read``: where the files of ``also`` are, and how they are read. DataError where the mapping does not fit.
     """
     out = _renamed(table, mapping["columns"])
+    if of_topics(table):
+        out = named_topics(out)
     for other in mapping.get("also", []):
         if folder is None or read is None:
             raise DataError(f"The mapping takes columns from {other['file']}, too; give the log as a file beside it.")
-        out = merged(out, _renamed(read(folder / other["file"]), other["columns"], others=False))
+        with _of_file(other["file"]):
+            out = merged(out, _renamed(read(folder / other["file"]), other["columns"], others=False))
     if mapping.get("relative"):
         out = relative_motions(out)
     out = wheels_from_body(out, mapping.get("wheelbase_m"))
@@ -44,6 +48,17 @@ def applied(
     if mapping.get("repeated_poses") == "lost":
         out.loc[repeated(out), list(POSE)] = np.nan
     return out[[*(c for c in COLUMNS if c in out.columns), *(c for c in out.columns if c not in COLUMNS)]]
+
+
+@contextmanager
+def _of_file(name: str) -> Iterator[None]:
+    """Name the file in an error that is met with it."""
+    try:
+        yield
+    except DataError as error:
+        if name in str(error):
+            raise
+        raise DataError(f"{name}: {error}") from error
 
 
 def repeated(table: pd.DataFrame) -> pd.Series:

@@ -16,7 +16,7 @@ from bns.diagnose.data.apply_mapping import repeated
 from bns.diagnose.data.merge_topics import without_commands
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
-from bns.measurements import COLUMNS, COMMANDS, POSE
+from bns.measurements import COLUMNS, COMMANDS, POSE, RUN_UP
 
 _HELD = DEFAULTS.data.held_share
 _JUMP_M = DEFAULTS.data.jump_m
@@ -47,10 +47,10 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     to_numbers(table, COLUMNS[1:])
     findings: list[Finding] = []
     _held(table, findings)
-    t, pose = table["t_s"].to_numpy(), table[list(POSE)].to_numpy()
+    t, pose, own = table["t_s"].to_numpy(), table[list(POSE)].to_numpy(), own_rows(table)
     kept = []
     for trial, at in rows_by_trial(table):
-        if not _is_sound(t[at], pose[at]):
+        if not (_is_sound(t[at[own[at]]], pose[at[own[at]]]) and (np.diff(t[at]) > 0).all()):
             good = _looked_through(trial, table.iloc[at], findings)
             at = good.index.to_numpy()  # noqa: PLW2901  # rows are numbered from 0
             pose[at] = good[list(POSE)].to_numpy()
@@ -72,6 +72,11 @@ def rows_by_trial(table: pd.DataFrame) -> list[tuple[str, np.ndarray]]:
     return list(zip(map(str, names), np.split(order, ends[:-1]) if len(names) else [], strict=True))
 
 
+def own_rows(table: pd.DataFrame) -> np.ndarray:
+    """Rows that are no run-up, (rows,) of bool."""
+    return (table[RUN_UP] != 1).to_numpy() if RUN_UP in table.columns else np.ones(len(table), dtype=bool)
+
+
 def _is_sound(t: np.ndarray, pose: np.ndarray) -> bool:
     """Whether a trial has nothing to find: what most trials are, and looking closer takes a hundred times as long."""
     steps = np.diff(t)
@@ -86,7 +91,7 @@ def _looked_through(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> 
     """The rows of a trial that can be used; none, if no pose was tracked in it."""
     good = forward_in_time(trial, rows, findings)
     good = _without_jumps(trial, good, findings)
-    _gaps_and_losses(trial, good, findings)
+    _gaps_and_losses(trial, good[own_rows(good)], findings)
     if _tracked(good).any():
         return good
     findings.append(Finding(trial, int(rows.index[0]), "no pose was tracked in it; the trial is left out"))
@@ -217,9 +222,27 @@ def _gaps_and_losses(trial: str, rows: pd.DataFrame, findings: list[Finding]) ->
         for i in map(int, np.flatnonzero(np.diff(t) > max(5 * usual, 0.2))):
             if usual < 0.2:
                 findings.append(Finding(trial, int(rows.index[i]), f"no row for {t[i + 1] - t[i]:.2f} s"))
-    lost = rows[list(POSE)].isna().any(axis=1)
-    if lost.any():
-        findings.append(Finding(trial, int(rows.index[lost][0]), f"{lost.sum()} poses lost, the first here"))
+    lost, first = poses_lost(t, _tracked(rows).to_numpy())
+    if lost:
+        findings.append(Finding(trial, int(rows.index[first]), f"{lost} poses lost, the first here"))
+
+
+def poses_lost(t_s: np.ndarray, tracked: np.ndarray) -> tuple[int, int]:
+    """How many poses of a trial are lost, and the first row that lacks one.
+
+    Rows without a pose between two poses that follow each other as quickly as usual hold commands alone: nothing is lost there.
+    ``t_s`` (rows,), ``tracked`` (rows,) of bool: does the row hold a whole pose?
+    """
+    at = np.flatnonzero(tracked)
+    if len(at) < 2:
+        return len(t_s) - len(at), int(np.argmin(tracked))
+    usual = float(np.median(np.diff(t_s[at])))
+    marks = np.concatenate([[-1], at, [len(t_s)]])
+    most = 0.6 * usual  # before the first and after the last pose one is due only where nearly a whole interval passes
+    times = np.concatenate([[t_s[0] - most], t_s[at], [t_s[-1] + most]])
+    due = np.maximum(np.round(np.diff(times) / usual) - 1, 0)
+    lost = np.minimum(np.diff(marks) - 1, due).astype(int)
+    return int(lost.sum()), int(marks[np.argmax(lost > 0)] + 1)
 
 
 def _units(table: pd.DataFrame) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
 import hashlib
-import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -12,23 +10,17 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import yaml
-from pyarrow import ArrowException
 
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import Finding, checked
 from bns.diagnose.data.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.data.joints import are_joints, joint_tracks
 from bns.diagnose.data.mapping import mapping_beside
-from bns.diagnose.data.relative_motions import read_json_lines
+from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracks import Tracks, tracks_of
-from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
-from bns.measurements import POSE
-
-MOST_COLUMNS = DEFAULTS.data.most_columns
-_LONGEST_LINE = DEFAULTS.data.longest_line
+from bns.measurements import DISCARDED, POSE
 
 
 @dataclass(frozen=True)
@@ -53,18 +45,29 @@ def load_measured(path: str | Path, robot: str | None = None, more: Sequence[Pat
     """
     path = Path(path)
     table = _joined([path, *more])
-    digest = hashlib.sha256(b"".join(p.read_bytes() for p in (path, *more))).hexdigest()[:20]
+    digest = _bytes_sha256([path, *more])[:20]
     return measured_table(table, path, digest, robot)
 
 
 def measured_table(table: pd.DataFrame, path: Path, digest: str = "", robot: str | None = None) -> Measured:
     """Check a table that was read and mapped already. ``path`` names it; ``digest``: by default that of its values."""
     with naming(path):
-        table = _of_one_robot(table, robot)
+        table = _kept(_of_one_robot(table, robot))
     of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
     with naming(path):
         tracks, findings = _tracks(table)
     return Measured(path, tracks, tuple(findings), digest or table_sha256(table)[:20], of, table)
+
+
+def _bytes_sha256(paths: Sequence[Path]) -> str:
+    """SHA-256 of files one after the other; of a folder (a recording) its files by name."""
+    whole = hashlib.sha256()
+    for path in paths:
+        for file in sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]:
+            with file.open("rb") as source:
+                while part := source.read(1 << 20):
+                    whole.update(part)
+    return whole.hexdigest()
 
 
 def table_sha256(table: pd.DataFrame) -> str:
@@ -109,41 +112,10 @@ def _jump_findings(tracks: Tracks, usable: pd.DataFrame) -> Iterator[Finding]:
             yield Finding(trial, int(rows[frame]), text)
             continue
         text = (
-            f"the tracked pose jumps by {1e3 * moved:.0f} mm at {tracks.t_s[frame]:.2f} s and stays there: another marker was "
+            f"the tracked pose jumps by {1e3 * moved:.0f} mm at {tracks.own_s[frame]:.2f} s and stays there: another marker was "
             "taken for the robot's, or somebody moved it; nothing is judged by the poses that follow in this trial"
         )
         yield Finding(trial, int(rows[frame]), text)
-
-
-def read_table(path: Path) -> pd.DataFrame:
-    """A .csv (or .csv.gz) or .parquet file as it is; DataError if there is none or it does not read."""
-    if not path.is_file():
-        raise DataError(f"There is no file {path}. Give a .csv or .parquet file of measurements.")
-    try:
-        if path.name.endswith((".csv", ".csv.gz")):
-            separator, decimal = _written(path)
-            return pd.read_csv(path, sep=separator, decimal=decimal)
-        if path.suffix == ".tuple":
-            return read_json_lines(path)
-        if path.suffix == ".parquet":
-            return pd.read_parquet(path)
-    except (ValueError, OSError, EOFError, zlib.error, OverflowError, KeyError, ArrowException, yaml.YAMLError) as fault:
-        raise DataError(f"{path} does not read as {path.suffix[1:]}: {fault}.") from fault
-    raise DataError(f"{path} is no .csv or .parquet file; measurements come as one of these.")
-
-
-def _written(path: Path) -> tuple[str, str]:
-    """What separates a .csv's columns, and its decimals, by its first two lines: many spreadsheets write 1,5;2,5."""
-    opened = gzip.open if path.suffix == ".gz" else open
-    with opened(path, "rt", encoding="utf-8", errors="replace") as lines:
-        head, first = lines.readline(_LONGEST_LINE), lines.readline(_LONGEST_LINE)
-    separator = max(",;\t", key=head.count)
-    if head.count(separator) >= MOST_COLUMNS or len(head) >= _LONGEST_LINE:
-        raise DataError(
-            f"{path} has {head.count(separator) + 1} columns or more, by its first line; {MOST_COLUMNS} are allowed. "
-            "Keep those that the diagnosis needs (docs/logs.md)."
-        )
-    return separator, "," if separator != "," and "," in first and "." not in first else "."
 
 
 def _joined(paths: Sequence[Path]) -> pd.DataFrame:
@@ -174,10 +146,22 @@ def naming(path: Path) -> Iterator[None]:
         raise DataError(f"{path}: {error}") from error
 
 
+def _kept(table: pd.DataFrame) -> pd.DataFrame:
+    """Without the rows of drives that whoever watched them discarded."""
+    if DISCARDED not in table.columns:
+        return table
+    kept = ~(pd.to_numeric(table[DISCARDED], errors="coerce") > 0)
+    if not kept.any():
+        raise DataError(f"All drives are marked as {DISCARDED}; there is nothing to judge by. Drive again.")
+    return table[kept]
+
+
 def _of_one_robot(table: pd.DataFrame, robot: str | None) -> pd.DataFrame:
     if "robot" not in table.columns:
         if robot is not None:
-            raise DataError(f"There is no column robot to choose {robot!r} by; leave out --robot, or name the robot of each row.")
+            raise DataError(
+                f"There is no column robot to choose {robot!r} by; leave out --robot, or name the robot of each row."
+            )
         return table
     names = sorted(str(name) for name in table["robot"].dropna().unique())
     if robot is None and len(names) > 1:

@@ -31,6 +31,18 @@ def merged(table: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
     return rows.groupby(keys, sort=False, as_index=False, dropna=False).first()
 
 
+def of_topics(table: pd.DataFrame) -> bool:
+    """Is this a recording's table, whose columns are called after topics (``/cmd_vel.linear.x``)?"""
+    return any(str(name).startswith("/") for name in table.columns)
+
+
+def named_topics(table: pd.DataFrame) -> pd.DataFrame:
+    """A recording's table with the columns that a mapping named, and the rows in which one of these says something."""
+    named = table[[name for name in table.columns if not str(name).startswith("/")]]
+    said = [name for name in named.columns if name not in {"t_s", "trial"}]
+    return named[named[said].notna().any(axis=1)].reset_index(drop=True)
+
+
 def held(table: pd.DataFrame, at_most_s: float) -> pd.DataFrame:
     """Every command in force until the next one, for at most so long: then the robot is told nothing, as by its watchdog.
 

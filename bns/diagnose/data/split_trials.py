@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
-from bns.measurements import BEFORE, COMMANDS, SESSION
+from bns.measurements import COMMANDS, POSE, RUN_UP, SESSION
 
 STILL_M_S = DEFAULTS.data.still_m_s
 KEPT_S = DEFAULTS.data.kept_standing_s
+RUN_UP_S = DEFAULTS.data.run_up_taken_s
 
 
 def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
@@ -19,7 +20,8 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
 
     ``by``: `standing_s` cuts wherever the robot is told to stand for so long (or told nothing) and leaves out all but the
     `KEPT_S` around a drive; `gap_s` where so long nothing was written; `lasting_s` into pieces of that length, which begin in
-    motion and so bring along what was commanded before (columns `BEFORE`). DataError where that makes fewer than two trials.
+    motion and so bring along what was commanded in the seconds before (`RUN_UP_S`), in rows with ``run_up`` 1 and without
+    poses. DataError where that makes fewer than two trials.
     """
     missing = [name for name in ("t_s", *COMMANDS) if name not in table.columns]
     if missing:
@@ -40,10 +42,24 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
         raise DataError(text + _hint(table, t))
     out = table.assign(trial=trial, **({} if SESSION in table.columns else {SESSION: t - t[0]}))
     if by == "lasting_s":
-        before = table[list(COMMANDS)].shift().fillna(0.0)
-        out = out.assign(**dict(zip(BEFORE, (before[name] for name in COMMANDS), strict=True)))
+        return _with_run_up(out, t)
     out = out[out["trial"] >= 0]
     return out.assign(t_s=out["t_s"] - out.groupby("trial")["t_s"].transform("first")).reset_index(drop=True)
+
+
+def _with_run_up(table: pd.DataFrame, t: NDArray[np.float64]) -> pd.DataFrame:
+    """Every trial behind the rows of the `RUN_UP_S` before it; t_s is 0 where the trial itself begins."""
+    trial, parts = table["trial"].to_numpy(), []
+    poses = {name: np.nan for name in POSE if name in table.columns}
+    for number in range(int(trial.max()) + 1):
+        own = np.flatnonzero(trial == number)
+        began = t[own[0]]
+        ahead = np.flatnonzero((t >= began - RUN_UP_S - 1e-9) & (np.arange(len(t)) < own[0]))
+        rows = table.iloc[own].assign(**{RUN_UP: 0})
+        if len(ahead):
+            rows = pd.concat([table.iloc[ahead].assign(trial=number, **poses, **{RUN_UP: 1}), rows])
+        parts.append(rows.assign(t_s=rows["t_s"] - began))
+    return pd.concat(parts, ignore_index=True)
 
 
 def _hint(table: pd.DataFrame, t: NDArray[np.float64]) -> str:

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bns.diagnose.data.checks import rows_by_trial
+from bns.diagnose.data.checks import own_rows, rows_by_trial
 from bns.diagnose.settings import DEFAULTS
-from bns.measurements import BEFORE, COMMANDS, POSE, SESSION
+from bns.measurements import BEFORE, COMMANDS, POSE, RUN_UP, SESSION
 
 Array = NDArray[np.float64]
 
@@ -26,12 +26,12 @@ RUN_UP_S = DEFAULTS.data.run_up_s
 class Tracks:
     """Trials one after the other.
 
-    ``first`` (trials + 1): where each trial's frames begin. ``t_s`` (frames,) since the trial's first row (in a table with the
-    columns `BEFORE`: `RUN_UP_S` more, and the speeds before are the first command), ``pose`` (frames, 3),
-    all finite. ``left_m_s, right_m_s, duration_s`` (trials, commands): what was in force, back to back from the first
-    row, padded with the command of the last row for 0 s. ``extra``: further numeric columns, (frames,) each.
-    ``start_s`` (trials,): time of the session at the first row; ``start_known``: it was logged, not made up from the order of
-    the trials.
+    ``first`` (trials + 1): where each trial's frames begin. ``t_s`` (frames,) since the trial's first row, run-up included (in
+    a table with the columns `BEFORE`: `RUN_UP_S` more, and the speeds before are the first command); ``lead_s`` (trials,): how
+    much of that lies before the trial itself begins; None: nothing. ``pose`` (frames, 3), all finite.
+    ``left_m_s, right_m_s, duration_s`` (trials, commands): what was in force, back to back from the first row, padded with the
+    command of the last row for 0 s. ``extra``: further numeric columns, (frames,) each. ``start_s`` (trials,): time of the
+    session at the first row; ``start_known``: it was logged, not made up from the order of the trials.
     """
 
     names: tuple[str, ...]
@@ -47,6 +47,8 @@ class Tracks:
     jumped: NDArray[np.bool_] | None = None
     """Frames (frames,) whose pose no drive leads to from the frame before (`tracker_faults`); None: there are none."""
 
+    lead_s: Array | None = None
+
     def __len__(self) -> int:
         return len(self.names)
 
@@ -54,6 +56,11 @@ class Tracks:
     def timed(self) -> bool:
         """Are frames seen at times of their own, so that a clock can be wrong?"""
         return True
+
+    @cached_property
+    def own_s(self) -> Array:
+        """Time of every frame since its trial itself began, (frames,): what is shown to people."""
+        return self.t_s if self.lead_s is None else self.t_s - self.lead_s[self.trial]
 
     @cached_property
     def trial(self) -> NDArray[np.int64]:
@@ -84,6 +91,7 @@ class Tracks:
             right_m_s=self.right_m_s[chosen],
             duration_s=self.duration_s[chosen],
             start_s=self.start_s[chosen],
+            lead_s=None if self.lead_s is None else self.lead_s[chosen],
         )
 
     def thinned(self, every: int) -> Tracks:
@@ -128,12 +136,13 @@ def tracks_of(table: pd.DataFrame) -> Tracks:
     tracked = np.isfinite(pose).all(axis=1)
     seen = np.concatenate([at[tracked[at]] for at in rows])
     run_up = RUN_UP_S if set(BEFORE) <= set(table.columns) else 0.0
-    since = np.empty(len(t))
+    since, own = np.empty(len(t)), own_rows(table)
     for at in rows:
         since[at] = t[at] - t[at[0]] + run_up
+    lead = np.array([since[at[own[at]][0]] if own[at].any() else since[at[-1]] for at in rows])
     commands = _commands(table, rows, t)
-    start, known = _session(table, rows, since)
-    others = [name for name in table.columns if name not in {"trial", "t_s", *COMMANDS, *POSE, *BEFORE}]
+    start, known = _session(table, rows, since, lead)
+    others = [name for name in table.columns if name not in {"trial", "t_s", *COMMANDS, *POSE, *BEFORE, RUN_UP}]
     numeric = [name for name in others if pd.api.types.is_numeric_dtype(table[name])]
     return Tracks(
         names=tuple(name for name, _ in trials),
@@ -145,8 +154,22 @@ def tracks_of(table: pd.DataFrame) -> Tracks:
         duration_s=_padded([c[2] for c in commands], "constant"),
         start_s=start,
         start_known=known,
-        extra={name: table[name].to_numpy(dtype=float)[seen] for name in numeric},
+        lead_s=lead if lead.any() else None,
+        extra={name: _at_poses(table[name].to_numpy(dtype=float), t, rows, tracked)[seen] for name in numeric},
     )
+
+
+def _at_poses(values: Array, t_s: Array, rows: list[NDArray[np.int64]], tracked: NDArray[np.bool_]) -> Array:
+    """A column (rows,) that was logged in rows without poses alone, by straight lines between these; else as it is."""
+    known = np.isfinite(values)
+    if (known & tracked).any() or not known.any():
+        return values
+    out = values.copy()
+    for at in rows:
+        there = at[known[at]]
+        if len(there):
+            out[at] = np.interp(t_s[at], t_s[there], values[there])
+    return out
 
 
 def _commands(table: pd.DataFrame, rows: list[NDArray[np.int64]], t_s: Array) -> list[tuple[Array, Array, Array]]:
@@ -175,11 +198,16 @@ def _padded(rows: list[Array], mode: Literal["edge", "constant"]) -> Array:
     return np.stack([np.pad(row, (0, width - len(row)), mode=mode) for row in rows])
 
 
-def _session(table: pd.DataFrame, rows: list[NDArray[np.int64]], since: Array) -> tuple[Array, bool]:
+def _session(
+    table: pd.DataFrame, rows: list[NDArray[np.int64]], since: Array, lead: Array
+) -> tuple[Array, bool]:
     """When each trial began in its session: as logged, else one trial right after the other."""
     if SESSION in table.columns and table[SESSION].notna().any():
-        t, session = table["t_s"].to_numpy(dtype=float), table[SESSION].to_numpy(dtype=float)
-        first = [session[at] - (t[at] - t[at[0]]) for at in rows]
-        return np.array([float(np.median(known)) if len(known := one[np.isfinite(one)]) else 0.0 for one in first]), True
-    lasted = np.array([since[at[-1]] for at in rows])
-    return np.concatenate([[0.0], np.cumsum(lasted)[:-1]]), False
+        session = table[SESSION].to_numpy(dtype=float)
+        first = [session[at] - since[at] for at in rows]
+        begun = np.array([float(np.median(k)) if len(k := one[np.isfinite(one)]) else 0.0 for one in first])
+        known = True
+    else:
+        lasted = np.array([since[at[-1]] for at in rows]) - lead
+        begun, known = np.concatenate([[0.0], np.cumsum(lasted)[:-1]]) - lead, False
+    return (begun - min(float(begun.min()), 0.0) if lead.any() else begun), known  # no session begins below 0

@@ -88,7 +88,7 @@ def without_last(selection: SelectionResult) -> Model:
     return selection.fit.model.without(selection.accepted[-1]) if selection.accepted else selection.nominal.model
 
 
-def _nearest(selection: SelectionResult, most: int = MOST - 1) -> list[tuple[str, ...]]:
+def _nearest(selection: SelectionResult, most: int | None = None) -> list[tuple[str, ...]]:
     """Sets of the same size as the accepted one (or of one name), with the candidates that earned most beside those accepted."""
     kept = selection.accepted[:-1]
     step = selection.steps[len(kept)] if len(kept) < len(selection.steps) else selection.steps[-1]
@@ -97,7 +97,7 @@ def _nearest(selection: SelectionResult, most: int = MOST - 1) -> list[tuple[str
         for c in step.ranking
         if c.name not in selection.accepted and not c.rejected_because and c.paired_comparison.elpd_diff > 0
     ]
-    return [(*kept, name) for name in close[:most]]
+    return [(*kept, name) for name in close[: MOST - 1 if most is None else most]]
 
 
 def _effects(d: Diagnosis) -> dict[str, Effect]:

@@ -21,9 +21,12 @@ _LARGEST_M = DEFAULTS.design.largest_m
 
 
 def arena_of(
-    tracks: Tracks, size: tuple[float, float] | None = None, start: tuple[float, float, float] | None = None
+    tracks: Tracks, size: tuple[float, ...] | None = None, start: tuple[float, float, float] | None = None
 ) -> Arena:
-    """The arena: where the robot was seen, or ``size`` (width, height in m) around it; and the start of every trial.
+    """The arena and the start of every trial.
+
+    The arena is where the robot was seen; or ``size``: (width, height) in m around the start, or (lowest x, highest x, lowest y,
+    highest y) in m.
 
     The start is ``start`` (x_m, y_m, heading_rad), else where the trials seen so far started if that was one place, else
     the arena's middle, facing north. DataError for what is no arena or start.
@@ -36,7 +39,9 @@ def arena_of(
     if begin is None and together:
         turn = np.angle(np.exp(1j * begins[:, 2]).mean())
         begin = (float(middle[0]), float(middle[1]), float(turn))
-    if size is not None:
+    if isinstance(size, list | tuple) and len(size) == 4:
+        low, high = _checked_sides(size)
+    elif size is not None:
         centre = np.array(begin[:2]) if begin is not None else (low + high) / 2
         half = _checked_size(size) / 2
         low, high = centre - half, centre + half
@@ -76,7 +81,7 @@ def bounds_of(tracks: Tracks, model: Model, speeds: tuple[float, float] | None =
     return Bounds(low, high, short, max(long, short), float(np.clip(per_trial, *_TRIAL_S)), grid_s)
 
 
-def _checked_size(size: tuple[float, float]) -> Array:
+def _checked_size(size: tuple[float, ...]) -> Array:
     sides = _numbers(size, 2)
     if sides is None or not (sides > 2 * MARGIN_M).all() or not (sides < _LARGEST_M).all():
         raise DataError(
@@ -84,6 +89,18 @@ def _checked_size(size: tuple[float, float]) -> Array:
             f"{_LARGEST_M:g}: --arena 1.8x1.3; in Python arena=(1.8, 1.3)."
         )
     return sides
+
+
+def _checked_sides(sides: tuple[float, ...]) -> tuple[Array, Array]:
+    """Lowest and highest x and y of an arena that is given by its sides."""
+    ends = _numbers(sides, 4)
+    if ends is None or not ends[0] < ends[1] or not ends[2] < ends[3]:
+        raise DataError(
+            f"The arena's sides are {sides!r}; they must be lowest x, highest x, lowest y, highest y in metres: "
+            "--arena=-0.5,1.2,0,0.9; in Python arena=(-0.5, 1.2, 0.0, 0.9)."
+        )
+    _checked_size((float(ends[1] - ends[0]), float(ends[3] - ends[2])))
+    return ends[[0, 2]], ends[[1, 3]]
 
 
 def _checked_start(start: tuple[float, float, float]) -> tuple[float, float, float]:

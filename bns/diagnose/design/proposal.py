@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,6 +36,8 @@ LONGEST_MINUTES = DEFAULTS.design.longest_minutes
 TARGET_POWER = DEFAULTS.design.target_power
 MOST_FASTER = DEFAULTS.design.most_faster
 _DENSE = DEFAULTS.design.dense
+_POINTS = 9
+"""Of the curve of the chance of a decision against minutes."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ class ModelPair:
 
     ``indistinguishable``: no command sequence tells them apart; ``independent_measurements`` would.
     ``times_faster``: as many times as long plain random commands would take.
-    ``already_decided``: what was measured so far decides.
+    ``already_decided``: what was measured so far decides. ``power_by_minutes``: minutes of the planned driving and the
+    chance of a decision by then; empty where no commands would decide.
     """
 
     first: str
@@ -55,6 +58,7 @@ class ModelPair:
     indistinguishable: bool
     already_decided: bool
     independent_measurements: tuple[str, ...]
+    power_by_minutes: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -187,9 +191,17 @@ def _model_pairs(
                 indistinguishable,
                 decision_probability([e.first(0) for e in both]) >= TARGET_POWER,
                 tuple(independent_measurements(one.effects, other.effects)),
+                () if indistinguishable else _power_by_minutes(both, best.plan.lasting_s),
             )
         )
     return out
+
+
+def _power_by_minutes(both: Sequence[ExpectedGain], lasting_s: Array) -> tuple[tuple[float, float], ...]:
+    """(minutes, chance of a decision) after some of the planned trials, the last one too."""
+    trials = np.unique(np.linspace(0, len(lasting_s), _POINTS).round().astype(int))
+    minutes = np.concatenate([[0.0], np.cumsum(lasting_s) / 60])
+    return tuple((float(minutes[n]), float(decision_probability([e.first(n) for e in both]))) for n in trials)
 
 
 def _expected(

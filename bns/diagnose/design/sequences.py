@@ -27,8 +27,9 @@ class Arena:
     y_high_m: float
     start: tuple[float, float, float]
 
-    def holds(self, x_m: Array, y_m: Array, margin_m: float = MARGIN_M) -> NDArray[np.bool_]:
+    def holds(self, x_m: Array, y_m: Array, margin_m: float | None = None) -> NDArray[np.bool_]:
         """Which places are inside by that margin."""
+        margin_m = MARGIN_M if margin_m is None else margin_m
         inside_x = (x_m >= self.x_low_m + margin_m) & (x_m <= self.x_high_m - margin_m)
         inside: NDArray[np.bool_] = inside_x & (y_m >= self.y_low_m + margin_m) & (y_m <= self.y_high_m - margin_m)
         return inside

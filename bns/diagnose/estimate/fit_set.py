@@ -7,8 +7,11 @@ start, since what came in later may have left it in another valley. Noise and nu
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
+from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
@@ -20,30 +23,62 @@ BETTER = DEFAULTS.estimate.valley_better
 ROUNDS = DEFAULTS.estimate.set_rounds
 
 
+class Tried:
+    """What was tried on the way to sets of effects, by the effects that were in already, in their order.
+
+    A ladder of n effects asks for its n first ones again at every step: remembered, the work grows with the square of n, not
+    with the cube.
+    """
+
+    def __init__(self) -> None:
+        self._reached: dict[tuple[Effect, ...], tuple[Problem, Fit]] = {}
+        self._fits: dict[tuple[tuple[Effect, ...], Effect], Fit] = {}
+
+    def reached(
+        self, predictor: Predictor, model: Model, order: tuple[Effect, ...], noise: Array | None = None
+    ) -> tuple[Problem, Fit]:
+        """Problem and fit once these effects are in, noise and numbers settled; from ``model``."""
+        if order not in self._reached:
+            problem = problem_for(predictor, model, noise)
+            self._reached[order] = problem, problem.fit(model)
+        return self._reached[order]
+
+    def fits(self, problem: Problem, fit: Fit, order: tuple[Effect, ...], left: Sequence[Effect]) -> list[Fit]:
+        """The fit with each of the effects that are left, on all cores."""
+        new = [effect for effect in left if (order, effect) not in self._fits]
+        for effect, added in zip(new, each(partial(fit_with, problem, fit), new), strict=True):
+            self._fits[order, effect] = added
+        return [self._fits[order, effect] for effect in left]
+
+
 def fit_set(
-    predictor: Predictor, model: Model, effects: Sequence[Effect], known: Model | None = None
+    predictor: Predictor,
+    model: Model,
+    effects: Sequence[Effect],
+    known: Model | None = None,
+    tried: Tried | None = None,
 ) -> tuple[Problem, Fit, tuple[str, ...]]:
     """The problem, the fit, and the names in the order in which they lowered the loss.
 
-    ``known``: a model with the same effects whose numbers may be a better start; the better of both ends counts.
+    ``known``: a model with the same effects whose numbers may be a better start; the better of both ends counts. ``tried``: what
+    earlier calls with the same predictor and model tried on the way; that of this one is added, and nothing is tried twice.
     """
-    problem = problem_for(predictor, model)
-    fit, left, order = problem.fit(model), {e.name: e for e in effects}, []
-    while left:
-        tried = {name: fit_with(problem, fit, effect) for name, effect in left.items()}
-        best = min(tried, key=lambda name: (tried[name].loss, name))
-        order.append(best)
-        fit = tried[best]
-        del left[best]
-        problem = problem_for(predictor, fit.model, problem.pose_filter.noise)
-        fit = problem.fit(fit.model)
+    tried = Tried() if tried is None else tried
+    order: tuple[Effect, ...] = ()
+    problem, fit = tried.reached(predictor, model, order)
+    while len(order) < len(effects):
+        left = [effect for effect in effects if effect not in order]
+        fits = dict(zip((e.name for e in left), tried.fits(problem, fit, order, left), strict=True))
+        best = min(left, key=lambda effect: (fits[effect.name].loss, effect.name))
+        order = (*order, best)
+        problem, fit = tried.reached(predictor, fits[best.name].model, order, problem.pose_filter.noise)
     fit = _begun_again(problem, fit, effects)
     problem, fit = _settled(predictor, problem, fit)
     if known is not None:
         other = problem.fit(known)
         if other.loss < fit.loss - BETTER:
             problem, fit = _settled(predictor, problem, other)
-    return problem, fit, tuple(order)
+    return problem, fit, tuple(effect.name for effect in order)
 
 
 def _begun_again(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> Fit:

@@ -17,13 +17,14 @@ from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
 from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
-from bns.physics.signals import Body, Conditions, View, Wheels
+from bns.physics.signals import Body, Conditions, Logged, View, Wheels
 from bns.physics.wheels.differential_drive import taken_at
 from bns.physics.wheels.grid import Grid
 from bns.physics.wheels.motion import flow_of, wheel_motion, with_body_effects
 
 RECENT_S = DEFAULTS.predict.recent_s
 _COARSE_S = DEFAULTS.predict.coarse_s
+_RUN_UP_STEP_S = DEFAULTS.data.run_up_step_s
 _TAIL_S = DEFAULTS.predict.tail_s
 _KEPT = 500_000
 """Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
@@ -52,6 +53,7 @@ class WheelPredictor:
         wheels_m_s = (np.abs(self.grid.left_m_s) + np.abs(self.grid.right_m_s)) / 2
         way = followed(self.grid.step_s, wheels_m_s, zero, zero, zero, tracks.trial, tracks.t_s)[0][:, 0]
         self.way_m = self._since_previous(way)
+        self._no_drift = np.zeros((len(tracks.t_s), 2))
         self._of_horizon = lru_cache(partial(windows, tracks))
         self._starts: dict[tuple[str, float], tuple[tuple[float, ...], ...]] = {}
         # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
@@ -160,7 +162,7 @@ class WheelPredictor:
             "previous_speed_m_s": _before(speed, changed),
             "previous_wheel_difference_m_s": _before(turn, changed),
             "time_in_command_s": middle - began,
-            "time_in_trial_s": middle,
+            "time_in_trial_s": middle if tracks.lead_s is None else middle - tracks.lead_s[:, None],
             "session_s": tracks.start_s[:, None] + middle,
             "way_m": way,
             "left_change_m_s": _fresh_change(grid.left_m_s, middle - began, changed),
@@ -207,7 +209,7 @@ class WheelPredictor:
         """
         flow = flow_of(model)
         if (flow.x_m_s, flow.y_m_s, flow.return_per_s) == (0.0, 0.0, 0.0):
-            return np.zeros((len(path), 2))
+            return self._no_drift
         time_s, *where = self._since_previous(sums).T
         way, before, seen = self._since_previous(path), np.roll(path, 1, axis=0), self.tracks.pose
         bent = np.stack(where, axis=1) - time_s[:, None] * (before + way / 2)[:, :2]
@@ -246,11 +248,13 @@ def _grid_of(tracks: Tracks, dt_s: float) -> Grid:
     nodes, lefts, rights = [], [], []
     for trial in range(len(tracks)):
         frames = tracks.t_s[tracks.first[trial] : tracks.first[trial + 1]]
+        lead = 0.0 if tracks.lead_s is None else tracks.lead_s[trial]
         ends = np.cumsum(tracks.duration_s[trial])
         marks = np.unique(
-            np.concatenate([[0.0], ends, frames[frames >= 0], [max(ends[-1], *frames[-1:]) + _TAIL_S]]).round(9)
+            np.concatenate([[0.0, lead], ends, frames[frames >= 0], [max(ends[-1], *frames[-1:]) + _TAIL_S]]).round(9)
         )
-        counts = np.maximum(np.ceil(np.diff(marks) / dt_s - 1e-9).astype(np.int64), 1)
+        longest = np.where(marks[1:] <= lead + 1e-9, max(dt_s, _RUN_UP_STEP_S), dt_s)
+        counts = np.maximum(np.ceil(np.diff(marks) / longest - 1e-9).astype(np.int64), 1)
         inner = np.concatenate([[0.0], np.repeat(np.diff(marks) / counts, counts)])
         node = marks[0] + np.cumsum(inner)
         lasting = np.flatnonzero(tracks.duration_s[trial] > 0)
@@ -302,7 +306,12 @@ def _conditions(tracks: Tracks, node_s: Array) -> Conditions:
         reference = volts[np.isfinite(volts)][0]
         drop = np.stack([_held(tracks, volts, row, middle[row]) for row in range(len(tracks))]) - reference
         drop = -drop
-    return Conditions(session_s=tracks.start_s[:, None] + middle, battery_drop_v=drop)
+    def on_grid(name: str) -> Array:
+        values = tracks.extra[name]
+        return np.stack([_held(tracks, values, row, middle[row]) for row in range(len(tracks))])
+
+    there = [name for name, values in tracks.extra.items() if np.isfinite(values).any()]
+    return Conditions(tracks.start_s[:, None] + middle, drop, logged=Logged(there, on_grid))
 
 
 def _between_frames(tracks: Tracks, grid: Grid) -> NDArray[np.bool_]:

@@ -24,7 +24,7 @@ _SHOWN = DEFAULTS.report.planned_trials
 def plan_figure(p: Proposal, path: Path) -> Path:
     """One panel a trial: the arena, the start, and where each explanation says that the robot goes."""
     shown = min(_SHOWN, len(p.plan))
-    seen = _foreseen(p, np.arange(shown))
+    seen = foreseen(p, np.arange(shown))
     figure, axes = panels(shown, 2.6, wide=True)
     for trial, (axis,) in enumerate(axes):
         _draw_trial(axis, p, seen, trial)
@@ -36,13 +36,13 @@ def plan_figure(p: Proposal, path: Path) -> Path:
 
 def trial_axes(axis: Axes, p: Proposal, trial: int) -> None:
     """One trial of the plan on axes that are there."""
-    _draw_trial(axis, p, _foreseen(p, np.array([trial])), 0)
+    _draw_trial(axis, p, foreseen(p, np.array([trial])), 0)
     axis.set_title(f"trial {trial}, {p.plan.lasting_s[trial]:.0f} s")
     axis.legend()
 
 
-def _foreseen(p: Proposal, trials: NDArray[np.int64]) -> list[Tracks]:
-    """What each explanation says of these trials."""
+def foreseen(p: Proposal, trials: NDArray[np.int64]) -> list[Tracks]:
+    """What each explanation says of these trials (numbers from 0): tracks with a frame every so many milliseconds."""
     plan = p.plan.only(trials)
     tracks = planned_tracks(plan, p.arena.start, _FRAME_S, np.zeros(len(plan)))
     return [noise_free_predictor(competitor.fit.model, tracks).tracks for competitor in p.competing_models]

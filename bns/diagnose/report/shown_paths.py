@@ -55,7 +55,7 @@ def _trial(predictor: Predictor, trial: int, before: Array, after: Array | None)
     tracks = predictor.tracks
     first, last = int(tracks.first[trial]), int(tracks.first[trial + 1])
     rows = np.unique(np.linspace(first, last - 1, min(last - first, MOST_POSES)).round().astype(int))
-    shown = {"name": tracks.names[trial], "t": [round(float(t), 2) for t in tracks.t_s[rows]]}
+    shown = {"name": tracks.names[trial], "t": [round(float(t), 2) for t in tracks.own_s[rows]]}
     parts = {"measured": tracks.pose, "before": before} | ({"after": after} if after is not None else {})
     return {**shown, **{name: _flat(poses, rows) for name, poses in parts.items()}}
 

@@ -49,7 +49,7 @@ def outliers(problem: Problem, fit: Fit) -> list[Outlier]:
     size = np.abs(sums / np.maximum(usual, 1e-9)).max(axis=1)
     order = [i for i in np.argsort(-size) if size[i] > FAR]
     worst = {int(tracks.trial[start[i]]): i for i in reversed(order)}
-    found = [Outlier(tracks.names[t], float(tracks.t_s[start[i]]), float(size[i])) for t, i in worst.items()]
+    found = [Outlier(tracks.names[t], float(tracks.own_s[start[i]]), float(size[i])) for t, i in worst.items()]
     return sorted(found, key=lambda o: -o.size) if len(found) >= TRIALS else []
 
 

@@ -17,6 +17,9 @@ values stand in `bns/diagnose/settings`; this page is made from them (`python -m
 `--json` and `to_json()` carry them all under `provenance`, with their digest, here `{{digest}}`: two verdicts with the same
 digest were made by the same settings.
 
+Others are given by `bns diagnose LOG --model M --settings FILE.yaml` or `bns.diagnose(log, model, settings=...)`, room by room
+(`select:`, below it `min_gain: 0.02`); what differs from the default is printed, and in the provenance under `settings_changed`.
+
 Of the {{count}} settings {{unmeasured}} are marked "{BY_HAND}": no study tried other values of that one. All of them together
 are judged on generated worlds ([hidden effects](hidden-effects.md)). Numbers that are written inside a function (factors by
 which units are recognised, steps of derivatives) are not listed; plausible ranges of an effect's numbers stand in its own file.

@@ -56,7 +56,7 @@ class Predict:
         (0.6, 1.2), "1", f"The same where effects are only screened: one node a side does; {BY_HAND}."
     )
     response_clipped_m: float = setting(
-        0.1,
+        0.5,
         "m",
         f"A response that moves a point farther than this is a robot that rolled over: it counts as this far; {BY_HAND}.",
     )

@@ -17,6 +17,8 @@ from bns.physics.model import Model
 from bns.physics.wheels.differential_drive import observe, track
 
 _STEP_S = 0.01
+SPEED_OVER_S = _STEP_S
+"""A speed is the mean over so long before its time."""
 _AHEAD_S = 4.0
 
 

@@ -31,6 +31,8 @@ KINDS: Mapping[str, str] = {
     "brown-out": "the robot's processor starts anew: wheels stop, silence for a while",
     "lost-marker": "the tracker sees no marker",
     "stuck-marker": "the tracker shows an old picture as if it were new",
+    "late-tracker": "the tracker's poses are older than their time stamps, by for_s, from at_s on",
+    "frozen-scene": "the tracker goes on and shows what was there when this began",
     "swapped-markers": "lights change places in the report",
     "reflection": "a light that is no marker appears",
     "silent-servo": "one servo does not answer",
@@ -70,6 +72,12 @@ class Faults:
     def length_s(self, kind: str) -> float:
         """How long a fault of this kind lasts."""
         return max((f.for_s for f in self._plan if f.kind == kind), default=0.0)
+
+    def filmed_s(self, t_s: float) -> float:
+        """When a tracker's pose of that time was really taken."""
+        frozen = [f.at_s for f in self._plan if f.kind == "frozen-scene" and f.at_s <= t_s < f.at_s + f.for_s]
+        late_s = max((f.for_s for f in self._plan if f.kind == "late-tracker" and t_s >= f.at_s), default=0.0)
+        return min(frozen, default=t_s) - late_s
 
     def _struck(self, number: int, fault: Fault, t_s: float) -> bool:
         began = self._begun.get(number, -math.inf)

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable
 
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.body import DifferentialBody
+from bns.hardware.emulators.body import SPEED_OVER_S, DifferentialBody
 from bns.hardware.emulators.faults import Faults
 from bns.hardware.khepera import HIGHEST_UNITS, Firmware
 
@@ -76,8 +76,9 @@ class KheperaEmulator:
         deaf = self._faults.strikes("lost-request", now_s) or self._faults.strikes("bus-fault", now_s)
         if deaf or now_s < self._silent_until_s:
             return self._nothing()
+        self._clock.sleep(self._latency_s / 2)  # as long there as back
         answer = self._carried_out(line.decode("latin-1")).encode() + b"\r\n"
-        self._clock.sleep(_LATE_S if self._faults.strikes("late-reply", now_s) else self._latency_s)
+        self._clock.sleep((_LATE_S if self._faults.strikes("late-reply", now_s) else self._latency_s) - self._latency_s / 2)
         if self._faults.strikes("lost-reply", now_s):
             return self._nothing()
         if self._faults.strikes("corrupt-reply", now_s):
@@ -118,7 +119,7 @@ class KheperaEmulator:
         steps = max(1, round((now_s - self._encoders_at_s) / 0.02))
         width_s = (now_s - self._encoders_at_s) / steps
         for i in range(steps):
-            speeds = self.body.wheel_speeds_m_s(self._encoders_at_s + (i + 0.5) * width_s)
+            speeds = self.body.wheel_speeds_m_s(self._encoders_at_s + (i + 0.5) * width_s + SPEED_OVER_S / 2)
             self._encoders_m = [m + v * width_s for m, v in zip(self._encoders_m, speeds, strict=True)]
         self._encoders_at_s = now_s
 

@@ -38,7 +38,7 @@ class EmulatedSnakeRig:
 
     def __init__(self, rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> None:
         settings, faults = snake_settings(rig.driver), plan.of("snake")
-        self._clock = clock
+        self._clock, self._tracker_faults, self._worn_last = clock, plan.of("tracker"), list[Patch]()
         self.body = SnakeBody(shipped_parameters(), seed)
         self.body.lay(START_M, START_HEADING_RAD, 0.0)
         self.servos = [Servo(n, clock, faults, self.body.joint(place)) for place, n in enumerate(settings.ids)]
@@ -51,7 +51,7 @@ class EmulatedSnakeRig:
         if self._bridge is not None:
             self._bridge.send = self._line.send
         tracker, self._camera = emulated_camera(
-            rig.tracker, folder, lambda now_s: self._worn(rig.tracker, now_s), clock, plan.of("tracker"), seed, lens(), _RATE_HZ
+            rig.tracker, folder, lambda now_s: self._worn(rig.tracker, now_s), clock, self._tracker_faults, seed, lens(), _RATE_HZ
         )
         self.rig = replace(rig, port=str(self._line.path), tracker=tracker)
 
@@ -73,11 +73,17 @@ class EmulatedSnakeRig:
         self._camera.close()
 
     def _worn(self, settings: Mapping[str, Any], now_s: float) -> list[Patch]:
-        """The markers are balls, alike from everywhere, on the tops of their links: a link that lies on its side hides them."""
+        """The markers are balls, alike from everywhere, on the tops of their links: a link that lies on its side hides them.
+
+        Of a frozen scene they are where they were; the body cannot be asked where it was at any other time.
+        """
+        if self._tracker_faults.filmed_s(now_s) < now_s and self._worn_last:
+            return self._worn_last
         places, up = self.body.markers(now_s)
         diameter_m = float(settings["diameter_m"])
-        return [
+        self._worn_last = [
             disc(colour, diameter_m, x, y, z)
             for (x, y, z), top, colour in zip(places.tolist(), up, (YELLOW_BGR, GREEN_BGR), strict=True)
             if top > 0.0
         ]
+        return self._worn_last

@@ -14,7 +14,7 @@ from typing import Protocol, Self
 
 from bns.hardware.clock import EmulatedClock
 
-_LONGEST_WAY_S = 1.0  # by the computer's clock; somebody reads meanwhile, or nobody can
+_QUIET_S = 0.05  # by the computer's clock; after so long without a change, what is not there was read already
 _LONGEST_TURN_S = 30.0  # likewise; a pump that takes longer to come round hangs
 
 
@@ -29,11 +29,17 @@ class Device(Protocol):
 
 
 def put_through(master: int, slave: int, data: bytes) -> None:
-    """Write, and wait until it is at the other end: the kernel takes its time for that, emulated time would not wait."""
-    end_s, wanted = time.monotonic() + _LONGEST_WAY_S, _waiting(slave) + len(data)
+    """Write, and wait until it is at the other end: the kernel takes its time for that, emulated time would not wait.
+
+    Somebody who reads meanwhile takes away what has come; then nothing new for a while says that all of it was there.
+    """
+    before, came = _waiting(slave), 0
     os.write(master, data)
-    while _waiting(slave) < wanted and time.monotonic() < end_s:
+    quiet_s = (now_s := time.monotonic()) + _QUIET_S
+    while came < len(data) and now_s < quiet_s:
         time.sleep(0)
+        here, now_s = _waiting(slave), time.monotonic()
+        quiet_s, came, before = (quiet_s if here == before else now_s + _QUIET_S), came + max(here - before, 0), here
 
 
 def _waiting(slave: int) -> int:
@@ -86,9 +92,16 @@ class PseudoTerminal:
 
     def send(self, data: bytes) -> None:
         """What the device says unasked; it can be read at the near end when this returns."""
-        with self._lock, contextlib.suppress(OSError):
-            if self._master >= 0:
-                put_through(self._master, self._slave, data)
+        with contextlib.suppress(OSError):
+            with self._lock:
+                if self._master < 0:
+                    return
+                line = os.dup(self._master), os.dup(self._slave)  # it may be cut while the bytes are on their way
+            try:
+                put_through(*line, data)
+            finally:
+                for end in line:
+                    os.close(end)
 
     def cut(self) -> None:
         """The line goes dead, as when a Bluetooth link breaks; the device knows nothing of it."""

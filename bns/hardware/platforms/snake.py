@@ -15,17 +15,17 @@ from bns.hardware.dynamixel import BAUD as BUS_BAUD
 from bns.hardware.dynamixel import Ax12Chain
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
+from bns.hardware.guard.recipe import StopRecipe, ax12_recipe, bridge_recipe
 from bns.hardware.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
-from bns.hardware.servo_chain import ServoChain, ServoError
+from bns.hardware.servo_chain import ServoChain, ServoError, StuckServoError
 from bns.hardware.snake_drive import SnakeDrive
 from bns.hardware.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
-from bns.hardware.stop_recipe import StopRecipe, ax12_recipe, bridge_recipe
 from bns.hardware.tracking.eye import Eye
-from bns.hardware.tracking.kinds import checked, open_tracker
+from bns.hardware.tracking.kinds import checked, delay_of, open_tracker
 
 REPEATS = 3
 """How often a trial drives its final controller, unless it is told otherwise: the source drove it three times (section 5.7)."""
@@ -79,7 +79,7 @@ class SnakePlatform:
     def drive(self, commands: np.ndarray) -> Driven:
         """Straighten the robot, then drive the cycles one after the other."""
         drive, ended = SnakeDrive(self._chain, self._eye, self._watch, self._settings, self._clock, self._journal), ""
-        guard = StopsAtTheEnd(self.stop)
+        guard, stuck = StopsAtTheEnd(self.stop), ""
         began_s = self._clock.now_s()
         self._watch.begin()
         with guard:
@@ -87,13 +87,16 @@ class SnakePlatform:
                 drive.straighten()
                 for cycle in commands.astype(np.float64):
                     drive.carry_out(cycle)
+                drive.finish()
             except DriveEnded as end:
                 ended = str(end)
             except ServoError as error:
-                raise TrialPausedError(f"the servos failed: {error}") from error
+                if not isinstance(error, StuckServoError) or not len(drive.done()):  # straightening is no gait
+                    raise TrialPausedError(f"the servos failed: {error}") from error
+                ended, stuck = str(error), f"servo {error.number}"
         assert guard.last is not None
         seconds = self._clock.now_s() - began_s
-        return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, drive.spans_s)
+        return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, drive.spans_s, stuck)
 
 
 def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: HardwareLog) -> ServoChain:
@@ -111,7 +114,7 @@ def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stoppi
     try:
         with StopsAtTheEnd(chain.stop):
             chain.health()
-        eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0)
+        eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0, delay_of(rig.tracker))
     except ServoError as error:
         chain.close()
         raise HardwareError(f"the servos are not fit to drive: {error}. See to it, then try again.") from error

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,11 +24,13 @@ with extra("robot"):
     import cv2
 
 _FIRST_FRAME_S = 10.0
+_OLDEST_S = 1.0
+"""A stamp that says more is by another clock."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture (height, width, 3), BGR, and when it arrived."""
+    """A picture (height, width, 3), BGR, and when the camera's driver got it; if that does not tell, when it arrived."""
 
     t_s: float
     picture: np.ndarray
@@ -70,6 +74,8 @@ class StreamCamera:
         except HardwareError:
             self._capture.release()
             raise
+        self.stamps = ""
+        """Who says when a frame was taken: the camera's driver, or its arrival."""
         self._frame: Frame | None = None
         self._arrived, self._open = threading.Event(), True
         self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
@@ -87,6 +93,14 @@ class StreamCamera:
         self._open = False
         self._thread.join(timeout=5)
 
+    def _filmed_s(self) -> float:
+        """V4L2 stamps each buffer by the computer's steady clock, and OpenCV hands that on; streams count from their start."""
+        now_s, age_s = self._clock.now_s(), math.inf
+        if is_local(self._source):
+            age_s = time.monotonic() - self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        self.stamps = "driver" if 0.0 <= age_s < _OLDEST_S else "arrival"
+        return now_s - age_s if self.stamps == "driver" else now_s
+
     def _read(self) -> None:
         while self._open:
             good, picture = self._capture.read()
@@ -94,7 +108,7 @@ class StreamCamera:
                 self._frame = None
                 break
             if self._frame is None or not np.array_equal(picture, self._frame.picture):
-                self._frame = Frame(self._clock.now_s(), picture)
+                self._frame = Frame(self._filmed_s(), picture)
             self._arrived.set()
             self._clock.arrived()
         self._capture.release()
@@ -105,14 +119,17 @@ class FrameTracker:
 
     def __init__(self, camera: Camera, find: Callable[[Frame], Sight | None]) -> None:
         self.camera, self._find = camera, find
-        self.facts: Mapping[str, Any] = {"picture": getattr(camera, "picture", {})}
+        self.facts: Mapping[str, Any] = {"picture": getattr(camera, "picture", {}), "stamps": getattr(camera, "stamps", "")}
         self._last: tuple[float, Sight | None] = (-1.0, None)
+        self.picture_s: float | None = None
+        """When the newest picture came, whatever it shows."""
 
     def look(self) -> Sight | None:
         """What the newest frame shows."""
         frame = self.camera.newest()
         if frame is None:
             return None
+        self.picture_s = frame.t_s
         if frame.t_s != self._last[0]:
             self._last = (frame.t_s, self._find(frame))
         return self._last[1]

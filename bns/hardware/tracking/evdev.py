@@ -5,7 +5,9 @@ Formats: include/uapi/linux/input.h and input-event-codes.h; Documentation/input
 
 from __future__ import annotations
 
+import contextlib
 import struct
+import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +19,8 @@ EV_SYN, EV_ABS, SYN_REPORT, SYN_DROPPED, ABS_HAT0X = 0, 3, 0, 3, 0x10
 CLASS = Path("/sys/class/input")
 _ABSINFO = struct.Struct("6i")
 """struct input_absinfo: value, minimum, maximum, fuzz, flat, resolution."""
+_CLOCK = struct.Struct("i")
+_SET_CLOCK = 1 << 30 | _CLOCK.size << 16 | ord("E") << 8 | 0xA0
 _READ = 2 << 30 | _ABSINFO.size << 16 | ord("E") << 8
 
 
@@ -60,3 +64,11 @@ def absolute(file: int, axis: int) -> int | None:
         return int(_ABSINFO.unpack(fcntl.ioctl(file, _READ | 0x40 + axis, bytes(_ABSINFO.size)))[0])
     except OSError:
         return None
+
+
+def stamp_by_steady_clock(file: int) -> None:
+    """Have the kernel stamp events by CLOCK_MONOTONIC (EVIOCSCLOCKID); a file that is no input device stays as it is."""
+    import fcntl  # noqa: PLC0415  # Windows has none
+
+    with contextlib.suppress(OSError):
+        fcntl.ioctl(file, _SET_CLOCK, _CLOCK.pack(time.CLOCK_MONOTONIC))

@@ -14,16 +14,26 @@ _LOOKS, _BETWEEN_S = 10, 0.02
 
 
 class Eye:
-    """`heading_rad` is where the robot looks first, give or take half a turn."""
+    """`heading_rad` is where the robot looks first, give or take half a turn; sights are `delay_s` older than their stamps."""
 
-    def __init__(self, tracker: Tracker, clock: Clock, journal: HardwareLog, heading_rad: float) -> None:
-        self._tracker, self._clock, self._journal = tracker, clock, journal
+    def __init__(
+        self, tracker: Tracker, clock: Clock, journal: HardwareLog, heading_rad: float, delay_s: float = 0.0
+    ) -> None:
+        self._tracker, self._clock, self._journal, self._delay_s = tracker, clock, journal, delay_s
         self._heading_rad, self._newest_s = heading_rad, -1.0
         if facts := getattr(tracker, "facts", None):  # of a camera: how it takes its pictures
             journal.note("tracker", **facts)
 
+    @property
+    def picture_s(self) -> float | None:
+        """When the newest picture came, seen or not; None of a tracker that does not tell."""
+        return getattr(self._tracker, "picture_s", None)
+
     def look(self) -> Sight | None:
-        """A sight newer than the last; None if there is none. TrialPausedError if the tracker's device is gone."""
+        """A sight newer than the last, with the time at which it was filmed; None if there is none.
+
+        TrialPausedError if the tracker's device is gone.
+        """
         try:
             sight = self._tracker.look()
         except HardwareError as error:
@@ -34,8 +44,10 @@ class Eye:
         self._heading_rad = unwrapped(float(sight.pose[2]), self._heading_rad)
         pose = np.array([sight.pose[0], sight.pose[1], self._heading_rad])
         points = {name: [round(float(v), 5) for v in place] for name, place in sight.points.items()}
-        self._journal.note("seen", pose=[round(float(v), 5) for v in pose], residual_m=round(sight.residual_m, 6), points=points)
-        return Sight(sight.t_s, pose, sight.residual_m, sight.points)
+        filmed_s, rounded = sight.t_s - self._delay_s, [round(float(v), 5) for v in pose]
+        residual_m = round(sight.residual_m, 6)
+        self._journal.note("seen", pose=rounded, residual_m=residual_m, points=points, filmed_s=round(filmed_s, 6))
+        return Sight(filmed_s, pose, sight.residual_m, sight.points)
 
     def standing(self) -> Sight | None:
         """Mean of some looks, from now on, at a robot that stands; None if it is not seen often enough."""

@@ -43,6 +43,17 @@ class TrackerKind(Protocol):
 
 
 Pose = Callable[[float], np.ndarray]
+DELAY = "delay_s"
+"""A setting of every kind: how much older than its time stamp a pose is (`bns calibrate --delay` measures it)."""
+_MOST_DELAY_S = 1.0
+
+
+def delay_of(settings: Mapping[str, Any]) -> float:
+    """The delay in a rig's settings, s, 0 without one; HardwareError if it makes no sense."""
+    value = settings.get(DELAY, 0.0)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _MOST_DELAY_S:
+        raise HardwareError(f"the tracker's {DELAY} is {value!r}; it is a number of seconds, up to {_MOST_DELAY_S:g}.")
+    return float(value)
 
 
 def open_tracker(settings: Mapping[str, Any], clock: Clock) -> Tracker:
@@ -60,24 +71,29 @@ def emulated(
     settings: Mapping[str, Any], folder: Path, pose: Pose, clock: Clock, faults: Any, seed: int
 ) -> tuple[dict[str, Any], Device]:
     """An emulated device for the tracker of a rig, as `TrackerKind.emulate` says; HardwareError if its kind has none."""
-    checked(settings)
+    own = checked(settings)
     emulate = kind_of(settings).emulate
     if emulate is None:
         raise HardwareError(f"the {settings['kind']} tracker has no emulation; name a rig with another tracker, such as wii.")
-    return emulate(settings, folder, pose, clock, faults, seed)
+    kept = {name: settings[name] for name in ("kind", DELAY) if name in settings}
+    found, device = emulate(
+        {"kind": settings["kind"], **own}, folder, lambda t_s: pose(faults.filmed_s(t_s)), clock, faults, seed
+    )
+    return {**found, **kept}, device
 
 
 def checked(settings: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The settings without their kind; HardwareError names one that is missing, unknown or makes no sense."""
+    """The settings of the kind's own; HardwareError names one that is missing, unknown or makes no sense."""
     module, kind = kind_of(settings), settings["kind"]
-    own = {name: value for name, value in settings.items() if name != "kind"}
+    delay_of(settings)
+    own = {name: value for name, value in settings.items() if name not in {"kind", DELAY}}
     needed, others, sizes = module.SETTINGS
     missing = [name for name in needed if name not in own]
     if missing:
         raise HardwareError(f"the {kind} tracker of the rig lacks {', '.join(missing)}; it needs {', '.join(needed)}.")
     unknown = [name for name in own if name not in {*needed, *others}]
     if unknown:
-        raise HardwareError(f"the {kind} tracker: {unknown_name('setting', unknown[0], [*needed, *others])}")
+        raise HardwareError(f"the {kind} tracker: {unknown_name('setting', unknown[0], [*needed, *others, DELAY])}")
     for name in sizes:
         value = own.get(name, 1.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:

@@ -19,7 +19,17 @@ import numpy as np
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
-from bns.hardware.tracking.evdev import ABS_HAT0X, EV_ABS, EV_SYN, EVENT, SYN_DROPPED, SYN_REPORT, absolute, device_file
+from bns.hardware.tracking.evdev import (
+    ABS_HAT0X,
+    EV_ABS,
+    EV_SYN,
+    EVENT,
+    SYN_DROPPED,
+    SYN_REPORT,
+    absolute,
+    device_file,
+    stamp_by_steady_clock,
+)
 from bns.hardware.tracking.kinds import Device, Pose, Settings
 from bns.hardware.tracking.rigid import best_fit
 from bns.hardware.tracking.sight import Sight
@@ -42,6 +52,8 @@ LEDS_M = np.array([[0.0, 0.060], [-0.045, -0.020], [0.020, -0.050]])
 """Where the LEDs sit on the robot: to the right of the axle's middle, ahead of it. The sides differ by
 2 cm, so that its mirror image fits nowhere."""
 _WORST_M = 0.006
+_OLDEST_S = 1.0
+"""A stamp that says more is by another clock."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +107,7 @@ class WiiTracker:
                 f"cannot open the Wii remote at {device}: {error.strerror}. Press 1+2 on the remote to pair it, and make "
                 "sure that you are in the group input. Try: bns doctor"
             ) from error
+        stamp_by_steady_clock(self._file)
         self._px = self._asked()
 
     def lights_px(self) -> np.ndarray:
@@ -133,14 +146,19 @@ class WiiTracker:
     def _take(self, data: bytes) -> None:
         whole = len(data) - len(data) % EVENT.size
         self._rest = data[whole:]
-        for _seconds, _micros, kind, code, value in EVENT.iter_unpack(data[:whole]):
+        for seconds, micros, kind, code, value in EVENT.iter_unpack(data[:whole]):
             if kind == EV_SYN and code == SYN_DROPPED:
                 self._dropped = True  # the kernel lost events: what comes up to the next report is a part of one
             elif kind == EV_SYN and code == SYN_REPORT:
                 self._px = self._asked() if self._dropped else self._px
-                self._dropped, self._reported_s = False, self._clock.now_s()
+                self._dropped, self._reported_s = False, self._stamped_s(seconds + 1e-6 * micros)
             elif kind == EV_ABS and ABS_HAT0X <= code < ABS_HAT0X + 2 * LIGHTS and not self._dropped:
                 self._px[divmod(code - ABS_HAT0X, 2)] = value
+
+    def _stamped_s(self, stamp_s: float) -> float:
+        """When the kernel got a report, by the trial's clock; where it counts by another one, when it was read."""
+        now_s = self._clock.now_s()
+        return stamp_s if 0.0 <= now_s - stamp_s < _OLDEST_S else now_s
 
     def _asked(self) -> np.ndarray:
         """What the kernel remembers of all lights (4, 2); nothing where it cannot be asked, until it has been reported again."""

@@ -81,4 +81,5 @@ def _body(wheels: Wheels) -> Body:
         left_m_s=left,
         right_m_s=right,
         session_s=wheels.session_s,
+        conditions=wheels.conditions,
     )

@@ -29,11 +29,12 @@ class Parts:
     fixed: dict[str, Any] = field(default_factory=dict)
     grid: dict[str, list[Any]] = field(default_factory=dict)
     zip: dict[str, list[Any]] = field(default_factory=dict)
+    sample: list[dict[str, Any]] = field(default_factory=list)
     include: list[tuple[Located, dict[str, Any]]] = field(default_factory=list)
     exclude: list[tuple[Located, dict[str, Any]]] = field(default_factory=list)
     tasks: list[tuple[Located, str]] = field(default_factory=list)
     keys: dict[str, Located] = field(default_factory=dict)
-    """Parameter -> its key under fixed, grid or zip."""
+    """Parameter -> its key under fixed, grid, zip or sample."""
 
 
 def combinations(root: Located, parts: Parts) -> dict[RunSpec, dict[str, Any]]:
@@ -84,9 +85,9 @@ def _matches(combo: Mapping[str, Any], pattern: Mapping[str, Any]) -> bool:
 
 
 def _product(root: Located, parts: Parts) -> list[dict[str, Any]]:
-    if parts.include and not parts.grid and not parts.zip:
+    if parts.include and not parts.grid and not parts.zip and not parts.sample:
         return []
-    size = math.prod(map(len, parts.grid.values())) * len(next(iter(parts.zip.values()), [None]))
+    size = math.prod(map(len, parts.grid.values())) * len(next(iter(parts.zip.values()), [None])) * max(len(parts.sample), 1)
     # Before it is laid out, which would take all memory.
     check_size(size, next((parts.keys[name] for name in (*parts.grid, *parts.zip)), root))
     return list(_laid_out(parts))
@@ -95,6 +96,7 @@ def _product(root: Located, parts: Parts) -> list[dict[str, Any]]:
 def _laid_out(parts: Parts) -> Iterator[dict[str, Any]]:
     in_step = zip(*parts.zip.values(), strict=True)
     steps = [dict(zip(parts.zip, values, strict=True)) for values in in_step] or [{}]
+    drawn: list[dict[str, Any]] = parts.sample or [{}]
     for values in itertools.product(*parts.grid.values()):
-        for step in steps:
-            yield parts.fixed | dict(zip(parts.grid, values, strict=True)) | step
+        for step, point in itertools.product(steps, drawn):
+            yield parts.fixed | dict(zip(parts.grid, values, strict=True)) | step | point

@@ -2,6 +2,7 @@
 
 Keys: ``name``, ``robot`` (required); ``seeds`` (how many; default 1); ``first_seed`` (default 0); ``fixed`` (parameter: value);
 ``grid`` (parameter: list; the product); ``zip`` (parameter: list; taken in step, multiplied with the grid);
+``sample`` (combinations drawn from ranges, multiplied with the grid: `sample.py`);
 ``exclude`` (list of mappings; combinations of the product that have all these values are left out);
 ``include`` (list of mappings; further combinations, on top of ``fixed``, added after ``exclude``).
 """
@@ -19,11 +20,12 @@ from bns.errors import SpecError, unknown_name
 from bns.robots import load_robot
 from bns.spec import FIELDS, RunSpec, checked
 from bns.sweep.expand.combos import Parts, check_size, combinations
+from bns.sweep.expand.sample import range_names, read_sample
 from bns.sweep.expand.shipped_sweeps import sweep_file
 from bns.sweep.expand.yaml_lines import Located, parse_yaml, read_text
 from bns.tasks import task_names
 
-KEYS = ("name", "robot", "seeds", "first_seed", "fixed", "grid", "zip", "include", "exclude")
+KEYS = ("name", "robot", "seeds", "first_seed", "fixed", "grid", "zip", "sample", "include", "exclude")
 PARAMETERS = tuple(name for name in FIELDS if name not in ("robot", "seed"))
 _ELSEWHERE = {
     "robot": "'robot' is a key of the file itself: one robot a sweep.",
@@ -162,6 +164,10 @@ def _read_zip(parts: Parts, value: Located) -> None:
         value.fail(f"the lists under zip are taken in step and must be equally long, but {listed}.")
 
 
+def _read_sample(parts: Parts, value: Located) -> None:
+    parts.sample = read_sample(value)
+
+
 def _read_include(parts: Parts, value: Located) -> None:
     for each in value.elements("include"):
         parts.include.append((each, _mapping(parts, each, "an element of include")))
@@ -182,6 +188,7 @@ _READERS: Mapping[str, Callable[[Parts, Located], None]] = {
     "fixed": _read_fixed,
     "grid": _read_grid,
     "zip": _read_zip,
+    "sample": _read_sample,
     "include": _read_include,
     "exclude": _read_exclude,
 }
@@ -221,17 +228,21 @@ def _checked(parts: Parts, name: str, key: Located, value: Located) -> Any:
 
 
 def _check_once(places: Mapping[str, tuple[Located, Located]]) -> dict[str, Located]:
-    """Key of every parameter; in two of fixed, grid and zip it would silently lose one of its values."""
+    """Key of every parameter; in two of fixed, grid, zip and sample it would silently lose one of its values."""
     seen: dict[str, tuple[str, Located]] = {}
-    for part in ("fixed", "grid", "zip"):
+    for part in ("fixed", "grid", "zip", "sample"):
         if part not in places:
             continue
-        for name, key, _value in places[part][1].items(part):
+        for name, key in _names(part, places[part][1]):
             if name in seen:
                 other, former = seen[name]
                 key.fail(f"{name!r} is given under {part} and, on line {former.line}, under {other}. Keep one.")
             seen[name] = part, key
     return {name: key for name, (_part, key) in seen.items()}
+
+
+def _names(part: str, value: Located) -> Iterable[tuple[str, Located]]:
+    return range_names(value) if part == "sample" else ((name, key) for name, key, _ in value.items(part))
 
 
 def _check_tasks(parts: Parts) -> None:

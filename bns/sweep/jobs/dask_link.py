@@ -6,13 +6,14 @@ import logging
 import re
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Self
 
 from bns.errors import ClusterError
 from bns.extras import extra
 from bns.sweep.jobs.dask_job import LeavesSignals
 from bns.sweep.jobs.executor import ATTEMPTS
+from bns.sweep.jobs.trackers import without_complaints
 
 with extra("cluster"):
     import dask
@@ -25,6 +26,7 @@ _ADDRESS = re.compile(r"((tcp|tls|ws|wss|ucx|ucxx|inproc)://.+|[\w.-]+:\d{1,5}|\
 _FIRST_S, _TRY_S = 30.0, 5.0
 _CLOSE_S = 10.0
 _LOOK_S = 2.0
+_STARTS = 2
 
 
 class DaskLink:
@@ -144,11 +146,29 @@ class DaskLink:
 
 
 def _own_cluster(workers: int) -> LocalCluster:
-    with dask.config.set({"distributed.scheduler.allowed-failures": ATTEMPTS - 1}):
-        return LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address="127.0.0.1:0",
-            silence_logs=logging.ERROR,
-        )
+    """A scheduler and workers of our own, tried again where a worker dies before it has begun; ClusterError."""
+    without_complaints()
+    fault: Exception | None = None
+    for _ in range(_STARTS):
+        try:
+            with dask.config.set({"distributed.scheduler.allowed-failures": ATTEMPTS - 1}):
+                return LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL,
+                )
+        except (OSError, RuntimeError) as error:
+            fault = error
+    causes = [str(each) for each in _chain(fault) if str(each)]
+    raise ClusterError(
+        f"{workers} Dask workers could not be started on this machine, {_STARTS} times: {'; '.join(causes)}. Something kills "
+        "them as they begin, most often for want of memory: try fewer --jobs, or leave --executor out."
+    ) from fault
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    while error is not None:
+        yield error
+        error = error.__cause__

@@ -24,6 +24,7 @@ from bns.spec import RunSpec
 from bns.store.record import RunRecord
 from bns.sweep.jobs.executor import ATTEMPTS, Job, attempted, without_result
 from bns.sweep.jobs.job import describe, run_job
+from bns.sweep.jobs.trackers import without_complaints
 
 _ONE_THREAD = dict.fromkeys(
     (
@@ -75,6 +76,7 @@ class LokyExecutor:
         self._job, self._slots, self._cancelled = job, [_Slot() for _ in range(jobs)], False
 
     def __enter__(self) -> Self:
+        without_complaints()
         return self
 
     def __exit__(self, *exc: object) -> None:

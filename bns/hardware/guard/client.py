@@ -11,6 +11,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,15 @@ import numpy as np
 
 from bns.errors import HardwareError, StopNotConfirmedError
 from bns.hardware.clock import RealClock
+from bns.hardware.guard.recipe import StopRecipe
 from bns.hardware.platform import Driven, Platform
 from bns.hardware.safety import Stopping
 from bns.hardware.serial_link import no_port, why_not_opened
 from bns.hardware.stop import Stop
-from bns.hardware.stop_recipe import StopRecipe
 
-_SCRIPT = Path(__file__).with_name("guard_process.py")
+_CODE = "import sys; sys.path.append(sys.argv[1]); from guard.process import main; main()"
+"""What the process runs: this folder as a package by itself, found after the standard library."""
+_FOLDER = Path(__file__).parent
 _BEAT_S = 0.02
 _READY_S = 10.0
 _ENDS_S = 2.0
@@ -36,11 +39,21 @@ class Guard:
     """Starts the process, tells it that the trial lives, and hears when it has stopped the robot.
 
     `path` is the port to give to the robot's driver. A trial that gives no sign of life for `silent_s` is taken to hang. What the
-    guard does is written into `log`. A guard that has died is started again.
+    guard does is written into `log`. A guard that has died is started again. One whose trial is gone goes on trying to stop the
+    robot until that has not been heard for `gives_up_s`. `sysfs` is where the system tells which device a port is.
     """
 
-    def __init__(self, port: str, recipe: StopRecipe, silent_s: float, log: Path | None = None) -> None:
-        self._port, self._recipe, self._log, self._silent_s = port, recipe, log, silent_s
+    def __init__(
+        self,
+        port: str,
+        recipe: StopRecipe,
+        silent_s: float,
+        log: Path | None = None,
+        gives_up_s: float = 14400.0,
+        sysfs: str = "/sys",
+    ) -> None:
+        self._port, self._recipe, self._log = port, recipe, log
+        self._setup: dict[str, Any] = {"silent_s": silent_s, "gives_up_s": gives_up_s, "sysfs": sysfs, "identity": None}
         self.path = ""
         self._armed, self._told_s, self._tried_s = False, 0.0, 0.0
         self._why: str | None = None
@@ -53,20 +66,21 @@ class Guard:
         folder.mkdir(exist_ok=True)
         self.path = str(folder / "port")
         self._control, far = socket.socketpair()
-        script = [sys.executable, "-I", "-S", str(_SCRIPT)]
+        script = [sys.executable, "-I", "-S", "-c", _CODE, str(_FOLDER.parent)]
         with far:
             self._process = subprocess.Popen(
                 script, stdin=far.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
             )
         self._said = b""
-        setup: dict[str, Any] = {"port": self._port, "baud": self._recipe.baud, "link": self.path, "process": os.getpid()}
-        setup |= {"silent_s": self._silent_s, "log": self._log and str(self._log.absolute()), "stop": self._recipe.as_json()}
+        setup = self._setup | {"port": self._port, "link": self.path, "process": os.getpid()}
+        setup |= {"log": self._log and str(self._log.absolute()), "stop": self._recipe.as_json()}
         self._control.sendall((json.dumps(setup) + "\n").encode())
         answer = self._first_answer()
         self._control.setblocking(False)
         if answer["kind"] == "refused":
             self._gone(folder)
             raise HardwareError(why_not_opened(self._port, OSError(answer["errno"], answer["what"])))
+        self._setup["identity"] = answer["identity"]
 
     def _gone(self, folder: Path) -> None:
         self._control.close()
@@ -222,10 +236,17 @@ class GuardedPlatform:
 
         Where the guard has stopped the robot, nothing that the drive left counts, and what its driver missed is not the cause.
         """
+        return self._guarded(lambda: self._platform.drive(commands))
+
+    def turn_about(self, seconds: float) -> Any:
+        """Turn to and fro, guarded likewise, where the robot's platform can."""
+        return self._guarded(lambda: self._platform.turn_about(seconds))  # type: ignore[attr-defined]
+
+    def _guarded(self, move: Callable[[], Any]) -> Any:
         self._stopping.check()
         self._guard.arm()
         try:
-            driven = self._platform.drive(commands)
+            driven = move()
         except StopNotConfirmedError:
             raise
         except BaseException:

@@ -33,6 +33,7 @@ class StopRecipe:
     def as_json(self) -> dict[str, object]:
         """For the guard; bytes become text, one letter each."""
         return {
+            "baud": self.baud,
             "steps": [(send.decode("latin-1"), reply and reply.decode("latin-1")) for send, reply in self.steps],
             "own_stop": self.own_stop.decode("latin-1"),
             "within": self.within,

@@ -15,7 +15,7 @@ from typing import Any
 from panel.io.server import get_server
 from tornado.ioloop import IOLoop
 
-from bns.app.guard import LOOPBACK, Guard
+from bns.app.web.guard import LOOPBACK, Guard
 from bns.errors import BnsError
 
 LARGEST_UPLOAD = 1 << 29

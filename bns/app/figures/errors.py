@@ -1,0 +1,86 @@
+"""Errors: of one model after the other, and of every window."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from bokeh.models import ColumnDataSource, FactorRange, HoverTool, Span, Whisker
+
+from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank
+from bns.diagnose.predict.paired_errors import HorizonErrors
+from bns.plotting.style import BLUE, GREY, RED
+
+
+class LadderFigure:
+    """The error of one model after the other, with intervals, above the noise of the tracking."""
+
+    def __init__(self) -> None:
+        self.source = ColumnDataSource({"name": [], "error": [], "low": [], "high": []})
+        self.figure = blank(
+            "", "", "position error (mm)", height=240, x_range=FactorRange(), y_range=(0, 1), tools="hover,reset"
+        )
+        self.figure.scatter("name", "error", source=self.source, size=11, color=BLUE)
+        self.figure.line("name", "error", source=self.source, color=BLUE)
+        self.figure.add_layout(
+            Whisker(base="name", lower="low", upper="high", source=self.source, line_color=BLUE, line_width=2)
+        )
+        self._noise = Span(location=0, dimension="width", line_dash="dotted", line_color=GREY, line_width=2)
+        self.figure.add_layout(self._noise)
+        self.figure.xaxis.major_label_orientation = 0.6
+
+    def fill(self, e: HorizonErrors) -> None:
+        """The models of a horizon."""
+        names = [m.name for m in e.models]
+        self.figure.x_range.factors = names
+        values = {key: [1e3 * getattr(m, f"{key}_m") for m in e.models] for key in ("rms", "low", "high")}
+        self.source.data = {"name": names, "error": values["rms"], "low": values["low"], "high": values["high"]}
+        self.figure.y_range.end = 1.1 * max(
+            [v for v in (*values["rms"], *values["high"]) if np.isfinite(v)], default=1.0
+        )
+        self._noise.location = 1e3 * e.noise_floor_m if np.isfinite(e.noise_floor_m) else 0
+        self.figure.title.text = "Error and its 95 % interval; dotted: noise of the tracking"
+
+
+class WindowFigures:
+    """Errors of all windows four ways; what is brushed in one is marked in all, since they share one source."""
+
+    def __init__(self) -> None:
+        numbers = ("t_s", "number", "error_mm", "x_m", "y_m", "along", "from_s", "size")
+        self.source = ColumnDataSource({**{k: [0.0] for k in numbers}, "trial": [""]})
+        self._noise: list[Span] = []
+        self.time = self._scatter("Over time", "time in the trial (s)", "t_s")
+        self.along = self._scatter("Along a variable", "", "along")
+        self.trial = self._scatter("By trial", "trial, by number from 0", "number")
+        self.floor = blank("On the floor: the larger, the worse", *EAST_NORTH, tools=SELECTING, **FLOOR)
+        self._dots(self.floor, "x_m", "y_m", "size")
+        self.all = (self.time, self.along, self.trial, self.floor)
+
+    def _scatter(self, title: str, x: str, column: str) -> Any:
+        made = blank(title, x, "position error (mm)", tools=SELECTING)
+        self._dots(made, column, "error_mm", 6)
+        noise = Span(location=0, dimension="width", line_dash="dotted", line_color=GREY, line_width=2)
+        made.add_layout(noise)
+        self._noise.append(noise)
+        return made
+
+    def _dots(self, made: Any, x: str, y: str, size: Any) -> None:
+        look = {"fill_color": BLUE, "line_color": None, "fill_alpha": 0.5}
+        dots = made.scatter(x, y, source=self.source, size=size, **look, nonselection_fill_alpha=0.08)
+        dots.selection_glyph = dots.glyph.clone(fill_color=RED, fill_alpha=0.9)
+        tips = [("trial", "@trial"), ("until", "@t_s{0.00} s"), ("off by", "@error_mm{0.0} mm")]
+        made.add_tools(HoverTool(renderers=[dots], tooltips=tips))
+
+    def fill(self, table: Any, variable: str, noise_floor_m: float) -> None:
+        """``table``: the windows, a row each, of `Workbench.windows`."""
+        columns = {
+            name: table[name].to_numpy() for name in ("t_s", "number", "error_mm", "x_m", "y_m", "trial", "from_s")
+        }
+        largest = max(float(columns["error_mm"].max()), 1e-9) if len(table) else 1.0
+        size = 4 + 14 * columns["error_mm"] / largest
+        self.source.selected.indices = []
+        self.source.data = {**columns, "along": table[variable].to_numpy(), "size": size}
+        self.along.xaxis.axis_label = variable
+        self.along.title.text = f"Along {variable}"
+        for span in self._noise:
+            span.location = 1e3 * noise_floor_m if np.isfinite(noise_floor_m) else 0

@@ -1,0 +1,84 @@
+"""Measured and predicted paths, one trial or all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from bokeh.models import ColumnDataSource, HoverTool
+
+from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank, drawable
+from bns.diagnose.data.tracks import Array
+from bns.plotting.style import BLUE, OKABE_ITO, RED
+
+
+class PathFigure:
+    """Measured (solid) and predicted (dashed) path of one trial, and where both are at a time."""
+
+    def __init__(self, title: str, beside: PathFigure | None = None) -> None:
+        ranges: dict[str, Any] = (
+            {} if beside is None else {"x_range": beside.figure.x_range, "y_range": beside.figure.y_range}
+        )
+        self.figure: Any = blank(title, EAST_NORTH[0], EAST_NORTH[1], **ranges, **FLOOR)
+        self._lines = [ColumnDataSource({"x": [0.0], "y": [0.0]}) for _ in range(2)]
+        self._dots = ColumnDataSource({"x": [], "y": [], "color": []})
+        self._times, self._poses = np.zeros(0), (np.zeros((0, 3)), np.zeros((0, 3)))
+        for source, color, dash, name in zip(
+            self._lines, (BLUE, RED), ("solid", "dashed"), ("measured", "predicted"), strict=True
+        ):
+            self.figure.line("x", "y", source=source, color=color, line_dash=dash, line_width=2, legend_label=name)
+        self.figure.scatter("x", "y", source=self._dots, color="color", size=11, line_color="black")
+        self.figure.legend.location, self.figure.legend.background_fill_alpha = "top_left", 0.6
+
+    def fill(self, title: str, t_s: Array, measured: Array, predicted: Array) -> None:
+        """Poses (frames, 3) of both at the times ``t_s`` (frames,)."""
+        self.figure.title.text = title
+        for source, poses in zip(self._lines, (measured, predicted), strict=True):
+            shown = drawable(poses)
+            source.data = {"x": shown[:, 0], "y": shown[:, 1]}
+        self._times, self._poses = t_s, (measured, predicted)
+
+    def at(self, t_s: float) -> None:
+        """Dots where both are at a time (s)."""
+        if not len(self._times):
+            return
+        frame = int(np.searchsorted(self._times, t_s).clip(max=len(self._times) - 1))
+        places = [poses[frame] for poses in self._poses]
+        self._dots.data = {"x": [p[0] for p in places], "y": [p[1] for p in places], "color": [BLUE, RED]}
+
+
+class LogFigure:
+    """All measured paths, what was found odd on them, and trials that can be selected."""
+
+    def __init__(self) -> None:
+        self.paths = ColumnDataSource({"x": [[0.0]], "y": [[0.0]], "trial": [""], "color": [BLUE]})
+        self.findings = ColumnDataSource({"x": [], "y": [], "text": []})
+        self.figure = blank(
+            "Measured paths; crosses: findings. Tap or brush paths to choose trials",
+            *EAST_NORTH,
+            tools=SELECTING,
+            height=420,
+            **FLOOR,
+        )
+        lines = self.figure.multi_line(
+            "x", "y", source=self.paths, color="color", line_width=1.5, nonselection_alpha=0.15
+        )
+        self.figure.add_tools(HoverTool(renderers=[lines], tooltips=[("trial", "@trial")]))
+        marks = self.figure.scatter(
+            "x", "y", source=self.findings, marker="x", size=12, line_width=3, color="black", nonselection_alpha=1.0
+        )
+        self.figure.add_tools(HoverTool(renderers=[marks], tooltips=[("", "@text")]))
+
+    def fill(self, paths: Sequence[Array], names: Sequence[str], findings: dict[str, list[Any]]) -> None:
+        """Poses (frames, 3) of each trial; findings as x, y, text."""
+        most = max(50, 60_000 // max(len(paths), 1))
+        thin = [p[:: max(1, -(-len(p) // most))] for p in paths]
+        self.paths.selected.indices = []
+        self.paths.data = {
+            "x": [p[:, 0] for p in thin],
+            "y": [p[:, 1] for p in thin],
+            "trial": list(names),
+            "color": [OKABE_ITO[i % len(OKABE_ITO)] for i in range(len(thin))],
+        }
+        self.findings.data = findings

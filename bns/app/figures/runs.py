@@ -1,0 +1,129 @@
+"""Runs of a sweep: a dot each, parallel coordinates, and curves over evaluations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from bokeh.models import ColumnDataSource, FixedTicker, HoverTool
+
+from bns.app.figures.common import blank
+from bns.plotting.style import BLUE, OKABE_ITO, RED
+
+SUCCEEDED, FAILED = OKABE_ITO[2], RED
+MOST_DOTS, MOST_LINES = 20_000, 1_500
+"""More of them no screen shows apart; the figure's title says how many are drawn."""
+
+
+class RunsFigure:
+    """A dot a run; ``picked`` is told the run whose dot is clicked."""
+
+    def __init__(self, picked: Callable[[str], None]) -> None:
+        self.source = ColumnDataSource({"x": [0.0], "y": [0.0], "run": [""], "what": [""], "color": [SUCCEEDED]})
+        self.figure: Any = blank("", "", "", tools="tap,pan,wheel_zoom,box_zoom,reset", height=360)
+        dots = self.figure.scatter(
+            "x", "y", source=self.source, size=8, color="color", fill_alpha=0.55, nonselection_fill_alpha=0.15
+        )
+        self.figure.add_tools(HoverTool(renderers=[dots], tooltips=[("run", "@run"), ("", "@what")]))
+        self.source.selected.on_change("indices", lambda _a, _o, new: self._tell(new, picked))
+
+    def _tell(self, indices: Sequence[int], picked: Callable[[str], None]) -> None:
+        if indices:
+            picked(str(self.source.data["run"][indices[0]]))
+
+    def fill(self, rows: pd.DataFrame, x: tuple[str, str], y: tuple[str, str], varied: Sequence[str]) -> None:
+        """``x``, ``y``: column and words. Green dots: the fittest succeeds at the end."""
+        shown = rows.iloc[:: max(1, -(-len(rows) // MOST_DOTS))]
+        what = [
+            ", ".join(f"{name} {value}" for name, value in zip(varied, row, strict=True))
+            for row in shown[list(varied)].values
+        ]
+        names = shown["task"] + ", seed " + shown["seed"].astype(str)
+        self.source.selected.indices = []
+        self.source.data = {
+            "x": shown[x[0]].astype(float).to_numpy(),
+            "y": shown[y[0]].astype(float).to_numpy(),
+            "run": shown["run_id"].to_numpy(),
+            "what": [f"{name}; {text}" if text else name for name, text in zip(names, what, strict=True)],
+            "color": np.where(shown["success"], SUCCEEDED, FAILED),
+        }
+        self.figure.xaxis.axis_label, self.figure.yaxis.axis_label = x[1], y[1]
+        drawn = f", {len(shown)} of them drawn" if len(shown) < len(rows) else ""
+        self.figure.title.text = f"{len(rows)} runs{drawn}; green: the fittest succeeds at the end"
+
+
+class ParallelFigure:
+    """A line a run across all that varies and the outcomes; each axis from its smallest value to its largest."""
+
+    def __init__(self) -> None:
+        self.source = ColumnDataSource({"x": [[0.0]], "y": [[0.0]], "color": [SUCCEEDED]})
+        self._ends = ColumnDataSource({"x": [0.0], "y": [0.0], "text": [""]})
+        self.figure: Any = blank("", "", "", height=320, y_range=(-0.12, 1.12))
+        self.figure.multi_line("x", "y", source=self.source, color="color", line_alpha=0.25)
+        self.figure.text("x", "y", "text", source=self._ends, text_font_size="11px", text_align="center", y_offset=6)
+        self.figure.yaxis.visible = False
+        self.figure.xaxis.major_label_orientation = 0.5
+
+    def fill(self, rows: pd.DataFrame, axes: Mapping[str, str]) -> None:
+        """``axes``: column -> words."""
+        shown = rows.iloc[:: max(1, -(-len(rows) // MOST_LINES))]
+        heights, low, high = [], [], []
+        for name in axes:
+            values, ends = _heights(shown[name])
+            heights.append(values)
+            low.append(ends[0])
+            high.append(ends[1])
+        lines = np.array(heights, dtype=float).T
+        places = list(range(len(axes)))
+        self.source.data = {
+            "x": [places] * len(lines),
+            "y": [list(line) for line in lines],
+            "color": list(np.where(shown["success"], SUCCEEDED, FAILED)),
+        }
+        self._ends.data = {
+            "x": [*places, *places],
+            "y": [-0.06] * len(places) + [1.06] * len(places),
+            "text": [*low, *high],
+        }
+        self.figure.xaxis.ticker = FixedTicker(ticks=places)
+        self.figure.xaxis.major_label_overrides = dict(enumerate(axes.values()))
+        drawn = f"{len(shown)} of {len(rows)} runs drawn" if len(shown) < len(rows) else f"{len(rows)} runs"
+        self.figure.title.text = f"{drawn}, a line each; green: the fittest succeeds at the end"
+
+
+def _heights(column: pd.Series) -> tuple[np.ndarray, tuple[str, str]]:
+    """Values as heights from 0 to 1, and what the ends are."""
+    if column.dtype == bool:
+        return column.to_numpy(dtype=float), ("no", "yes")
+    if not pd.api.types.is_numeric_dtype(column):
+        names = sorted(column.astype(str).unique())
+        place = {name: i / max(len(names) - 1, 1) for i, name in enumerate(names)}
+        return np.array([place[str(v)] for v in column]), (names[0], names[-1]) if names else ("", "")
+    values = column.to_numpy(dtype=float)
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    return (values - low) / (high - low if high > low else 1.0), (f"{low:.3g}", f"{high:.3g}")
+
+
+class CurveFigure:
+    """One quantity over the evaluations of two runs."""
+
+    def __init__(self) -> None:
+        self.figure: Any = blank("", "evaluation", "", height=300)
+        self._sources = [ColumnDataSource({"x": [0.0], "y": [0.0]}) for _ in range(2)]
+        for source, color, dash, name in zip(self._sources, (BLUE, RED), ("solid", "dashed"), "AB", strict=True):
+            self.figure.line(
+                "x", "y", source=source, color=color, line_dash=dash, line_width=2, legend_label=f"run {name}"
+            )
+        self.figure.legend.location, self.figure.legend.background_fill_alpha = "top_right", 0.6
+
+    def fill(self, which: int, evaluations: Any, values: Any) -> None:
+        """Run A (0) or B (1)."""
+        self._sources[which].data = {"x": np.asarray(evaluations), "y": np.asarray(values, dtype=float)}
+
+    def name(self, words: str) -> None:
+        """What is drawn."""
+        self.figure.yaxis.axis_label = words
+        self.figure.title.text = f"{words} of the fittest"

@@ -1,0 +1,150 @@
+"""The page of a store: filters, parallel coordinates, a dot a run, two runs side by side."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import panel as pn
+
+from bns.app.figures.runs import CurveFigure, ParallelFigure, RunsFigure
+from bns.app.parts import CSS, WIDE, Problem, beside, button, drawn, heading, html, row
+from bns.app.results.one_run import OneRun
+from bns.app.results.study import CURVES, OUTCOMES, PARAMETERS, Study
+from bns.errors import StoreError
+
+TITLE = "bns explore: results"
+EVERY_MS = 10_000
+_MOST_NAMES = 2_000
+"""Of runs in a menu; filters make the list shorter."""
+
+
+def results_page(study: Study, icon: str) -> Any:
+    """A page of its own for every tab of the browser."""
+    template = pn.template.BootstrapTemplate(title=TITLE, header_background="#23395d", favicon=icon, raw_css=[CSS])
+    template.main.append(ResultsScreen(study).view)
+    return template
+
+
+class ResultsScreen:
+    """What the filters leave, drawn three ways."""
+
+    def __init__(self, study: Study) -> None:
+        self._study, self._problem, self._count = study, Problem(), html()
+        self._filters = {name: _menu(name) for name in ("sweep", "robot", "task", *PARAMETERS)}
+        self._x = pn.widgets.Select(name="Across", options=_options(OUTCOMES), value="diversity", width=220)
+        self._y = pn.widgets.Select(name="Up", options=_options(OUTCOMES), value="fitness_error", width=220)
+        self._curve = pn.widgets.Select(name="Curve", options=_options(CURVES), width=220)
+        self._names = [pn.widgets.Select(name=f"Run {letter}", options=[], width=300) for letter in "AB"]
+        self._live = pn.widgets.Checkbox(name="Look for new runs every 10 s", value=False)
+        self._clock: Any = None
+        self._next = 0
+        self._dots, self._parallel, self._curves = RunsFigure(self._pick), ParallelFigure(), CurveFigure()
+        self._runs = [OneRun(study, letter) for letter in "AB"]
+        for menu in self._filters.values():
+            menu.param.watch(lambda _event: self._draw(), "value")
+        for axis in (self._x, self._y):
+            axis.param.watch(lambda _event: self._draw(), "value")
+        for which, name in enumerate(self._names):
+            name.param.watch(lambda event, which=which: self._show_run(which, event.new), "value")
+        self._curve.param.watch(lambda _event: self._draw_curves(), "value")
+        self._live.param.watch(lambda event: self._watch(event.new), "value")
+        self.view = self._laid_out()
+        self._fill_menus()
+        self._draw()
+
+    def _laid_out(self) -> Any:
+        filters = pn.Column(
+            heading("Which runs"),
+            self._count,
+            row(button("Look for new runs", self._refresh), self._live, align_items="center"),
+            self._problem.view,
+            *self._filters.values(),
+            **WIDE,
+        )
+        pictures = pn.Column(drawn(self._parallel.figure), row(self._x, self._y), drawn(self._dots.figure), **WIDE)
+        words = html("<p>Click a dot, or choose here: the first click is run A, the next run B.</p>")
+        pair = beside(self._runs[0].view, self._runs[1].view)
+        compared = pn.Column(
+            heading("Two runs side by side"),
+            words,
+            row(*self._names, self._curve),
+            drawn(self._curves.figure),
+            pair,
+            **WIDE,
+        )
+        return pn.Column(beside(filters, pictures, least=300, first=pictures), compared, **WIDE)
+
+    def _fill_menus(self) -> None:
+        for name, menu in self._filters.items():
+            values = sorted(self._study.runs[name].dropna().unique().tolist(), key=str)
+            menu.options = {str(value): value for value in values}
+            menu.visible = len(values) > 1
+
+    def _draw(self) -> None:
+        rows = self._study.chosen({name: menu.value for name, menu in self._filters.items()})
+        self._count.object = f"<p id='bns-runs'>{len(rows)} of {len(self._study.runs)} finished runs.</p>"
+        varied = self._study.varied(rows)
+        words = {name: name.replace("_", " ") for name in varied}
+        self._parallel.fill(rows, {**words, **{k: OUTCOMES[k] for k in ("diversity", "fitness_error", "success")}})
+        self._dots.fill(
+            rows, (self._x.value, OUTCOMES[self._x.value]), (self._y.value, OUTCOMES[self._y.value]), varied
+        )
+        names = [_named(each, varied) for each in rows.head(_MOST_NAMES).to_dict("records")]
+        options = {"": "", **dict(zip(names, rows["run_id"].head(_MOST_NAMES), strict=True))}
+        for menu in self._names:
+            kept = menu.value
+            menu.options = options if kept in options.values() or not kept else {**options, kept: kept}
+
+    def _pick(self, run_id: str) -> None:
+        menu = self._names[self._next]
+        if run_id not in menu.options.values():
+            menu.options = {**menu.options, run_id: run_id}
+        menu.value = run_id
+        self._next = 1 - self._next
+
+    def _show_run(self, which: int, run_id: str) -> None:
+        self._runs[which].show(run_id or "")
+        self._draw_curves()
+
+    def _draw_curves(self) -> None:
+        column = self._curve.value
+        self._curves.name(CURVES[column])
+        for which, menu in enumerate(self._names):
+            if menu.value:
+                rows = self._study.curve(menu.value)
+                self._curves.fill(which, rows["evaluation"], rows[column])
+            else:
+                self._curves.fill(
+                    which, [0.0], [0.0]
+                )  # a picture without a point has no size, which Bokeh complains of
+
+    def _watch(self, on: bool) -> None:
+        if on and self._clock is None:
+            self._clock = pn.state.add_periodic_callback(self._refresh, period=EVERY_MS)
+        elif not on and self._clock is not None:
+            self._clock.stop()
+            self._clock = None
+
+    def _refresh(self) -> None:
+        try:
+            changed = self._study.refresh()
+        except StoreError as fault:
+            self._problem.show(str(fault))
+            return
+        self._problem.show("")
+        if changed:
+            self._fill_menus()
+            self._draw()
+
+
+def _menu(name: str) -> Any:
+    return pn.widgets.MultiSelect(name=f"Only {name.replace('_', ' ')} (none: all)", options=[], size=4, **WIDE)
+
+
+def _options(words: dict[str, str]) -> dict[str, str]:
+    return {text: name for name, text in words.items()}
+
+
+def _named(run: dict[Any, Any], varied: list[str]) -> str:
+    values = ", ".join(f"{name.replace('_', ' ')} {run[name]}" for name in varied)
+    return f"{run['sweep']}: {run['task']}, seed {run['seed']}" + (f", {values}" if values else "")

@@ -1,0 +1,139 @@
+"""The next experiment: the arena drawn with the mouse, the proposed trials as each explanation expects them, power by minutes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import panel as pn
+
+from bns.api.diagnose import diagnose
+from bns.api.propose import ProposeResult, checked_minutes, proposed
+from bns.app.background import Tell
+from bns.app.figures.floor import ArenaFigure, PowerFigure, Sides
+from bns.app.html import table
+from bns.app.parts import WIDE, Problem, beside, download, drawn, heading, html, row
+from bns.app.screens.working import Working
+from bns.app.tab import Tab
+from bns.app.workbench import Workbench
+from bns.diagnose.report.proposal_figure import foreseen
+from bns.errors import DataError
+
+_SIDES = ("x from (m)", "x to (m)", "y from (m)", "y to (m)")
+
+
+class ExperimentPart:
+    """Of the screen Next. The proposal is that of `bns propose` for the model as given."""
+
+    def __init__(self, tab: Tab) -> None:
+        self._tab, self._problem = tab, Problem()
+        self._bench: Workbench | None = None
+        self._frame_s = 0.04
+        self._picture, self._power = ArenaFigure(self._draw), PowerFigure()
+        self._minutes = pn.widgets.FloatInput(
+            name="Minutes of driving", value=5.0, start=0.1, end=600, step=1, width=130
+        )
+        self._sides = [pn.widgets.FloatInput(name=name, value=0.0, step=0.1, width=95) for name in _SIDES]
+        for side in self._sides:
+            side.param.watch(lambda _event: self._picture.arena(self._arena()), "value")
+        self._trial = pn.widgets.Select(name="Proposed trial", options=[], width=140)
+        self._time = pn.widgets.Player(
+            name="Time", start=0, end=1, value=0, interval=40, loop_policy="loop", show_loop_controls=False, width=260
+        )
+        self._trial.param.watch(lambda _event: self._show_trial(), "value")
+        self._time.param.watch(lambda event: self._picture.at(self._frame_s * event.new), "value")
+        self._table, self._save = html(), html()
+        self._work = Working("Propose the next experiment", self._begin, lambda: tab.experiment, self._show)
+        self._found = pn.Column(**WIDE)  # a picture that is hidden has no size to begin with, which Bokeh complains of
+        controls = pn.Column(
+            html("<p>Commands that tell the remaining explanations apart in the least time on the robot.</p>"),
+            row(*self._sides, self._minutes),
+            self._work.buttons,
+            self._problem.view,
+            self._work.said,
+            self._found,
+            **WIDE,
+        )
+        self.view = pn.Column(
+            heading("The next experiment"), beside(drawn(self._picture.figure), controls, least=330), **WIDE
+        )
+
+    def enter(self) -> None:
+        """Where the robot was seen, and the proposal as it stands."""
+        bench = self._tab.bench
+        if bench is None:
+            return
+        if bench is not self._bench:
+            self._bench, self._found.objects = bench, []
+            places = bench.ready.predictor.tracks.pose[:, :2]
+            self._picture.seen(places)
+            low, high = np.quantile(places, [0.005, 0.995], axis=0)
+            self._draw((float(low[0]), float(high[0]), float(low[1]), float(high[1])))
+        self._work.enter()
+
+    def _arena(self) -> Sides:
+        a, b, c, d = (float(side.value or 0.0) for side in self._sides)
+        return a, b, c, d
+
+    def _draw(self, sides: Sides) -> None:
+        for widget, value in zip(self._sides, sides, strict=True):
+            widget.value = round(value, 3)
+        self._picture.arena(self._arena())
+
+    def _begin(self) -> None:
+        bench, model, minutes, arena = self._tab.bench, self._tab.model, float(self._minutes.value or 0), self._arena()
+        if bench is None:
+            self._problem.show("Open a log first: the screen Data.")
+            return
+        try:
+            checked_minutes(minutes)
+        except DataError as fault:
+            self._problem.show(str(fault))
+            return
+        self._problem.show("")
+        kept = self._tab.diagnosis
+
+        def work(tell: Tell) -> ProposeResult:
+            found = kept.result or diagnose(bench.ready.log, model, progress=tell)
+            return proposed(found, minutes=minutes, arena=arena, progress=tell)
+
+        self._tab.experiment.start("planning", work)
+
+    def _show(self, result: ProposeResult) -> None:
+        pairs = result.proposal.model_pairs
+        rows = [[f"{p.first} or {p.second}", f"{p.power:.0%}", _minutes(p)] for p in pairs]
+        caption = f"{len(result.proposal.plan)} trials"
+        columns = ["which is it?", "chance of a decision", "minutes until nine in ten decide"]
+        self._table.object = table(columns, rows, caption, "bns-pairs")
+        curves = [(p.power_by_minutes, f"{p.first} / {p.second}") for p in pairs if p.power_by_minutes]
+        self._power.fill([c for c, _ in curves], [name for _, name in curves])
+        numbers = range(len(result.proposal.plan))
+        self._trial.options = {f"trial {n}": n for n in numbers}
+        player = row(self._trial, self._time, align_items="end")
+        self._found.objects = [player, self._table, drawn(self._power.figure), self._save]
+        self._save.object = ""
+        if numbers:
+            text = result.commands.to_csv(index=False).encode()
+            self._save.object = download("Save the commands (bns trial --commands)", "next.csv", text, "text/csv")
+            self._trial.value = 0
+            self._show_trial()
+
+    def _show_trial(self) -> None:
+        result, number = self._tab.experiment.result, self._trial.value
+        if result is None or number is None:
+            return
+        p = result.proposal
+        tracks = foreseen(p, np.array([number]))
+        t_s = tracks[0].t_s
+        names = [model.title for model in p.competing_models]
+        title = f"Trial {number}, {p.plan.lasting_s[number]:.0f} s, as each explanation expects it"
+        self._picture.trial(title, t_s, [each.pose for each in tracks], names)
+        self._frame_s = float(t_s[-1]) / max(len(t_s) - 1, 1)
+        self._time.end, self._time.value = len(t_s) - 1, 0
+        self._picture.at(0.0)
+
+
+def _minutes(pair: Any) -> str:
+    if pair.indistinguishable:
+        return "no commands tell them apart; measure " + ("; ".join(pair.independent_measurements) or "something else")
+    return f"{pair.minutes:.1f}"

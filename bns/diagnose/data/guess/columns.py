@@ -1,0 +1,106 @@
+"""Which columns of a plain table may be what, by their names, their units and the sizes of their numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bns.diagnose.data.guess.words import QUATERNIONS, WORDS, rank, source, unit_of, words_of
+from bns.diagnose.data.mapping import DURATION, FORWARD, TURN, UNITS
+from bns.diagnose.settings import DEFAULTS
+from bns.measurements import COLUMNS, COMMANDS
+
+RADIUS, METRES_A_COUNT = "RADIUS_M", "METRES_A_COUNT"
+"""Stand where a number is that no log tells: the wheel's radius, and the way of a wheel for one count."""
+_STEPS = DEFAULTS.data.guess_units
+_LARGE_RAD = DEFAULTS.data.guess_degrees
+_KINDS = {"t_s": "s", "x_m": "m", "y_m": "m", "heading_rad": "rad", TURN: "rad/s"}
+_COUNTS = re.compile(r"\b(ticks?|counts?|encoders?|enc)\b")
+
+
+def of_columns(table: pd.DataFrame) -> dict[str, Any]:
+    """Entries of a mapping, as far as names tell; a column that has the table's own name already comes first."""
+    names = {str(name): words_of(str(name)) for name in table.columns}
+    entries: dict[str, Any] = {}
+    quaternion = next((q for words in QUATERNIONS if len(q := list(_each(words, names))) == 4), None)
+    for column, words in WORDS.items():
+        selected = {entry["from"] for entry in entries.values()} | set(quaternion or ())
+        left = {name: said for name, said in names.items() if name not in selected}
+        fitting = {name: said for name, said in left.items() if _fits(column, said)}
+        if column in {*COMMANDS, FORWARD, TURN}:
+            fitting = dict(sorted(fitting.items(), key=lambda item: -rank(item[1], truth=False)))
+        found = column if column in COLUMNS and column in left else source(words, fitting)
+        if column == "heading_rad" and quaternion is not None:  # the last
+            entries[column] = {"from": quaternion, "unit": "quaternion"}
+        elif found is not None and not (column in {FORWARD, TURN} and "left_m_s" in entries):
+            entries[column] = {"from": found, **_unit(column, names[found], table[found])}
+    return _whole(entries)
+
+
+def motions_of(table: pd.DataFrame) -> dict[str, Any] | None:
+    """Entries for a table of single relative motions (scan matching): a duration, both wheels, and a list of three numbers."""
+    names = {str(name): words_of(str(name)) for name in table.columns}
+    bases = [
+        name[:-2] for name in names if name.endswith("_2") and {f"{name[:-2]}_{i}" for i in range(3)} <= set(names)
+    ]
+    lasted = source(("duration", "duration s", "dt", "t"), names)
+    wheels = [source(WORDS[name], names) for name in COMMANDS]
+    if not bases or lasted is None or None in wheels:
+        return None
+    moved = zip(("x_m", "y_m", "heading_rad"), range(3), strict=True)
+    speeds = {c: {"from": w, **_speed(names[str(w)])} for c, w in zip(COMMANDS, wheels, strict=True)}
+    return {DURATION: {"from": lasted}, **speeds, **{name: {"from": f"{bases[0]}_{i}"} for name, i in moved}}
+
+
+def _whole(entries: dict[str, Any]) -> dict[str, Any]:
+    """Without half of a pair of commands."""
+    for pair in (COMMANDS, (FORWARD, TURN)):
+        if sum(name in entries for name in pair) == 1 and not set(COMMANDS) <= set(entries):
+            entries = {name: entry for name, entry in entries.items() if name not in pair}
+    return entries
+
+
+def _fits(column: str, said: str) -> bool:
+    """Whether the unit that a name ends with can be one of the column's; a wheel may be told in rad/s, a heading in anything."""
+    unit = unit_of(said)
+    if unit is None or column in {"trial", "heading_rad", *COMMANDS}:
+        return True
+    return UNITS[unit][0] == _KINDS.get(column, "m/s") or len(unit) == 1
+
+
+def _each(words: tuple[str, ...], names: Mapping[str, str]) -> Iterator[str]:
+    for word in words:
+        found = source((word,), names)
+        if found is not None:
+            yield found
+
+
+def _speed(said: str) -> dict[str, Any]:
+    """How a wheel's column becomes m/s, where its name tells that it is none."""
+    if _COUNTS.search(said):
+        return {"scale": METRES_A_COUNT, "counts": True}
+    turning = unit_of(said) in {"rad/s", "deg/s"} or re.search(r"\b(phi|wl|wr|omega|rad s)\b", said)
+    return {"scale": RADIUS} if turning else {}
+
+
+def _unit(column: str, said: str, values: pd.Series) -> dict[str, Any]:
+    """The unit that a name ends with, or that the numbers show."""
+    if column == "trial":
+        return {}
+    if column in COMMANDS and (speed := _speed(said)):
+        return speed
+    numbers = pd.to_numeric(values, errors="coerce")
+    if column == "t_s" and numbers.isna().all():
+        return {"unit": "date"}
+    kind = _KINDS.get(column, "m/s")
+    for unit, (measures, size) in UNITS.items():
+        if measures == kind and size != 1.0 and re.search(rf"\b{' '.join(re.findall('[a-z]+', unit))}$", said):
+            return {"unit": unit}
+    if column == "t_s":
+        step = float(numbers.diff().abs().replace(0, np.nan).median())
+        return next(({"unit": unit} for least, unit in _STEPS if step > least), {})
+    return {"unit": "deg"} if column == "heading_rad" and float(numbers.abs().max()) > _LARGE_RAD else {}

@@ -1,0 +1,148 @@
+"""A first mapping for a log that has none, guessed from the names of its columns: to be read and corrected, never used unseen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import yaml
+
+from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, motions_of, of_columns
+from bns.diagnose.data.guess.topics import of_topic_columns
+from bns.diagnose.data.guess.words import rank, words_of
+from bns.diagnose.data.mapping import FORWARD, TURN
+from bns.diagnose.data.merge_topics import of_topics
+from bns.measurements import COMMANDS, POSE
+
+Entries = dict[str, Any]
+_SERVE_COMMANDS = (
+    "speeds of both wheels (m/s; rad/s with the wheel's radius), counters of encoders, or forward and turning speed of the body "
+    "(a topic of geometry_msgs/Twist or TwistStamped such as /cmd_vel, sensor_msgs/JointState of the wheels)"
+)
+_SERVE_POSE = (
+    "x, y and heading (or a quaternion) from motion capture, a camera or a lidar (a topic of geometry_msgs/PoseStamped, "
+    "nav_msgs/Odometry of a tracker, a transform in /tf)"
+)
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A mapping as a tree, and what to know of it: what lacks, and what may not be what it seems."""
+
+    mapping: dict[str, Any]
+    remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def text(self) -> str:
+        """The mapping as YAML, the remarks as comments above it."""
+        said = "".join(f"# {line}\n" for line in self.remarks)
+        return said + yaml.safe_dump(self.mapping, sort_keys=False, default_flow_style=None, width=120)
+
+
+def drafted(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = None) -> str:
+    """The guess as YAML; an empty ``columns`` where no name tells anything. ``others``: further files by name, joined by time."""
+    return guessed(table, others).text
+
+
+def guessed(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = None, name: str = "") -> Guess:
+    """The guess for one file, or for several of which the first is the one beside which the mapping lies."""
+    motions = motions_of(table)
+    if motions is not None and not others:
+        return Guess({"relative": True, "columns": motions}, tuple(_placeholders(motions)))
+    tables = {name: table, **(others or {})}
+    found = {file: _entries(one) for file, one in tables.items()}
+    poses = _best(found, POSE, truth=True)
+    told = _best(found, _commands_in(found), truth=False)
+    kept = {file: _part(entries, file == poses, file == told) for file, entries in found.items()}
+    tree: dict[str, Any] = {"columns": kept.pop(name)}
+    also = [{"file": file, "columns": entries} for file, entries in kept.items() if set(entries) > {"t_s"}]
+    if also:
+        tree["also"] = also
+    everything = {k: v for entries in (tree["columns"], *(one["columns"] for one in also)) for k, v in entries.items()}
+    if {FORWARD, TURN} <= set(everything):
+        tree["wheelbase_m"] = "METRES"
+    if also or of_topics(table) or _apart(table, everything):
+        tree["hold_commands_s"] = float("inf")
+    if "trial" not in everything:
+        tree["trials"] = {"standing_s": 1}
+    return Guess(tree, tuple(_remarks(everything, tables)))
+
+
+def lacking(mapping: Mapping[str, Any]) -> tuple[str, ...]:
+    """What measurements need and a mapping's columns do not give (times, commands, poses), each with what would serve."""
+    entries = {**mapping["columns"], **{k: v for one in mapping.get("also", ()) for k, v in one["columns"].items()}}
+    return tuple(_lacks(entries))
+
+
+def _entries(table: pd.DataFrame) -> Entries:
+    return of_topic_columns(table) if of_topics(table) else of_columns(table)
+
+
+def _commands_in(found: Mapping[str, Entries]) -> tuple[str, ...]:
+    return COMMANDS if any(set(COMMANDS) <= set(entries) for entries in found.values()) else (FORWARD, TURN)
+
+
+def _best(found: Mapping[str, Entries], wanted: tuple[str, ...], truth: bool) -> str | None:
+    """The file that gives most of the columns; of equals, by what its name and those of its columns say."""
+
+    def merit(file: str) -> tuple[int, int]:
+        entries = found[file]
+        names = " ".join(words_of(str(entries[name]["from"])) for name in wanted if name in entries)
+        return sum(name in entries for name in wanted), rank(f"{words_of(Path(file).name)} {names}", truth)
+
+    best = max(found, key=merit)
+    return best if merit(best)[0] else None
+
+
+def _part(entries: Entries, poses: bool, commands: bool) -> Entries:
+    """What is taken of a file: its time, and what it is the best source of."""
+    barred = (set() if poses else {*POSE}) | (set() if commands else {*COMMANDS, FORWARD, TURN})
+    return {name: entry for name, entry in entries.items() if name not in barred}
+
+
+def _apart(table: pd.DataFrame, entries: Entries) -> bool:
+    """Do commands stand in rows without poses?"""
+    told, seen = (
+        [e["from"] for n, e in entries.items() if n in names and isinstance(e["from"], str) and e["from"] in table]
+        for names in ({*COMMANDS, FORWARD, TURN}, set(POSE))
+    )
+    if not told or not seen:
+        return False
+    rows = table[seen].notna().all(axis=1)
+    return bool(rows.any() and table.loc[rows, told].isna().any(axis=1).mean() > 0.5)
+
+
+def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
+    yield from _lacks(entries)
+    yield from _placeholders(entries)
+    if {FORWARD, TURN} <= set(entries):
+        yield "Fill in METRES, the distance of the wheels that the robot's own controller reckons with."
+    told = " ".join(words_of(str(entries[n]["from"])) for n in (*COMMANDS, FORWARD, TURN) if n in entries)
+    if told and rank(told, truth=False) < 0:
+        yield "The speeds are measured ones, not commands: what motors and controller do to a command (lag, limits) cannot show."
+    seen = " ".join(words_of(str(entries[n]["from"])) for n in POSE if n in entries)
+    if seen and rank(seen, truth=True) < 0:
+        yield "These poses are the robot's own odometry: they agree with its wheels whatever it does. Use those of a tracker."
+    if any(str(c).startswith("column_") for table in tables.values() for c in table.columns):
+        yield "Columns without a heading are called column_1, column_2, ...; say which is which."
+
+
+def _lacks(entries: Mapping[str, Any]) -> Iterator[str]:
+    if "t_s" not in entries and "duration_s" not in entries:
+        yield "No column tells the time; add an entry t_s."
+    if not ({*COMMANDS} <= set(entries) or {FORWARD, TURN} <= set(entries) or {"left_m", "right_m"} <= set(entries)):
+        yield f"No column tells what the robot was commanded. What would serve: {_SERVE_COMMANDS}."
+    gone = [name for name in POSE if name not in entries]
+    if gone:
+        yield f"No column tells {', '.join(gone)}. What would serve: {_SERVE_POSE}."
+
+
+def _placeholders(entries: Entries) -> Iterator[str]:
+    scales = {entry.get("scale") for entry in entries.values()}
+    if RADIUS in scales:
+        yield f"Fill in {RADIUS}, the radius of the wheels: their speeds are in rad/s."
+    if METRES_A_COUNT in scales:
+        yield f"Fill in {METRES_A_COUNT}, the way of a wheel in metres for one count of its encoder."

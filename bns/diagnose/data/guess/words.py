@@ -1,0 +1,53 @@
+"""What names of columns, topics and files say of what is in them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from bns.diagnose.data.mapping import FORWARD, TURN, UNITS
+
+WORDS: dict[str, tuple[str, ...]] = {
+    "trial": ("trial", "run", "episode", "experiment"),
+    "t_s": ("t", "t s", "time", "stamp", "timestamp"),
+    "left_m_s": ("left", "vl", "wl", "phi l"),
+    "right_m_s": ("right", "vr", "wr", "phi r"),
+    FORWARD: ("v", "linear x", "twist x", "vx", "forward velocity", "linear velocity", "forward", "speed", "velocity"),
+    TURN: ("omega", "angular z", "w", "wz", "yaw rate", "yawrate", "angular velocity", "turn rate"),
+    "x_m": ("position x", "pos x", "px", "tx", "x"),
+    "y_m": ("position y", "pos y", "py", "ty", "y"),
+    "heading_rad": ("yaw", "heading", "theta", "psi", "compass", "orientation"),
+}
+"""Column of the table -> words that its sources have in their names, the surer first."""
+QUATERNIONS = (("qx", "qy", "qz", "qw"), tuple(f"orientation {axis}" for axis in "xyzw"))
+_TRUTH: tuple[str, ...] = (
+    *("ground truth", "groundtruth", "truth", "gt", "mocap", "vrpn", "optitrack", "vicon", "qualisys", "tracker"),
+    *("aruco", "apriltag", "lidar", "icp", "slam", "amcl", "map", "world"),
+)
+_TOLD = ("cmd", "command", "commanded", "cmd vel", "setpoint", "target", "desired", "reference", "control", "input")
+_MEASURED = ("odom", "odometry", "encoder", "joint states", "measured", "wheel odom")
+
+
+def words_of(name: str) -> str:
+    """A column's name in small words: `pose.position.x`, `cmdVel_left (mm/s)` -> `pose position x`, `cmd vel left mm s`."""
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    return " ".join(re.findall(r"[a-z0-9]+", spaced.lower()))
+
+
+def rank(said: str, truth: bool) -> int:
+    """1 where words speak for poses of a tracker (``truth``) or for commands, -1 where they speak of wheel odometry, else 0."""
+    for words, merit in ((_TRUTH if truth else _TOLD, 1), (_MEASURED, -1)):
+        if any(re.search(rf"\b{word}\b", said) for word in words):
+            return merit
+    return 0
+
+
+def source(words: Sequence[str], names: Mapping[str, str]) -> str | None:
+    """The first of ``names`` (name -> its words) that has one of ``words``, the surest first."""
+    return next((name for word in words for name, said in names.items() if re.search(rf"\b{word}\b", said)), None)
+
+
+def unit_of(said: str) -> str | None:
+    """The unit that a name ends with; of several that fit, the longest."""
+    fitting = [u for u in UNITS if re.search(rf"\b{' '.join(re.findall('[a-z]+', u))}$", said)]
+    return max(fitting, key=len, default=None)

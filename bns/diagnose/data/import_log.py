@@ -1,0 +1,97 @@
+"""A lab's files as one table of measurements, or what keeps them from being one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.checks import Finding, checked, own_rows
+from bns.diagnose.data.guess.mapping import guessed, lacking
+from bns.diagnose.data.load import naming
+from bns.diagnose.data.mapping import mapping_beside
+from bns.diagnose.data.sources.read import read_table
+from bns.errors import DataError
+from bns.measurements import COLUMNS, POSE
+
+
+@dataclass(frozen=True)
+class Imported:
+    """The table as it is written, the trials that passed the checks, and what was odd."""
+
+    table: pd.DataFrame
+    trials: int
+    findings: tuple[Finding, ...]
+    mapping: Mapping[str, Any] | None
+
+    @property
+    def poses(self) -> int:
+        """Rows that hold a whole pose."""
+        return int(self.table[list(POSE)].notna().all(axis=1).sum())
+
+    def summary(self, where: str) -> str:
+        """How much was written; rows without a pose hold commands (or other columns) alone."""
+        alone = int(own_rows(self.table).sum()) - self.poses
+        rest = f", {alone} without a pose" if alone else ""
+        return f"{len(self.table)} rows of {self.trials} trials written to {where}: {self.poses} with a pose{rest}"
+
+
+def import_log(files: Sequence[Path], mapping: Mapping[str, Any] | None = None) -> Imported:
+    """The first of the files, joined with the others by time, under ``mapping`` or the one that lies beside the first.
+
+    Raises:
+        DataError: no mapping and other columns (the message proposes one), a mapping that leaves something out, or measurements
+            that cannot be used.
+    """
+    first, *others = files
+    mapping = mapping_beside(first) if mapping is None else mapping
+    table = read_table(first)
+    if mapping is None and not others and set(COLUMNS) <= set(table.columns):
+        return _checked(first, table, None)
+    if mapping is None:
+        raise DataError(_proposed(first, table, others))
+    named = {one["file"] for one in mapping.get("also", ())}
+    missing = [path for path in others if path.name not in named and str(path) not in named]
+    if missing:
+        raise DataError(
+            f"The mapping of {first} takes nothing from {missing[0]}; add it under also: (docs/logs.md), or leave the file out."
+        )
+    with naming(first):
+        try:
+            out = applied(table, mapping, first.parent, read_table)
+        except DataError as error:
+            more = lacking(mapping)
+            raise DataError(" ".join([str(error), *more])) from error
+        gone = lacking(mapping) if not set(COLUMNS) <= set(out.columns) else ()
+        if gone:
+            raise DataError(" ".join(gone))
+    return _checked(first, out, mapping)
+
+
+def _checked(path: Path, table: pd.DataFrame, mapping: Mapping[str, Any] | None) -> Imported:
+    with naming(path):
+        usable, findings = checked(table)
+    return Imported(table, usable["trial"].nunique(), tuple(findings), mapping)
+
+
+def _proposed(first: Path, table: pd.DataFrame, others: Sequence[Path]) -> str:
+    """What is in the files, and the mapping that their names suggest."""
+    tables = {_beside(path, first): read_table(path) for path in others}
+    guess = guessed(table, tables)
+    columns = [f"{first} has the columns {', '.join(map(str, table.columns))}"]
+    columns += [f"{name} has the columns {', '.join(map(str, one.columns))}" for name, one in tables.items()]
+    several = f" It joins {len(files)} files by time." if len(files := [first, *others]) > 1 else ""
+    return (
+        f"There is no mapping beside {first}. {'; '.join(columns)}. Write {first.name}.import.yaml, or give such a file with "
+        f"--map; docs/logs.md has all that may stand in it.{several} "
+        f"A beginning, guessed from the names, to be checked line by line:\n\n{guess.text}"
+    )
+
+
+def _beside(path: Path, first: Path) -> str:
+    """How a mapping beside ``first`` names another file."""
+    return path.name if path.parent == first.parent else str(path.absolute())

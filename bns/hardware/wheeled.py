@@ -1,0 +1,144 @@
+"""Any robot on two wheels on its rig: commands driven at their times, watched, and stopped. What differs is its driver."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from bns.errors import TrialPausedError
+from bns.hardware.agreement import Agreement
+from bns.hardware.clock import Clock
+from bns.hardware.delay import Turns, turned
+from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.platform import Driven
+from bns.hardware.rig import Rig
+from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
+from bns.hardware.stop import Stop
+from bns.hardware.tracking.eye import Eye
+from bns.hardware.tracking.kinds import delay_of
+from bns.hardware.tracking.sight import Tracker
+from bns.hardware.wheel_drive import RobotLostError, WheelDrive
+
+_NOT_SEEN = "the tracker does not see the robot: is it lit, marked and on the surface? Try: bns track"
+
+
+class WheelDriver(Protocol):
+    """What the driver of such a robot does; RobotLostError from whatever is asked of one that does not answer any more."""
+
+    retries: int
+    """How often a question was asked again so far."""
+
+    def set_speed_m_s(self, left: float, right: float) -> tuple[float, float]:
+        """Set the speeds of the wheels' surfaces, m/s; what was really sent, once the robot has acknowledged it."""
+
+    def speed_m_s(self) -> tuple[float, float]:
+        """Speeds of the wheels' surfaces as the robot measures them, m/s."""
+
+    def encoders_m(self) -> tuple[float, float]:
+        """Way of the wheels' surfaces since any fixed instant, m."""
+
+    def battery_v(self) -> float:
+        """Voltage of the battery; NaN of a robot that does not tell."""
+
+    def stop(self) -> Stop:
+        """Stop, and see that the wheels stand still; never raises."""
+
+    def close(self) -> None:
+        """Give the link free."""
+
+
+@dataclass(frozen=True)
+class Wheels:
+    """The robot's numbers: of its commands' speed for one metre per second, of their duration for one second; wheelbase."""
+
+    units_per_m_s: float
+    units_per_s: float
+    wheelbase_m: float
+    heartbeat_looks: int = 5
+    """Every so many looks (a tenth of a second each) the robot is asked for its speed. A robot that stops by itself when it hears
+    nothing for half a second needs 2."""
+
+
+class WheeledPlatform:
+    """Implements `bns.hardware.platform.Platform`. Commands are (left, right, duration) in the units of ``wheels``."""
+
+    def __init__(
+        self,
+        driver: WheelDriver,
+        tracker: Tracker,
+        wheels: Wheels,
+        rig: Rig,
+        clock: Clock,
+        journal: HardwareLog,
+        stopping: Stopping,
+    ) -> None:
+        self._driver, self._wheels, self._clock, self._journal = driver, wheels, clock, journal
+        self._eye = Eye(tracker, clock, journal, math.pi / 2, delay_of(rig.tracker))
+        self._units = np.array([wheels.units_per_m_s, wheels.units_per_m_s, wheels.units_per_s])
+        self._watch, self._disagree_s = Watch(rig.limits, clock, stopping), rig.limits.disagree_s
+
+    @property
+    def retries(self) -> int:
+        """How often a question was asked again so far."""
+        return self._driver.retries
+
+    def pose(self) -> np.ndarray | None:
+        """Mean of some looks at the standing robot."""
+        sight = self._eye.standing()
+        return None if sight is None else sight.pose
+
+    def readings(self) -> dict[str, float]:
+        """Battery."""
+        try:
+            volts = self._driver.battery_v()
+            return {} if math.isnan(volts) else {"battery_v": volts}
+        except RobotLostError as error:
+            raise TrialPausedError(f"the robot is lost: {error}") from error
+
+    def stop(self) -> Stop:
+        """Stop and confirm."""
+        return self._driver.stop()
+
+    def close(self) -> None:
+        """Give port and tracker free."""
+        self._driver.close()
+        self._eye.close()
+
+    def turn_about(self, seconds: float) -> Turns:
+        """Turn to and fro on the spot, for the tracker's delay; stopped at the end. TrialPausedError, StopNotConfirmedError."""
+        if self.pose() is None:
+            raise TrialPausedError(_NOT_SEEN)
+        with StopsAtTheEnd(self.stop):
+            try:
+                return turned(self._driver, self._eye, self._watch, self._clock, seconds)
+            except (RobotLostError, DriveEnded) as error:
+                raise TrialPausedError(f"the robot could not be turned about: {error}") from error
+
+    def drive(self, commands: np.ndarray) -> Driven:
+        """Drive the commands back to back from where the robot stands."""
+        start = self.pose()
+        if start is None:
+            raise TrialPausedError(_NOT_SEEN)
+        agreement = Agreement(self._disagree_s, self._wheels.wheelbase_m)
+        often = self._wheels.heartbeat_looks
+        drive = WheelDrive(self._driver, self._eye, self._watch, agreement, self._clock, self._journal, start, often)
+        ended = ""
+        guard = StopsAtTheEnd(self.stop)
+        began_s = self._clock.now_s()
+        self._watch.begin()
+        with guard:
+            try:
+                for command in commands / self._units:
+                    drive.carry_out(*command.tolist())
+                drive.finish()
+            except DriveEnded as end:
+                ended = str(end)
+            except RobotLostError as error:
+                raise TrialPausedError(f"the robot was lost: {error}") from error
+        assert guard.last is not None
+        seconds = self._clock.now_s() - began_s
+        done = (drive.carried() * self._units).astype(np.float32)
+        return Driven(done, drive.poses(), drive.rows(), guard.last, ended, seconds)

@@ -1,0 +1,73 @@
+"""The page of a store: numbers are those of the store, a run driven again is the run."""
+
+import pytest
+
+import bns
+from bns.app.results.study import Study, is_store
+from bns.errors import StoreError
+
+pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
+from .test_page import CHROMIUM, Visit, browser, shown  # noqa: F401  # a fixture, too
+
+QUICK = {"population_size": [8], "evaluations": [3], "training_iterations_per_evaluation": [2]}
+TASKS = ["circle", "infinity", "complex"]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("results")
+    sweep = bns.Sweep(
+        name="little", robot="khepera", grid={"task": TASKS, "mutation_rate": [0.1, 0.9], **QUICK}, seeds=2
+    )
+    assert sweep.run(folder, jobs=1).finished
+    return folder
+
+
+def test_the_table_holds_every_run_with_its_last_evaluation(results):
+    study, evals = Study(results), bns.load(results)
+    last = evals[evals["evaluation"] == 3].set_index("run_id")
+    assert len(study.runs) == 12
+    assert study.varied(study.runs) == ["mutation_rate"]
+    for run in study.runs.to_dict("records"):
+        assert run["diversity"] == last["diversity"][run["run_id"]]
+        assert run["success"] == last["success"][run["run_id"]]
+    assert len(study.chosen({"mutation_rate": [0.9], "task": ["circle"], "sweep": []})) == 2
+
+
+def test_a_run_driven_again_is_the_run(results):
+    study = Study(results)
+    run_id = study.runs["run_id"][0]
+    again = study.drive_again(run_id, lambda _share, _text: None)
+    assert again.run_id == run_id
+    assert again.evals["diversity"].tolist() == study.curve(run_id)["diversity"].tolist()
+
+
+def test_what_is_no_store_is_said(tmp_path, results):
+    assert not is_store(tmp_path)
+    with pytest.raises(StoreError, match="holds no results of bns"):
+        Study(tmp_path)
+    with pytest.raises(StoreError, match="no name of a run"):
+        Study(results).curve("x' OR 1=1 --")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
+def test_runs_are_filtered_compared_and_driven_again_in_the_browser(results, browser):  # noqa: F811
+    visit = Visit(browser, results)
+    page = visit.open()
+    page.get_by_text("12 of 12 finished runs.").wait_for()
+    page.get_by_label("Run A", exact=True).select_option(index=1)
+    page.locator("#bns-run-a").wait_for()
+    page.get_by_label("Run B", exact=True).select_option(index=4)
+    page.locator("#bns-run-b").wait_for()
+    page.get_by_role("button", name="Drive it again to see its path").first.click()
+    page.locator(".bk-Figure").nth(3).wait_for()  # the path beside the three that are there from the start
+    page.wait_for_timeout(1500)
+    shown(page, "results")
+    page.close()
+    narrow = visit.open(400)
+    narrow.get_by_text("12 of 12 finished runs.").wait_for()
+    shown(narrow, "results-narrow")
+    narrow.close()
+    assert visit.outside == []
+    assert visit.odd == []
+    assert visit.end()[0] == 0

@@ -1,0 +1,219 @@
+"""Files as labs have them: recordings of ROS, tables with ``#`` headings, odometry and truth apart."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from bns.cli.main import main
+from bns.diagnose.data.checks import checked, poses_lost
+from bns.diagnose.data.guess.mapping import guessed
+from bns.diagnose.data.import_log import import_log
+from bns.diagnose.data.load import load_measured
+from bns.diagnose.data.sources.read import read_table
+from bns.errors import DataError
+from tests.diagnose.logs import continuous
+from tests.diagnose.worlds import BASE_M, NOMINAL, measured
+
+pytest.importorskip("rosbags")
+from tests.diagnose import bags
+
+SHARED = Path(__file__).parents[3] / "shared" / "data"
+RADIUS_M = 0.021
+
+
+@pytest.fixture(scope="module")
+def table():
+    return measured(NOMINAL, trials=3, seed=4)
+
+
+@pytest.fixture(scope="module")
+def log(table):
+    return continuous(table)
+
+
+def filled(guess):
+    """The proposal with what no log tells filled in."""
+    text = guess.text.replace("METRES,", f"{BASE_M},").replace("METRES\n", f"{BASE_M}\n").replace("RADIUS_M}", f"{RADIUS_M}}}")
+    return yaml.safe_load(text)
+
+
+def same_drives(folder, imported, table):
+    """The imported table holds the trials as they were driven."""
+    imported.table.to_parquet(folder / "m.parquet")
+    tracks = load_measured(folder / "m.parquet").tracks
+    assert len(tracks) == table["trial"].nunique()
+    for trial, (_, rows) in enumerate(table.groupby("trial")):
+        told = np.abs(tracks.left_m_s[trial]) + np.abs(tracks.right_m_s[trial]) > 0
+        lasted = rows["t_s"].iloc[-1] - rows["t_s"].iloc[0]
+        assert (tracks.duration_s[trial] * told).sum() == pytest.approx(lasted, abs=0.05)
+        way = np.abs(tracks.left_m_s[trial] * tracks.duration_s[trial]).sum()
+        given = (rows["left_m_s"].abs() * rows["t_s"].diff().shift(-1)).sum()
+        assert way == pytest.approx(given, rel=0.03)
+
+
+@pytest.mark.parametrize("kind", bags.KINDS)
+def test_a_recording_becomes_measurements_by_its_own_proposal(tmp_path, table, log, kind):
+    topics = {"/cmd_vel": bags.twist, "/vrpn/robot/pose": bags.pose_stamped, "/odom": bags.odometry}
+    bag = bags.write_bag(tmp_path, log, topics, kind)
+    guess = guessed(read_table(bag))
+    assert guess.mapping["columns"]["x_m"] == {"from": "/vrpn/robot/pose.pose.position.x"}
+    assert guess.mapping["columns"]["forward_m_s"] == {"from": "/cmd_vel.linear.x"}
+    found = import_log([bag], filled(guess))
+    assert not [f for f in found.findings if "lost" in f.text]
+    assert not any(str(name).startswith("/") for name in found.table.columns)
+    same_drives(tmp_path, found, table)
+
+
+@pytest.mark.parametrize(
+    ("topics", "takes", "remark"),
+    [
+        ({"/cmd": bags.twist_stamped, "/tf": bags.transforms}, "/cmd.twist.linear.x", None),
+        ({"/joint_states": bags.joints(RADIUS_M), "/odom": bags.odometry}, "/joint_states.velocity.wheel_left_joint", "measured"),
+        ({"/odom": bags.odometry}, "/odom.twist.twist.linear.x", "own odometry"),
+    ],
+)
+def test_what_stands_in_for_commands_and_poses_is_said(tmp_path, log, topics, takes, remark):
+    guess = guessed(read_table(bags.write_bag(tmp_path, log.iloc[:400], topics)))
+    taken = [entry["from"] for entry in guess.mapping["columns"].values()]
+    assert takes in taken
+    assert (remark is None) == (not any("own odometry" in r or "measured" in r for r in guess.remarks))
+    assert remark is None or any(remark in r for r in guess.remarks)
+
+
+def test_joint_states_and_transforms_are_measurements_too(tmp_path, table, log):
+    bag = bags.write_bag(tmp_path, log, {"/joint_states": bags.joints(RADIUS_M), "/tf": bags.transforms})
+    same_drives(tmp_path, import_log([bag], filled(guessed(read_table(bag)))), table)
+
+
+def test_a_recording_without_commands_says_what_would_serve(tmp_path, log, capsys):
+    bag = bags.write_bag(tmp_path, log.iloc[:200], {"/mocap": bags.pose_stamped}, "mcap")
+    assert main(["import", str(bag), "-o", str(tmp_path / "m.csv")]) == 2
+    said = capsys.readouterr().err
+    assert "No column tells what the robot was commanded. What would serve" in said
+    assert "/cmd_vel" in said
+    assert "/mocap.pose.position.x" in said
+    assert not (tmp_path / "m.csv").exists()
+    with pytest.raises(DataError, match=r"commanded. What would serve"):
+        import_log([bag], guessed(read_table(bag)).mapping)
+
+
+def test_a_damaged_recording_is_named(tmp_path):
+    (tmp_path / "a.mcap").write_bytes(b"no recording at all")
+    (tmp_path / "empty").mkdir()
+    for name in ("a.mcap", "empty", "b.bag"):
+        with pytest.raises(DataError, match=name):
+            read_table(tmp_path / name)
+
+
+def test_stamps_of_another_clock_give_way_to_the_recorders(tmp_path, log, monkeypatch):
+    monkeypatch.setattr(bags, "EPOCH_NS", bags.EPOCH_NS)
+    header = bags.Messages.header
+    monkeypatch.setattr(bags.Messages, "header", lambda self, at_s, frame="world": header(self, at_s - 500.0, frame))
+    bag = bags.write_bag(tmp_path, log.iloc[:50], {"/mocap": bags.pose_stamped, "/cmd_vel": bags.twist})
+    read = read_table(bag)
+    assert read["t_s"].iloc[-1] == pytest.approx(log["t_s"].iloc[49], abs=0.01)
+
+
+def lab_files(folder, log):
+    """Odometry with commands as .dat, truth as .txt with a `#` heading at a rate of its own, by one clock."""
+    told = log[["t_s", "left_m_s", "right_m_s"]].assign(t_s=log["t_s"] + 1000.0)
+    names = "# recorded by us\n# Time [s]    left wheel velocity [m/s]    right wheel velocity [m/s]\n"
+    lines = "\n".join(" ".join(f"{v:.6f}" for v in row) for row in told.to_numpy())
+    (folder / "Odometry.dat").write_text(names + lines + "\n")
+    truth = log.iloc[1::2].assign(t_s=log["t_s"].iloc[1::2] + 1000.013)[["t_s", "x_m", "y_m", "heading_rad"]]
+    truth.columns = ["#timestamp", "x", "y", "yaw"]
+    truth.to_csv(folder / "groundtruth.txt", index=False, sep="\t")
+    return folder / "Odometry.dat", folder / "groundtruth.txt"
+
+
+def test_two_files_of_a_lab_are_joined_by_time(tmp_path, table, log, capsys):
+    first, second = lab_files(tmp_path, log)
+    read = read_table(first)
+    assert list(read.columns) == ["Time [s]", "left wheel velocity [m/s]", "right wheel velocity [m/s]"]
+    guess = guessed(read, {second.name: read_table(second)})
+    assert guess.remarks == ()
+    (tmp_path / "Odometry.dat.import.yaml").write_text(guess.text)
+    assert main(["import", str(first), str(second), "-o", str(tmp_path / "m.parquet")]) == 0
+    said = capsys.readouterr().out
+    assert "without a pose" in said
+    assert "poses lost" not in said
+    same_drives(tmp_path, import_log([first]), table)
+    assert len(load_measured(first).tracks) == 3  # every command reads it by the mapping beside it
+
+
+def test_a_file_that_the_mapping_does_not_know_is_refused(tmp_path, log):
+    first, second = lab_files(tmp_path, log)
+    (tmp_path / "Odometry.dat.import.yaml").write_text(guessed(read_table(first)).text)
+    with pytest.raises(DataError, match=r"takes nothing from .*groundtruth.txt; add it under also"):
+        import_log([first, second])
+
+
+def test_a_table_that_needs_no_mapping_is_taken_as_it_is(tmp_path, table):
+    table.to_csv(tmp_path / "t.csv", index=False)
+    assert import_log([tmp_path / "t.csv"]).trials == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "columns"),
+    [
+        ("# Time [s]   x [m]   orientation [rad]\n1 2 3\n2 3 4\n", ["Time [s]", "x [m]", "orientation [rad]"]),
+        ("# timestamp tx ty tz qx qy qz qw\n1 0 0 0 0 0 0 1\n", ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]),
+        ("% a;b\n1;2\n3;4\n", ["a", "b"]),
+        ("1 2 3\n4 5 6\n", ["column_1", "column_2", "column_3"]),
+        ("# a note of the author\nt x\n1 2\n", ["t", "x"]),
+    ],
+)
+def test_headings_of_text_files(tmp_path, text, columns):
+    path = tmp_path / "log.dat"
+    path.write_text(text)
+    read = read_table(path)
+    assert list(read.columns) == columns
+    assert len(read) == len([line for line in text.splitlines() if line[0].isdigit()])
+    assert read.dtypes.map(lambda kind: kind.kind in "if").all()
+
+
+def test_rows_of_commands_alone_are_no_lost_poses():
+    t = np.arange(0, 10, 0.01)
+    assert poses_lost(t, np.arange(1000) % 4 == 0)[0] == 0
+    tracked = np.arange(1000) % 4 == 0
+    tracked[200:240] = False
+    assert poses_lost(t, tracked) == (10, 197)
+    assert poses_lost(np.arange(20.0), np.arange(20) != 7) == (1, 7)
+    assert poses_lost(np.arange(20.0), np.arange(20) < 15) == (5, 15)
+
+
+def test_command_rows_give_no_finding(table):
+    own = table.assign(t_s=table["t_s"] + 0.01)[["trial", "t_s", "left_m_s", "right_m_s"]]
+    both = pd.concat([table, own]).sort_values(["trial", "t_s"], kind="stable").reset_index(drop=True)
+    assert not [f for f in checked(both)[1] if "lost" in f.text]
+
+
+def test_a_log_of_scan_matches_is_seen_for_what_it_is(tmp_path):
+    path = SHARED / "khepera3_laser" / "l90_0.tuple"
+    if not path.is_file():
+        pytest.skip(f"no {path}")
+    guess = guessed(read_table(path))
+    assert guess.mapping["relative"]
+    assert guess.remarks == ("Fill in RADIUS_M, the radius of the wheels: their speeds are in rad/s.",)
+    assert import_log([path], filled(guess)).trials > 100
+
+
+@pytest.mark.parametrize("name", ["diff_drive_optitrack.parquet", "skid_steer_terrains.parquet"])
+def test_shared_tables_need_no_mapping(name):
+    path = SHARED / name
+    if not path.is_file():
+        pytest.skip(f"no {path}")
+    found = import_log([path])
+    assert found.trials > 100
+    assert found.poses == len(found.table)
+
+
+def test_a_log_without_poses_and_commands_says_both():
+    path = SHARED / "servo_logs.csv.gz"
+    if not path.is_file():
+        pytest.skip(f"no {path}")
+    with pytest.raises(DataError, match=r"(?s)commanded. What would serve.*No column tells x_m, y_m, heading_rad"):
+        import_log([path])

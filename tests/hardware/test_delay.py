@@ -1,0 +1,109 @@
+"""Poses are stamped when they were filmed: the tracker's delay, measured by the robot's own motion, and what a trial does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bns.errors import HardwareError
+from bns.hardware.delay import Turns, delay_between
+from bns.hardware.emulators.faults import Fault, FaultPlan
+from bns.hardware.rig import shipped_rig
+from bns.hardware.safety import Stopping
+from bns.trial.delay import measured_delay
+from bns.trial.session import TrialSetup, open_rig
+
+ARUCO = {"kind": "aruco", "camera": 0, "calibration": "x", "side_m": 0.09, "height_m": 0.07}
+
+
+def setup(tracker, late_s, **more):
+    rig = shipped_rig("khepera")
+    rig = replace(rig, tracker={**(tracker or rig.tracker), **more})
+    plan = FaultPlan((Fault("late-tracker", at_s=0.0, for_s=late_s),)) if late_s else FaultPlan()
+    return TrialSetup(rig, emulated=True, speed=np.inf, plan=plan)
+
+
+@pytest.mark.parametrize(("tracker", "late_s"), [(None, 0.0), (None, 0.15), (ARUCO, 0.0), (ARUCO, 0.07), (ARUCO, 0.15)])
+def test_a_late_tracker_is_found_out(tracker, late_s):
+    """A camera's fifteen pictures a second are taken when they are stamped, or so much before.
+
+    What the kernel's smoothing does to a Wii remote's lights comes on top of its delay.
+    """
+    found = measured_delay(setup(tracker, late_s))
+    low_s, high_s = (-0.003, 0.003) if tracker else (-0.003, 0.015)
+    assert low_s < found.delay_s - late_s < high_s
+    assert found.error_s < 0.003
+
+
+def test_what_is_known_already_is_part_of_the_delay():
+    assert measured_delay(setup(ARUCO, 0.1, delay_s=0.04)).delay_s == pytest.approx(0.1, abs=0.003)
+
+
+def driven(how, commands):
+    with Stopping() as stopping, open_rig(how, 0, None, stopping) as opened:
+        emulation = opened.operator._emulation
+        found = opened.platform.drive(np.array(commands, np.float32))
+        asked_s = emulation.body._segments[1][0] - emulation.robot._latency_s / 2
+    return found, lambda t_s: emulation.body.seen(asked_s + t_s)[:2]
+
+
+@pytest.mark.parametrize("corrected", [True, False])
+def test_rows_of_a_trial_are_stamped_when_they_were_filmed(corrected):
+    """With a camera 120 ms late, poses compared with where the robot was: which shift of time brings the true path nearest."""
+    how = setup(ARUCO, 0.12, **({"delay_s": 0.12} if corrected else {}))
+    found, true = driven(how, [[20000, 12000, 1500], [8000, 20000, 1500], [15000, 15000, 1000]])
+    shifts, off_s = np.arange(-0.3, 0.3, 0.001), []
+    for row in [row for row in found.rows if 0.5 < row["t_s"] < found.rows[-1]["t_s"] - 0.3]:
+        path = np.array([true(row["t_s"] - shift) for shift in shifts])
+        off_s.append(shifts[np.argmin(np.hypot(*(path - [row["x_m"], row["y_m"]]).T))])
+    if corrected:
+        assert np.abs(off_s).max() <= 0.005
+    else:
+        assert np.median(off_s) == pytest.approx(0.12, abs=0.005)
+
+
+def test_commands_end_where_the_robot_was_when_they_ended():
+    commands = np.array([[20000, 20000, 1500], [6000, 20000, 1500]])
+    found, true = driven(setup(ARUCO, 0.12, delay_s=0.12), commands)
+    for pose, t_s in zip(found.poses[1:], np.cumsum(found.commands[:, 2]) / 1000, strict=True):
+        assert np.hypot(*(pose[:2] - true(t_s))) < 0.004
+    np.testing.assert_allclose(found.commands[:, 2], commands[:, 2], atol=60)
+
+
+def turns(late_s, slope=1.0, noise=0.0, seed=0):
+    draw = np.random.default_rng(seed)
+    robot_s = np.arange(0.0, 12.0, 0.05)
+    heading = lambda t: np.sin(2.1 * t) + 0.6 * np.sin(5.3 * t + 1.0)  # noqa: E731
+    seen_s = np.arange(0.0, 12.0, 0.033)
+    seen = slope * heading(seen_s - late_s) + 0.02 * seen_s + 0.3 + noise * draw.standard_normal(len(seen_s))
+    return Turns(robot_s, 0.04 * heading(robot_s), seen_s, seen)
+
+
+@pytest.mark.parametrize("late_s", [-0.05, 0.0, 0.08, 0.3])
+def test_the_delay_is_that_of_the_motion_whatever_scale_and_drift(late_s):
+    found = delay_between(turns(late_s, slope=1.3, noise=0.01))
+    assert found.delay_s == pytest.approx(late_s, abs=0.003)
+
+
+def test_the_standard_error_is_the_scatter():
+    found = [delay_between(turns(0.1, noise=0.05, seed=seed)) for seed in range(40)]
+    scatter = np.std([one.delay_s for one in found])
+    assert np.mean([one.error_s for one in found]) == pytest.approx(scatter, rel=0.4)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (turns(0.1)._replace(seen_s=np.arange(3.0), seen_rad=np.zeros(3)), "was seen 3 times"),
+        (turns(0.1, slope=0.0, noise=0.1), "does not follow the robot's own turns"),
+        (turns(0.9), "does not follow the robot's own turns"),
+    ],
+)
+def test_what_tells_no_delay_is_refused(given, message):
+    with pytest.raises(HardwareError, match=message):
+        delay_between(given)
+
+
+def test_a_delay_that_makes_no_sense_is_named():
+    with pytest.raises(HardwareError, match="delay_s is 'late'; it is a number of seconds, up to 1"):
+        measured_delay(setup(None, 0.0, delay_s="late"))

@@ -1,0 +1,174 @@
+"""Time-outs that follow the link: the arithmetic of RFC 6298, and drives over links of every speed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bns.errors import HardwareError, StopNotConfirmedError, TrialPausedError
+from bns.hardware.clock import RealClock
+from bns.hardware.emulators.faults import Fault, Faults
+from bns.hardware.emulators.khepera import KheperaEmulator
+from bns.hardware.emulators.terminal import PseudoTerminal
+from bns.hardware.hardware_log import HardwareLog, events
+from bns.hardware.khepera import BAUD, KheperaIII, firmware
+from bns.hardware.khepera_settings import khepera_settings
+from bns.hardware.platforms import khepera as platform
+from bns.hardware.reply_time import ReplyLimits, ReplyTime
+from bns.hardware.rig import shipped_rig
+from bns.hardware.safety import Stopping, StopsAtTheEnd
+from bns.hardware.serial_link import SerialLink
+from bns.hardware.tracking.sight import Sight
+from bns.hardware.wheel_drive import RobotLostError
+from bns.trial.session import TrialSetup, open_rig
+
+from .robots_on_the_line import DistantRobot
+
+MOST = ReplyLimits(1.0, 0.0, 100.0)
+
+
+def test_the_time_out_is_that_of_the_rfc():
+    """Section 2 worked by hand: 0.2 s first, then 0.1 s."""
+    time = ReplyTime(MOST)
+    assert time.timeout_s == 1.0
+    time.measured(0.2)
+    assert (time.smoothed_s, time.deviation_s) == (0.2, 0.1)
+    assert time.timeout_s == pytest.approx(0.2 + 4 * 0.1)
+    time.measured(0.1)
+    assert time.deviation_s == pytest.approx(0.75 * 0.1 + 0.25 * 0.1)
+    assert time.smoothed_s == pytest.approx(0.1875)
+    time.measured(0.1)
+    assert time.deviation_s == pytest.approx(0.75 * 0.1 + 0.25 * 0.0875)
+    assert time.smoothed_s == pytest.approx(0.875 * 0.1875 + 0.125 * 0.1)
+
+
+def test_a_steady_link_is_waited_for_little_longer_than_it_takes():
+    time = ReplyTime(MOST)
+    for _ in range(100):
+        time.measured(0.05)
+    assert time.timeout_s == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize(("trip_s", "timeout_s"), [(0.001, 0.03), (9.0, 0.8)])
+def test_time_outs_stay_within_their_limits(trip_s, timeout_s):
+    time = ReplyTime()
+    for _ in range(100):
+        time.measured(trip_s)
+    assert time.timeout_s == timeout_s
+
+
+class BodysEye:
+    """A tracker that always knows."""
+
+    def __init__(self, robot, clock):
+        self._robot, self._clock = robot, clock
+
+    def look(self):
+        return Sight(self._clock.now_s(), self._robot.body.pose(self._robot.clock.now_s()))
+
+    def close(self):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "jitter", "loss"), [(0.02, 1.0, 0.02), (0.11, 0.2, 0.0), (0.15, 0.3, 0.02), (0.3, 0.3, 0.02)]
+)
+def test_a_slow_link_is_driven_over(tmp_path, monkeypatch, delay_s, jitter, loss):
+    """On a real line in real time, guard and all: done or paused, and standing."""
+    robot = DistantRobot(tmp_path, delay_s, jitter, loss, seed=1)
+    monkeypatch.setattr(platform, "open_tracker", lambda _settings, clock: BodysEye(robot, clock))
+    rig, commands = replace(shipped_rig("khepera"), port=str(robot.path)), np.array(3 * [[9000.0, 6000.0, 1000.0]], np.float32)
+    try:
+        with Stopping() as stopping, open_rig(TrialSetup(rig, yes=True), 0, tmp_path / "journal.jsonl", stopping) as opened:
+            driven = opened.platform.drive(commands)
+            assert driven.stop.confirmed
+            assert len(driven.commands) == 3
+    except TrialPausedError:
+        assert loss
+    assert not robot.moves()
+    assert all(e["confirmed"] for e in events(tmp_path / "journal.jsonl", "stop"))
+    robot.close()
+
+
+@pytest.mark.parametrize("latency_s", [0.02, 0.11, 0.15, 0.3])
+def test_losses_on_a_slow_link_never_end_in_an_unconfirmed_stop(tmp_path, clock, body, latency_s):
+    """Forty drives on the emulated clock; every twentieth exchange is lost, on its way there or back."""
+    faults = Faults((Fault("lost-request", rate=0.025), Fault("lost-reply", rate=0.025)), 3, "khepera")
+    lost = 0
+    with PseudoTerminal(KheperaEmulator(body, clock, firmware(2, 4), faults, latency_s), tmp_path, "khepera") as line:
+        journal = HardwareLog(None, clock)
+        link = SerialLink(str(line.path), BAUD, clock, journal)
+        driver = KheperaIII(link, clock, journal)
+        for _ in range(40):
+            try:
+                driver.set_speed_m_s(0.1, 0.08)
+                for _ in range(3):
+                    clock.sleep(0.5)
+                    driver.speed_m_s()
+            except RobotLostError:
+                lost += 1
+            assert driver.stop().confirmed
+        link.close()
+    assert driver.retries > 2
+    assert lost <= 4
+
+
+def test_an_answer_to_what_was_asked_before_is_none_to_what_is_asked_now(tmp_path):
+    """The answer to a D comes after the next question: a D's is not taken for it, an E's is waited for."""
+    robot = DistantRobot(tmp_path, 0.4, 0.0, 0.0)
+    clock = RealClock()
+    journal = HardwareLog(tmp_path / "journal.jsonl", clock)
+    link = SerialLink(str(robot.path), BAUD, clock, journal)
+    with pytest.raises(Exception, match="no answer to"):
+        link.exchange(b"D,l3000,l3000\n", 0.1)
+    assert link.exchange(b"E\n", 1.0).startswith(b"e,")
+    link.close()
+    journal.close()
+    robot.close()
+    assert [e["data"] for e in events(tmp_path / "journal.jsonl", "passed-over")] == ["d\r\n"]
+
+
+@pytest.mark.parametrize(
+    ("driver", "message"),
+    [
+        ({"first_reply": 1.0}, "unknown setting 'first_reply'. Did you mean 'first_reply_s'"),
+        ({"stop_s": -1}, "stop_s is -1; it must be a number of seconds above 0"),
+        ({"least_reply_s": 2.0}, "least_reply_s is 2, above its most_reply_s 0.8"),
+    ],
+)
+def test_bad_settings_are_named(driver, message):
+    with pytest.raises(HardwareError, match=message.replace("'", ".")):
+        khepera_settings(driver)
+
+
+def test_a_rigs_settings_reach_link_and_driver(tmp_path, monkeypatch):
+    robot = DistantRobot(tmp_path, 0.02, 0.0, 0.0)
+    monkeypatch.setattr(platform, "open_tracker", lambda _settings, clock: BodysEye(robot, clock))
+    driver = {"first_reply_s": 0.5, "least_reply_s": 0.21, "most_reply_s": 0.7, "stop_s": 0.6}
+    rig = replace(shipped_rig("khepera"), port=str(robot.path), driver=driver)
+    with Stopping() as stopping, open_rig(TrialSetup(rig, yes=True), 0, None, stopping) as opened:
+        link = opened.platform._platform._driver._link
+        assert link.times.limits == ReplyLimits(0.5, 0.21, 0.7)
+        assert link.times.timeout_s == 0.21
+        opened.platform._platform._driver._link.times.measured(0.02)
+        robot.body.order(0.1, 0.1, robot.clock.now_s())
+        robot.body.order = lambda *_: None  # takes the order, does not carry it out
+        stop = opened.platform._platform._driver.stop()
+        assert not stop.confirmed
+        assert 0.6 < stop.seconds < 1.2
+        del robot.body.order
+    assert not robot.moves()
+    robot.close()
+
+
+def test_a_link_that_cannot_be_had_back_is_said_to_be_so(tmp_path):
+    """Only then: nobody answers any more."""
+    robot = DistantRobot(tmp_path, 0.02, 0.0, 0.0)
+    clock, journal = RealClock(), HardwareLog(None, None)
+    link = SerialLink(str(robot.path), BAUD, clock, journal)
+    driver = KheperaIII(link, clock, journal, 0.5)
+    robot._loss = 1.0
+    with pytest.raises(StopNotConfirmedError), StopsAtTheEnd(driver.stop):
+        pass
+    link.close()
+    robot.close()

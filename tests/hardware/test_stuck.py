@@ -1,0 +1,142 @@
+"""A controller whose drive is stuck is driven once more; stuck there again, it is kept as it was."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bns.errors import TrialPausedError
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.hardware_log import HardwareLog, events
+from bns.hardware.platform import Driven
+from bns.hardware.platforms import snake
+from bns.hardware.rig import shipped_rig
+from bns.hardware.servo_chain import ServoError, StuckServoError
+from bns.hardware.stop import Stop
+from bns.trial.driver import TrialDriver
+from bns.trial.folder import past_evaluations, stuck_before
+from bns.trial.operator import Decision, UnattendedOperator
+
+CYCLES = np.zeros((3, 5), np.float32)
+
+
+class Hands:
+    """Puts the robot back whenever it is asked to, and keeps everything."""
+
+    def __init__(self):
+        self.placed = []
+
+    def place(self, _start, why):
+        self.placed.append(why)
+
+    def accept(self, _summary, _spans):
+        return Decision("next")
+
+
+def drives(*stuck):
+    """A platform whose drives end one after the other stuck at these servos ("" : not at all)."""
+    left = list(stuck)
+
+    def drive(commands):
+        what = left.pop(0)
+        done = len(commands) if not what else 1
+        ended = f"{what} is stuck" if what else ""
+        return Driven(commands[:done], np.zeros((done + 1, 9)), [], Stop(True, 0.1, 0.1, ""), ended, 5.0, (), what)
+
+    return SimpleNamespace(pose=lambda: np.zeros(3), readings=dict, drive=drive, left=left)
+
+
+@pytest.fixture
+def driver(tmp_path):
+    """driver(platform, operator) -> a TrialDriver that goes on with the same journal."""
+    path, clock, logs = tmp_path / "journal.jsonl", EmulatedClock(np.inf), []
+
+    def build(platform, operator):
+        stuck = stuck_before(path)
+        logs.append(HardwareLog(path, clock))
+        return TrialDriver(platform, operator, shipped_rig("snake"), np.zeros(3), clock, logs[-1], stuck)
+
+    build.path = path
+    yield build
+    for log in logs:
+        log.close()
+
+
+def test_a_drive_that_is_stuck_once_is_repeated(driver):
+    hands, platform = Hands(), drives("servo 9", "")
+    kept = driver(platform, hands).evaluate(1, CYCLES)
+    assert len(kept.commands) == 3
+    assert hands.placed == ["servo 9 is stuck"]
+    assert len(past_evaluations(driver.path)) == 1
+    assert len(past_evaluations(driver.path)[0].commands) == 3
+
+
+def test_a_drive_that_is_stuck_there_again_is_kept_as_far_as_it_went(driver):
+    hands, platform = Hands(), drives("servo 9", "servo 9", "not driven")
+    kept = driver(platform, hands).evaluate(1, CYCLES)
+    assert len(kept.commands) == 1
+    assert platform.left == ["not driven"]
+
+
+def test_another_servo_and_another_evaluation_are_other_causes(driver):
+    hands, platform = Hands(), drives("servo 9", "servo 3", "servo 9", "servo 9", "")
+    driven = driver(platform, hands)
+    assert len(driven.evaluate(1, CYCLES).commands) == 1
+    assert len(driven.evaluate(2, CYCLES).commands) == 3
+    assert len(hands.placed) == 3
+
+
+def test_with_nobody_there_it_pauses_once_and_goes_on_with_what_the_second_attempt_gives(driver):
+    with pytest.raises(TrialPausedError, match="servo 9 is stuck, and with --yes nobody can put it back"):
+        driver(drives("servo 9"), UnattendedOperator()).evaluate(1, CYCLES)
+    assert past_evaluations(driver.path) == []
+    kept = driver(drives("servo 9"), UnattendedOperator()).evaluate(1, CYCLES)
+    assert len(kept.commands) == 1
+    assert [event["what"] for event in events(driver.path, "stuck")] == ["servo 9"]
+
+
+class Drive:
+    """In place of `SnakeDrive`: fails while it straightens or in its second cycle."""
+
+    def __init__(self, error, straightening):
+        self.error, self.straightening, self.cycles, self.rows, self.spans_s = error, straightening, [], [], []
+
+    def __call__(self, *_):
+        return self
+
+    def straighten(self):
+        if self.straightening:
+            raise self.error
+
+    def carry_out(self, cycle):
+        self.cycles.append(cycle)
+        if len(self.cycles) == 2:
+            raise self.error
+
+    def finish(self):
+        pass
+
+    def done(self):
+        return np.array(self.cycles)
+
+    def observed(self):
+        return np.zeros((len(self.cycles) + 1, 9))
+
+
+def driven(monkeypatch, error, straightening=False):
+    chain = SimpleNamespace(stop=lambda: Stop(True, 0.1, 0.1, ""))
+    rig = SimpleNamespace(limits=shipped_rig("snake").limits)
+    monkeypatch.setattr(snake, "SnakeDrive", Drive(error, straightening))
+    stopping = SimpleNamespace(check=lambda: None)
+    return snake.SnakePlatform(chain, None, rig, None, EmulatedClock(np.inf), None, stopping).drive(CYCLES)
+
+
+def test_a_stuck_servo_ends_the_drive_and_other_faults_and_a_body_that_cannot_lie_straight_pause(monkeypatch):
+    stuck = StuckServoError(9, 1.0, 1.2)
+    ended = driven(monkeypatch, stuck)
+    assert (ended.stuck, len(ended.commands)) == ("servo 9", 2)
+    assert ended.ended == "servo 9 has used 100% of its torque for 1.2 s; is it stuck?"
+    with pytest.raises(TrialPausedError, match="servos failed: servo 9 has used"):
+        driven(monkeypatch, stuck, straightening=True)
+    with pytest.raises(TrialPausedError, match="servos failed: servo 2 is at 70"):
+        driven(monkeypatch, ServoError("servo 2 is at 70"))

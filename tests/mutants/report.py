@@ -1,0 +1,25 @@
+"""The page that says how many planted faults the tests notice."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+
+HEAD = """# Planted faults
+
+Written by `make mutants`: cosmic-ray exchanges one comparison, operator, number or truth value at a time in the rooms
+where numbers are made, and the tests nearest to each must fail. A sample (seed {seed}, {minutes:g} minutes), drawn in
+turn from all rooms.
+
+| room | places | planted | noticed | share |
+|---|---|---|---|---|
+"""
+
+
+def written(
+    sizes: Mapping[str, int], killed: Mapping[str, int], survivors: Mapping[str, Sequence[str]], options: argparse.Namespace
+) -> str:
+    """The page, as Markdown."""
+    rows = [(room, sizes[room], killed[room] + len(survivors[room]), killed[room]) for room in sizes]
+    rows.append(("all", *(sum(column) for column in zip(*(row[1:] for row in rows), strict=True))))
+    table = [f"| {room} | {size} | {tried} | {found} | {found / max(tried, 1):.0%} |" for room, size, tried, found in rows]
+    listed = [f"- {room}: {text}" for room, texts in survivors.items() for text in texts]
+    return HEAD.format(seed=options.seed, minutes=options.minutes) + "\n".join([*table, "", "## Not noticed", "", *listed]) + "\n"

@@ -1,0 +1,27 @@
+"""The rooms where numbers are made, and the tests nearest to each."""
+
+ROOMS: dict[str, tuple[str, str]] = {
+    "engine": ("bns/engine/[!_rj]*.py bns/engine/rprop.py", "tests/engine tests/robots/test_snake_breeding.py"),
+    "tasks": ("bns/tasks/__init__.py bns/robots/khepera/robot.py", "tests/robots/test_khepera.py tests/robots/test_contract.py"),
+    "store": (
+        "bns/store/disk/*.py bns/store/write/*.py bns/store/read/*.py",
+        "tests/store/test_damage.py tests/store/test_order.py tests/store/test_journal.py tests/store/test_compact.py "
+        "tests/store/test_round_trip.py tests/store/test_lock.py tests/store/test_question.py",
+    ),
+    "estimate": (
+        "bns/diagnose/estimate/*.py",
+        "tests/diagnose/test_held_out.py tests/diagnose/test_evidence.py tests/diagnose/test_clocks.py "
+        "tests/diagnose/test_normal.py",
+    ),
+    "select": (
+        "bns/diagnose/select/*.py",
+        "tests/diagnose/test_alike.py tests/diagnose/test_equivalents.py tests/diagnose/test_search.py",
+    ),
+    "safety": ("bns/hardware/safety.py", "tests/hardware/test_safety.py tests/hardware/test_confirmed_stop.py"),
+    "drivers": (
+        "bns/hardware/khepera.py bns/hardware/dynamixel.py bns/hardware/servo_chain.py bns/hardware/bridge.py",
+        "tests/hardware/test_confirmed_stop.py tests/hardware/test_khepera.py tests/hardware/test_ax12.py "
+        "tests/hardware/test_bridge.py",
+    ),
+}
+"""Name -> files that are changed, tests that must notice; patterns with spaces between."""

@@ -1,0 +1,124 @@
+"""The documentation site: it builds without a warning, asks no other host for anything, and has a page for every part."""
+
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import bns
+from bns.cli.main import _parser
+from bns.physics.effects import all_effects
+from site_pages.command_pages import page as command_page
+from site_pages.drives import VALUES, demonstrate, visible_values
+
+ROOT = Path(__file__).resolve().parent.parent
+FETCHED = {
+    "script": "src",
+    "img": "src",
+    "iframe": "src",
+    "source": "src",
+    "video": "src",
+    "link": "href",
+    "object": "data",
+}
+OTHER_HOST = re.compile(r"^(?:https?:)?//")
+
+
+class Requests(HTMLParser):
+    """Collects what a browser fetches by itself when it shows a page."""
+
+    def __init__(self):
+        super().__init__()
+        self.addresses = []
+
+    def handle_starttag(self, tag, attrs):
+        found = dict(attrs)
+        if tag in FETCHED and found.get("rel") not in {"canonical", "next", "prev"}:
+            self.addresses.append(found.get(FETCHED[tag]) or "")
+        self.addresses += re.findall(r"url\(([^)]+)\)", found.get("style") or "")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The built site: that of `make docs` where BNS_SITE names it, else a fresh one."""
+    if os.environ.get("BNS_SITE"):
+        return Path(os.environ["BNS_SITE"])
+    pytest.importorskip("material", reason="the extra docs is not installed")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(folder)]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=280, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert "WARNING" not in done.stderr
+    return folder
+
+
+def test_no_page_asks_another_host_for_anything(site):
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > 60
+    for page in pages:
+        requests = Requests()
+        requests.feed(text := page.read_text())
+        assert not [a for a in requests.addresses if OTHER_HOST.match(a.strip("'\""))], page
+        assert 'class="mermaid"' not in text, "the theme would fetch a library for it"
+    for sheet in site.rglob("*.css"):
+        assert not re.findall(r"(?:url\(|@import )[\"']?(?:https?:)?//", sheet.read_text()), sheet
+
+
+def test_every_effect_has_a_page_with_its_picture(site):
+    overview = (site / "gallery" / "effects.html").read_text()
+    for name, effect in all_effects().items():
+        page = (site / "gallery" / "effects" / f"{name}.html").read_text()
+        assert f'src="{name}.svg"' in page
+        assert (site / "gallery" / "effects" / f"{name}.svg").stat().st_size > 5000
+        assert f'href="effects/{name}.html"' in overview
+        for heading in ("Parameters", "Look-alikes", "Confirm it on the bench"):
+            assert f">{heading}<" in page, name
+        assert all(f"<code>{p.name}</code>" in page for p in effect.parameters)
+
+
+def test_every_public_name_has_its_docstring_on_the_page(site):
+    page = (site / "reference" / "python.html").read_text()
+    for name in bns.__all__:
+        if not name.startswith("_"):
+            assert f"bns.{name}" in page, name
+    assert "Raises:" in page
+
+
+@pytest.mark.parametrize("name", sorted(all_effects()))
+def test_pictures_show_a_difference(name):
+    shown = demonstrate(all_effects()[name])
+    assert 0.01 < shown.apart_m.max() < 0.7
+
+
+def test_an_effect_of_a_package_has_a_picture_too():
+    for effect in all_effects().values():
+        values = visible_values(effect)
+        assert effect.checked(values)
+        assert values != effect.neutral
+    assert set(VALUES) <= set(all_effects())
+
+
+def test_the_command_reference_has_every_command_and_option():
+    text = command_page()
+    commands = _parser()._commands()
+    assert len(commands) > 20
+    for name, parser in commands.items():
+        assert f"\n## bns {name}\n" in text
+        section = text.split(f"\n## bns {name}\n")[1].split("\n## ")[0]
+        assert all(option in section for action in parser._actions for option in shown_options(action)), name
+
+
+def shown_options(action):
+    return [] if action.help in {"==SUPPRESS=="} or action.dest == "help" else action.option_strings
+
+
+def test_the_menu_names_pages_that_exist_once_each():
+    named = re.findall(r"- ([\w/.-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), flags=re.M)
+    made = {"gallery/effects.md", "reference/commands.md", "reference/python.md"}
+    assert len(named) == len(set(named))
+    assert all((ROOT / "docs" / page).is_file() for page in set(named) - made)
