@@ -74,14 +74,14 @@ hidden-effects: setup ## does the diagnosis name what is missing? Generated worl
 
 GAP = docs/closing-the-gap
 OUT = results/closing-the-gap
-closing-the-gap: setup ## from a run on a robot to a mended model, and how controllers of either do on the robot (minutes)
+closing-the-gap: setup ## from a run on a robot to an extended model, and how controllers of either do on the robot (minutes)
 	@mkdir -p $(OUT)
 	$(BIN)/bns run --world $(GAP)/robot.yaml --task circle --seed 1000 --evaluations 30 --measurements $(OUT)/log.parquet \
 		--save-snn $(OUT)/networks.safetensors --results $(OUT)
 	$(BIN)/bns diagnose $(OUT)/log.parquet --model $(GAP)/drawing.yaml --figures $(OUT)/figures
-	$(BIN)/bns add $(OUT)/log.parquet wheel-mismatch motor-lag --model $(GAP)/drawing.yaml -o $(OUT)/mended.yaml --figures $(OUT)/figures
+	$(BIN)/bns add $(OUT)/log.parquet wheel-mismatch motor-lag --model $(GAP)/drawing.yaml -o $(OUT)/extended.yaml --figures $(OUT)/figures
 	$(BIN)/bns sweep $(GAP)/before.yaml $(GAP)/after.yaml $(GAP)/direct.yaml --results $(OUT)
-	$(BIN)/python -m analysis.transfer "gap-before=the drawing" "gap-after=the mended model" \
+	$(BIN)/python -m analysis.transfer "gap-before=the drawing" "gap-after=the extended model" \
 		--reference "gap-direct=the robot itself" --to $(GAP)/robot.yaml --results $(OUT) --out $(OUT)/figures
 
 propose-benchmark: setup ## robot time until confusable explanations are told apart: proposed commands against random ones

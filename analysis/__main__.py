@@ -21,7 +21,7 @@ from bns.registry import FIGURES
 
 
 def figures(broken: list[str] | None = None) -> dict[str, Any]:
-    """The figures of this folder and of installed packages by NAME, in the order of the source's numbers.
+    """The figures of this folder and of installed packages by NAME, in the order of the dissertation's numbers.
 
     SpecError if a package's figure cannot be used; with ``broken`` that is said there, and the others are given.
     """

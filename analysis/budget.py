@@ -17,7 +17,7 @@ from analysis.results import NoDataError, Results
 from bns.plotting.style import note, ordered_styles, panels, style
 
 NAME = "budget"
-PAPER = "choice of defaults, not in the source"
+PAPER = "choice of defaults, not in the dissertation"
 TITLE = "How much evolution and training an evaluation gets"
 SWEEP = "budget"
 LATE = 0.3

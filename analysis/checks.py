@@ -1,4 +1,4 @@
-"""One function a kind of finding: it measures these results as the source measured its own, with an interval.
+"""One function a kind of finding: it measures these results as the dissertation measured its own, with an interval.
 
 Each takes the store, a selection, a task and the arguments that stand in source.yaml, and gives a `Checked`.
 """
@@ -89,7 +89,7 @@ def best_values(store: Results, chosen: Selection, task: str, parameter: str, va
     share = float((best == np.sort([known.index(value) for value in values])).all(axis=1).mean())
     order = np.argsort(rates.mean(axis=0))[::-1][: len(values)]
     ours = " and ".join(valued(parameter, known[place]) for place in order)
-    return Checked(claim, f"best {ours} over all evaluations; as in the source in {share:.0%} of the samples", likely(share))
+    return Checked(claim, f"best {ours} over all evaluations; as in the dissertation in {share:.0%} of samples", likely(share))
 
 
 def larger_is_better(store: Results, chosen: Selection, task: str, parameter: str) -> Checked:

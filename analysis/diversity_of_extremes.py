@@ -20,7 +20,7 @@ from bns.plotting.style import BLUE, GREY, lettered, note, panels, style
 NAME = "diversity-of-extremes"
 PAPER = "figures 4.13 to 4.15, 5.29 and 5.30"
 FIRST_EVALUATION = 5
-"""Before it controllers are almost random; the source draws nothing of that either."""
+"""Before it controllers are almost random; the dissertation draws nothing of that either."""
 
 
 def draw(store: Results) -> list[FigureResult]:

@@ -1,4 +1,4 @@
-"""What the source found (sections 4.6 and 5.9) beside what these results say: agrees, differs, undecided yet."""
+"""What the dissertation found (sections 4.6 and 5.9) beside what these results say: agrees, differs, undecided yet."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _NOWHERE = ""
 def draw(store: Results) -> list[FigureResult]:
     found = [(chosen, table) for chosen in selections(store) if not (table := checked(store, chosen)).empty]
     if not found:
-        raise NoDataError("no finished run is of a robot and task of the source; run make sweep-khepera BUDGET=10m")
+        raise NoDataError("no finished run is of a robot and task of the dissertation; run make sweep-khepera BUDGET=10m")
     return [_drawn(store, chosen, table) for chosen, table in found]
 
 
 def checked(store: Results, chosen: Selection) -> pd.DataFrame:
-    """One row a finding and task: the source's words and ours, the verdict, where it stands; one row a task with too few runs."""
+    """One row a finding and task: the dissertation's words, ours, verdict, section; one row a task with too few runs."""
     ready = _with_enough_runs(store, chosen)
     numbers = {task_number(chosen.robot, task): task for task in chosen.tasks}
     made, waiting = [], Counter[int]()
@@ -43,12 +43,12 @@ def checked(store: Results, chosen: Selection) -> pd.DataFrame:
             elif number in numbers:
                 result = _check(store, chosen, finding["check"], numbers[number], arguments)
                 title = f"{number}, {task_title(chosen.robot, numbers[number])}"
-                row = {"task": title, "the source": result.claim, "these results": result.ours, "verdict": result.verdict}
+                row = {"task": title, "the dissertation": result.claim, "these results": result.ours, "verdict": result.verdict}
                 made.append(row | {"where": finding["where"]})
     for number, findings in waiting.items():
         title = f"{number}, {task_title(chosen.robot, numbers[number])}"
         few = f"no combination of parameters has {fewest(store, chosen)} finished runs yet"
-        row = {"task": title, "the source": f"all {findings} findings", "these results": few, "verdict": UNDECIDED}
+        row = {"task": title, "the dissertation": f"all {findings} findings", "these results": few, "verdict": UNDECIDED}
         made.append(row | {"where": _NOWHERE})
     return pd.DataFrame(made)
 
@@ -85,13 +85,13 @@ def _drawn(store: Results, chosen: Selection, table: pd.DataFrame) -> FigureResu
     if len(waiting):
         see += f"; too few runs yet of {' and '.join(task.partition(', ')[2] for task in waiting.task)}"
     shows = (
-        f"Each finding of the source that a number can be put to, beside the same measure of these results with its 95 % "
-        f"interval (bootstrap over seeds, or Wilson). Agrees: the interval lies within 5, or a fifth of the source's value, of "
+        f"Each finding of the dissertation that a number can be put to, beside the same measure of these results with its 95 % "
+        f"interval (bootstrap over seeds, or Wilson). Agrees: the interval is within 5, or 20 % of the dissertation's value, of "
         f"it; differs: it lies outside; undecided: neither yet. Orders agree if they hold in 95 % of the bootstrap samples, and "
-        f"differ if in 5 %. The source's numbers come from 500 combinations and 30 runs each; these from n = {chosen.n:,} runs "
+        f"differ if in 5 %. The dissertation's numbers come from 500 combinations of 30 runs; these from n = {chosen.n:,} runs "
         f"of {', '.join(chosen.sweeps)}."
     )
     return FigureResult(
-        f"{NAME}-{chosen.robot}", "What the source found, and these results", None, shows, chosen.n, chosen.sweeps,
+        f"{NAME}-{chosen.robot}", "What the dissertation found, and these results", None, shows, chosen.n, chosen.sweeps,
         (*said.missing, *chosen.left_out), see=f"{see}.", data=table, table=table,
     )  # fmt: skip

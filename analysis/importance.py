@@ -1,6 +1,6 @@
 """How much each parameter matters for success at the last evaluation: three measures, all with seeds as the unit.
 
-The *gap* is the source's: how far the curves of a parameter's values lie apart at most. The *variance share* is functional
+The *gap* is the dissertation's: how far the curves of a parameter's values lie apart at most. The *variance share* is functional
 analysis of variance on the success rates of the combinations: on a whole grid the main effects of a type II analysis of
 variance, less what the chance of single runs adds to them. The *permutation importance* is how much worse a regression tree
 predicts success on seeds that it has not seen when the values of the parameter are shuffled.

@@ -14,7 +14,7 @@ TITLES = {
     "mutation_rate": "mutation rate",
     "real_world_selection_size": "real-world selection size",
 }
-"""The parameters whose combinations the source compares (table 4.3), and what they are called on a figure."""
+"""The parameters whose combinations the dissertation compares (table 4.3), and what they are called on a figure."""
 CELL = tuple(TITLES)
 """Their columns; together they name a combination."""
 SHORT = {
@@ -55,7 +55,7 @@ def task_title(robot: str, task: str) -> str:
 
 
 def task_order(robot: str, task: str) -> tuple[str, str]:
-    """Sort key: the source's order of tasks."""
+    """Sort key: the dissertation's order of tasks."""
     try:
         return load_task(robot, task).source, task
     except SpecError:
@@ -63,12 +63,12 @@ def task_order(robot: str, task: str) -> tuple[str, str]:
 
 
 def task_number(robot: str, task: str) -> int | None:
-    """Which of the source's tasks of that robot this is, from 1; None for a task that the source does not have."""
+    """Which of the dissertation's tasks of that robot this is, from 1; None for a task that the dissertation does not have."""
     words = task_order(robot, task)[0].split(" (")[0].split()
     return int(words[-1]) if len(words) > 1 and words[-1].isdigit() else None
 
 
 def source_position(paper: str) -> tuple[float, float]:
-    """Where a figure stands in the source, (4, 12) for "figures 4.12 and 5.27"; last of all what the source lacks."""
+    """Where a figure stands in the dissertation, (4, 12) for "figures 4.12 and 5.27"; last of all what the dissertation lacks."""
     number = re.search(r"(?:figure|table)s? (\d+)\.(\d+)", paper)
     return (float(number[1]), float(number[2])) if number else (float("inf"), 0.0)

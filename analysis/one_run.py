@@ -15,12 +15,12 @@ NAME = "one-run"
 PAPER = "figure 4.17"
 OF_A_RUN = True
 FIRST = "prototype"
-"""The sweep whose runs come first: the source's own settings."""
+"""The sweep whose runs come first: the dissertation's own settings."""
 TASK = 2
-"""The source shows a run of its second task."""
+"""The dissertation shows a run of its second task."""
 TITLES = ("fitness", "simulator and world", "successive simulators")
 SHOWN = 30
-"""Evaluations that the source's run had."""
+"""Evaluations that the dissertation's run had."""
 
 
 def draw(store: Results) -> list[FigureResult]:

@@ -17,7 +17,7 @@ NAME = "paths"
 PAPER = "figures 4.4 to 4.6, 5.16 to 5.21"
 OF_A_RUN = True
 FIRST = "prototype"
-"""The sweep whose runs come first: the source's own trials."""
+"""The sweep whose runs come first: the dissertation's own trials."""
 MOST_PANELS = 6
 WORLD, SNN = ["x_m", "y_m", "heading_rad"], ["snn_x_m", "snn_y_m", "snn_heading_rad"]
 

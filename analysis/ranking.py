@@ -1,4 +1,4 @@
-"""Combinations of parameters from best to worst, as section 4.5 of the source ranks them."""
+"""Combinations of parameters from best to worst, as section 4.5 of the dissertation ranks them."""
 
 from __future__ import annotations
 

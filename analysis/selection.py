@@ -49,7 +49,7 @@ class Selection:
 
 @remembered
 def selections(store: Results, parameter: str | None = None) -> list[Selection]:
-    """One selection a robot, of the sweeps that compare ``parameter`` (by default any of the source's four).
+    """One selection a robot, of the sweeps that compare ``parameter`` (by default any of the dissertation's four).
 
     Raises:
         NoDataError: there is none; the message says why and what would feed it.

@@ -22,9 +22,9 @@ NAME = "simulator-accuracy"
 PAPER = "figures 5.7 to 5.10"
 STABLE = "stable"
 SOURCE = {"dx_yellow": (0.84, 0.85), "dy_yellow": (0.17, 0.28), "dx_green": (0.75, 0.90), "dy_green": (0.05, 0.25)}
-"""R² and slope of the source's regression lines (section 5.5.1)."""
+"""R² and slope of the dissertation's regression lines (section 5.5.1)."""
 SOURCE_STABILITY = {"stable": 0.94, "unstable": 0.58}
-"""Shares of stable and unstable verification cycles that the source's network got right."""
+"""Shares of stable and unstable verification cycles that the dissertation's network got right."""
 
 
 def draw(store: Results) -> list[FigureResult]:
@@ -66,9 +66,9 @@ def _draw(simulator: StaticSimulator) -> FigureResult:
     shows = (
         f"Displacement in a cycle as the static simulator of the {robot.name} predicts it, against what the physics world "
         f"did, for n = {n} stable verification cycles. Dashed: prediction is right; solid: regression of predicted on "
-        f"measured. Its R² and slope stand above each panel, the source's in brackets."
+        f"measured. Its R² and slope stand above each panel, the dissertation's in brackets."
     )
-    see = "The source predicted x well (R² 0.84 and 0.75) and y hardly at all (0.17 and 0.05)."
+    see = "The dissertation predicted x well (R² 0.84 and 0.75) and y hardly at all (0.17 and 0.05)."
     columns = [f"{kind}_{net}" for kind in ("measured", "predicted") for net in simulator.networks]
     data, title = pd.DataFrame(np.hstack([measured, predicted]), columns=columns), f"Static simulator of the {robot.name}"
     return FigureResult(f"{NAME}-{robot.name}", title, figure, shows, 1, (), see=see, data=data, table=table)
@@ -96,15 +96,15 @@ def _row(name: str, got: dict[str, float]) -> dict[str, Any]:
     return {
         "network": name,
         "R² of the regression": round(got["regression_r2"], 2),
-        "in the source": r2,
+        "in the dissertation": r2,
         "slope": round(got["slope"], 2),
-        "slope in the source": slope,
+        "slope in the dissertation": slope,
         "RMSE, cm": round(100 * got["rmse"], 1),
     }
 
 
 def _stability(networks: tuple[str, ...], measured: np.ndarray, predicted: np.ndarray) -> pd.DataFrame:
-    """What became of stable and of unstable cycles, with the source's shares."""
+    """What became of stable and of unstable cycles, with the dissertation's shares."""
     net, rows = networks.index(STABLE), []
     for kind, truth in (("stable", measured[:, net] >= 0.5), ("unstable", measured[:, net] < 0.5)):
         right = (predicted[truth, net] >= 0.5) == (kind == "stable")
@@ -115,7 +115,7 @@ def _stability(networks: tuple[str, ...], measured: np.ndarray, predicted: np.nd
                 "called stable": int((predicted[truth, net] >= 0.5).sum()),
                 "called unstable": int((predicted[truth, net] < 0.5).sum()),
                 "right": f"{right.mean():.0%} ({low:.0%} to {high:.0%})" if len(right) else "none",
-                "right in the source": f"{SOURCE_STABILITY[kind]:.0%}",
+                "right in the dissertation": f"{SOURCE_STABILITY[kind]:.0%}",
             }
         )
     return pd.DataFrame(rows)
@@ -124,5 +124,5 @@ def _stability(networks: tuple[str, ...], measured: np.ndarray, predicted: np.nd
 def _said(table: pd.DataFrame) -> str:
     kinds = table.dropna(subset=["right"])
     return "Stability called right: " + "; ".join(
-        f"{row['network']} {row['right']}, in the source {row['right in the source']}" for _, row in kinds.iterrows()
+        f"{row['network']} {row['right']}, in the dissertation {row['right in the dissertation']}" for _, row in kinds.iterrows()
     ) + "."

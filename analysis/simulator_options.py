@@ -12,8 +12,8 @@ from bns.plotting.style import OKABE_ITO, lettered, note, panels, style
 from bns.spec import OPTION_MARK
 
 NAME = "simulator-options"
-PAPER = "beyond the source"
-_AS_SOURCE = "the simulator as in the source"
+PAPER = "beyond the dissertation"
+_AS_SOURCE = "the simulator as in the dissertation"
 
 
 def draw(store: Results) -> list[FigureResult]:
@@ -21,7 +21,7 @@ def draw(store: Results) -> list[FigureResult]:
 
     found = driven_tables(store.results)
     if not found:
-        raise NoDataError("no random controllers were driven to hold a simulator against; run bns validate --robot snake")
+        raise NoDataError("no random controllers were driven to compare a simulator with; run bns validate --robot snake")
     return [_draw(name, path) for name, path in found.items()]
 
 
@@ -58,7 +58,7 @@ def _draw(robot: str, path: Path) -> FigureResult:
         "one cycle, over the change to the next, over three cycles and the changes between them, over all stable cycles that a "
         "controller began with. changes: the change of posture moves the markers; rigid: the markers are on one body."
     )
-    see = "An option is worth what it takes off the first of each group."
+    see = "The gain of an option is what it takes off the first of each group."
     title = f"What options of the simulator buy, {robot}"
     return FigureResult(f"{NAME}-{robot}", title, figure, shows, len(tracks), (), see=see, data=data)
 

@@ -1,4 +1,4 @@
-"""The source's numbers, read from source.yaml."""
+"""The dissertation's numbers, read from source.yaml."""
 
 from __future__ import annotations
 
@@ -19,6 +19,6 @@ def source() -> dict[str, Any]:
 
 
 def trials_of(robot: str, number: int | None) -> list[tuple[float, float]]:
-    """Evaluations and minutes of the source's trials of a task; none for a task or robot that it does not have."""
+    """Evaluations and minutes of the dissertation's trials of a task; none for a task or robot that it does not have."""
     found = source()["trials"].get(robot, {}).get(number, [])
     return [(float(evaluations), float(minutes)) for evaluations, minutes in found]

@@ -18,7 +18,7 @@ from bns.tasks import load_task
 NAME = "trajectories"
 PAPER = "figures 5.11 to 5.13, table 5.2"
 SOURCE = (
-    "The source shows the best three of twelve (89, 78 and 100 % of the goals; 21, 16 and 53 cm); of the others three left the "
+    "It shows the best three of twelve (89, 78 and 100 % of the goals; 21, 16 and 53 cm); of the others three left the "
     "surface, three rolled over between cycles, one had an unstable cycle, two transferred poorly."
 )
 _MARGIN_M = 0.1

@@ -19,9 +19,9 @@ NAME = "trials"
 PAPER = "tables 4.2 and 5.4"
 OF_A_RUN = True
 SWEEPS = "prototype"
-"""Sweeps of this name, or whose names end in it (robot-prototype), are the source's trials: its own settings, a few seeds."""
+"""Sweeps with this name, or this ending (robot-prototype), are the dissertation's trials: its settings, a few seeds."""
 IN_A_ROW = 3
-"""The source's trials went on until the robot was seen to do the task consistently: here, this often in succession."""
+"""The dissertation's trials went on until the robot was seen to do the task consistently: here, this often in succession."""
 MARKS = {
     "first_success": ("first success", "success", 1),
     "consistent": (f"consistent, {IN_A_ROW} in succession", "success", IN_A_ROW),
@@ -80,8 +80,8 @@ def _draw(store: Results, robot: str, rows: pd.DataFrame) -> FigureResult:
     not_yet = (f"{never} never {IN_A_ROW} in succession",) if never else ()
     note(figure, "; ".join((*said.sentences, *not_yet, "one mark a trial")) + ".")
     shows = (
-        f"Evaluations until success of each trial of {', '.join(sweeps)} beside the source's trials on the robot. First: the "
-        f"fittest controller visits all goals. Consistent: in {IN_A_ROW} evaluations in succession (the source judged by eye). "
+        f"Evaluations until success of each trial of {', '.join(sweeps)} beside the dissertation's trials on robots. First: the "
+        f"fittest controller visits all goals. Consistent: in {IN_A_ROW} evaluations in a row (the dissertation judged by eye). "
         f"Minutes: {_pace(robot)}. Driving: the commands of the controllers that were driven until the first success."
     )
     return FigureResult(
@@ -96,7 +96,8 @@ def _dots(ax: Axes, robot: str, rows: pd.DataFrame, tasks: list[str]) -> None:
     for place, task in enumerate(tasks):
         lines = [(rows[rows.task == task][name], MARKS[name][0], {"color": BLUE, **looks[name]}) for name in known]
         theirs = [evaluations for evaluations, _ in trials_of(robot, task_number(robot, task))]
-        lines.append((pd.Series(theirs, dtype=float), "the source's robot, consistent by eye", {"color": RED, "marker": "s"}))
+        by_eye = "the dissertation's robot, consistent by eye"
+        lines.append((pd.Series(theirs, dtype=float), by_eye, {"color": RED, "marker": "s"}))
         for offset, (values, label, look) in zip(np.linspace(-0.3, 0.3, len(lines)), lines, strict=True):
             ax.plot(values, np.full(len(values), place + offset), ls="none", label=None if place else label, **look)
         if place:
@@ -108,14 +109,16 @@ def _dots(ax: Axes, robot: str, rows: pd.DataFrame, tasks: list[str]) -> None:
 
 
 def seconds_an_evaluation(robot: str) -> tuple[float, float] | None:
-    """Shortest and longest of the source's trials of that robot, s an evaluation; None for a robot it does not have."""
+    """Shortest and longest of the dissertation's trials of that robot, s an evaluation; None for a robot it does not have."""
     paces = [60 * minutes / evaluations for number in range(1, 9) for evaluations, minutes in trials_of(robot, number)]
     return (min(paces), max(paces)) if paces else None
 
 
 def _pace(robot: str) -> str:
     pace = seconds_an_evaluation(robot)
-    return f"at the source's {pace[0]:.0f} to {pace[1]:.0f} s an evaluation" if pace else "unknown, the source has no such robot"
+    if pace is None:
+        return "unknown, the dissertation has no such robot"
+    return f"at the dissertation's {pace[0]:.0f} to {pace[1]:.0f} s an evaluation"
 
 
 def _table(robot: str, rows: pd.DataFrame, tasks: list[str]) -> pd.DataFrame:
@@ -127,7 +130,7 @@ def _table(robot: str, rows: pd.DataFrame, tasks: list[str]) -> pd.DataFrame:
             driving = "–" if math.isnan(row["driving_min"]) else f"{row['driving_min']:.1f} min"
             source = f"{theirs[trial][0]:.0f} ({theirs[trial][1]:.0f} min)" if trial < len(theirs) else "–"
             title = task_title(robot, task)
-            made.append({"task": title, "seed": row["seed"], **ours, "driving": driving, "the source's trial": source})
+            made.append({"task": title, "seed": row["seed"], **ours, "driving": driving, "the dissertation's trial": source})
     return pd.DataFrame(made)
 
 

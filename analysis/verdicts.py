@@ -1,4 +1,4 @@
-"""When a finding of the source counts as agreed with, differed from, or undecided yet: intervals decide, not estimates."""
+"""When a finding of the dissertation counts as agreed with, differed from, or undecided yet: intervals decide, not estimates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SURE = 0.95
 
 @dataclass(frozen=True)
 class Checked:
-    """What the source found, what these results say, and which of the three words it comes to."""
+    """What the dissertation found, what these results say, and which of the three words it comes to."""
 
     claim: str
     ours: str
@@ -28,7 +28,7 @@ def within(low: float, high: float, lowest: float, highest: float) -> str:
 
 
 def near(low: float, high: float, value: float, least: float = 5.0) -> str:
-    """The same around a value of the source: within ``least`` or a fifth of it, whichever is more."""
+    """The same around a value of the dissertation: within ``least`` or a fifth of it, whichever is more."""
     reach = max(least, 0.2 * abs(value))
     return within(low, high, value - reach, value + reach)
 

@@ -1,4 +1,4 @@
-"""Bootstrapped Neuro-Simulation: run it, sweep it, hold models against measurements, analyse the batch.
+"""Bootstrapped Neuro-Simulation: run it, sweep it, compare models with measurements, analyse the batch.
 
     import bns
 

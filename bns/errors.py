@@ -29,7 +29,7 @@ class HardwareError(BnsError):
 
 
 class TrialPausedError(BnsError):
-    """A trial that stopped with the robot confirmed still, and can be gone on with."""
+    """A trial that stopped with the robot confirmed still, and can be resumed."""
 
     exit_code = 3
 
@@ -56,7 +56,7 @@ class TrialFileError(BnsError):
         return cls(f"{error} {_STANDS}")
 
 
-_STANDS = "The robot stands; evaluations noted before that are in the journal. When there is room again, go on with --resume."
+_STANDS = "The robot stands; evaluations noted before that are in the journal. When there is room again, resume with --resume."
 
 
 class ClusterError(BnsError):

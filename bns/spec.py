@@ -54,11 +54,11 @@ def _field(
 class RunSpec:
     """One run: robot, task, world, parameters and seed.
 
-    The defaults are the prototype settings of the source (table 4.1, section 4.3) with 100 evaluations
+    The defaults are the prototype settings of the dissertation (table 4.1, section 4.3) with 100 evaluations
     (section 4.5). Shares are fractions of the population, 0..1.
     """
 
-    robot: str = _field("khepera", "robot; what its simulator can do beyond the source is added to the name: snake+changes+rigid")
+    robot: str = _field("khepera", "robot; options of its simulator are added to the name: snake+changes+rigid")
     task: str = _field("circle", "goal task of that robot")
     world: str = _field(
         "substitute",

@@ -7,6 +7,7 @@ from itertools import groupby
 
 from bns.physics.effect import STAGES, Effect, Parameter
 from bns.physics.effects import all_effects
+from bns.registry import JOINT_EFFECTS
 from site_pages.drives import Demonstration, demonstrate
 from site_pages.pictures import picture
 
@@ -28,6 +29,13 @@ Each picture shows one drive of a Khepera III, predicted twice: by the plain mod
 The sizes are larger than on a sound robot, so that you can see them.
 """
 
+_JOINTS_HEAD = """\
+## Bodies on joints
+
+For robots such as the snake, whose model is a body of links and servos in MuJoCo. An effect of one joint or marker
+counts once for each of them.
+"""
+
 
 def pages() -> Iterator[tuple[str, str | bytes]]:
     """Path and content of every generated page and picture."""
@@ -43,11 +51,42 @@ def overview(effects: list[Effect]) -> str:
     """The list of all effects, a table a stage."""
     parts = [_LIST_HEAD]
     for stage, group in groupby(effects, key=lambda effect: effect.stage):
-        rows = [f"| [{e.name}](effects/{e.name}.md) | {e.in_words} | `{e.equation}` |" for e in group]
+        rows = [f"| [{e.name}](effects/{e.name}.md) | {e.in_words} | `{_code(e.equation)}` |" for e in group]
         parts.append(
-            "\n".join([f"## {STAGE_TEXT[stage]}\n", "| effect | what happens | equation |", "|---|---|---|", *rows, ""])
+            "\n".join(
+                [
+                    f"## {STAGE_TEXT.get(stage, stage)}\n",
+                    "| effect | what happens | equation |",
+                    "|---|---|---|",
+                    *rows,
+                    "",
+                ]
+            )
         )
-    return "\n".join(parts)
+    return "\n".join([*parts, joints()])
+
+
+def joints() -> str:
+    """The effects of bodies on joints: a table without pictures."""
+    loaded = [(name, JOINT_EFFECTS.load(name)) for name in JOINT_EFFECTS.names()]
+    parts = [(name, getattr(part, "effect", part)) for name, part in loaded]
+    rows = [
+        f"| {name} | {_placed(e.in_words)} | `{_code(e.equation)}` | {_placed(e.measurement)} |" for name, e in parts
+    ]
+    head = ["| effect | what happens | equation | confirm it on the bench |", "|---|---|---|---|"]
+    return "\n".join([_JOINTS_HEAD, *head, *rows, ""])
+
+
+def _placed(text: str) -> str:
+    """A sentence about "the joint", where it names one of many."""
+    words = {"the marker {site}": "a marker", "{joint}": "a joint", "{site}": "a marker", "|": "\\|"}
+    for there, here in words.items():
+        text = text.replace(there, here)
+    return text
+
+
+def _code(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def page(effect: Effect, shown: Demonstration) -> str:

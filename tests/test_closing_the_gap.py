@@ -1,4 +1,4 @@
-"""The circle from a run to controllers of a mended model: the page's commands in order, with fewer and smaller runs."""
+"""The circle from a run to controllers of an extended model: the page's commands in order, with fewer and smaller runs."""
 
 import re
 import shlex
@@ -56,8 +56,8 @@ def test_the_page_and_the_target_of_make_are_the_same_commands():
 def test_every_command_of_the_page_works_in_its_order(walked):
     folder, codes = walked
     assert codes == [0] * len(COMMANDS)
-    mended = yaml.safe_load((folder / "results/closing-the-gap/mended.yaml").read_text())
-    found = {effect["name"]: effect["values"] for effect in mended["effects"]}
+    extended = yaml.safe_load((folder / "results/closing-the-gap/extended.yaml").read_text())
+    found = {effect["name"]: effect["values"] for effect in extended["effects"]}
     assert found["wheel-mismatch"]["ratio"] == pytest.approx(1.05, abs=0.005)
     assert found["motor-lag"]["tau_s"] == pytest.approx(0.2, abs=0.02)
     assert (folder / "results/closing-the-gap/figures/transfer.png").is_file()

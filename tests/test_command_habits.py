@@ -175,7 +175,7 @@ def test_example_fills_a_new_folder_and_no_other(tmp_path, capsys):
     assert load_sweep(folder / "my-sweep.yaml").total == 12
     (folder / "khepera-log.csv").write_text("mine")
     assert main(["example", str(folder)]) == 2
-    assert "is not empty, and nothing is written over" in capsys.readouterr().err
+    assert "is not empty, and nothing is overwritten" in capsys.readouterr().err
     assert (folder / "khepera-log.csv").read_text() == "mine"
     assert main(["example", str(folder / "khepera-log.csv")]) == 2
     assert "is a file" in capsys.readouterr().err
@@ -206,5 +206,5 @@ def test_the_script_of_the_example_finds_what_is_hidden(tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "Missing from the model: motor-lag." in done.stdout
-    [effect] = yaml.safe_load((tmp_path / "mended.yaml").read_text())["effects"][-1:]
+    [effect] = yaml.safe_load((tmp_path / "extended.yaml").read_text())["effects"][-1:]
     assert effect["values"]["tau_s"] == pytest.approx(WORLD.hidden["motor-lag"]["tau_s"], abs=0.005)

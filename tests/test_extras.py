@@ -36,7 +36,7 @@ for module in pkgutil.walk_packages(bns.__path__, "bns."):
         importlib.import_module(module.name)
         imported += 1
 from bns.store.disk import shared
-from bns.hardware.terminal_error import TerminalError
+from bns.hardware.link.terminal_error import TerminalError
 assert shared.fcntl is None and TerminalError is OSError, "the block has no effect"
 print(imported)
 """

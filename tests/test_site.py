@@ -12,8 +12,10 @@ import pytest
 import bns
 from bns.cli.main import _parser
 from bns.physics.effects import all_effects
+from bns.registry import JOINT_EFFECTS
 from site_pages.command_pages import page as command_page
 from site_pages.drives import VALUES, demonstrate, visible_values
+from site_pages.effect_pages import joints
 
 ROOT = Path(__file__).resolve().parent.parent
 FETCHED = {
@@ -81,6 +83,14 @@ def test_every_effect_has_a_page_with_its_picture(site):
         assert all(f"<code>{p.name}</code>" in page for p in effect.parameters)
 
 
+def test_effects_of_joints_are_listed_with_no_blank_left():
+    text = joints()
+    assert len(JOINT_EFFECTS.names()) > 10
+    for name in JOINT_EFFECTS.names():
+        assert f"| {name} |" in text
+    assert "{" not in text
+
+
 def test_every_public_name_has_its_docstring_on_the_page(site):
     page = (site / "reference" / "python.html").read_text()
     for name in bns.__all__:
@@ -122,3 +132,50 @@ def test_the_menu_names_pages_that_exist_once_each():
     made = {"gallery/effects.md", "reference/commands.md", "reference/python.md"}
     assert len(named) == len(set(named))
     assert all((ROOT / "docs" / page).is_file() for page in set(named) - made)
+
+
+BANNED = re.compile(
+    r"\b(held against|mend(s|ed|ing)?|anew|gone on with|go(es)? on with|nobody is there|foret(ell|ells|old)|the source('s)?|"
+    r"hold a model against|worth)\b",
+    re.IGNORECASE,
+)
+"""Words that are no plain technical English, or that have a term of their own in the glossary."""
+PROSE = [*(ROOT / "docs").rglob("*.md"), ROOT / "bns" / "examples" / "files" / "README.md"]
+
+
+def prose_of(page):
+    """Line number and text of every line outside of blocks of code, links' addresses left out."""
+    code = False
+    for number, line in enumerate(page.read_text().splitlines(), 1):
+        if line.strip().startswith("```"):
+            code = not code
+        elif not code:
+            yield number, line
+
+
+@pytest.mark.parametrize("page", PROSE, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_pages_are_plain_english_in_short_lines(page):
+    for number, line in prose_of(page):
+        assert not BANNED.search(re.sub(r"`[^`]*`", "", line)), f"{page}:{number}: {line}"
+        if not line.lstrip().startswith(("|", "#")):
+            assert len(re.sub(r"\]\([^)]*\)", "]()", line)) <= 120, f"{page}:{number} is longer than 120 characters"
+
+
+def test_help_is_plain_english():
+    parsers = [_parser()]
+    for parser in parsers:
+        parsers += parser._commands().values()
+        text = parser.format_help().replace("--mend", "")
+        assert not (found := BANNED.search(text)), f"{parser.prog}: {found}"
+
+
+def test_choices_name_files_that_exist():
+    rows = [line for line in (ROOT / "docs" / "choices.md").read_text().splitlines() if line.startswith("|")]
+    files = [
+        match[1]
+        for row in rows
+        if (match := re.fullmatch(r"`([\w./-]+/[\w./-]*)`", row.rstrip("| ").split("|")[-1].strip()))
+    ]
+    assert len(files) > 20
+    for file in files:
+        assert (ROOT / "bns" / file).exists() or (ROOT / file).exists(), file

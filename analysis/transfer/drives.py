@@ -21,7 +21,7 @@ from bns.worlds.base import World
 
 SUCCESSES = tuple(f"success_{cm}cm" for cm in RADII_CM)
 NEEDED_AT = "success_10cm"
-"""What "evaluations needed" counts to: the 10 cm at which the source's own figures compare."""
+"""What "evaluations needed" counts to: the 10 cm at which the dissertation's own figures compare."""
 _RUN = ["sweep", "task", "seed"]
 
 

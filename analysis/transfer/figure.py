@@ -19,7 +19,7 @@ _LINES = ("-", "--", "-.", ":")
 BLOCK = 5
 """Lines are means over so many evaluations: single drives of one controller scatter."""
 SHOWN = ("success_10cm", "success_20cm")
-"""The radius at which the source's own figures compare, and the widest."""
+"""The radius at which the dissertation's own figures compare, and the widest."""
 
 
 @style()

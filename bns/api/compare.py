@@ -1,4 +1,4 @@
-"""`bns.compare`: a model, or a run's networks, held against measurements as it is."""
+"""`bns.compare`: a model, or a run's networks, compared with measurements as it is."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class CompareResult(Shown):
 def compare(
     log: Log, model: Given, *, fresh: bool = False, progress: Progress | None = None
 ) -> CompareResult:
-    """Hold a model as it is against measurements; nothing is fitted.
+    """Compare a model, as it is, with measurements; nothing is fitted.
 
     Args:
         log: a file, a table, or `bns.Measurements`.

@@ -87,7 +87,7 @@ def trial(
         seed: of this run.
         speed: of the emulator's clock: as fast as it goes, or 1 for the pace of a robot (as `bns trial` has it).
         faults: what the emulator shall do wrong: a plan or its file.
-        unattended: nobody is there to be asked.
+        unattended: answer yes to every prompt.
         resume: go on from the last evaluation driven.
         most_rounds: of training and evolution while one controller drives.
         until_success: end when so many driven controllers in a row have reached all goals.

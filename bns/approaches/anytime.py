@@ -82,7 +82,7 @@ class Anytime(Physical):
 
     options: ClassVar[Options] = {
         "window": Option(20, 1, 100_000, "latest drives that the monitor looks at"),
-        "restart": Option(0.5, 0.0, 1.0, "share of the population that is random anew when the simulator has changed"),
+        "restart": Option(0.5, 0.0, 1.0, "fraction of the population that is drawn again when the simulator has changed"),
     }
 
     def __init__(self, setting: Setting, robot: TwoWheeled, space: ModelSpace) -> None:

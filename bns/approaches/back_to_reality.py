@@ -1,6 +1,7 @@
 """Back to reality: simulators co-evolve with controllers, judged by differences of fitness alone.
 
-After Zagal and Ruiz-del-Solar ("Combining simulation and reality in evolutionary robotics", 2007) and the source's equation 2.10:
+After Zagal and Ruiz-del-Solar ("Combining simulation and reality in evolutionary robotics", 2007) and equation 2.10
+of the dissertation:
 
 1. controllers evolve on the best simulator: `advance`
 2. some of them are driven, and their fitness in reality is kept: `pick`, `learn`

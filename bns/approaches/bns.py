@@ -1,6 +1,6 @@
 """Bootstrapped Neuro-Simulation (BNS): networks, population and drives from nothing, all at once.
 
-After the source, figure 3.1 and section 3.3: no data is collected before; what the evolution so far finds promising is driven,
+After the dissertation, figure 3.1 and section 3.3: no data is collected before; what evolution finds promising is driven,
 the networks learn from that, and the evolution goes on with them.
 """
 

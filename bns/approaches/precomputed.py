@@ -1,7 +1,7 @@
 """Pre-computed simulator neural networks: data first, training once, then evolution alone.
 
 After Pretorius, du Plessis and Cilliers ("Simulating robots without conventional physics: a neural network approach", Journal of
-Intelligent & Robotic Systems, 2013) and the source's sections 2.5 and 5.4:
+Intelligent & Robotic Systems, 2013) and the dissertation's sections 2.5 and 5.4:
 
 1. random commands are driven and measured: `pick` in the first evaluations, `learn`
 2. the networks are trained, once: `advance` after the last of these
@@ -25,7 +25,7 @@ from bns.approaches.parts.neuro_simulation import NeuroSimulation
 from bns.bootstrap.trainer import Trainer
 
 MOST_ROUNDS = 25
-"""500 generations at the prototype's 20, as in the source's trials of its static simulators (section 5.4.2)."""
+"""500 generations at the prototype's 20, as in the dissertation's trials of its static simulators (section 5.4.2)."""
 
 
 class Precomputed(NeuroSimulation):

@@ -1,4 +1,4 @@
-"""Bootstrapped Neuro-Simulation, and its neighbours: the four steps of the source's figure 3.1.
+"""Bootstrapped Neuro-Simulation, and its neighbours: the four steps of the dissertation's figure 3.1.
 
 What learns from a drive, and picks the next, is the spec's approach (`bns.approaches`); all else is the same for all of them.
 

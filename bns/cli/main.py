@@ -59,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"bns: cannot write {error.filename or 'the output'}: {error.strerror}", file=sys.stderr)
         elif error.errno in _NO_PLACE and error.filename is not None:
             print(
-                f"bns: cannot use {error.filename}: {error.strerror}. Name another place, or mend that one.",
+                f"bns: cannot use {error.filename}: {error.strerror}. Name another place, or repair that one.",
                 file=sys.stderr,
             )
         else:
@@ -189,7 +189,7 @@ def track(options: argparse.Namespace) -> int:
 
 
 def doctor(options: argparse.Namespace) -> int:
-    """What is fine and what is not; 2 if something is to be mended."""
+    """What is fine and what is not; 2 if something has to be fixed."""
     from bns.cli.commands.doctor import checked_up
 
     return checked_up(options)

@@ -1,4 +1,4 @@
-"""Files to begin with, and their way into a folder of the user's."""
+"""Files to begin with: a sample log, a sweep, notebooks and a script, copied into a folder of the user's."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from bns.errors import BnsError
 
 FOLDER = Path(__file__).resolve().parent / "files"
 ROBOT = Path(__file__).resolve().parent / "robot"
-FILES = ("README.md", "khepera-log.csv", "khepera-log.csv.import.yaml", "my-sweep.yaml", "example.py")
+FILES = (
+    *("README.md", "khepera-log.csv", "khepera-log.csv.import.yaml", "diagnosis.ipynb"),
+    *("my-sweep.yaml", "sweep.ipynb", "example.py"),
+)
 
 
 def copy_example(folder: str | Path) -> list[Path]:
-    """Copy the files to begin with into ``folder``, which is made if it is missing; where they are now.
+    """Copy the files to begin with into ``folder``, which is made if it is missing; return their new paths.
 
     Raises:
-        BnsError: ``folder`` is no folder, or not empty: nothing is written over.
+        BnsError: ``folder`` is a file, or not empty; nothing is overwritten.
     """
     folder = _emptied(folder)
     return [Path(shutil.copy(FOLDER / name, folder / name)) for name in FILES]
@@ -35,6 +38,6 @@ def _emptied(folder: str | Path) -> Path:
     if folder.exists() and not folder.is_dir():
         raise BnsError(f"{folder} is a file; give a folder that is new or empty.")
     if folder.is_dir() and any(folder.iterdir()):
-        raise BnsError(f"the folder {folder} is not empty, and nothing is written over; give one that is new or empty.")
+        raise BnsError(f"the folder {folder} is not empty, and nothing is overwritten; give one that is new or empty.")
     folder.mkdir(parents=True, exist_ok=True)
     return folder

@@ -12,19 +12,19 @@ from pathlib import Path
 from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.khepera import BAUD, KheperaIII, check_battery
-from bns.hardware.khepera_settings import khepera_settings
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.link.serial_link import SerialLink
 from bns.hardware.platforms.snake import open_chain
 from bns.hardware.rig import Rig
-from bns.hardware.serial_link import SerialLink
-from bns.hardware.servo_chain import ServoError
-from bns.hardware.snake_settings import snake_settings
+from bns.hardware.servos.servo_chain import ServoError
+from bns.hardware.servos.snake_settings import snake_settings
 from bns.hardware.tracking.calibration import WORST_RMS_PX, load_calibration
-from bns.hardware.tracking.evdev import CLASS, input_devices
+from bns.hardware.tracking.infrared.evdev import CLASS, input_devices
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.wii import KERNEL_NAME
-from bns.hardware.wheel_drive import RobotLostError
+from bns.hardware.wheels.khepera import BAUD, KheperaIII, check_battery
+from bns.hardware.wheels.khepera_settings import khepera_settings
+from bns.hardware.wheels.wheel_drive import RobotLostError
 
 with extra("robot"):
     from serial.tools.list_ports import comports

@@ -81,7 +81,7 @@ def views(camera: StreamCamera, board: Board, count: int, clock: Clock, say: Cal
     while len(kept) < count:
         frame = camera.newest()
         if frame is None:
-            raise HardwareError("the camera is gone; plug it in anew.")
+            raise HardwareError("the camera is gone; plug it in again.")
         found = corners(frame.picture, board)
         if found is not None:
             middle = found[1].reshape(-1, 2).mean(axis=0)

@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 from bns.errors import HardwareError
 from bns.extras import extra
-from bns.hardware.ax12_table import REGISTERS
 from bns.hardware.clock import Clock
 from bns.hardware.doctor import Finding, latency_of
-from bns.hardware.dynamixel import BAUD
-from bns.hardware.dynamixel_port import ClockedPort
-from bns.hardware.servo_chain import ServoLimits
-from bns.hardware.terminal_error import TerminalError
+from bns.hardware.link.terminal_error import TerminalError
+from bns.hardware.servos.ax12_table import REGISTERS
+from bns.hardware.servos.dynamixel import BAUD
+from bns.hardware.servos.dynamixel_port import ClockedPort
+from bns.hardware.servos.servo_chain import ServoLimits
 
 with extra("robot"):
     from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
@@ -79,7 +79,7 @@ class ServoBus:
         there = list(self.scan())
         meant = [servo for servo in there if old is None or servo.number == old]
         if len(meant) != 1 or not meant[0].model:
-            listed = "; ".join(str(servo) for servo in there) or "nobody answers"
+            listed = "; ".join(str(servo) for servo in there) or "no servo answers"
             which = "Connect one servo alone" if old is None else f"No single servo has the id {old}"
             raise HardwareError(f"{which}: {listed}. Name one of several with --from ID.")
         if any(servo.number == new for servo in there if servo is not meant[0]):
@@ -96,7 +96,7 @@ class ServoBus:
         values = {name: self.read(number, name) for name in (*_WANTED, "model_number", "present_voltage", "alarm_shutdown")}
         model = MODELS.get(values["model_number"], str(values["model_number"]))
         yield Finding(values["model_number"] == _AX12, f"servo {number} is a {model}", "" if model == "AX-12" else "replace it")
-        mend = f"bns servos check --mend --port {self.port}"
+        mend = f"bns servos check --fix --port {self.port}"
         yield _fit(number, "return delay", 2 * values["return_delay"], "µs", values["return_delay"] <= _MOST_DELAY, mend)
         yield _fit(number, "status return level", values["status_return"], "", values["status_return"] == _ANSWERS_ALL, mend)
         low, high = values["cw_angle_limit"], values["ccw_angle_limit"]

@@ -24,12 +24,12 @@ ON: Mapping[str, str] = {"v": "forward_m_s", "s": "sideways_m_s", "w": "yaw_rad_
 """What a term can be added to: forward, sideways (to the right) and turning velocity, and velocity in the world's frame."""
 VARIABLES: Mapping[str, str] = {
     "v": "forward velocity, m/s",
-    "w": "turning velocity, rad/s, left positive",
+    "w": "turn rate, rad/s, left positive",
     "l": "speed of the left wheel, m/s",
     "r": "speed of the right wheel, m/s",
     "t": "time since the session began, s",
     "tau": "time since the trial began, s",
-    "d": "way driven in the trial, m",
+    "d": "distance driven in the trial, m",
     "x": "position east, m",
     "y": "position north, m",
     "heading": "heading, rad",

@@ -27,7 +27,7 @@ def scripts() -> Path:
     if root is None:
         raise BnsError(
             f"the figures' scripts did not come with this package (there is no folder analysis in or beside {PACKAGE}). "
-            "Install bns anew, from a wheel or a whole checkout: pip install --force-reinstall bns"
+            "Reinstall bns, from a wheel or a whole checkout: pip install --force-reinstall bns"
         )
     return root
 

@@ -210,7 +210,7 @@ class Drawing(Protocol):
 
 
 class Options(Protocol):
-    """What a robot's simulator can do beyond the source, and other readings of it."""
+    """What a robot's simulator can do beyond the dissertation, and other readings of it."""
 
     options: tuple[str, ...]
     """Switched on by ``ROBOT+OPTION`` as the robot's name in a spec."""

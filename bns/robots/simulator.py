@@ -141,7 +141,7 @@ def load_simulator(path: Path | str) -> StaticSimulator:
         raise ModelError(f"{path} has {_TRAINING} of shape {learned_from.shape}; expected (patterns, {INPUTS}).")
     weights = from_tensors(networks, named)
     if not (np.isfinite(weights).all() and np.isfinite(learned_from).all()):
-        raise ModelError(f"{path} holds weights or patterns that are no finite numbers; write it anew.")
+        raise ModelError(f"{path} holds weights or patterns that are no finite numbers; write it again.")
     return StaticSimulator(networks, weights, noise_sd, provenance, learned_from.T)
 
 
@@ -152,9 +152,9 @@ def _about(path: Path, text: str) -> tuple[tuple[str, ...], np.ndarray, dict[str
         names, noise_sd = tuple(about["networks"]), np.asarray(about["noise_sd"], np.float64)
         provenance = dict(about["provenance"])
     except (ValueError, TypeError, LookupError, RecursionError) as error:
-        raise ModelError(f"{path} does not say which networks it holds ({error}); write it anew with bns.") from error
+        raise ModelError(f"{path} does not say which networks it holds ({error}); write it again with bns.") from error
     if not names or not all(isinstance(name, str) for name in names) or not np.isfinite(noise_sd).all() or noise_sd.ndim != 1:
-        raise ModelError(f"{path} names no networks, or noise that is no number, in its header; write it anew with bns.")
+        raise ModelError(f"{path} names no networks, or noise that is no number, in its header; write it again with bns.")
     return names, noise_sd, provenance
 
 

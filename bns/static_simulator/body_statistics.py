@@ -1,4 +1,4 @@
-"""Statistics of the snake's random cycles that the source's figures allow to be compared with."""
+"""Statistics of the snake's random cycles that the dissertation's figures allow to be compared with."""
 
 from __future__ import annotations
 

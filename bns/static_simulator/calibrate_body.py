@@ -1,4 +1,4 @@
-"""The snake's body fitted to what the source published of its random cycles: a few parameters, within ranges that have reasons.
+"""The snake's body fitted to what the dissertation published of its random cycles: a few parameters, within justified ranges.
 
 Least squares of (statistic - target) / tolerance over the logarithms of the parameters, from finite differences that are wide
 enough to see past single cycles that tip or not; every body drives the same cycles under the same draws.

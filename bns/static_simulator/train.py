@@ -1,4 +1,4 @@
-"""The static simulator: networks trained beforehand on random commands, as the source did from its robot (section 4.5).
+"""The static simulator: networks trained beforehand on random commands, as the dissertation did from its robot (section 4.5).
 
 Random commands drive the physics world trial by trial; networks learn from three quarters of the trials; the rest verifies
 them. The residuals on the verification trials give the noise of the substitute world.

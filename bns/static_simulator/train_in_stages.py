@@ -25,7 +25,7 @@ from bns.worlds.base import World
 from bns.worlds.many import drive_all
 
 VERIFICATION_SHARE, WATCHED_SHARE = 0.09, 0.09
-"""The source verified on 82 of 900 patterns."""
+"""The dissertation verified on 82 of 900 patterns."""
 CHUNK = 100
 """Iterations between two looks at the watched patterns."""
 CONTROLLERS, GENERATIONS, CYCLES = 12, 100, 4

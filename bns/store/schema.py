@@ -18,7 +18,7 @@ METADATA_KEY = b"bns"
 FOLDER_COLUMNS = ("sweep", "task")
 IDENTITY = ("run_id", "sweep", "robot", "task")
 NEAR_CM = (7, 10, 14, 20)
-"""Distances from the goal, cm, that the source counts successes at (section 4.4)."""
+"""Distances from the goal, cm, that the dissertation counts successes at (section 4.4)."""
 
 _UTC = pa.timestamp("us", tz="UTC")
 

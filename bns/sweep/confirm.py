@@ -70,7 +70,7 @@ def best(sweep: Sweep, results: Path, top: int, runs: dict[str, int] | None = No
     if means.empty:
         raise StoreError(
             f"no run of sweep {sweep.name!r} in {results} went well, so none of its combinations is best. See why with "
-            f"bns query \"SELECT error FROM runs WHERE sweep = '{sweep.name}'\", mend it, and sweep with --retry-failed."
+            f"bns query \"SELECT error FROM runs WHERE sweep = '{sweep.name}'\", fix the cause, and sweep with --retry-failed."
         )
     # The order of the file decides between equals, so that asking twice gives the same.
     ranking = means.sort_index().sort_values(list(RANKED_BY), ascending=False, kind="stable")

@@ -75,7 +75,7 @@ def task_names(robot: str) -> tuple[str, ...]:
 
 
 def default_task(robot: str) -> str:
-    """The task that a robot is given where none is named: the first of the source."""
+    """The task that a robot is given where none is named: the first of the dissertation."""
     return min(task_names(robot), key=lambda name: (load_task(robot, name).source, name))
 
 

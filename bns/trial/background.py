@@ -1,4 +1,4 @@
-"""A robot as the driver of the loop: training and evolution go on in the background while it drives, as in the source.
+"""A robot as the driver of the loop: training and evolution go on in the background while it drives, as in the dissertation.
 
 How many rounds of training and evolution fit into a drive depends on the machine; the number is noted with the drive. So
 a trial repeats what was driven already, round by round, and goes on from there, to the same numbers.

@@ -14,7 +14,7 @@ import numpy as np
 
 from bns.errors import TrialPausedError
 from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.platform import Driven, Platform
 from bns.hardware.rig import Rig, surface_text
 from bns.robots import load_robot

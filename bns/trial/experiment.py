@@ -123,12 +123,12 @@ def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int
     if not journal.exists():
         if resume:
             raise HardwareError(
-                f"there is nothing to go on with: no journal in {journal.parent}. Begin without --resume."
+                f"there is nothing to resume: no journal in {journal.parent}. Begin without --resume."
             )
         return 0
     if not resume:
         raise HardwareError(
-            f"there is an experiment in {journal.parent} already; go on with --resume, move it away or rename the commands' file."
+            f"there is an experiment in {journal.parent} already; resume it with --resume, move it away or rename the file."
         )
     past = past_evaluations(journal)
     same = len(past) <= len(trials) and all(

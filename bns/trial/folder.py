@@ -1,4 +1,4 @@
-"""The folder of a trial: its journal, spec and measurements, and what of it can be gone on with."""
+"""The folder of a trial: its journal, spec and measurements, and what of it can be resumed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 from bns.errors import BnsError, HardwareError, StoreError, TrialFileError
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.measurements import write_measurements
 from bns.spec import RunSpec
 from bns.trial.driver import REPEATED, Stuck
@@ -69,7 +69,7 @@ class TrialFolder:
                 f"{self.spec.seed + 1}; to do this one afresh, move its folder away."
             )
         if resume and not self.journal.exists():
-            raise HardwareError(f"there is nothing to go on with: no journal in {self.path}. Begin without --resume.")
+            raise HardwareError(f"there is nothing to resume: no journal in {self.path}. Begin without --resume.")
         return past_evaluations(self.journal) if resume else []
 
 

@@ -126,7 +126,7 @@ class UnattendedOperator:
 
     def place(self, start: np.ndarray, why: str) -> None:
         """Pause."""
-        raise TrialPausedError(f"{why}, and with --yes nobody can put it back. Do so, then go on with --resume")
+        raise TrialPausedError(f"{why}, and with --yes there is no operator to put it back. Do so, then resume with --resume")
 
     def accept(self, summary: str, spans_s: Spans) -> Decision:
         """Keep everything."""

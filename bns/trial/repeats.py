@@ -1,4 +1,4 @@
-"""The final controller of a trial driven several times, to show how repeatable it is (the source's figures 5.16 to 5.21).
+"""The final controller of a trial driven several times, to show how repeatable it is (the dissertation's figures 5.16 to 5.21).
 
 The first of the drives is the evaluation's own. It was picked for its success where there was one, so that the others
 are the fairer sample of what the controller is worth.

@@ -14,7 +14,7 @@ import numpy as np
 from bns.bootstrap.loop import run
 from bns.console import live_view
 from bns.errors import HardwareError
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.robots import load_robot
 from bns.sweep.single_run import keep_run
 from bns.trial.background import BackgroundDriver
@@ -29,7 +29,7 @@ class _NoRobot:
     """A driver that is never asked to drive."""
 
     def evaluate(self, number: int, controller: np.ndarray) -> Evaluation:
-        raise HardwareError(f"the journal has no evaluation {number}; go on with the trial itself: --resume")
+        raise HardwareError(f"the journal has no evaluation {number}; resume the trial itself: --resume")
 
     def evaluated(self, number: int, rounds: int, row: Mapping[str, Any]) -> None:
         pass

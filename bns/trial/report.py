@@ -1,4 +1,4 @@
-"""A trial as text: a row of the source's tables 4.2 and 5.4, and how well robot and computer kept up."""
+"""A trial as text: a row of the dissertation's tables 4.2 and 5.4, and how well robot and computer kept up."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from bns.errors import BnsError, HardwareError, TrialPausedError
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.guard.client import Guard, GuardedClock, GuardedPlatform
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.platform import Emulation, Platform, PlatformModule, platform_module, repeats_of
 from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd

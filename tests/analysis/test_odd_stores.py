@@ -128,11 +128,11 @@ def test_a_trial_says_when_it_succeeded_and_what_the_robot_would_have_cost(tmp_p
     drawn = trials.draw(Results(tmp_path))[0]
     row = drawn.data.iloc[0]
     assert (row.first_success, row.consistent, row.consistent_10cm, row.driving_min) == (2, 6, 3, 1.0)
-    # The source's robot took 30 s (task 1's second trial: 12 min for 20 evaluations is 36 s) to 50 s an evaluation.
+    # The dissertation's robot took 30 s (task 1's second trial: 12 min for 20 evaluations is 36 s) to 50 s an evaluation.
     low, high = trials.seconds_an_evaluation("khepera")
     assert (low, high) == (pytest.approx(60 * 25 / 45), pytest.approx(50))
     assert drawn.table["consistent, 3 in succession"][0] == "6 (3 to 5 min)"
-    assert drawn.table["the source's trial"][0] == "45 (25 min)"
+    assert drawn.table["the dissertation's trial"][0] == "45 (25 min)"
 
 
 def test_every_finding_of_the_source_has_a_check_and_every_robot_its_trials():

@@ -53,7 +53,7 @@ def store(tmp_path_factory):
 
 def test_planted_findings_about_the_snake_are_found(store):
     table = findings.draw(store)[0].table
-    found = {(row["where"], row["the source"], row["task"][0]): row["verdict"] for _, row in table.iterrows()}
+    found = {(row["where"], row["the dissertation"], row["task"][0]): row["verdict"] for _, row in table.iterrows()}
     assert found["figure 5.22", "success saturates at 80 to 90 %", "1"] == "agrees"
     for task in "12":
         assert found["figure 5.26", "fitness error falls with the population size", task] == "agrees"
@@ -85,7 +85,7 @@ def test_a_finished_sweep_of_two_seeds_has_its_dots_and_its_estimates_but_no_ver
     rows, thin = combinations(store, selections(store)[0])
     assert (len(rows), set(rows.runs), thin) == (40, {2}, 0)
     assert fitness_error_by_diversity.draw(store)[0].n == 80
-    table = findings.draw(store)[0].table.set_index("the source")
+    table = findings.draw(store)[0].table.set_index("the dissertation")
     assert not (table["where"] == "").any()
     assert "no bands: fewer than 5 seeds" in diversity_of_extremes.draw(store)[0].shows
     assert set(influence.draw(store)[0].table["loss of R²"]) == {"from 5 seeds on"}

@@ -134,7 +134,7 @@ def test_a_browser_shows_it_without_an_error_and_the_slider_moves(page_of, tmp_p
     assert "CONSOLE" not in done.stderr
     found = json.loads(html.unescape(re.search(r"<title>(.*?)</title>", done.stdout)[1]))
     assert (found["broken"], found["wide"], found["lost"]) == (0, False, 0)
-    assert found["first"].startswith("0.0 s: model as it was 0 mm off")
+    assert found["first"].startswith("0.0 s: model as given 0 mm off")
     assert len({found["first"], found["last"], found["other"]}) == 3
     assert found["rows"] > 3
     assert found["lines"] == (4 if verdict == "effects" else 3)  # the scale, and one a path

@@ -122,6 +122,20 @@ def test_formulas_are_calculated_or_explained(term):
     explained(work)
 
 
+@pytest.mark.parametrize("term", ["v / (k - k)", "(0 * k) ** -1 * v", "(-k) ** 0.5", "log(-k) * v"])
+def test_formulas_that_fail_for_their_numbers_alone_are_explained(term):
+    ones = np.full((2, 3), 0.5)
+
+    def work():
+        effect = formula_effect("f", term, "v")
+        body = Body(ones, ones, ones, np.ones((2, 3)), ones, ones, ones + 2, np.zeros((2, 3, 3)))
+        effect.apply(body, **{p.name: 0.5 for p in effect.parameters})
+
+    explained(work)
+    with pytest.raises(BnsError):
+        work()
+
+
 def test_logs_under_spoilt_mappings_are_read_or_explained(folder):
     log = written(folder, "foreign.csv", files.CSV.replace("t_s", "time").replace("x_m", "X").encode())
     mapping = files.MAPPING.split("also:")[0].replace("{from: yaw", "{from: heading_rad").replace("{from: l,", "{from: left_m_s,")

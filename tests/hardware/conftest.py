@@ -8,12 +8,12 @@ import pytest
 from bns.engine.philox import Key
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.body import DifferentialBody
+from bns.hardware.emulators.devices.khepera import KheperaEmulator
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Fault, Faults
-from bns.hardware.emulators.khepera import KheperaEmulator
-from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.hardware_log import HardwareLog, events
-from bns.hardware.khepera import BAUD, KheperaIII, firmware
-from bns.hardware.serial_link import SerialLink
+from bns.hardware.link.hardware_log import HardwareLog, events
+from bns.hardware.link.serial_link import SerialLink
+from bns.hardware.wheels.khepera import BAUD, KheperaIII, firmware
 from bns.physics.model import load_model
 
 NORTH = (0.0, 0.0, np.pi / 2)

@@ -21,14 +21,14 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.errors import BnsError
-from bns.hardware.emulators.terminal import PseudoTerminal
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.guard.client import Guard
 from bns.hardware.guard.recipe import khepera_recipe
-from bns.hardware.khepera import KheperaIII
 from bns.hardware.platforms import khepera, snake
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping, Surface
 from bns.hardware.tracking.sight import Sight
+from bns.hardware.wheels.khepera import KheperaIII
 from bns.robots.khepera import UNITS_PER_M_S
 from bns.trial.session import TrialSetup, open_rig
 

@@ -10,14 +10,14 @@ import numpy as np
 
 from bns.engine.philox import Key
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.ax12 import Bus
 from bns.hardware.emulators.body import DifferentialBody
-from bns.hardware.emulators.bridge import BridgeEmulator
+from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.bridge import BridgeEmulator
+from bns.hardware.emulators.devices.khepera import KheperaEmulator
+from bns.hardware.emulators.devices.servo import Servo
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
-from bns.hardware.emulators.khepera import KheperaEmulator
-from bns.hardware.emulators.servo import Servo
-from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.khepera import firmware
+from bns.hardware.wheels.khepera import firmware
 from bns.physics.model import load_model
 from bns.robots.khepera import START
 

@@ -12,8 +12,8 @@ import tty
 from pathlib import Path
 
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.ax12 import Bus
-from bns.hardware.emulators.terminal import put_through
+from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.terminal import put_through
 
 HERE = Path(__file__).parent / "arduino"
 CORE = Path("/usr/share/arduino/hardware/arduino/avr")

@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 from bns.cli.main import main
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.trial.folder import past_evaluations
 
 QUICK = [
@@ -111,7 +111,7 @@ def judged(seed, results, robot="khepera"):
     again, _ = trial(robot, seed, results, "--resume")
     assert again in {0, 3, 4}
     assert len(past_evaluations(journal)) >= len(kept)
-    return "paused, gone on with"
+    return "paused, resumed"
 
 
 def soak(robot, count, first=0):

@@ -13,7 +13,7 @@ import numpy as np
 from bns.errors import BnsError
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.faults import Fault, FaultPlan
-from bns.hardware.hardware_log import HardwareLog, events
+from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.platform import platform_module
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping, Surface

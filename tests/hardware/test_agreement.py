@@ -9,11 +9,11 @@ import pytest
 from bns.errors import TrialPausedError
 from bns.hardware.agreement import Agreement, SameScene
 from bns.hardware.emulators.faults import Fault, FaultPlan
-from bns.hardware.hardware_log import events
-from bns.hardware.khepera import WHEELBASE_M
+from bns.hardware.link.hardware_log import events
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
 from bns.hardware.tracking.sight import Sight
+from bns.hardware.wheels.khepera import WHEELBASE_M
 from bns.trial.driver import TrialDriver
 from bns.trial.operator import UnattendedOperator
 from bns.trial.session import TrialSetup, open_rig

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from bns.errors import HardwareError
-from bns.hardware.ax12_table import RAD_PER_STEP, REGISTERS
-from bns.hardware.dynamixel import Ax12Chain
-from bns.hardware.emulators.ax12 import Bus, packet
+from bns.hardware.emulators.devices.ax12 import Bus, packet
+from bns.hardware.emulators.devices.servo import Servo
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Fault, Faults
-from bns.hardware.emulators.servo import Servo
-from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.servo_chain import Health, ServoError, ServoLimits, StrainWatch
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.servos.ax12_table import RAD_PER_STEP, REGISTERS
+from bns.hardware.servos.dynamixel import Ax12Chain
+from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits, StrainWatch
 
 IDS = (1, 2, 3)
 

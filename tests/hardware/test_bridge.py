@@ -5,14 +5,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bns.errors import HardwareError
-from bns.hardware.bridge import BridgeChain
-from bns.hardware.bridge_frames import STARTED_S, WATCHDOG_S, Frame, crc16, decoded, encoded, searched
-from bns.hardware.emulators.bridge import BOOT_S, BridgeEmulator
+from bns.hardware.emulators.devices.bridge import BOOT_S, BridgeEmulator
+from bns.hardware.emulators.devices.servo import Servo
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Fault, Faults
-from bns.hardware.emulators.servo import Servo
-from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.servo_chain import ServoError, ServoLimits
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.servos.bridge import BridgeChain
+from bns.hardware.servos.bridge_frames import STARTED_S, WATCHDOG_S, Frame, crc16, decoded, encoded, searched
+from bns.hardware.servos.servo_chain import ServoError, ServoLimits
 
 
 @pytest.fixture
@@ -137,7 +137,7 @@ def test_alarms_are_errors(bridge, clock):
 def test_other_bridges_are_refused(bridge, monkeypatch):
     with pytest.raises(HardwareError, match="has found 2 servos; version 3 and 3 servos are needed"):
         bridge(count=2)
-    monkeypatch.setattr("bns.hardware.emulators.bridge.VERSION", 1)
+    monkeypatch.setattr("bns.hardware.emulators.devices.bridge.VERSION", 1)
     with pytest.raises(HardwareError, match=r"speaks version 1 .*Load the sketch of this bns"):
         bridge()
 

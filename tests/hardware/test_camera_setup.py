@@ -9,7 +9,7 @@ import pytest
 from bns.cli.main import main
 from bns.errors import HardwareError
 from bns.hardware.emulators.scene import Patch, Scene, flat
-from bns.hardware.hardware_log import HardwareLog, events
+from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.tracking.calibration import Board, Calibration, _laid, calibrate, check_scale
 from bns.hardware.tracking.camera import StreamCamera
 from bns.hardware.tracking.eye import Eye

@@ -5,13 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bns.hardware.reply_time import ReplyTime
 
-from bns.hardware.hardware_log import HardwareLog, events
-from bns.hardware.khepera import KheperaIII, firmware
+from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.platform import Driven
 from bns.hardware.rig import shipped_rig
-from bns.hardware.servo_chain import Health, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
+from bns.hardware.wheels.khepera import KheperaIII, firmware
 from bns.trial.driver import TrialDriver
 from bns.trial.operator import Decision
 
@@ -34,11 +35,9 @@ class Scripted:
 
     def __init__(self, clock, readings, version=2):
         self.clock, self.readings, self.version, self.asked = clock, iter(readings), version, 0
+        self.times = ReplyTime()
 
-    def forget(self):
-        pass
-
-    def exchange(self, request, hurry=False):
+    def exchange(self, request, timeout_s, again=False):
         self.clock.t_s += 0.01
         if request.startswith(b"E"):
             self.asked += 1

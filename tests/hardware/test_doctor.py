@@ -26,7 +26,7 @@ def test_what_is_missing_is_named_with_the_next_step(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "BAD  the robot: there is no port /dev/nowhere" in said
     assert "BAD  the tracker: cannot open the Wii remote" in said
-    assert "to be mended" in said
+    assert "to be fixed" in said
 
 
 def findings(tmp_path, bench, volts):

@@ -12,7 +12,7 @@ import pytest
 from bns.cli.main import main
 from bns.errors import StopNotConfirmedError, TrialFileError
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.hardware_log import HardwareLog, events
+from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
 from bns.trial.folder import measurements_however_it_ends, past_evaluations
@@ -44,7 +44,7 @@ def test_a_full_disk_stops_the_robot_and_the_trial_is_gone_on_with(tmp_path, cap
     journal = journal_of(tmp_path)
     [line] = done.stderr.splitlines()
     assert f"cannot write {journal}: File too large. The robot stands" in line
-    assert "go on with --resume" in line
+    assert "resume with --resume" in line
     assert journal.stat().st_size <= most
     before = past_evaluations(journal)  # whole: every line has its checksum
     assert 1 <= len(before) < 5
@@ -62,7 +62,7 @@ def test_results_that_cannot_be_stored_leave_a_trial_to_be_gone_on_with(tmp_path
     said = capsys.readouterr().err
     assert str(tmp_path / "journal") in said
     assert "The robot stands" in said
-    assert "go on with --resume" in said
+    assert "resume with --resume" in said
     (tmp_path / "journal").unlink()
     driven = len(list(events(journal_of(tmp_path), "driven")))
     assert main([*asked, "--resume"]) == 0
@@ -83,7 +83,7 @@ def full(monkeypatch):
                 return write(descriptor, data[: len(data) // 2])
             raise OSError(errno.ENOSPC, "No space left on device")
 
-        monkeypatch.setattr("bns.hardware.hardware_log.os.write", half)
+        monkeypatch.setattr("bns.hardware.link.hardware_log.os.write", half)
 
     return fill
 

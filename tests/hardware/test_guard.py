@@ -13,18 +13,18 @@ from pathlib import Path
 import pytest
 
 from bns.errors import HardwareError
-from bns.hardware.bridge import BridgeChain
 from bns.hardware.clock import RealClock
-from bns.hardware.dynamixel import Ax12Chain
-from bns.hardware.emulators.terminal import PseudoTerminal
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.guard import client as guard_client
 from bns.hardware.guard import process as guard_process
 from bns.hardware.guard.client import Guard, GuardedClock
 from bns.hardware.guard.line import identity
 from bns.hardware.guard.recipe import ax12_recipe, bridge_recipe, khepera_recipe
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.khepera import BAUD, KheperaIII
-from bns.hardware.serial_link import NoReplyError, SerialLink
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.link.serial_link import NoReplyError, SerialLink
+from bns.hardware.servos.bridge import BridgeChain
+from bns.hardware.servos.dynamixel import Ax12Chain
+from bns.hardware.wheels.khepera import BAUD, KheperaIII
 
 from . import outlive
 from .robots_on_the_line import LINKS, Robot

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from bns.errors import HardwareError
-from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.khepera import ATTEMPTS, STILL_M_S, check_battery, firmware
-from bns.hardware.serial_link import SerialLink
-from bns.hardware.wheel_drive import RobotLostError
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.link.serial_link import SerialLink
+from bns.hardware.wheels.khepera import ATTEMPTS, STILL_M_S, check_battery, firmware
+from bns.hardware.wheels.wheel_drive import RobotLostError
 
 
 def test_golden_bytes(bench):
@@ -179,7 +179,7 @@ class Other:
 @pytest.mark.parametrize("answer", [b"", b"OK\r\n", b"no end"])
 def test_what_is_no_khepera_is_named_so(tmp_path, clock, answer, monkeypatch):
     monkeypatch.setattr("bns.hardware.clock._LONGEST_ANSWER_S", 0.1)
-    from bns.hardware.khepera import KheperaIII
+    from bns.hardware.wheels.khepera import KheperaIII
 
     journal = HardwareLog(None, clock)
     with PseudoTerminal(Other(clock, answer), tmp_path, "other") as line:

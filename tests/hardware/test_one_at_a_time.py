@@ -6,15 +6,15 @@ from filelock import FileLock
 
 from bns.cli.main import main
 from bns.errors import HardwareError
-from bns.hardware.bridge import BridgeChain
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.dynamixel import Ax12Chain
-from bns.hardware.emulators.ax12 import Bus
+from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.servo import Servo
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
-from bns.hardware.emulators.servo import Servo
-from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.servo_setup import ServoBus
+from bns.hardware.servos.bridge import BridgeChain
+from bns.hardware.servos.dynamixel import Ax12Chain
 
 IDS = (1, 2, 3)
 EMULATED = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf"]

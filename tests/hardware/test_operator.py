@@ -13,7 +13,7 @@ import bns
 from bns.cli.main import main
 from bns.console import LiveView, live_view
 from bns.errors import DataError, TrialPausedError
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
 from bns.trial import session

@@ -7,7 +7,7 @@ import pytest
 import bns
 from bns.cli.main import main
 from bns.errors import TrialPausedError
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.robots import load_robot
 from bns.trial.folder import past_evaluations, past_repeats
 from bns.trial.repeats import drive_repeats, final_evaluation

@@ -7,19 +7,19 @@ import pytest
 
 from bns.errors import HardwareError, StopNotConfirmedError, TrialPausedError
 from bns.hardware.clock import RealClock
+from bns.hardware.emulators.devices.khepera import KheperaEmulator
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Fault, Faults
-from bns.hardware.emulators.khepera import KheperaEmulator
-from bns.hardware.emulators.terminal import PseudoTerminal
-from bns.hardware.hardware_log import HardwareLog, events
-from bns.hardware.khepera import BAUD, KheperaIII, firmware
-from bns.hardware.khepera_settings import khepera_settings
+from bns.hardware.link.hardware_log import HardwareLog, events
+from bns.hardware.link.reply_time import ReplyLimits, ReplyTime
+from bns.hardware.link.serial_link import SerialLink
 from bns.hardware.platforms import khepera as platform
-from bns.hardware.reply_time import ReplyLimits, ReplyTime
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
-from bns.hardware.serial_link import SerialLink
 from bns.hardware.tracking.sight import Sight
-from bns.hardware.wheel_drive import RobotLostError
+from bns.hardware.wheels.khepera import BAUD, KheperaIII, firmware
+from bns.hardware.wheels.khepera_settings import khepera_settings
+from bns.hardware.wheels.wheel_drive import RobotLostError
 from bns.trial.session import TrialSetup, open_rig
 
 from .robots_on_the_line import DistantRobot

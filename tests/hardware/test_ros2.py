@@ -11,12 +11,12 @@ from bns.engine.philox import Key
 from bns.errors import HardwareError, StopNotConfirmedError, TrialPausedError
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.body import DifferentialBody
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.rig import shipped_rig
-from bns.hardware.ros2 import Odometry, RclpyNode, Ros2Driver, Ros2Settings, open_ros2, ros2_settings
 from bns.hardware.safety import Stopping
 from bns.hardware.tracking.sight import Sight
-from bns.hardware.wheel_drive import RobotLostError
+from bns.hardware.wheels.ros2 import Odometry, RclpyNode, Ros2Driver, Ros2Settings, open_ros2, ros2_settings
+from bns.hardware.wheels.wheel_drive import RobotLostError
 from bns.physics.model import load_model
 
 NORTH = (0.0, 0.0, np.pi / 2)
@@ -86,7 +86,7 @@ def driver(base, clock):
 
 
 def platform(base, monkeypatch, **driver):
-    monkeypatch.setattr("bns.hardware.ros2.open_tracker", lambda _settings, _clock: Eyes(base))
+    monkeypatch.setattr("bns.hardware.wheels.ros2.open_tracker", lambda _settings, _clock: Eyes(base))
     rig = replace(shipped_rig("khepera"), driver={"wheelbase_m": BASE_M, **driver})
     journal = HardwareLog(None, base.clock)
     return open_ros2(rig, base.clock, journal, Stopping(), (1000.0, 1000.0), lambda _settings, _clock: base)

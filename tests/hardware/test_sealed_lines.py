@@ -8,8 +8,8 @@ import pytest
 
 from bns.errors import HardwareError
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.hardware_log import HardwareLog, events
-from bns.hardware.sealed_lines import LogWarning
+from bns.hardware.link.hardware_log import HardwareLog, events
+from bns.hardware.link.sealed_lines import LogWarning
 
 
 def write(path, count, first=0):
@@ -48,7 +48,7 @@ def test_what_was_written_is_read(log):
         (lambda lines: [*lines[:6], lines[6][:-1] + lines[7], *lines[8:]], "line 7 of .*"),
     ],
 )
-@pytest.mark.filterwarnings("ignore::bns.hardware.sealed_lines.LogWarning")
+@pytest.mark.filterwarnings("ignore::bns.hardware.link.sealed_lines.LogWarning")
 def test_lines_that_are_not_as_they_were_are_named(log, change, message):
     log.write_text("".join(change(log.read_text().splitlines(keepends=True))))
     with pytest.raises(HardwareError, match=message):

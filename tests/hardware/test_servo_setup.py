@@ -8,12 +8,12 @@ import pytest
 from bns.cli.main import main
 from bns.errors import HardwareError
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.ax12 import Bus
+from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.servo import Servo
+from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
-from bns.hardware.emulators.servo import Servo
-from bns.hardware.emulators.terminal import PseudoTerminal
 from bns.hardware.servo_setup import ServoBus, adapter
-from bns.hardware.snake_settings import snake_settings
+from bns.hardware.servos.snake_settings import snake_settings
 
 
 @pytest.fixture
@@ -86,9 +86,9 @@ def test_check_names_what_is_not_fit_and_mends_it(bus, capsys):
     assert code == 2
     for what in ("return delay 500 µs", "status return level 1", "angle limits 300 to 1023"):
         assert f"BAD  servo 2: {what}" in said.out
-    assert f"bns servos check --mend --port {port}" in said.out
+    assert f"bns servos check --fix --port {port}" in said.out
     assert servos[0].get("status_return") == 1  # nothing was written
-    code, said = call(capsys, "check", "--mend", "--port", port)
+    code, said = call(capsys, "check", "--fix", "--port", port)
     assert (code, said.out.splitlines()[-1]) == (0, "all fine")
     assert [s.get("return_delay") for s in servos] == [0, 0]
     assert "servo 1: status_return, return_delay, cw_angle_limit written" in said.err
@@ -110,7 +110,7 @@ def test_nobody_and_no_port(bus, capsys):
     assert call(capsys, "check", "--port", port)[0] == 2
     code, said = call(capsys, "scan", "--port", port)
     assert code == 2
-    assert said.out.startswith("nobody answers")
+    assert said.out.startswith("no servo answers")
     code, said = call(capsys, "scan", "--port", "/dev/none")
     assert code == 2
     assert "there is no port /dev/none" in said.err

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from bns.errors import HardwareError
-from bns.hardware.bridge import BridgeChain
-from bns.hardware.bridge_frames import HELLO, MOVE, START, STATE, STOP, WATCHDOG_S, Frame, decoded, encoded
-from bns.hardware.emulators.bridge import BOOT_S, BridgeEmulator
+from bns.hardware.emulators.devices.bridge import BOOT_S, BridgeEmulator
+from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.faults import Fault, Faults
-from bns.hardware.emulators.servo import Servo
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.servo_chain import ServoError, ServoLimits
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.servos.bridge import BridgeChain
+from bns.hardware.servos.bridge_frames import HELLO, MOVE, START, STATE, STOP, WATCHDOG_S, Frame, decoded, encoded
+from bns.hardware.servos.servo_chain import ServoError, ServoLimits
 from tests.hardware.simulated_board import Board, BoardClock, build, lacking
 
 SKETCH = Path(str(resources.files("bns.hardware"))) / "bridge_sketch" / "bridge_sketch.ino"

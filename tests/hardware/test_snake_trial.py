@@ -16,11 +16,11 @@ from bns.cli.main import main
 from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.doctor import examine
 from bns.hardware.emulators.faults import Fault, FaultPlan
-from bns.hardware.hardware_log import HardwareLog, events
+from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.platforms import snake
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
-from bns.hardware.snake_settings import snake_settings
+from bns.hardware.servos.snake_settings import snake_settings
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 from bns.robots import load_robot
@@ -260,5 +260,5 @@ def test_a_robot_that_is_lost_while_it_straightens_has_driven_nothing(rigged, cl
 
 def test_ten_trials_with_faults_at_random(tmp_path):
     ends = [soak.judged(seed, tmp_path, "snake") for seed in range(10)]
-    assert set(ends) <= {"done", "paused, gone on with", "stop not confirmed, and shouted", "refused before it moved"}
+    assert set(ends) <= {"done", "paused, resumed", "stop not confirmed, and shouted", "refused before it moved"}
     assert ends.count("done") >= 2

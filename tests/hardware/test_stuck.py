@@ -7,11 +7,11 @@ import pytest
 
 from bns.errors import TrialPausedError
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.hardware_log import HardwareLog, events
+from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.platform import Driven
 from bns.hardware.platforms import snake
 from bns.hardware.rig import shipped_rig
-from bns.hardware.servo_chain import ServoError, StuckServoError
+from bns.hardware.servos.servo_chain import ServoError, StuckServoError
 from bns.hardware.stop import Stop
 from bns.trial.driver import TrialDriver
 from bns.trial.folder import past_evaluations, stuck_before

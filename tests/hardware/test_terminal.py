@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from bns.hardware.emulators.terminal import PseudoTerminal, put_through
+from bns.hardware.emulators.devices.terminal import PseudoTerminal, put_through
 
 from .outlive import Echo
 
@@ -50,7 +50,7 @@ def test_a_line_can_be_cut_while_bytes_are_on_their_way(line, monkeypatch):
         go_on.wait(10)
         put_through(*way)
 
-    monkeypatch.setattr("bns.hardware.emulators.terminal.put_through", slow)
+    monkeypatch.setattr("bns.hardware.emulators.devices.terminal.put_through", slow)
     sending = threading.Thread(target=line.send, args=(b"x",))
     sending.start()
     under_way.wait(10)

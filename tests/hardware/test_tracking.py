@@ -166,7 +166,7 @@ def test_calibrations_that_do_not_fit(tmp_path, shots):
     with pytest.raises(HardwareError, match=r"has no calibration.*bns calibrate"):
         load_calibration(tmp_path / "none.json")
     (tmp_path / "bad.json").write_text("{}")
-    with pytest.raises(HardwareError, match=r"is no calibration.*make it anew"):
+    with pytest.raises(HardwareError, match=r"is no calibration.*make it again"):
         load_calibration(tmp_path / "bad.json")
     with pytest.raises(HardwareError, match="960 x 540 pixels, the camera gives 640 x 480: another camera"):
         check_size(Calibration(TRUE, 0.1, 12, "cam"), np.zeros((480, 640, 3)))

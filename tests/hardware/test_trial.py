@@ -20,7 +20,7 @@ from rich.console import Console
 import bns
 from bns.cli.main import main
 from bns.console import view
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.trial.folder import past_evaluations
 
 from . import soak
@@ -182,7 +182,7 @@ def test_signals_stop_the_robot_first(tmp_path, number, word):
         (["--robot", "khepera"], "a real robot needs --rig FILE"),
         (["--robot", "khepera", "--emulated", "--speed", "0"], "--speed is 0; it must be above 0"),
         (["--robot", "khepera", "--rig", "none.yaml"], "cannot read the rig none.yaml"),
-        (["--robot", "khepera", "--emulated", "--resume"], "nothing to go on with"),
+        (["--robot", "khepera", "--emulated", "--resume"], "nothing to resume"),
         (["--robot", "kepera", "--emulated"], "unknown robot 'kepera'. Did you mean 'khepera'"),
         (["--replay", "none.jsonl"], "cannot read the journal none.jsonl"),
         (["--robot", "khepera", "--rig", "r.yaml", "--faults", "f.yaml"], "--faults is for --emulated"),
@@ -264,7 +264,7 @@ def test_what_calibrating_writes_needs_a_place(capsys, arguments, message):
     assert message in capsys.readouterr().err
 
 
-@pytest.mark.filterwarnings("default::bns.hardware.sealed_lines.LogWarning")
+@pytest.mark.filterwarnings("default::bns.hardware.link.sealed_lines.LogWarning")
 def test_an_edited_journal_is_refused(tmp_path, capsys):
     assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path) == 0
     journal = journal_of(tmp_path)
@@ -296,7 +296,7 @@ def test_a_torn_last_line_is_passed_over(tmp_path):
 
 def test_ten_trials_with_faults_at_random(tmp_path):
     ends = [soak.judged(seed, tmp_path) for seed in range(10)]
-    assert set(ends) <= {"done", "paused, gone on with", "stop not confirmed, and shouted", "refused before it moved"}
+    assert set(ends) <= {"done", "paused, resumed", "stop not confirmed, and shouted", "refused before it moved"}
     assert ends.count("done") >= 2
 
 
@@ -311,7 +311,7 @@ def test_given_commands_are_driven_and_measured(tmp_path, capsys):
     first = table[table["trial"] == 1]
     assert first["y_m"].iloc[-1] - first["y_m"].iloc[0] == pytest.approx(0.13, abs=0.02)
     assert call(*asked, "--commands", file) == 2
-    assert "already; go on with --resume, move it away" in capsys.readouterr().err
+    assert "already; resume it with --resume, move it away" in capsys.readouterr().err
 
 
 def test_given_commands_are_gone_on_with(tmp_path, capsys):
@@ -319,7 +319,7 @@ def test_given_commands_are_gone_on_with(tmp_path, capsys):
     file.write_text("trial,left_m_s,right_m_s,duration_s\n" + "".join(f"{n},0.1,0.08,3.0\n" for n in range(1, 5)))
     asked = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", "--results", tmp_path, "--commands", file]
     assert call(*asked, "--resume") == 2
-    assert "nothing to go on with" in capsys.readouterr().err
+    assert "nothing to resume" in capsys.readouterr().err
     assert call(*asked, *faults(tmp_path, {"kind": "hang-up", "at_s": 6, "for_s": 2})) == 3
     table = tmp_path / "trials" / "experiment-proposed-emulated" / "measurements.csv"
     assert 1 <= pd.read_csv(table)["trial"].max() < 4

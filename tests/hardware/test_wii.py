@@ -8,15 +8,15 @@ import pytest
 from bns.cli.main import main
 from bns.errors import HardwareError
 from bns.hardware.clock import EmulatedClock, RealClock
+from bns.hardware.emulators.devices.wii import WiiEmulator, defuzzed, sensed_px
 from bns.hardware.emulators.faults import Fault, Faults
-from bns.hardware.emulators.wii import WiiEmulator, defuzzed, sensed_px
 from bns.hardware.rig import shipped_rig
-from bns.hardware.tracking.evdev import EVENT, device_file, input_devices
+from bns.hardware.tracking.infrared.evdev import EVENT, device_file, input_devices
+from bns.hardware.tracking.infrared.wii_calibration import ON_THE_START, hanging, look_at_lights
+from bns.hardware.tracking.infrared.wii_pulse import Pulse, battery_of
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.rigid import best_fit, fit, placed
 from bns.hardware.tracking.wii import LEDS_M, Overhead, WiiTracker, overhead
-from bns.hardware.tracking.wii_calibration import ON_THE_START, hanging, look_at_lights
-from bns.hardware.tracking.wii_pulse import Pulse, battery_of
 
 CAMERA = Overhead(2.4, 0.75)
 POSE = np.array([0.2, -0.1, 0.7])
@@ -183,7 +183,7 @@ def test_the_remote_is_found_by_the_name_that_the_kernel_gives_it(tmp_path):
 
 
 def test_the_pulse_of_a_driver_s_file_is_felt_in_a_thread(tmp_path, monkeypatch):
-    monkeypatch.setattr("bns.hardware.tracking.wii_pulse._SYSFS", str(tmp_path))
+    monkeypatch.setattr("bns.hardware.tracking.infrared.wii_pulse._SYSFS", str(tmp_path))
     battery, clock = tmp_path / "capacity", RealClock()
     os.mkfifo(battery)  # a remote that takes its time to answer
     pulse = Pulse(battery, clock)

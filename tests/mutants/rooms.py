@@ -19,7 +19,8 @@ ROOMS: dict[str, tuple[str, str]] = {
     ),
     "safety": ("bns/hardware/safety.py", "tests/hardware/test_safety.py tests/hardware/test_confirmed_stop.py"),
     "drivers": (
-        "bns/hardware/khepera.py bns/hardware/dynamixel.py bns/hardware/servo_chain.py bns/hardware/bridge.py",
+        "bns/hardware/wheels/khepera.py bns/hardware/servos/dynamixel.py bns/hardware/servos/servo_chain.py "
+        "bns/hardware/servos/bridge.py",
         "tests/hardware/test_confirmed_stop.py tests/hardware/test_khepera.py tests/hardware/test_ax12.py "
         "tests/hardware/test_bridge.py",
     ),

@@ -12,7 +12,7 @@ import pytest
 
 from bns.cli.main import main
 from bns.examples import copy_robot
-from bns.hardware.hardware_log import events
+from bns.hardware.link.hardware_log import events
 from bns.store.read.reader import load
 from tests.plugins.package import announce
 from tests.plugins.test_stranger import SCRIPT

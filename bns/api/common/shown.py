@@ -25,7 +25,7 @@ class Shown(ABC):
 
     @abstractmethod
     def _line(self) -> str:
-        """What is most worth knowing, after the class's name."""
+        """The most important facts, after the class's name."""
 
     def __repr__(self) -> str:
         line = " ".join(f"<{type(self).__name__}: {self._line()}>".split())

@@ -1,4 +1,4 @@
-"""`bns calibrate-body`: the snake's body fitted to what the source published of its random cycles."""
+"""`bns calibrate-body`: the snake's body fitted to what the dissertation published of its random cycles."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 def add_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     """The one command, with its options."""
-    fitting = command("calibrate-body", calibrate_body, "fit the snake's body to the source's statistics of random cycles")
+    fitting = command("calibrate-body", calibrate_body, "fit the snake's body to the dissertation's statistics of random cycles")
     fitting.add_argument("--recipe", type=Path, metavar="FILE", help="ranges and targets (default: as shipped)")
     fitting.add_argument("--model", type=Path, metavar="FILE", help="parameters to begin with (default: as shipped)")
     fitting.add_argument("--seed", type=int, default=0, help="decides on the random cycles (default: 0)")

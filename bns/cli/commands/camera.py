@@ -21,11 +21,11 @@ from bns.hardware.platform import platform_module
 from bns.hardware.rig import Rig, load_rig, shipped_rig
 from bns.hardware.tracking.calibration import Board, Calibration, calibrate, check_scale
 from bns.hardware.tracking.camera import StreamCamera
+from bns.hardware.tracking.infrared.wii_calibration import ON_THE_START, checked_tracker, hanging, look_at_lights
 from bns.hardware.tracking.kinds import checked
 from bns.hardware.tracking.picture import SETTINGS as PICTURE
 from bns.hardware.tracking.wii import LEDS_M
 from bns.hardware.tracking.wii import open_tracker as open_wii
-from bns.hardware.tracking.wii_calibration import ON_THE_START, checked_tracker, hanging, look_at_lights
 from bns.trial.delay import in_words, measured_delay
 
 with extra("robot"):
@@ -108,7 +108,7 @@ def _filmed(options: argparse.Namespace, board: Board) -> Calibration:
             input(_ON_START if number == 0 else _ELSEWHERE)
             frame = camera.newest()
             if frame is None:
-                raise HardwareError("the camera is gone; plug it in anew.")
+                raise HardwareError("the camera is gone; plug it in again.")
             floors.append(frame.picture)
         return calibrate(kept, floors, board, options.camera, {name: camera.picture[name] for name in asked})
     finally:

@@ -1,4 +1,4 @@
-"""The commands that hold models against measurements: import, compare, diagnose, add."""
+"""The commands that compare models with measurements: import, compare, diagnose, add."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def add_commands(command: Adder) -> None:
     read.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="table to write (.csv or .parquet)"
     )
-    held = command("compare", compare, "hold a model against measurements: how far it is off, and where")
+    held = command("compare", compare, "compare a model with measurements: how far off it is, and where")
     found = command(
         "diagnose", diagnose, "which physical effect a model lacks, how sure that is, and what else it could be"
     )
@@ -59,9 +59,9 @@ def add_commands(command: Adder) -> None:
     more.add_argument(
         "--per-trial",
         action="store_true",
-        help="every trial has a value of its own (clock-offset: clocks set anew each time)",
+        help="every trial has a value of its own (clock-offset: clocks that are set again each time)",
     )
-    more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the mended model")
+    more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the extended model")
     more.add_argument("--json", action="store_true", help="one JSON object on stdout")
     for one in (held, found):
         one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")

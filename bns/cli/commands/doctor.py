@@ -18,5 +18,5 @@ def checked_up(options: argparse.Namespace) -> int:
     for finding in examine(rig, RealClock()):
         print(finding, flush=True)
         bad += not finding.fine
-    print("all fine" if not bad else f"{bad} to be mended")
+    print("all fine" if not bad else f"{bad} to be fixed")
     return 2 if bad else 0

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Callable, Mapping
 
 from bns.hardware.clock import RealClock
-from bns.hardware.servo_chain import ServoLimits
 from bns.hardware.servo_setup import BAUDS, ServoBus, adapter
+from bns.hardware.servos.servo_chain import ServoLimits
 
 
 def served(options: argparse.Namespace) -> int:
@@ -27,7 +27,7 @@ def scan(bus: ServoBus, options: argparse.Namespace) -> int:
         found.append(servo)
         print(servo, flush=True)
     more = "" if options.all_bauds else " (1 Mbaud; --all-bauds tries others)"
-    print(f"{len(found)} ids answer{more}" if found else f"nobody answers{more}; is the supply on, the cable right?")
+    print(f"{len(found)} ids answer{more}" if found else f"no servo answers{more}; is the supply on, the cable right?")
     return 0 if found and all(servo.model for servo in found) else 2
 
 
@@ -53,7 +53,7 @@ def check(bus: ServoBus, options: argparse.Namespace) -> int:
     for finding in adapter(options.port):
         bad += not finding.fine
         print(finding)
-    print("nobody answers" if not there else f"{bad} to be mended" if bad else "all fine")
+    print("no servo answers" if not there else f"{bad} to be fixed" if bad else "all fine")
     return 2 if bad else 0
 
 

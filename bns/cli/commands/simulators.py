@@ -46,7 +46,7 @@ def validate(options: argparse.Namespace) -> int:
         with counting(f"random controllers of {robot.name}") as progress:
             write_table(random_drives(robot, build_world("physics", robot), progress), beside)
         print(
-            f"{beside}: random controllers, to hold a simulator against (bns compare {beside} --model {options.robot})"
+            f"{beside}: random controllers, to compare a simulator with (bns compare {beside} --model {options.robot})"
         )
     return 0
 

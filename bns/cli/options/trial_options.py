@@ -18,7 +18,7 @@ def add_trial_options(parser: argparse.ArgumentParser, positive: Convert) -> Non
     parser.add_argument("--emulated", **switch, help="drive the emulator of the robot: the same drivers, no hardware")  # type: ignore[arg-type]
     parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="of the emulator's clock (default: 1)")
     parser.add_argument("--faults", type=Path, metavar="FILE", help="what the emulator shall do wrong (YAML)")
-    parser.add_argument("--yes", **switch, help="nobody is there to be asked")  # type: ignore[arg-type]
+    parser.add_argument("--yes", **switch, help="run unattended: answer yes to every prompt")  # type: ignore[arg-type]
     parser.add_argument("--resume", **switch, help="go on from the last evaluation driven")  # type: ignore[arg-type]
     parser.add_argument(
         "--replay", type=Path, metavar="JOURNAL", help="run a trial again from its journal, without a robot"
@@ -112,5 +112,5 @@ def add_servo_options(parser: argparse.ArgumentParser) -> None:
     new.add_argument("id", type=int, metavar="ID", help="its new number, 0 to 252")
     new.add_argument("--from", type=int, dest="old", metavar="ID", help="its present number, where several are connected")
     part("check", "say what of the servos' settings is not as a drive needs it").add_argument(
-        "--mend", action="store_true", help="write return delay, status return level and angle limits first"
+        "--fix", "--mend", dest="mend", action="store_true", help="write return delay, status return level and angle limits first"
     )

@@ -36,8 +36,7 @@ LONGEST_MINUTES = DEFAULTS.design.longest_minutes
 TARGET_POWER = DEFAULTS.design.target_power
 MOST_FASTER = DEFAULTS.design.most_faster
 _DENSE = DEFAULTS.design.dense
-_POINTS = 9
-"""Of the curve of the chance of a decision against minutes."""
+_POINTS = DEFAULTS.design.power_points
 
 
 @dataclass(frozen=True)

@@ -52,14 +52,14 @@ def _lines(why: NetworkErrors) -> Iterator[str]:
         t = why.sparse_coverage
         yield f"  their squared error is {t.ratio:.1f} times that of the others (95 %: {t.low:.1f} to {t.high:.1f})"
     if "thin-data" in why.verdict:
-        yield "  Thin data: more evaluations with such commands would mend it."
+        yield "  Thin data: more evaluations with such commands would reduce it."
     for one in why.missing_inputs:
         yield (
             f"  The inputs cannot know: among the patterns {one.share:.0%} of the squared error follows "
             f"{_VARIABLES.get(one.variable, one.variable)} (p {one.p_value:.2g})."
         )
     if why.missing_inputs:
-        yield "  More evaluations will not mend that; `bns diagnose` says which effect it may be."
+        yield "  More evaluations will not reduce that; `bns diagnose` says which effect it may be."
     yield f"\n  {'cause':66}{'share of squared error':>24}"
     yield from (f"  {_CAUSES[name]:66}{share:24.1%}" for name, share in why.share.items())
 

@@ -151,7 +151,7 @@ def _paths_text(m: Material, has_after: bool) -> str:
     shown, trials = len(m.paths), len(m.measured.tracks)
     order = "those first in which mending the model changes most" if has_after else "the worst predicted first"
     some = f"{shown} of {trials} trials, {order}" if shown < trials else f"All {trials} trials, {order}"
-    after = " The mended model's numbers come from other trials than those it predicts here." if has_after else ""
+    after = " The extended model's numbers come from other trials than those it predicts here." if has_after else ""
     return (
         f"{some}. Predictions start from the first measured pose and know only the commands; even a perfect model's path parts "
         f"from the measured one in time, since motors vary and the first heading is known only so well.{after}"

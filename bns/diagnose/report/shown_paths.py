@@ -24,7 +24,7 @@ _STRANGE = DEFAULTS.report.strange
 def shown_paths(predictor: Predictor, model: Model, d: Diagnosis) -> list[dict[str, Any]]:
     """One entry a trial: name, t (s), and x, y (mm) measured, before, after ("after" only where something was accepted).
 
-    First those in which the mended model is more right by most; without one, the worst predicted. What comes after is predicted
+    First those in which the extended model is more right by most; without one, the worst predicted. What comes after is predicted
     for each trial by a model fitted to others.
     """
     tracks = predictor.tracks

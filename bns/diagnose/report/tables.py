@@ -170,9 +170,9 @@ def next_commands(d: Diagnosis, p: Proposal | None, command: Mapping[str, str]) 
     data, model = command["data"], command["model"]
     out = []
     if d.effects:
-        out.append(f"bns add {data} {' '.join(d.effects)} {model} -o mended.yaml")
+        out.append(f"bns add {data} {' '.join(d.effects)} {model} -o extended.yaml")
     if d.formula is not None:
-        out.append(f"bns add {data} found --term '{d.formula.term}' --on {d.formula.on} {model} -o mended.yaml")
+        out.append(f"bns add {data} found --term '{d.formula.term}' --on {d.formula.on} {model} -o extended.yaml")
     if p is not None and len(p.plan):
         out.append(f"bns propose {data} {model} -o next.csv")
         out.append("bns trial --robot khepera --rig RIG.yaml --commands next.csv")

@@ -15,7 +15,7 @@ class Design:
     most_models: int = setting(
         3,
         "models",
-        f"Explanations held against each other at most, after a clear verdict: pairs grow with the square; {BY_HAND}.",
+        f"Explanations compared with each other at most, after a clear verdict: pairs grow with the square; {BY_HAND}.",
     )
     most_tied_models: int = setting(5, "models", f"The same after a tie, where each may be the true one; {BY_HAND}.")
     together_m: float = setting(
@@ -25,7 +25,7 @@ class Design:
         (6.0, 25.0), "s", f"A planned trial is as long as those seen, within these bounds; {BY_HAND}."
     )
     heading_rad: float = setting(
-        math.pi / 2, "rad", "A start that nobody named faces north, as that of every task of the Khepera does."
+        math.pi / 2, "rad", "A start without a heading faces north, as that of every task of the Khepera does."
     )
     largest_m: float = setting(1000.0, "m", f"A longer side of an arena is no arena but a mistaken unit; {BY_HAND}.")
     margin_m: float = setting(
@@ -39,7 +39,7 @@ class Design:
         "Trials that are searched for may be as short as this share of the usual: where each tells enough, their number counts; "
         f"{BY_HAND}.",
     )
-    tries: int = setting(12, "draws", f"So often a command that leaves the arena is drawn anew; {BY_HAND}.")
+    tries: int = setting(12, "draws", f"So often a command that leaves the arena is drawn again; {BY_HAND}.")
     along: int = setting(4, "places", f"Places on a command's arc that are looked at, its end among them; {BY_HAND}.")
     place_rounds: int = setting(
         3,
@@ -72,13 +72,16 @@ class Design:
         "samples",
         "Samples of a planned outcome: a probability of 0.9 is then known within 0.007 (standard error).",
     )
+    power_points: int = setting(
+        9, "points", "Of the curve of the chance of a decision against minutes: enough to see where it rises."
+    )
     target_power: float = setting(
         0.9, "1", f"An experiment decides if it does so with this probability: a usual power; {BY_HAND}."
     )
     longest_minutes: float = setting(
         24 * 60.0, "min", f"Robot time (a day) beyond which a pair counts as the same for every experiment; {BY_HAND}."
     )
-    most_faster: float = setting(100.0, "1", f"More times as long than this is not worth counting; {BY_HAND}.")
+    most_faster: float = setting(100.0, "1", f"Ratios above this are not counted; {BY_HAND}.")
     dense: float = setting(
         3.0, "poses", f"Poses a command from which on they count as a track at the camera's rate; {BY_HAND}."
     )

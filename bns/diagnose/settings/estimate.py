@@ -75,7 +75,7 @@ class Estimate:
     start_nothing: float = setting(
         5e-3,
         "trials",
-        "A gain of fewer trials' losses than this, over all trials, is not worth a fit: it would not count (`min_gain`).",
+        "A gain of fewer trials' losses than this, over all trials, does not justify a fit: it would not count (`min_gain`).",
     )
     start_limits: int = setting(
         30,

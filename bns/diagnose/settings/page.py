@@ -10,24 +10,29 @@ from bns.diagnose.settings import DEFAULTS, Settings
 from bns.diagnose.settings.setting import BY_HAND
 
 _HEAD = f"""\
-# What the diagnosis goes by
+# Settings of the diagnosis
 
-Every threshold of `bns diagnose`, `compare`, `add`, `propose` and `report`, by the room of `bns/diagnose` that uses it. The
-values stand in `bns/diagnose/settings`; this page is made from them (`python -m bns.diagnose.settings > docs/settings.md`).
-`--json` and `to_json()` carry them all under `provenance`, with their digest, here `{{digest}}`: two verdicts with the same
-digest were made by the same settings.
+Every threshold of `bns diagnose`, `compare`, `add`, `propose` and `report`, grouped by the folder of
+`bns/diagnose` that uses it. [How the diagnosis decides](explain/diagnosis.md) explains where they act.
 
-Others are given by `bns diagnose LOG --model M --settings FILE.yaml` or `bns.diagnose(log, model, settings=...)`, room by room
-(`select:`, below it `min_gain: 0.02`); what differs from the default is printed, and in the provenance under `settings_changed`.
+The values are defined in `bns/diagnose/settings`; this page is made from them by `python -m
+bns.diagnose.settings > docs/settings.md`. `--json` and `to_json()` carry all of them under `provenance`, with
+their digest, here `{{digest}}`. Two results with the same digest were made by the same settings.
 
-Of the {{count}} settings {{unmeasured}} are marked "{BY_HAND}": no study tried other values of that one. All of them together
-are judged on generated worlds ([hidden effects](hidden-effects.md)). Numbers that are written inside a function (factors by
-which units are recognised, steps of derivatives) are not listed; plausible ranges of an effect's numbers stand in its own file.
+To use other values, write `bns diagnose LOG --model M --settings FILE.yaml` or `bns.diagnose(log, model,
+settings=...)`. The file has a section for each folder (`select:`, below it `min_gain: 0.02`). What differs from the
+default is printed, and stands in the provenance under `settings_changed`.
+
+Of the {{count}} settings, {{unmeasured}} are marked "{BY_HAND}": no study tried other values of that one alone.
+All of them together are judged on generated worlds ([hidden effects](hidden-effects.md)).
+
+Not listed are numbers inside a function (factors by which units are recognised, steps of derivatives) and the
+plausible ranges of an effect's parameters; those are on the pages of the [effects](gallery/effects.md).
 """
 
 
 def page(settings: Settings = DEFAULTS) -> str:
-    """Markdown: a table for each room, with every setting's value, unit and reason."""
+    """Markdown: a table for each folder, with every setting's value, unit and reason."""
     rows = list(settings.rows())
     unmeasured = sum(BY_HAND in row[-1] for row in rows)
     parts = [_HEAD.format(digest=settings.digest(), count=len(rows), unmeasured=unmeasured)]

@@ -38,7 +38,7 @@ class Select:
     most_effects: int = setting(
         6,
         "effects",
-        f"Effects that a search accepts at most: beyond, each mends what the others left of a seventh; {BY_HAND}.",
+        f"Effects that a search accepts at most: beyond, each only corrects what the others left of a seventh; {BY_HAND}.",
     )
     screen_most: int = setting(
         8, "effects", f"Where fits are costly, so many effects at most are fitted after each step of a search; {BY_HAND}."

@@ -1,4 +1,4 @@
-"""What is missing in the model of a robot, and how much better it predicts with it."""
+"""Name the effect that the model of a robot lacks, add it, and show the error before and after."""
 
 import bns
 
@@ -8,7 +8,7 @@ model = bns.Model("khepera")
 found = bns.diagnose(log, model)
 print(found.summary())
 
-mended = bns.add(log, found.effects, model)
-print(mended.summary())
+added = bns.add(log, found.effects, model)
+print(added.summary())
 
-mended.model.save("mended.yaml")
+added.model.save("extended.yaml")

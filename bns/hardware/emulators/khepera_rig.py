@@ -10,12 +10,12 @@ import numpy as np
 from bns.engine.philox import Key
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.body import DifferentialBody
+from bns.hardware.emulators.devices.khepera import KheperaEmulator
+from bns.hardware.emulators.devices.terminal import HangUp, PseudoTerminal
 from bns.hardware.emulators.faults import FaultPlan
-from bns.hardware.emulators.khepera import KheperaEmulator
-from bns.hardware.emulators.terminal import HangUp, PseudoTerminal
-from bns.hardware.khepera import firmware
 from bns.hardware.rig import Rig
 from bns.hardware.tracking.kinds import emulated
+from bns.hardware.wheels.khepera import firmware
 from bns.physics.model import load_model
 from bns.robots.khepera import START
 

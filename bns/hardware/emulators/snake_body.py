@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bns.hardware.ax12_table import CENTRE, RAD_PER_STEP
-from bns.hardware.emulators.servo import Motion, Servo
+from bns.hardware.emulators.devices.servo import Motion, Servo
+from bns.hardware.servos.ax12_table import CENTRE, RAD_PER_STEP
 from bns.physics.snake.body import LOOK_EVERY, Body
 from bns.physics.snake.parameters import SnakeParameters
 from bns.physics.snake.stability import Watch
@@ -103,7 +103,7 @@ class SnakeBody:
 
 
 class Joint:
-    """Implements `bns.hardware.emulators.servo.Shaft`."""
+    """Implements `bns.hardware.emulators.devices.servo.Shaft`."""
 
     def __init__(self, body: SnakeBody, number: int) -> None:
         self._body, self._number = body, number

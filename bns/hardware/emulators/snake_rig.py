@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.ax12 import Bus
-from bns.hardware.emulators.bridge import BridgeEmulator
+from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.bridge import BridgeEmulator
+from bns.hardware.emulators.devices.servo import Servo
+from bns.hardware.emulators.devices.terminal import HangUp, PseudoTerminal
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.scene import Patch, disc
-from bns.hardware.emulators.servo import Servo
 from bns.hardware.emulators.snake_body import SnakeBody
-from bns.hardware.emulators.terminal import HangUp, PseudoTerminal
 from bns.hardware.emulators.watchers import GREEN_BGR, YELLOW_BGR, emulated_camera, emulated_lens
 from bns.hardware.rig import Rig
-from bns.hardware.snake_settings import snake_settings
+from bns.hardware.servos.snake_settings import snake_settings
 from bns.hardware.tracking.lens import Lens
 from bns.physics.snake.parameters import shipped_parameters
 from bns.physics.snake_drive import START_HEADING_RAD, START_M

@@ -21,9 +21,9 @@ import numpy as np
 from bns.errors import HardwareError, StopNotConfirmedError
 from bns.hardware.clock import RealClock
 from bns.hardware.guard.recipe import StopRecipe
+from bns.hardware.link.serial_link import no_port, why_not_opened
 from bns.hardware.platform import Driven, Platform
 from bns.hardware.safety import Stopping
-from bns.hardware.serial_link import no_port, why_not_opened
 from bns.hardware.stop import Stop
 
 _CODE = "import sys; sys.path.append(sys.argv[1]); from guard.process import main; main()"

@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bns.hardware.ax12_table import BROADCAST, READ, REGISTERS, WRITE
-from bns.hardware.bridge_frames import ANSWER, POSITION, START, STARTED_S, STOP, STOPPED, Frame, encoded
-from bns.hardware.servo_chain import STILL_STEPS
+from bns.hardware.servos.ax12_table import BROADCAST, READ, REGISTERS, WRITE
+from bns.hardware.servos.bridge_frames import ANSWER, POSITION, START, STARTED_S, STOP, STOPPED, Frame, encoded
+from bns.hardware.servos.servo_chain import STILL_STEPS
 
 
 @dataclass(frozen=True)

@@ -10,22 +10,22 @@ from bns.hardware.clock import Clock, EmulatedClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.khepera_rig import EmulatedKheperaRig
 from bns.hardware.guard.recipe import StopRecipe, khepera_recipe
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.khepera import BAUD, STILL_M_S, WHEELBASE_M, KheperaIII, check_battery, firmware
-from bns.hardware.khepera_settings import khepera_settings
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.link.serial_link import SerialLink
 from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
-from bns.hardware.serial_link import SerialLink
 from bns.hardware.tracking.kinds import open_tracker
-from bns.hardware.wheel_drive import RobotLostError
-from bns.hardware.wheeled import WheeledPlatform, Wheels
+from bns.hardware.wheels.khepera import BAUD, STILL_M_S, WHEELBASE_M, KheperaIII, check_battery, firmware
+from bns.hardware.wheels.khepera_settings import khepera_settings
+from bns.hardware.wheels.wheel_drive import RobotLostError
+from bns.hardware.wheels.wheeled import WheeledPlatform, Wheels
 from bns.robots.khepera import UNITS_PER_M_S
 
 RIG = resources.files("bns.hardware") / "rigs" / "khepera.yaml"
 
 WHEELS = Wheels(UNITS_PER_M_S, 1000.0, WHEELBASE_M)
 REPEATS = 1
-"""How often a trial drives its final controller, unless it is told otherwise: the source shows one drive of it (section 4.3)."""
+"""How often a trial drives its final controller by default: the dissertation shows one drive of it (section 4.3)."""
 
 
 def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stopping) -> WheeledPlatform:

@@ -8,27 +8,27 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import HardwareError, TrialPausedError
-from bns.hardware.bridge import BAUD as BRIDGE_BAUD
-from bns.hardware.bridge import BridgeChain
 from bns.hardware.clock import Clock, EmulatedClock
-from bns.hardware.dynamixel import BAUD as BUS_BAUD
-from bns.hardware.dynamixel import Ax12Chain
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
 from bns.hardware.guard.recipe import StopRecipe, ax12_recipe, bridge_recipe
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
-from bns.hardware.servo_chain import ServoChain, ServoError, StuckServoError
-from bns.hardware.snake_drive import SnakeDrive
-from bns.hardware.snake_settings import SnakeSettings, snake_settings
+from bns.hardware.servos.bridge import BAUD as BRIDGE_BAUD
+from bns.hardware.servos.bridge import BridgeChain
+from bns.hardware.servos.dynamixel import BAUD as BUS_BAUD
+from bns.hardware.servos.dynamixel import Ax12Chain
+from bns.hardware.servos.servo_chain import ServoChain, ServoError, StuckServoError
+from bns.hardware.servos.snake_drive import SnakeDrive
+from bns.hardware.servos.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import checked, delay_of, open_tracker
 
 REPEATS = 3
-"""How often a trial drives its final controller, unless it is told otherwise: the source drove it three times (section 5.7)."""
+"""How often a trial drives its final controller by default: the dissertation drove it three times (section 5.7)."""
 RIG = resources.files("bns.hardware") / "rigs" / "snake.yaml"
 
 

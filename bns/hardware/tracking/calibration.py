@@ -70,7 +70,7 @@ class Calibration:
     picture: Mapping[str, float] = field(default_factory=dict)
 
     def save(self, path: Path) -> None:
-        """Write it as JSON; nobody meets half a file."""
+        """Write it as JSON; a reader never sees half a file."""
         lens = self.lens
         content = {
             "camera": self.camera, "size_px": list(lens.size), "rms_px": self.rms_px, "views": self.views,
@@ -100,7 +100,7 @@ def load_calibration(path: Path) -> Calibration:
             f"the camera has no calibration: cannot read {path} ({error.strerror}). Make one with: bns calibrate"
         ) from error
     except (ValueError, KeyError, TypeError) as error:
-        raise HardwareError(f"{path} is no calibration ({error!r}); make it anew with: bns calibrate") from error
+        raise HardwareError(f"{path} is no calibration ({error!r}); make it again with: bns calibrate") from error
 
 
 def _or_none(value: float) -> float | None:
@@ -128,7 +128,7 @@ def check_scale(board: Board, measured_m: float) -> None:
     if abs(measured_m / width_m - 1.0) > _WRONG_SCALE:
         raise HardwareError(
             f"the board is {1000 * measured_m:g} mm wide, not {1000 * width_m:g}: printed at {measured_m / width_m:.1%}. "
-            f"Print it without scaling, or go on with --square-mm {1000 * measured_m / board.across:.2f}."
+            f"Print it without scaling, or continue with --square-mm {1000 * measured_m / board.across:.2f}."
         )
 
 

@@ -82,7 +82,7 @@ class StreamCamera:
         self._thread.start()
         if not self._arrived.wait(_FIRST_FRAME_S):
             self.close()
-            raise HardwareError(f"the camera {source} is open but gives no picture; plug it in anew.")
+            raise HardwareError(f"the camera {source} is open but gives no picture; plug it in again.")
 
     def newest(self) -> Frame | None:
         """The frame that arrived last."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.tracking.sight import Sight, Tracker, unwrapped
 
 _FRESH_S = 0.1

@@ -19,7 +19,7 @@ import numpy as np
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
-from bns.hardware.tracking.evdev import (
+from bns.hardware.tracking.infrared.evdev import (
     ABS_HAT0X,
     EV_ABS,
     EV_SYN,
@@ -30,10 +30,10 @@ from bns.hardware.tracking.evdev import (
     device_file,
     stamp_by_steady_clock,
 )
+from bns.hardware.tracking.infrared.wii_pulse import Pulse, battery_of
 from bns.hardware.tracking.kinds import Device, Pose, Settings
 from bns.hardware.tracking.rigid import best_fit
 from bns.hardware.tracking.sight import Sight
-from bns.hardware.tracking.wii_pulse import Pulse, battery_of
 
 if TYPE_CHECKING:
     from bns.hardware.clock import EmulatedClock
@@ -192,7 +192,7 @@ def emulate(
     settings: Mapping[str, Any], folder: Path, pose: Pose, clock: EmulatedClock, faults: Faults, seed: int
 ) -> tuple[dict[str, Any], Device]:
     """A pipe into which an emulated remote writes what it sees."""
-    from bns.hardware.emulators.wii import WiiEmulator  # noqa: PLC0415  # a real robot needs no emulators
+    from bns.hardware.emulators.devices.wii import WiiEmulator  # noqa: PLC0415  # a real robot needs no emulators
 
     path = folder / "wiimote"
     remote = WiiEmulator(path, pose, overhead(settings), clock, faults, seed)

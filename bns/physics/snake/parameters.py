@@ -18,7 +18,7 @@ from bns.safe_yaml import read_yaml, shown
 BASIS = ("measured", "published", "fitted", "guess")
 """How a value came to be known."""
 READINGS = ("tether_at_yellow", "tipped_on_the_way_fails", "tipped_on_the_way_ends", "roles_switch_on_side")
-"""Parameters that are 1 or 0: where the source can be read in two ways."""
+"""Parameters that are 1 or 0: where the dissertation can be read in two ways."""
 
 
 def _within(low: float, high: float) -> Any:

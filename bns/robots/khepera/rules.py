@@ -15,7 +15,7 @@ while math.sqrt(math.nextafter(SQUARED_REACH_M2, 1.0)) <= GOAL_RADIUS_M:
 """The largest number whose root is not above GOAL_RADIUS_M: to compare squares with it is to compare distances, bit for bit."""
 MISSED_GOAL_M = 10.0
 """Penalty for a goal not reached, in metres of distance: more than any path on the surface adds up to, so that one goal
-more always outweighs a shorter path. The source says "a large constant"."""
+more always outweighs a shorter path. The dissertation says "a large constant"."""
 SMALLEST_SUM_M = 0.01
 """The distance sum that fitness is the inverse of is kept above this, so that fitness never exceeds 100 per metre."""
 LARGEST_HEADING_RAD = 1e5

@@ -1,4 +1,4 @@
-"""What can be switched on by the snake's name: what goes beyond the source, and other ways to read it (docs/choices.md)."""
+"""What can be switched on by the snake's name: what goes beyond the dissertation, and other ways to read it (docs/choices.md)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from bns.robots.snake.path import START_M, YELLOW_ON_ORIGIN_M
 
 BEYOND = ("changes", "rigid")
-"""What the simulator can do beyond the source."""
+"""What the simulator can do beyond the dissertation."""
 READINGS = (
     "crossover-80",
     "cut-without-noise",
@@ -19,7 +19,7 @@ READINGS = (
     "sorted-amplitudes",
     "yellow-on-origin",
 )
-"""Readings of the source that are not the default."""
+"""Readings of the dissertation that are not the default."""
 FLAT_SPOT = 0.1
 """What the original's library adds to the slope of every sigmoid while it trains."""
 _HALF, _MOST = 0.5, 0.8

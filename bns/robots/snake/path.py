@@ -15,7 +15,7 @@ YELLOW_ON_ORIGIN_M = ((0.0, 0.0), (0.65, 0.0))
 """The other reading of section 5.3.3: yellow on the origin, so that their middle is at (32.5, 0)."""
 PENALTY_M = 10.0
 """For a position outside the surface, for one reached by an unstable cycle and for a goal missed after the current one:
-metres of distance, more than the surface is wide. The source says "a large constant"."""
+metres of distance, more than the surface is wide. The dissertation says "a large constant"."""
 SMALLEST_SUM_M = 0.1
 """The sum that fitness is the inverse of is kept above this, half the way from a region's middle to its edge; so that fitness
 never exceeds 10 per metre, twice that of a path which ends at the edge of the last region."""

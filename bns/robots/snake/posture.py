@@ -1,7 +1,7 @@
 """What the change from one cycle to the next does to the markers, from the shapes of the two postures alone.
 
-The source leaves the change out. Here the body that takes up the next cycle's first posture is laid onto where it was, so that
-its links move as little as they can, in the mean square: if the floor drags every link in proportion to its speed, the pulls
+The dissertation leaves out the change. Here the body that takes up the next cycle's first posture is laid onto the old one so
+that its links move as little as they can, in the mean square: if the floor drags every link in proportion to its speed, the pulls
 then balance, along the floor and about the body's middle. The drawing of the body is all that is known: nothing is learned.
 """
 

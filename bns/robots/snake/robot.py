@@ -35,7 +35,7 @@ from bns.tasks import Task
 class Snake:
     """Implements `bns.robots.base.Robot`: poses are observations (n, 9) as in `path.walk`.
 
-    What the source leaves out can be switched on: ``changes`` (from one cycle to the next the markers move as `posture` says) and
+    What the dissertation leaves out can be switched on: ``changes`` (between cycles the markers move as `posture` says) and
     ``rigid`` (the markers, which are on one body, cannot drift apart); and other readings of it (`bns.robots.snake.options`).
     """
 

@@ -19,7 +19,7 @@ REPEATS = 4
 _ANGLES = 2
 """The first of two components that go round."""
 LARGEST_RATIO = 0.999
-"""Largest A_vertical as a share of A_lateral: the source demands less than 1."""
+"""Largest A_vertical as a share of A_lateral: the dissertation demands less than 1."""
 TURN_RAD, LARGEST_AMPLITUDE_RAD, _STEP = 2 * math.pi, math.pi / 2, math.radians(20)
 _TURN, _RATIO = np.float32(TURN_RAD), np.float32(LARGEST_RATIO)
 BOUNDS = CommandBounds(

@@ -70,13 +70,13 @@
     }
     const [x] = cursor[1](trial.t[k], 0);
     cursor[0].setAttribute("d", `M${x},14V118`);
-    const words = {before: "model as it was", after: "mended model"};
+    const words = {before: "model as given", after: "extended model"};
     at("now").textContent = `${trial.t[k].toFixed(1)} s: ` + kinds.filter(kind => kind !== "measured")
       .map(kind => `${words[kind]} ${Math.round(error(kind, k))} mm off`).join(", ");
   }
 
   function fillTable() {
-    const names = {measured: "measured", before: "as it was", after: "mended"};
+    const names = {measured: "measured", before: "as given", after: "extended"};
     const head = ["t (s)", ...kinds.flatMap(kind => [`${names[kind]} x (mm)`, "y (mm)"])];
     const rows = trial.t.map((t, k) => [t, ...kinds.flatMap(kind => place(kind, k))]);
     const row = (cells, kind) => `<tr>${cells.map(cell => `<${kind}>${cell}</${kind}>`).join("")}</tr>`;

@@ -11,8 +11,8 @@ from bns.errors import HardwareError
 from bns.hardware.safety import StopsAtTheEnd
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.kinds import open_tracker
-from bns.hardware.wheel_drive import RobotLostError
-from bns.hardware.wheeled import WheeledPlatform, Wheels
+from bns.hardware.wheels.wheel_drive import RobotLostError
+from bns.hardware.wheels.wheeled import WheeledPlatform, Wheels
 from my_robot.emulator import EmulatedRig
 from my_robot.protocol import FASTEST_MM_S, Message, decoded
 
@@ -22,7 +22,7 @@ ATTEMPTS, REPLY_S, STILL_M_S, FLAT_V = 4, 0.15, 0.005, 9.5
 
 
 class MyDriver:
-    """Implements `bns.hardware.wheeled.WheelDriver`."""
+    """Implements `bns.hardware.wheels.wheeled.WheelDriver`."""
 
     def __init__(self, address, clock, journal, reply_s=REPLY_S):
         host, _, port = address.rpartition(":")

@@ -13,11 +13,11 @@ from typing import Protocol
 
 from bns.errors import HardwareError
 from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.reply_time import ReplyTime
-from bns.hardware.serial_link import NoReplyError
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.link.reply_time import ReplyTime
+from bns.hardware.link.serial_link import NoReplyError
 from bns.hardware.stop import Stop
-from bns.hardware.wheel_drive import RobotLostError
+from bns.hardware.wheels.wheel_drive import RobotLostError
 
 BAUD = 115200
 ATTEMPTS = 4

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from bns.extras import extra
 from bns.hardware.clock import Clock
-from bns.hardware.serial_link import open_port
+from bns.hardware.link.serial_link import open_port
 
 with extra("robot"):
     from dynamixel_sdk import PortHandler

@@ -5,7 +5,10 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable
 
-from bns.hardware.ax12_table import (
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.emulators.devices.servo import Servo
+from bns.hardware.emulators.faults import Faults
+from bns.hardware.servos.ax12_table import (
     ACTION,
     BROADCAST,
     CHECKSUM,
@@ -20,9 +23,6 @@ from bns.hardware.ax12_table import (
     TABLE_SIZE,
     WRITE,
 )
-from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.faults import Faults
-from bns.hardware.emulators.servo import Servo
 
 _HEADER = b"\xff\xff"
 _BYTE_S = 10 / 1_000_000

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.body import SPEED_OVER_S, DifferentialBody
 from bns.hardware.emulators.faults import Faults
-from bns.hardware.khepera import HIGHEST_UNITS, Firmware
+from bns.hardware.wheels.khepera import HIGHEST_UNITS, Firmware
 
 _LONGEST_LINE, _MOST_ARGUMENTS, _LONGEST_ARGUMENT = 82, 4, 9
 _QUANTUM_SHARE = 53 / 30000  # of the highest commanded speed; the reading comes in whole steps of it

@@ -12,7 +12,7 @@ from bns.errors import TrialPausedError
 from bns.hardware.agreement import Agreement
 from bns.hardware.clock import Clock
 from bns.hardware.delay import Turns, turned
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
@@ -20,7 +20,7 @@ from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import delay_of
 from bns.hardware.tracking.sight import Tracker
-from bns.hardware.wheel_drive import RobotLostError, WheelDrive
+from bns.hardware.wheels.wheel_drive import RobotLostError, WheelDrive
 
 _NOT_SEEN = "the tracker does not see the robot: is it lit, marked and on the surface? Try: bns track"
 

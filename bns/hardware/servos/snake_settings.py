@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bns.errors import HardwareError, unknown_name
-from bns.hardware.servo_chain import REFUSED_V, ServoLimits
+from bns.hardware.servos.servo_chain import REFUSED_V, ServoLimits
 from bns.physics.snake.parameters import shipped_parameters
 
 WIRINGS = ("bus", "bridge")

@@ -9,7 +9,7 @@ import numpy as np
 
 from bns.hardware.agreement import Agreement
 from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.safety import Watch
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight

@@ -10,13 +10,13 @@ from dataclasses import asdict
 
 from bns.errors import HardwareError
 from bns.extras import extra
-from bns.hardware.ax12_table import BROADCAST, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
 from bns.hardware.clock import Clock
-from bns.hardware.dynamixel_port import ClockedPort
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.link.terminal_error import TerminalError
+from bns.hardware.servos.ax12_table import BROADCAST, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
+from bns.hardware.servos.dynamixel_port import ClockedPort
+from bns.hardware.servos.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
-from bns.hardware.terminal_error import TerminalError
 
 with extra("robot"):
     from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler

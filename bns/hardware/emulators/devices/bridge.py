@@ -6,7 +6,10 @@ import math
 import threading
 from collections.abc import Callable, Sequence
 
-from bns.hardware.bridge_frames import (
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.emulators.devices.servo import Servo
+from bns.hardware.emulators.faults import Faults
+from bns.hardware.servos.bridge_frames import (
     ANSWER,
     ARM,
     GOAL,
@@ -26,9 +29,6 @@ from bns.hardware.bridge_frames import (
     decoded,
     encoded,
 )
-from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.faults import Faults
-from bns.hardware.emulators.servo import Servo
 
 _LATENCY_S = 0.002
 _BYTE_S = 10 / 115_200

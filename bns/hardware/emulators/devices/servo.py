@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, Protocol
 
-from bns.hardware.ax12_table import ANGLE, OVERHEAT, OVERLOAD, RANGE, REGISTERS, TABLE_SIZE, VOLTAGE
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.faults import Faults
+from bns.hardware.servos.ax12_table import ANGLE, OVERHEAT, OVERLOAD, RANGE, REGISTERS, TABLE_SIZE, VOLTAGE
 
 _NO_LOAD_STEPS_S = 59 * 360 / 60 * 1023 / 300  # 59 turns a minute
 _SPEED_STEPS_S = 0.111 * 360 / 60 * 1023 / 300

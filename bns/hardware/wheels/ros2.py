@@ -17,13 +17,13 @@ from typing import Any, NamedTuple, Protocol
 
 from bns.errors import HardwareError, unknown_name
 from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.kinds import open_tracker
-from bns.hardware.wheel_drive import RobotLostError
-from bns.hardware.wheeled import WheeledPlatform, Wheels
+from bns.hardware.wheels.wheel_drive import RobotLostError
+from bns.hardware.wheels.wheeled import WheeledPlatform, Wheels
 
 STILL_M_S = 0.005
 _POLL_S = 0.01
@@ -80,7 +80,7 @@ def ros2_settings(driver: Mapping[str, Any]) -> Ros2Settings:
 
 
 class Ros2Driver:
-    """Implements `bns.hardware.wheeled.WheelDriver` over a node."""
+    """Implements `bns.hardware.wheels.wheeled.WheelDriver` over a node."""
 
     def __init__(self, node: Node, settings: Ros2Settings, clock: Clock, journal: HardwareLog) -> None:
         self._node, self._settings, self._clock, self._journal = node, settings, clock, journal

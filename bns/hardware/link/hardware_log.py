@@ -1,7 +1,7 @@
 """The hardware log: everything sent, received and observed in a trial, one JSON line each, with time stamps.
 
 A trial is resumed from it, or replayed. Its file is `journal.jsonl` in the folder of the trial. Each line has a number and a
-checksum (`bns.hardware.sealed_lines`).
+checksum (`bns.hardware.link.sealed_lines`).
 
 `t_s` is the trial's clock, `wall_s` the computer's (seconds since 1970). A line that a kill cut in two is dropped when the
 file is opened again; evaluations are synced to the disk before the next one begins.
@@ -23,7 +23,7 @@ from typing import Any, Self
 
 from bns.errors import HardwareError, TrialFileError
 from bns.hardware.clock import Clock
-from bns.hardware.sealed_lines import Seals, checked_lines
+from bns.hardware.link.sealed_lines import Seals, checked_lines
 
 _HELD = 1 << 13
 """Bytes that are kept back before they are written."""

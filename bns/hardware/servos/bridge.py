@@ -8,8 +8,12 @@ from dataclasses import asdict
 
 from bns.errors import HardwareError
 from bns.extras import extra
-from bns.hardware.ax12_table import CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
-from bns.hardware.bridge_frames import (
+from bns.hardware.clock import Clock
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.link.serial_link import open_port
+from bns.hardware.link.terminal_error import TerminalError
+from bns.hardware.servos.ax12_table import CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
+from bns.hardware.servos.bridge_frames import (
     ANSWER,
     ARM,
     GOAL,
@@ -27,12 +31,8 @@ from bns.hardware.bridge_frames import (
     encoded,
     searched,
 )
-from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.serial_link import open_port
-from bns.hardware.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
-from bns.hardware.terminal_error import TerminalError
 
 with extra("robot"):
     import serial

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bns.errors import HardwareError, unknown_name
-from bns.hardware.reply_time import ReplyLimits
+from bns.hardware.link.reply_time import ReplyLimits
 
 _REPLIES = {"first_reply_s": "first_s", "least_reply_s": "least_s", "most_reply_s": "most_s"}
 _KNOWN = (*_REPLIES, "stop_s")
@@ -16,7 +16,7 @@ _KNOWN = (*_REPLIES, "stop_s")
 
 @dataclass(frozen=True)
 class KheperaSettings:
-    """Limits of the time-out for answers (`bns.hardware.reply_time`); how long a stop is tried before it counts as failed."""
+    """Limits of the time-out for answers (`bns.hardware.link.reply_time`), and for how long a stop is tried."""
 
     reply: ReplyLimits = field(default_factory=ReplyLimits)
     stop_s: float = 5.0

@@ -92,5 +92,5 @@ def _text(path: Path, number: int, line: bytes) -> str:
 
 def _wrong(path: Path, number: int, what: str) -> HardwareError:
     kept = f"head -n {number - 2} {path}" if number > 2 else ""
-    below = f" What stands above it can be gone on with: {kept} > FILE, in its place." if kept else ""
+    below = f" What stands above it can be resumed: {kept} > FILE, in its place." if kept else ""
     return HardwareError(f"line {number} of {path} {what}. Take the file from a copy, unedited.{below}")

@@ -11,9 +11,9 @@ from pathlib import Path
 from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
-from bns.hardware.reply_time import GRANULARITY_S, ReplyLimits, ReplyTime
-from bns.hardware.terminal_error import TerminalError
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.link.reply_time import GRANULARITY_S, ReplyLimits, ReplyTime
+from bns.hardware.link.terminal_error import TerminalError
 
 with extra("robot"):
     import serial

@@ -27,7 +27,7 @@ import numpy as np
 
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.faults import Faults
-from bns.hardware.tracking.evdev import ABS_HAT0X, EV_ABS, EV_SYN, EVENT, SYN_DROPPED, SYN_REPORT
+from bns.hardware.tracking.infrared.evdev import ABS_HAT0X, EV_ABS, EV_SYN, EVENT, SYN_DROPPED, SYN_REPORT
 from bns.hardware.tracking.rigid import placed
 from bns.hardware.tracking.wii import LEDS_M, Overhead
 

@@ -8,20 +8,20 @@ import numpy as np
 
 from bns.errors import TrialPausedError
 from bns.hardware.agreement import SameScene
-from bns.hardware.ax12_table import RAD_PER_STEP
 from bns.hardware.clock import Clock
-from bns.hardware.hardware_log import HardwareLog
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.safety import OutOfSight, Watch
-from bns.hardware.servo_chain import ServoChain, StrainWatch, StuckServoError
-from bns.hardware.snake_settings import SnakeSettings
+from bns.hardware.servos.ax12_table import RAD_PER_STEP
+from bns.hardware.servos.servo_chain import ServoChain, StrainWatch, StuckServoError
+from bns.hardware.servos.snake_settings import SnakeSettings
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight
 from bns.physics.snake.gait import PARAMETERS, cycle_angles
 
 _TICK_S = 0.15
 _STRAIGHTENING_RAD_S = 0.5
-_FROZEN_RAD = 0.35
-"""Joints that turn so far move the ends of the body by centimetres."""
+_FROZEN_RAD = 0.8
+"""Joints that turn so far move an end of the body: in the model, by 3 mm after 0.42 rad at most. A camera adds its delay."""
 _MARKERS = ("yellow", "green")
 _PLACES = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
 _NOTHING = dict.fromkeys(("cycle", *PARAMETERS, "stable"), math.nan)

@@ -59,7 +59,7 @@ def hanging(lights_px: np.ndarray, pose: np.ndarray, height_m: float, leds_m: np
     if rms_m > _WORST_M or other_m < _CLEARLY * rms_m:
         raise HardwareError(
             f"the lights do not fit the LEDs clearly: within {1000 * rms_m:.1f} mm, mirrored {1000 * other_m:.1f} mm. Measure "
-            "leds_m anew (to the right of the axle's middle, ahead of it); the triangle's sides must differ by centimetres."
+            "leds_m again (to the right of the axle's middle, ahead of it); the triangle's sides must differ by centimetres."
         )
     view_rad = 2.0 * math.atan(abs(scale) * WIDTH_PX / 2.0 / height_m)
     return Hanging(Overhead(height_m, view_rad, shift.real, shift.imag, float(np.angle(scale)), mirror), rms_m, other_m)

@@ -1,0 +1,1 @@
+"""Emulated devices that speak the bytes of the real ones."""

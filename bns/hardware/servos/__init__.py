@@ -1,0 +1,1 @@
+"""Servos: their registers, the bus, the bridge, and the drive of a snake."""

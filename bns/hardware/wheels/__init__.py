@@ -1,0 +1,1 @@
+"""Robots on two wheels: their drivers and their drive."""
