@@ -28,6 +28,7 @@ from bns.diagnose.report.proposal_text import proposal_text
 from bns.diagnose.settings.chosen import in_force
 from bns.errors import DataError
 from bns.physics.effect import Effect
+from bns.physics.jointed.model import JointedModel
 from bns.store.disk.files import publish
 
 MOST_MINUTES = 600.0
@@ -135,6 +136,11 @@ def proposed(
 ) -> ProposeResult:
     """The experiment for a diagnosis that is there."""
     checked_minutes(minutes)
+    if isinstance(found.ready.model, JointedModel):
+        raise DataError(
+            f"No experiment is proposed for {found.ready.model.name}, a body on joints: commands are planned for wheels only. "
+            "More random trials settle what is open; so does a measurement with a ruler or a scale (docs/snake-diagnosis.md)."
+        )
     tracks = found.ready.predictor.tracks
     inside, bounds = arena_of(tracks, arena, start), bounds_of(tracks, found.ready.model, speeds)
     meter = Meter(progress, PHASES, pace=GENERATIONS)

@@ -82,7 +82,8 @@ def add_model_options(parser: argparse.ArgumentParser) -> None:
         "--model",
         required=True,
         metavar="M",
-        help="khepera, differential-drive, a YAML file; for compare also networks (.safetensors), snake, snake+changes",
+        help="khepera, differential-drive, snake, a YAML file, an MJCF file (.xml); for compare also networks (.safetensors, "
+        "snake-networks, snake+changes)",
     )
     parser.add_argument(
         "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"

@@ -108,12 +108,9 @@ class Responses:
         effect, p = self._known[number]
         side, step = (1.0 if value > p.neutral else -1.0), abs(value - p.neutral)
         nodes = self._nodes(p, side)
-        known = self._curves.setdefault(number, {})
-        across = [at for at in known if (at - p.neutral) * side < 0 and abs(at - p.neutral) >= step]
-        if not nodes or (p.neutral + side * nodes[0] not in known and step <= nodes[0] and across):
-            nearest = min(across or list(known), key=lambda at: abs(at - p.neutral), default=None)
-            if nearest is not None:
-                return known[nearest] * ((value - p.neutral) / (nearest - p.neutral))
+        self._curves.setdefault(number, {})
+        if not nodes:
+            return np.zeros_like(self._sound)
         at = int(np.searchsorted(nodes, step, side="left"))
         outer = min(at, len(nodes) - 1)
         upper = self._node(number, effect, p, p.neutral + side * nodes[outer])

@@ -56,7 +56,7 @@ class Predict:
         (0.6, 1.2), "1", f"The same where effects are only screened: one node a side does; {BY_HAND}."
     )
     response_clipped_m: float = setting(
-        0.1,
+        0.5,
         "m",
         f"A response that moves a point farther than this is a robot that rolled over: it counts as this far; {BY_HAND}.",
     )
@@ -70,7 +70,11 @@ class Predict:
         0.04, "s", f"A simulated body is looked at this often; what a camera sees in between lies on the chord; {BY_HAND}."
     )
     wild_m: float = setting(
-        0.06, "m", f"Cycles that a little luck (`still_m`) moves farther than this cannot be foreseen: left out; {BY_HAND}."
+        0.03,
+        "m",
+        "Cycles that a little luck (friction 30 % higher, a floor that falls 0.7 degrees) moves farther than this cannot be "
+        "foreseen and are left out: with 0.06 a friction that was plain by likelihood was withdrawn, for few wild cycles decide "
+        "a root mean square.",
     )
     still_m: float = setting(
         5e-3, "m", f"Cycles that a little luck moves less far than this scatter alike; {BY_HAND}."

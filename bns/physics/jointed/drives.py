@@ -55,7 +55,7 @@ def at_times(
     return Drive(set_points[np.maximum(at, 0)], _looks(before, steps, looks), begin)
 
 
-RUN_UP_S = 1.0
+RUN_UP_S = 2.0
 """Set points of this long before a stretch bring the joints to where they are when it begins."""
 
 

@@ -126,8 +126,8 @@ class Simulator:
         kept: list[list[Array]] = [[] for _ in order]
         datas = [mujoco.MjData(model) for _ in range(self._threads)]
         with rollout.Rollout(nthread=self._threads) as threads:
-            for step in range(int(lasts[0])):
-                n = int(np.searchsorted(-lasts, -step, side="left"))  # rows that last longer than this many steps
+            for step in range(int(lasts[0]) + 1):
+                n = int(np.searchsorted(-lasts, -step, side="right"))  # rows that last so many steps or longer
                 q = state[:n, 1 + machine.joint_at]
                 control[:n, 0, : model.nu] = servos.control(step, q)
                 floor.push(control[:n, 0, model.nu :], sensed[:n])
@@ -144,8 +144,8 @@ class Simulator:
                 warm[:n] = (after[:, 0, speeds] - state[:n, speeds]) / self._dt_s
                 state[:n], sensed[:n] = after[:, 0], now[:, 0]
                 for row in range(n):
-                    if step + 1 in wanted_frames[row]:
-                        repeats = int((self.drives[order[row]].frames == step + 1).sum())
+                    if step in wanted_frames[row]:  # what is sensed is where the step began
+                        repeats = int((self.drives[order[row]].frames == step).sum())
                         kept[row] += [sensed[row].copy()] * repeats
         for row, frames in enumerate(kept):
             seen[row] = np.array(frames)
@@ -165,7 +165,7 @@ class _Servos:
         self, machine: Machine, plant: Plant, set_points: Sequence[Array], dt_s: float, told_rad_s: float
     ) -> None:
         p, m = plant, machine
-        self._wanted = _delayed(set_points, max(1.0, (m.mechanism.delay_s + p.delay_s) / dt_s)) + p.zero_rad
+        self._wanted = _delayed(set_points, max(0.0, (m.mechanism.delay_s + p.delay_s) / dt_s)) + p.zero_rad
         self._band = m.mechanism.dead_band_rad + p.dead_band_rad
         self._stiffness = p.stiffness
         self._furthest = m.torque_n_m * p.torque / m.stiffness_n_m_rad
@@ -176,7 +176,7 @@ class _Servos:
     def control(self, step: int, q: Array) -> Array:
         """Positions (rows, joints) for the rows that go on, whose joints are at ``q``."""
         n = len(q)
-        wanted = self._wanted[:n, step]
+        wanted = self._wanted[:n, min(step, self._wanted.shape[1] - 1)]
         if self._reach is not None:
             self._now[:n] += np.clip(wanted - self._now[:n], -self._reach, self._reach)
             wanted = self._now[:n]

@@ -1,0 +1,171 @@
+"""Bodies on joints: the simulation in rows is the one of the world, effects change what they say, files are read back."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import bns
+from bns.errors import DataError, ModelError
+from bns.physics.jointed.drives import at_times, through_postures, told_speed_rad_s
+from bns.physics.jointed.mechanism import machine
+from bns.physics.jointed.model_files import load_body
+from bns.physics.jointed.plant import Plant, Sighting
+from bns.physics.jointed.simulate import Simulator
+from bns.physics.model import load_model
+from bns.physics.snake.body import Body
+from bns.physics.snake.gait import cycle_angles
+from bns.physics.snake.parameters import shipped_parameters
+from tests.jointed.arm import xml
+
+SNAKE = load_body("snake")
+GAITS = (
+    (0.68, 0.38, 4.64, 6.01),
+    (0.47, 0.33, 4.54, 1.37),
+    (0.9, 0.1, 1.0, 2.0),
+    (0.45, 0.28, 4.37, 1.84),
+    (0.13, 0.03, 5.03, 3.66),
+)
+
+
+def simulated(plant=None):
+    """Markers (gaits, 2, 2, 2) at the begin and end of each gait, driven from straight."""
+    body = machine(SNAKE.mechanism)
+    begin = np.array([0.3, 0.1, 0.5])
+    drives = [
+        through_postures(SNAKE.mechanism, np.vstack([np.zeros(12), cycle_angles(gait)]), body.model.opt.timestep, begin)
+        for gait in GAITS
+    ]
+    simulator = Simulator(body, drives, 2)
+    return simulator.sightings(plant or body.plant, simulator.at_rest()).point_m.reshape(-1, 2, 2, 2)
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return simulated()
+
+
+def moved(markers):
+    """Way of the middle along and beside the markers' line, m, and its turn, rad; (gaits, 3)."""
+    lines = markers[:, :, 1] - markers[:, :, 0]
+    heading = np.arctan2(lines[..., 1], lines[..., 0])
+    way = np.diff(markers.mean(axis=2), axis=1)[:, 0]
+    c, s = np.cos(heading[:, 0]), np.sin(heading[:, 0])
+    turn = np.angle(np.exp(1j * (heading[:, 1] - heading[:, 0])))
+    return np.column_stack([c * way[:, 0] + s * way[:, 1], c * way[:, 1] - s * way[:, 0], turn])
+
+
+def test_rows_move_as_the_world_s_body_does(sound):
+    """Friction by pairs, servos as arrays, MuJoCo's threads: within millimetres, but for gaits in which luck decides."""
+    there = []
+    for gait in GAITS:
+        body = Body(shipped_parameters())
+        body.lay_straight()
+        driven = body.drive_cycle(gait)
+        there.append([driven.before_m, driven.after_m])
+    off = np.abs(moved(sound) - moved(np.array(there)))
+    assert (np.median(off, axis=0) < [3e-3, 5e-3, 0.01]).all(), off
+
+
+def test_every_stretch_begins_where_the_robot_was_seen(sound):
+    assert sound[:, 0].mean(axis=1) == pytest.approx(np.tile([0.3, 0.1], (len(GAITS), 1)), abs=2e-4)
+    line = sound[:, 0, 1] - sound[:, 0, 0]
+    assert np.arctan2(line[:, 1], line[:, 0]) == pytest.approx(0.5, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", [n for n in SNAKE.catalogue() if n.endswith(("joint3", "green")) or "joint" not in n])
+def test_an_effect_does_nothing_at_neutral_and_something_elsewhere(name):
+    effect = SNAKE.effect_named(name)
+    if effect.stage == "clock":
+        return
+    points = np.arange(8.0).reshape(2, 2, 2)
+    given = machine(SNAKE.mechanism).plant if effect.stage == "mechanics" else Sighting(points, points / 9, points / 7)
+    for p in effect.parameters:
+        far = max(p.plausible, key=lambda end, p=p: abs(end - p.neutral))
+        changed = effect.apply(given, **{**effect.neutral, p.name: far})
+        assert not same(changed, given), p.name
+    assert same(effect.apply(given, **effect.neutral), given)
+    assert effect.sentence
+    assert effect.measurement
+    assert "{" not in effect.sentence
+
+
+def same(one, other):
+    fields = (f.name for f in dataclasses.fields(one if isinstance(one, Plant) else Sighting))
+    # a speed limit at what is told, or beyond, is none
+    bounded = [(np.minimum(getattr(v, f), 1.0) if f == "speed" else getattr(v, f)) for f in fields for v in (one, other)]
+    return all(np.array_equal(np.asarray(a), np.asarray(b)) for a, b in zip(bounded[::2], bounded[1::2], strict=True))
+
+
+def test_a_slope_pulls_downhill_in_the_world_s_frame(sound):
+    plant = machine(SNAKE.mechanism).plant
+    tilted = simulated(SNAKE.effect_named("floor-slope").apply(plant, east_rad=0.0, north_rad=0.05))
+    gone = (tilted[:, 1] - tilted[:, 0] - (sound[:, 1] - sound[:, 0])).mean(axis=(0, 1))
+    assert gone[1] > 0.01
+    assert gone[1] > 2 * abs(gone[0])
+
+
+def test_a_joint_whose_zero_is_off_bends_the_body(sound):
+    plant = machine(SNAKE.mechanism).plant
+    bent = simulated(SNAKE.effect_named("joint-zero-joint6").apply(plant, offset_rad=0.3))
+    gaps = [np.hypot(*(m[:, 0, 1] - m[:, 0, 0]).T) for m in (bent, sound)]
+    assert (np.abs(gaps[0] - gaps[1]) > 2e-3).all()
+
+
+def test_set_points_at_times_hold_until_the_next():
+    t, told = np.array([0.0, 1.0, 2.0]), np.array([[0.0], [1.0], [2.0]])
+    drive = at_times(t, told, (1.0, 2.5), 0.1, np.zeros(3), looks=4)
+    assert drive.frames.tolist() == [10, 15, 20, 25]
+    assert drive.set_points[[0, 9, 10, 19, 20], 0].tolist() == [0, 0, 1, 1, 2]
+    assert told_speed_rad_s([drive], 0.1) == pytest.approx(10.0)
+
+
+def test_a_model_file_names_body_and_effects(tmp_path):
+    model = bns.Model("snake").with_effect("weak-joint-joint5", strength=0.5).with_effect("camera-scale", scale=0.02)
+    path = model.save(tmp_path / "mine.yaml")
+    again = bns.Model(path)
+    assert isinstance(again, bns.Model)
+    assert again.canonical_json() == load_model(path).canonical_json() == model.canonical_json()
+    assert again.canonical_json() != bns.Model("snake").canonical_json()
+    assert "12 joints" in repr(again)
+
+
+def test_any_mjcf_file_with_servos_and_sites_is_a_model(tmp_path):
+    file = tmp_path / "arm.xml"
+    file.write_text(xml())
+    arm = bns.Model(file, sites=["hand"])
+    assert machine(arm.mechanism).joints == ("shoulder", "elbow", "wrist")
+    assert "floor-friction" not in arm.catalogue()
+    assert "weak-joint-elbow" in arm.catalogue()
+    assert bns.Model(arm.save(tmp_path / "arm.yaml")).canonical_json() == arm.canonical_json()
+
+
+@pytest.mark.parametrize(
+    ("text", "settings", "said"),
+    [
+        ("<mujoco/>", {}, "sites is"),
+        (xml(), {"sites": ["nose"]}, "no site 'nose'"),
+        (xml().replace("<position", "<motor").replace(' kp="6.0"', ""), {}, "no position servo"),
+        ("no xml", {}, "does not read"),
+        (xml(), {"delay_s": -1.0}, "delay_s is -1.0"),
+        (xml(), {"colour": "red"}, "colour"),
+    ],
+)
+def test_a_body_that_cannot_be_used_is_refused_with_what_to_do(tmp_path, text, settings, said):
+    file = tmp_path / "robot.xml"
+    file.write_text(text)
+    with pytest.raises(ModelError, match=said):
+        bns.Model(file, **settings).catalogue()
+
+
+def test_data_of_another_kind_of_robot_are_refused(tmp_path):
+    file = tmp_path / "arm.xml"
+    file.write_text(xml())
+    with pytest.raises(DataError, match="lack elbow_set_rad"):
+        bns.compare(_no_elbow(), bns.Model(file))
+
+
+def _no_elbow():
+    from tests.jointed.arm import log
+
+    return log(1).drop(columns=["elbow_set_rad"])

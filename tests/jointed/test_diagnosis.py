@@ -1,0 +1,143 @@
+"""A robot on joints diagnosed: curves of responses, stretches, and effects planted in a robot that is no snake."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bns
+from bns.api.common.prepared import prepared
+from bns.cli.main import main
+from bns.diagnose.data.cycles import checked_cycles, cycle_tracks
+from bns.diagnose.data.stretches import apart, poses_of, stretches_of_cycles
+from bns.diagnose.predict.responses import Responses
+from bns.errors import DataError, ModelError
+from bns.physics.effect import Effect, Parameter
+from bns.physics.jointed.model_files import load_body
+from bns.physics.model import ActiveEffect
+from tests.hidden_snake.__main__ import judged
+from tests.hidden_snake.body import Hidden
+from tests.hidden_snake.worlds import World, driven
+from tests.jointed.arm import log, xml
+
+SNAKE = load_body("snake")
+
+
+def effect(name, neutral=0.0):
+    number = Parameter("x", "1", -10.0, 10.0, (-1.0, 1.0), neutral, "")
+    return Effect(name, "mechanics", (number,), "", "", (), lambda plant, x: plant)
+
+
+A, B = effect("a"), effect("b")
+
+
+def bent(model):
+    """Points that go by x_a, its square, and both numbers' product; ``calls`` counts."""
+    bent.calls += 1
+    x = {active.effect.name: active.values[0] for active in model.at("mechanics")}
+    a, b = x.get("a", 0.0), x.get("b", 0.0)
+    return np.array([a, 0.01 * a * a, 0.01 * a * b, b]) / 100
+
+
+def test_responses_are_exact_at_nodes_and_anchors_and_ask_for_few_simulations():
+    bent.calls = 0
+    bare = replace(SNAKE, effects=())
+    responses = Responses(bent, bare, None, (0.5, 1.0))
+
+    def seen(**values):
+        active = tuple(ActiveEffect({"a": A, "b": B}[name], (value,)) for name, value in values.items())
+        return responses.seen(replace(bare, effects=active)), replace(bare, effects=active)
+
+    for value in (0.1, 0.3, 0.5, 1.0, 0.7, -0.2):
+        got, model = seen(a=value)
+        assert got[0] == pytest.approx(value / 100)
+        assert got[1] == pytest.approx(bent(model)[1], abs=2e-5)
+    both, model = seen(a=1.0, b=1.0)
+    assert both[2] == 0.0  # curves do not know that numbers act on each other
+    responses.anchor(model)
+    assert seen(a=1.0, b=1.0)[0] == pytest.approx(bent(model))
+    before = bent.calls
+    seen(a=0.6, b=0.9)
+    responses.anchor(seen(a=1.01, b=1.0)[1])
+    assert bent.calls == before  # read between nodes; the model near an anchor is not simulated again
+
+
+def test_distances_hold_what_a_pose_does_not():
+    points = np.array([[[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]], [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]])
+    assert apart(points) == pytest.approx(np.array([[2**0.5, 2, 2**0.5], [1, 2, 1]]))
+    assert poses_of(points)[:, 2].tolist() == [0.0, 0.0]
+    assert apart(points[:, :1]).shape == (2, 0)
+
+
+@pytest.fixture(scope="module")
+def camera():
+    return cycle_tracks(checked_cycles(driven(World("x", "none", Hidden(), ()), 1, 3, 3, camera=True))[0])
+
+
+def test_frames_between_the_ends_of_a_cycle_become_frames_of_its_stretch(camera):
+    stretches = stretches_of_cycles(camera, SNAKE.mechanism, 12)
+    counts = np.bincount(stretches.stretch)
+    assert len(counts) == camera.stable.sum()
+    assert (counts > 5).all()
+    assert stretches.timed
+    assert not np.isfinite(stretches.since_s[stretches.ends]).any()
+    assert (stretches.since_s[stretches.begins] == 0).all()
+    last = stretches.of(np.array([len(counts) - 1]))
+    assert len(last) == 1
+    assert len(last.t_s) == counts[-1]
+    assert last.names == (camera.names[camera.trial[2 * np.flatnonzero(camera.stable)[-1]]],)
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    file = tmp_path_factory.mktemp("arm") / "arm.xml"
+    file.write_text(xml())
+    return file
+
+
+def test_a_sound_arm_lacks_nothing(arm):
+    found = bns.diagnose(log(12, seed=1), bns.Model(arm))
+    assert (found.verdict, found.effects) == ("none", ())
+
+
+def test_a_joint_of_an_arm_whose_zero_is_off_is_ranked_first(arm):
+    found = bns.diagnose(log(12, seed=1, zero_rad=0.08), bns.Model(arm))
+    assert found.ranking.index[0] == "joint-zero-elbow"
+
+
+def test_an_offset_is_added_by_the_command_line_and_read_back(arm, tmp_path, capsys):
+    data, out = tmp_path / "log.csv", tmp_path / "mended.yaml"
+    log(8, seed=3, zero_rad=0.08).to_csv(data, index=False)
+    assert main(["add", str(data), "joint-zero-elbow", "--model", str(arm), "-o", str(out), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["parameters"]["joint-zero-elbow"]["offset_rad"]["value"] == pytest.approx(0.08, abs=0.004)
+    before = prepared(data, str(arm))
+    after = bns.compare(data, bns.Model(out)).errors["position_m"]
+    assert after["stretch"] < 0.5 * bns.compare(data, before.model).errors["position_m"]["stretch"]
+
+
+def test_no_experiment_is_planned_for_a_body(arm):
+    with pytest.raises(DataError, match="planned for wheels only"):
+        bns.propose(log(12, seed=1), bns.Model(arm))
+
+
+def test_networks_of_the_snake_are_named_apart_from_its_body(tmp_path):
+    with pytest.raises(ModelError, match="holds networks"):
+        bns.diagnose(tmp_path / "none.csv", "snake-networks")
+
+
+@pytest.mark.parametrize(
+    ("right", "verdict", "explanations", "good"),
+    [
+        (("a",), "effects", [["a"]], True),
+        (("a",), "effects", [["a", "b"]], False),
+        (("a",), "tie", [["b"], ["a"]], True),
+        (("a",), "unlisted", [["a"]], False),
+        ((), "none", [[]], True),
+        ((), "effects", [["a"]], False),
+    ],
+)
+def test_answers_are_judged_by_what_was_hidden(right, verdict, explanations, good):
+    world = World("w", "single" if right else "none", Hidden(), right)
+    assert judged(world, {"verdict": verdict, "effects": [], "explanations": explanations}) is good
