@@ -10,6 +10,7 @@ import panel as pn
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.app.parts import WIDE, button, heading
 from bns.app.screens.working import Working
+from bns.app.switches import Term
 from bns.app.tab import Tab
 from bns.diagnose.report.plain_language import certainty, headline
 
@@ -17,7 +18,9 @@ from bns.diagnose.report.plain_language import certainty, headline
 class DiagnosisPart:
     """``found``: called when there is something new to show; ``switch_on``: with the effects that were found."""
 
-    def __init__(self, tab: Tab, found: Callable[[], None], switch_on: Callable[[tuple[str, ...]], None]) -> None:
+    def __init__(
+        self, tab: Tab, found: Callable[[], None], switch_on: Callable[[tuple[str, ...], tuple[Term, ...]], None]
+    ) -> None:
         self._tab, self._found, self._switch_to = tab, found, switch_on
         self._work = Working("Diagnose in the background", self._start, lambda: tab.diagnosis, self._show)
         self._switch_on = button("Switch on what it found", self._take)
@@ -53,10 +56,12 @@ class DiagnosisPart:
     def _take(self) -> None:
         result = self._tab.diagnosis.result
         if result is not None:
-            self._switch_to(result.effects)
+            terms = tuple(Term(t.name, t.term, t.on) for t in result.diagnosis.terms)
+            self._switch_to(result.effects, terms)
 
     def _show(self, result: DiagnoseResult) -> None:
-        self._switch_on.disabled = not result.effects
+        self._switch_on.disabled = not (result.effects or result.diagnosis.terms)
         said, sure = escape(headline(result.diagnosis)), escape(certainty(result.diagnosis))
-        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}</p>"
+        words = "".join(f"<br>It looks like this: {escape(each)}." for each in result.diagnosis.terms_in_words)
+        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}{words}</p>"
         self._found()

@@ -95,12 +95,14 @@ class EffectsScreen:
             self._tab.history.to(self._tab.now.switched(name, on))
             self.update()
 
-    def _switch_to(self, names: tuple[str, ...]) -> None:
+    def _switch_to(self, names: tuple[str, ...], terms: tuple[Term, ...]) -> None:
         state = self._tab.now
         for name in names:
             state = state if name in state.on else state.switched(name, True)
+        for term in terms:
+            state = state.with_term(term)
         self._tab.history.to(state)
-        self.update()
+        self._after_walk()
 
     def _go_to(self, state: Switches) -> None:
         self._tab.history.to(state)

@@ -95,8 +95,8 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "verdict": d.verdict,
         "headline": headline(d),
         "certainty": certainty(d),
-        "numbers": numbers_in_words(d.selection.fit, d.effects) if d.selection is not None else [],
-        "formula": _formula(d),
+        "numbers": numbers_in_words(d.selection.fit, d.effects, d.numbers) if d.selection is not None else [],
+        "terms": _terms(d),
         "improvement": tables.improvement_text(d),
         "competing_models": _competing_models(m),
         "paths": Markup(json.dumps(m.paths, separators=(",", ":")).replace("<", "\\u003c")) if m.paths else "",
@@ -127,11 +127,19 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
     return {**values, "contents": [*shown, ("next", "next experiment"), ("details", "details")]}
 
 
-def _formula(d: Diagnosis) -> dict[str, str] | None:
-    if d.formula is None:
-        return None
-    values = ", ".join(f"{name} = {value:.3g}" for name, value in d.formula.values.items())
-    return {"on": d.formula.on, "term": d.formula.term, "numbers": values}
+def _terms(d: Diagnosis) -> list[dict[str, str]]:
+    """What no effect explains, in words and as formulas that can be added; where there is none, a formula that was found."""
+    terms = d.terms or ((d.formula,) if d.formula else ())
+    words = d.terms_in_words or ("A formula was found that explains a part of it",) * len(terms)
+    return [
+        {
+            "words": said,
+            "on": term.on,
+            "term": term.term,
+            "numbers": ", ".join(f"{name} = {value:.3g}" for name, value in term.values.items()),
+        }
+        for said, term in zip(words, terms, strict=True)
+    ]
 
 
 def _competing_models(m: Material) -> list[dict[str, str]]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from bns.diagnose.design.competing_models import without_last
@@ -39,8 +42,13 @@ def _digits(size: float) -> int:
     return int(np.clip(1 - np.floor(np.log10(max(size, 1e-12))), 0, 8))
 
 
-def numbers_in_words(fit: Fit, names: tuple[str, ...]) -> list[dict[str, str]]:
-    """Each number of some effects: effect, what it is, value, interval, and the value as the model file has it."""
+def numbers_in_words(
+    fit: Fit, names: tuple[str, ...], numbers: Mapping[str, Mapping[str, Mapping[str, Any]]] | None = None
+) -> list[dict[str, str]]:
+    """Each number of some effects: effect, what it is, value, interval, and the value as the model file has it.
+
+    ``numbers``: by effect and parameter, in the place of those of the fit.
+    """
     texts = {(f.effect, f.parameter.name): f.parameter.text for f in fit.free}
     return [
         {
@@ -52,7 +60,7 @@ def numbers_in_words(fit: Fit, names: tuple[str, ...]) -> list[dict[str, str]]:
             ),
             "exact": f"{n['value']:.6g} {n['unit'] if n['unit'] != '1' else ''}".strip(),
         }
-        for effect, values in numbers_of(fit).items()
+        for effect, values in (numbers_of(fit) if numbers is None else numbers).items()
         if effect in names
         for name, n in values.items()
     ]

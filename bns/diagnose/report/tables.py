@@ -145,7 +145,7 @@ def exact_table(d: Diagnosis) -> Table:
     assert d.selection is not None
     rows = [
         [effect, name, *(f"{n[k]:.6g}" if n[k] is not None else "" for k in ("value", "se", "low", "high")), n["unit"]]
-        for effect, numbers in numbers_of(d.selection.fit).items()
+        for effect, numbers in d.numbers.items()
         for name, n in numbers.items()
     ]
     return _table(["effect", "number", "value", "standard error", "95 % from", "to", "unit"], rows)
@@ -171,8 +171,9 @@ def next_commands(d: Diagnosis, p: Proposal | None, command: Mapping[str, str]) 
     out = []
     if d.effects:
         out.append(f"bns add {data} {' '.join(d.effects)} {model} -o extended.yaml")
-    if d.formula is not None:
-        out.append(f"bns add {data} found --term '{d.formula.term}' --on {d.formula.on} {model} -o extended.yaml")
+    for term in d.terms or ((d.formula,) if d.formula else ()):
+        base = "--model extended.yaml" if out else model
+        out.append(f"bns add {data} {term.name} --term '{term.term}' --on {term.on} {base} -o extended.yaml")
     if p is not None and len(p.plan):
         out.append(f"bns propose {data} {model} -o next.csv")
         out.append("bns trial --robot khepera --rig RIG.yaml --commands next.csv")
