@@ -124,7 +124,7 @@ def test_a_log_without_a_mapping_is_answered_with_a_draft(tmp_path):
     other.write_bytes(LOG.read_bytes())
     tab = Tab()
     with pytest.raises(DataError, match="lack"):
-        tab.upload({"../other.csv": other.read_bytes()})
+        tab.upload(tab.keep({"../other.csv": other.read_bytes()}))
     assert (tab.folder / "other.csv").is_file()
     assert "columns:" in draft_for(other)
     tab.open(other, "other.csv", mapping_of((FOLDER / "khepera-log.csv.import.yaml").read_text()))

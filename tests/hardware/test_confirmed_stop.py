@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bns.hardware.reply_time import ReplyTime
+from bns.hardware.link.reply_time import ReplyTime
 
 from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.platform import Driven

@@ -111,7 +111,7 @@ def test_the_operator_is_asked_until_the_answer_makes_sense(capsys):
 
 
 def test_with_nobody_there_a_misplaced_robot_pauses_the_trial():
-    with pytest.raises(TrialPausedError, match=r"stands 30 cm away, and with --yes nobody .*--resume"):
+    with pytest.raises(TrialPausedError, match=r"stands 30 cm away, and with --yes there is no operator .*--resume"):
         UnattendedOperator().place(np.zeros(3), "The robot stands 30 cm away")
     assert UnattendedOperator().accept("", ()) == ("next", ())
 

@@ -215,7 +215,7 @@ def test_given_cycles_are_driven_and_held_against_a_model(tmp_path, capsys):
     table = pd.read_csv(found)
     assert table.groupby("trial")["cycle"].max().to_dict() == {1: 2, 2: 1}
     np.testing.assert_allclose(table[list(GAIT)].dropna().drop_duplicates(), [GENTLE[:4]], atol=1e-6)
-    assert call("compare", found, "--model", "snake") == 0
+    assert call("compare", found, "--model", "snake-networks") == 0
     assert "2 trials, 6 tracked poses, model snake" in capsys.readouterr().out  # a begin and an end of each cycle
 
 

@@ -26,6 +26,11 @@ class Hands:
     def __init__(self):
         self.placed = []
 
+    wants_picture = False
+
+    def arm(self, _what):
+        pass
+
     def place(self, _start, why):
         self.placed.append(why)
 
@@ -87,7 +92,7 @@ def test_another_servo_and_another_evaluation_are_other_causes(driver):
 
 
 def test_with_nobody_there_it_pauses_once_and_goes_on_with_what_the_second_attempt_gives(driver):
-    with pytest.raises(TrialPausedError, match="servo 9 is stuck, and with --yes nobody can put it back"):
+    with pytest.raises(TrialPausedError, match="servo 9 is stuck, and with --yes there is no operator to put it back"):
         driver(drives("servo 9"), UnattendedOperator()).evaluate(1, CYCLES)
     assert past_evaluations(driver.path) == []
     kept = driver(drives("servo 9"), UnattendedOperator()).evaluate(1, CYCLES)
