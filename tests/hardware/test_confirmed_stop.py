@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bns.hardware.link.reply_time import ReplyTime
 
 from bns.hardware.link.hardware_log import HardwareLog, events
+from bns.hardware.link.reply_time import ReplyTime
 from bns.hardware.platform import Driven
 from bns.hardware.rig import shipped_rig
 from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
@@ -113,7 +113,7 @@ def test_a_drive_is_on_the_disk_before_anybody_is_asked_about_it(tmp_path):
         there.extend(event["kind"] for event in events(path))
         return Decision("next")
 
-    operator = SimpleNamespace(accept=asked, place=lambda *_: None)
+    operator = SimpleNamespace(accept=asked, place=lambda *_: None, arm=lambda _what: None, wants_picture=False)
     log = HardwareLog(path, clock)
     TrialDriver(platform, operator, shipped_rig("khepera"), np.zeros(3), clock, log).evaluate(1, commands)
     assert "driven" in there

@@ -59,7 +59,7 @@ def driver(tmp_path):
     def build(platform, operator):
         stuck = stuck_before(path)
         logs.append(HardwareLog(path, clock))
-        return TrialDriver(platform, operator, shipped_rig("snake"), np.zeros(3), clock, logs[-1], stuck)
+        return TrialDriver(platform, operator, shipped_rig("snake"), np.zeros(3), clock, logs[-1], stuck=stuck)
 
     build.path = path
     yield build
