@@ -237,9 +237,10 @@ def test_the_next_experiment_is_drawn_in_an_arena(page):
     go(page, "Next", "#bns-commands")
     page.get_by_role("link", name="Save the session").wait_for()  # what follows stands still from here on
     picture = page.locator(".bk-Figure").first
-    picture.scroll_into_view_if_needed()
     before = page.get_by_label("x from (m)").input_value()
     for _ in range(20):  # a drag while the page still grows misses the picture
+        picture.evaluate("element => element.scrollIntoView({block: 'center'})")
+        page.wait_for_timeout(300)
         box = picture.bounding_box()
         page.mouse.move(box["x"] + 0.2 * box["width"], box["y"] + 0.25 * box["height"])
         page.mouse.down()

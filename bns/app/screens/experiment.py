@@ -42,7 +42,7 @@ class ExperimentPart:
         )
         self._trial.param.watch(lambda _event: self._show_trial(), "value")
         self._time.param.watch(lambda event: self._picture.at(self._frame_s * event.new), "value")
-        self._table, self._save = html(), html()
+        self._table, self._save, self._floor = html(), html(), pn.Column(**WIDE)
         self._work = Working("Propose the next experiment", self._begin, lambda: tab.experiment, self._show)
         self._found = pn.Column(**WIDE)  # a picture that is hidden has no size to begin with, which Bokeh complains of
         controls = pn.Column(
@@ -54,19 +54,20 @@ class ExperimentPart:
             self._found,
             **WIDE,
         )
-        self.view = pn.Column(
-            heading("The next experiment"), beside(drawn(self._picture.figure), controls, least=330), **WIDE
-        )
+        self.view = pn.Column(heading("The next experiment"), beside(self._floor, controls, least=330), **WIDE)
 
     def enter(self) -> None:
         """Where the robot was seen, and the proposal as it stands."""
         bench = self._tab.bench
         if bench is None:
             return
+        self._picture = ArenaFigure(self._draw)  # a picture that was taken off the page hears the mouse no more
+        self._floor.objects = [drawn(self._picture.figure)]
+        places = bench.ready.predictor.tracks.pose[:, :2]
+        self._picture.seen(places)
+        self._picture.arena(self._arena())
         if bench is not self._bench:
             self._bench, self._found.objects = bench, []
-            places = bench.ready.predictor.tracks.pose[:, :2]
-            self._picture.seen(places)
             low, high = np.quantile(places, [0.005, 0.995], axis=0)
             self._draw((float(low[0]), float(high[0]), float(low[1]), float(high[1])))
         self._work.enter()
