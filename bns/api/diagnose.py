@@ -62,9 +62,18 @@ class DiagnoseResult(Shown):
 
     @property
     def model(self) -> Model:
-        """The model refitted with these effects; the model as it was where there was too little to fit."""
+        """The model refitted with these effects; the model as it was where there was too little to fit.
+
+        Where terms describe what is left, `parameters` are fitted beside these and stand in `model_with_terms`.
+        """
         fitted = self.diagnosis.model
         return self.ready.model if fitted is None else Model(fitted)
+
+    @property
+    def model_with_terms(self) -> Model | None:
+        """The model with the effects and the terms that describe what no effect explains; None where there are none."""
+        fitted = self.diagnosis.model_with_terms
+        return None if fitted is None else Model(fitted)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from bns.sweep.expand.grid import Sweep as Described
 from bns.sweep.expand.grid import load_sweep, parse_sweep
 from bns.sweep.expand.shard import Shard
 from bns.sweep.forecast.plan import Plan
-from bns.sweep.forecast.plan import plan as foretell
+from bns.sweep.forecast.plan import plan as forecast
 from bns.sweep.report import planned, summed_up
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
@@ -204,7 +204,7 @@ class Sweep(Shown):
     def plan(self, results: _Path = "results", *, jobs: int | None = None) -> SweepPlan:
         """What is left to do and what it would take; nothing is written. Without stored runs one short run is timed."""
         place = load_executor("joblib").placement(Request(results=Path(results), jobs=jobs))
-        return SweepPlan(foretell(self._described, Path(results), place.workers), place)
+        return SweepPlan(forecast(self._described, Path(results), place.workers), place)
 
     def status(self, results: _Path = "results") -> pd.DataFrame:
         """A row a task: sweep, task, done, failed, quarantined, total, remaining, mean_wall_s (s), last (when a run began)."""

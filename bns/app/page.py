@@ -36,7 +36,7 @@ ICON = (
 
 
 class Screens:
-    """The screens of a tab; what is shown is made anew when it is entered."""
+    """The screens of a tab; a screen is drawn again when it is entered."""
 
     def __init__(self, tab: Tab, name: str) -> None:
         self._said = html('<p class="bns-say" role="status"></p>')

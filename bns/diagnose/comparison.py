@@ -1,4 +1,4 @@
-"""A model held against measurements, nothing fitted: how far it is off, and where."""
+"""A model compared with measurements, nothing fitted: how far it is off, and where."""
 
 from __future__ import annotations
 

@@ -87,8 +87,16 @@ class Diagnosis:
 
     @property
     def model(self) -> Model | None:
-        """The model refitted with all accepted effects."""
+        """The model refitted with all accepted effects, without the terms: `errors` are of it.
+
+        Where there are terms its numbers differ from `numbers`, which `model_with_terms` has.
+        """
         return self.selection.fit.model if self.selection else None
+
+    @property
+    def model_with_terms(self) -> Model | None:
+        """The model with the effects and all terms, fitted together: `errors_with_terms` are of it; None without terms."""
+        return self.terms[0].fit.model if self.terms else None
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""

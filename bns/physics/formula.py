@@ -80,7 +80,7 @@ def formula_effect(
     Args:
         columns: names of the log's further columns, which the term may use.
         numbers: names of its numbers where a model file lists them; all names that are neither these nor could be numbers are
-            columns then, to be found in whatever log the model is held against.
+            columns then, to be found in whatever log the model is compared with.
 
     Raises:
         ModelError: the term does not parse, uses anything but arithmetic, `FUNCTIONS` and names, has an unknown name (the message

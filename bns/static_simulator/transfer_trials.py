@@ -99,7 +99,7 @@ def outcome(robot: Robot, task: Task, poses: np.ndarray, planned: int) -> str:
 
 
 def random_drives(robot: Robot, world: World, progress: Callable[[int, int], None] = lambda done, of: None) -> pd.DataFrame:
-    """Random controllers in the world, as a table of measurements: what a simulator is held against without favour."""
+    """Random controllers in the world, as a table of measurements: what a simulator is compared with."""
     key, rows = Key.of_run(0, 0, robot.name, "random drives"), []
     controllers = robot.random_controllers(key, RANDOM, COMMANDS)
     for i in range(RANDOM):

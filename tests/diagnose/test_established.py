@@ -9,7 +9,7 @@ from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals.established import established, left_over
+from bns.diagnose.residuals.established import _State, _step, established, left_over
 from bns.diagnose.residuals.grammar import families, ranked, rounding, significant
 from bns.diagnose.residuals.words import in_words
 from bns.physics.formula import formula_effect
@@ -49,6 +49,16 @@ def test_what_is_there_stands_where_nothing_is_left():
     assert not left_over(found.problem, found.fit)
 
 
+def test_a_curve_that_predicts_better_for_certain_comes_before_an_effect_that_imitates_it():
+    predictor = predictor_of(warming())
+    problem = problem_for(predictor, NOMINAL)
+    left = {"speed-gain": listed(NOMINAL, None, predictor.tracks)["speed-gain"]}
+    grammar = families(predictor, NOMINAL.wheelbase_m)
+    following = _step(predictor, _State(problem, problem.fit(NOMINAL)), left, grammar, 0.01)
+    assert following.names == ()
+    assert [term.signal for term in following.terms] == ["time in the trial"]
+
+
 def test_an_effect_that_keeps_little_of_its_gain_beside_the_term_is_out():
     predictor = predictor_of(hidden(backlash={"gap_m": 0.005}), speeds=BOTH_WAYS, commands=8, trials=30)
     found = stands(predictor, "motor-lag")
@@ -60,11 +70,14 @@ def test_an_effect_that_keeps_little_of_its_gain_beside_the_term_is_out():
 
 def test_a_diagnosis_lists_what_imitates_apart_and_offers_the_term_with_its_error():
     table = measured(warming(), trials=24, seed=3)
-    answer = diagnose(WheelPredictor(tracks_of(table)), NOMINAL, barred=("warm-up",)).as_json()
+    found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL, barred=("warm-up",))
+    answer = found.as_json()
     assert (answer["verdict"], answer["effects"], answer["parameters"]) == ("unlisted", [], {})
     assert answer["imitating"]
     assert re.match(r"slower by 1\d\.\d+% at 0 s of a trial", answer["terms"][0]["in_words"])
     assert answer["formula"]["term"] == answer["terms"][0]["term"]
+    term = answer["terms"][0]
+    assert found.model_with_terms.values_of(term["name"]) == term["values"]
     error = answer["error_with_terms"]["trial"]
     assert error["change_high"] < 0
     assert error["after"] < 0.6 * error["before"]

@@ -24,8 +24,6 @@ NO_SETTINGS = {
     ("predict/wheels.py", "_KEPT"): "the size of a cache: the answers are the same for any",
     ("report/page.py", "_PIXELS_IN_POINT"): "layout",
     ("report/plain_language.py", "_UNITS"): "factors between units, by definition",
-    ("residuals/outliers.py", "_NORMAL"): "the median of a standard normal number's size",
-    ("residuals/worst_trials.py", "_NORMAL"): "the median of a standard normal number's size",
     ("residuals/words.py", "_POINTS"): "points at which a curve is evaluated to be put in words",
 }
 """Numbers that stand in a module, and why they decide nothing that could be decided otherwise."""

@@ -54,7 +54,7 @@ class EffectsScreen:
         self._bench: object = None
 
     def enter(self) -> None:
-        """Shown anew: another log or model brings other effects."""
+        """Drawn again: another log or model brings other effects."""
         bench = self._tab.bench
         if bench is None:
             self._problem.show(self._tab.why_no_bench or "Open a log first: the screen Data.")

@@ -1,4 +1,4 @@
-"""Which model is held against the log: one of the catalogue, a YAML file, or a drive whose wheelbase the data suggest."""
+"""Which model is compared with the log: one of the catalogue, a YAML file, or a drive whose wheelbase the data suggest."""
 
 from __future__ import annotations
 

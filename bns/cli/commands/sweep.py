@@ -51,7 +51,7 @@ def sweep(options: argparse.Namespace) -> int:
     from bns.sweep.confirm import in_turn
     from bns.sweep.executors import load_executor
     from bns.sweep.expand.grid import load_sweep
-    from bns.sweep.forecast.plan import plan as foretell
+    from bns.sweep.forecast.plan import plan as forecast
     from bns.sweep.progress import SweepProgress
     from bns.sweep.report import planned, summed_up
 
@@ -63,7 +63,7 @@ def sweep(options: argparse.Namespace) -> int:
         if options.dry_run:
             place = backend.placement(request)
             for one in sweeps:
-                estimate = foretell(
+                estimate = forecast(
                     one, options.results, place.workers, options.shard, retry_failed=options.retry_failed
                 )
                 print(planned(estimate, place))

@@ -22,6 +22,7 @@ WIDTH = DEFAULTS.data.parabola_frames
 ORDER = DEFAULTS.data.parabola_order
 SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
 _NORMAL = 0.6745
+"""Median of a standard normal number's size."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +73,12 @@ def _centred(pose: Array) -> Array:
 
 def _pooled(parts: list[Array], basis: str) -> TrackingNoise:
     off = np.concatenate(parts)
-    position = float(np.median(np.abs(off[:, :2]))) / _NORMAL  # of single marker faults the median takes no notice
-    return TrackingNoise(position, float(np.median(np.abs(off[:, 2]))) / _NORMAL, basis)
+    return TrackingNoise(float(robust_sd(off[:, :2])), float(robust_sd(off[:, 2])), basis)
+
+
+def robust_sd(off: Array, axis: int | None = None) -> Array:
+    """Standard deviation about zero by the median of the sizes: single faults of a marker do not count."""
+    return np.asarray(np.median(np.abs(off), axis=axis) / _NORMAL)
 
 
 def _high_frequency(tracks: Tracks) -> TrackingNoise | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
+from bns.diagnose.data.tracking_noise import robust_sd
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS
@@ -66,7 +67,7 @@ def _scatter(apart_m: Array | None) -> Array | None:
     """Standard deviations (k,) of distances that are off by apart_m (frames, k), by their medians."""
     if apart_m is None:
         return None
-    return np.maximum(np.median(np.abs(apart_m), axis=0) / 0.6745, _LEAST_APART_M)
+    return np.maximum(robust_sd(apart_m, axis=0), _LEAST_APART_M)
 
 
 def estimate_noise(predictor: Predictor, steps: Steps, start: Array | None = None) -> Array:

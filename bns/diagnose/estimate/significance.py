@@ -47,7 +47,7 @@ def sign_flip_p(scores: Array, curvature: Array) -> float:
     """Chance that trials without the effect pull together as these do.
 
     ``scores`` (trials, k): each trial's gradient in the k numbers under test. Were nothing there, each trial would be as
-    likely to pull the other way: the statistic g' H^-1 g of the sum g is held against itself with the signs of
+    likely to pull the other way: the statistic g' H^-1 g of the sum g is compared with itself with the signs of
     whole trials drawn by lot. Exact whatever the scatter inside and between trials, heavy tails included.
     """
     sizes, directions = np.linalg.eigh(np.linalg.pinv(curvature, hermitian=True))

@@ -1,4 +1,4 @@
-"""Simulator networks of a robot that is driven in cycles, held against measurements of its markers."""
+"""Simulator networks of a robot that is driven in cycles, compared with measurements of its markers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A body on joints held against tracks of its sites: every stretch is simulated from where the robot was seen."""
+"""A body on joints compared with tracks of its sites: every stretch is simulated from where the robot was seen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run's simulator networks as a model that is held against measurements.
+"""A run's simulator networks as a model that is compared with measurements.
 
 Networks predict a whole command at once, so the tracks are looked at where commands begin and end.
 """

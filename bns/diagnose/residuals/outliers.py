@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from bns.diagnose.data.tracking_noise import robust_sd
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.settings import DEFAULTS
 
@@ -23,8 +24,6 @@ JUMP = DEFAULTS.residuals.fault_jump
 WAYS = DEFAULTS.residuals.fault_ways
 TURN = DEFAULTS.residuals.fault_turn
 _CLIP = DEFAULTS.residuals.clip
-_NORMAL = 0.6745
-"""Median of a standard normal number's size."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ def outliers(problem: Problem, fit: Fit) -> list[Outlier]:
         return []
     whitened = np.clip(fit.whitened, -_CLIP, _CLIP)
     sums = whitened[start[:, None] + np.arange(WIDTH)].sum(axis=1) / np.sqrt(WIDTH)
-    usual = np.median(np.abs(sums), axis=0) / _NORMAL
+    usual = robust_sd(sums, axis=0)
     size = np.abs(sums / np.maximum(usual, 1e-9)).max(axis=1)
     order = [i for i in np.argsort(-size) if size[i] > FAR]
     worst = {int(tracks.trial[start[i]]): i for i in reversed(order)}

@@ -1,7 +1,7 @@
 """Trials that are unlike the rest as a whole: somebody pushed the robot, a wheel was loose, the tracker held something else.
 
 A robust loss bounds what one frame does, not what a whole trial does; a few bad trials widen the noise that is estimated and
-hide what all others show. They stand out by their mean loss a frame, held against how that varies among trials.
+hide what all others show. They stand out by their mean loss a frame, compared with how that varies among trials.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bns.diagnose.data.tracking_noise import robust_sd
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.settings import DEFAULTS
 
 SHARE = DEFAULTS.residuals.worst_share
 FAR = DEFAULTS.residuals.worst_far
-_NORMAL = 0.6745
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def standing_out(problem: Problem, fit: Fit) -> NDArray[np.int64]:
     frames = np.diff(problem.predictor.tracks.first)
     usual = np.log(np.maximum(fit.held_out / np.maximum(frames, 1), 1e-12))
     off = usual - np.median(usual)
-    spread = max(float(np.median(np.abs(off))) / _NORMAL, 1.0 / np.sqrt(float(np.median(frames))))
+    spread = max(float(robust_sd(off)), 1.0 / np.sqrt(float(np.median(frames))))
     order = np.argsort(-off)
     wild = order[off[order] > FAR * spread]
     return wild if len(wild) <= most_left_out(len(frames)) else wild[:0]

@@ -8,7 +8,7 @@ from typing import TypeVar
 T = TypeVar("T")
 
 BY_HAND = "chosen by hand; not measured"
-"""The honest reason of a number that nobody has held against others."""
+"""The honest reason of a number that nobody has compared with others."""
 
 
 def setting(value: T, unit: str, why: str) -> T:

@@ -1,4 +1,4 @@
-"""One of the snake's servos by itself, turning a pendulum: the model of the servo held against a real one's log."""
+"""One of the snake's servos by itself, turning a pendulum: the model of the servo compared with a real one's log."""
 
 from __future__ import annotations
 
