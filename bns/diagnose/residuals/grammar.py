@@ -20,7 +20,7 @@ from bns.diagnose.estimate.significance import MIN_Z, PairedComparison
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.along_variables import earned_by_columns, losses_with_columns
 from bns.diagnose.settings import DEFAULTS
-from bns.physics.formula import SHARE, WHEELS, formula_effect
+from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, formula_effect
 
 NAME = "unlisted"
 PLACE, STEPPED = "place", "speed in steps"
@@ -69,8 +69,11 @@ def families(predictor: Predictor, wheelbase_m: float) -> list[Family]:
     if "left_m_s" not in seen:
         return []
     wheels = np.concatenate([seen["left_m_s"].ravel(), seen["right_m_s"].ravel()])
+    of_speed = _of_speed(float(np.abs(wheels).max()), bool((wheels < 0.0).any()))
     found = [
-        Family("speed of each wheel", WHEELS, _of_speed(float(np.abs(wheels).max()), bool((wheels < 0.0).any()))),
+        Family("speed of each wheel", WHEELS, of_speed),
+        Family("speed of the left wheel", LEFT, of_speed),
+        Family("speed of the right wheel", RIGHT, of_speed),
         Family("speed and turn", "v", ("v * w", "v * w**2", "v * abs(v)", "v**3", "moving * abs(w)")),
         Family("speed and turn", "w", ("w * abs(w)", "w * abs(v)", "w**3", "w * v**2", "w * v", "v * abs(w)")),
         Family("speed and turn", "s", ("v * w * abs(w)", "v * w * abs(v)", "w")),
@@ -93,6 +96,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0:
         ways = [share * wheelbase_m for share in REVERSAL_KNOTS]
         yield Family("way since each wheel reversed", WHEELS, tuple(f"u * {h}" for h in _hats("since", ways)[:-1]))
+    yield Family("recent work of each wheel", WHEELS, ("u * lately10", "u * lately100"))
     yield Family("direction of motion", SHARE, tuple(_hats("swing", SWING_KNOTS)[1:]))
     longest = float(seen["time_in_trial_s"].max())
     times = [share * longest for share in TIME_KNOTS]
