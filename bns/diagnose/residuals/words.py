@@ -88,6 +88,9 @@ def _speed(term: Formula, predictor: Predictor) -> str:
     fastest = float(max(np.abs(seen["left_m_s"]).max(), np.abs(seen["right_m_s"]).max()))
     at = fastest * np.array([0.1, 0.3, 1.0])
     got = at + _curve(term, "u", at, since=NEVER_M)
+    back = -fastest + _curve(term, "u", np.array([-fastest]), since=NEVER_M)
+    if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0 and abs(back[0] + got[-1]) > 0.01 * fastest:
+        at, got = np.append(at, -fastest), np.append(got, back)
     pairs = ", ".join(f"{a:.3g} m/s gives {b:.3g} m/s" for a, b in zip(at, got, strict=True))
     whose = {LEFT: "the left wheel", RIGHT: "the right wheel"}.get(term.on, "a wheel")
     return f"{whose}'s speed is not in proportion to its command: {pairs}"

@@ -130,6 +130,12 @@ class Residuals:
         "Bends of a curve along a wheel's way since it changed direction: play in gears is a few hundredths of a wheelbase; "
         "it is nothing at the last one.",
     )
+    surface_knots: tuple[tuple[float, ...], tuple[float, ...]] = setting(
+        ((0.0, 0.4, 1.0), (0.0, 0.3, 0.6, 1.0)),
+        "of the highest speed, and of the sharpest turn",
+        f"Knots of a free surface over both, as many as a formula may be long; {BY_HAND}. With them a robot that slides "
+        "beyond a lateral acceleration is described.",
+    )
     swing_knots: tuple[float, ...] = setting(
         (0.0, 0.1, 0.3, 0.6, 1.0),
         "1",
