@@ -13,13 +13,13 @@ from functools import cache, partial
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.parallel import each
+from bns.diagnose.estimate.plausibility import at_bound, implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import MIN_Z
 from bns.diagnose.estimate.starts import best_start, fit_with, listed
 from bns.diagnose.estimate.trial_clock_test import TrialClocks, compare_clocks, fit_trial_clocks, with_shared_clock
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.indistinguishable import indistinguishable
-from bns.diagnose.select.plausibility import at_bound, implausible
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
 from bns.diagnose.select.screening import screened, worth_a_fit
 from bns.diagnose.settings import DEFAULTS
@@ -46,8 +46,9 @@ class StepwiseSelection:
         extra: Mapping[str, Effect] | None = None,
         tick: Callable[[str], None] = lambda _: None,
         barred: Collection[str] = (),
+        alone: Callable[[Candidate], None] = lambda _: None,
     ) -> None:
-        self.predictor, self.model, self.tick = predictor, model.arranged(), tick
+        self.predictor, self.model, self.tick, self.alone = predictor, model.arranged(), tick, alone
         self._extra, self._barred = extra, barred
         self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
@@ -186,7 +187,10 @@ class StepwiseSelection:
     def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
         self.tick(effect.name)
         added = fit_with(problem, fit, effect)
-        return Candidate(effect.name, added, problem.paired_comparison(fit, added), self._rejected(added, effect.name))
+        found = Candidate(effect.name, added, problem.paired_comparison(fit, added), self._rejected(added, effect.name))
+        if len(added.model.effects) == len(self.model.effects) + 1 and effect.name in self.catalogue:
+            self.alone(found)
+        return found
 
     def _earned(self, candidate: Candidate, before: Fit, decoy_threshold: float) -> bool:
         e = candidate.paired_comparison
