@@ -1,4 +1,4 @@
-"""Draw the figures: ``python -m analysis --results results [--only NAME] [--out results/figures]``."""
+"""Draw the figures: ``python -m analysis --results results [--from published] [--only NAME] [--out results/figures]``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rich.progress import track
 from analysis.gallery import write_page
 from analysis.labels import source_position
 from analysis.publish import forget_all_but, forget_skipped, publish_figure, publish_skipped
-from analysis.results import NoDataError, Results
+from analysis.results import PUBLISHED, NoDataError, Results
 from bns.errors import BnsError, SpecError
 from bns.registry import FIGURES
 
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if wanted.run is not None:
             modules = {name: module for name, module in modules.items() if getattr(module, "OF_A_RUN", False)}
         if not wanted.page:
-            failed = not _draw_all(modules, Results(wanted.results, wanted.run), out, everything=wanted.only is None)
+            failed = not _draw_all(modules, _source(wanted), out, everything=wanted.only is None)
         print(f"page: {write_page(out, wanted.refresh)}")
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -59,9 +59,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(failed or bool(broken))
 
 
+def _source(wanted: argparse.Namespace) -> Results:
+    """The runs, or an archive of them."""
+    if wanted.archive is None:
+        return Results(wanted.results, wanted.run)
+    place = wanted.results / PUBLISHED if wanted.archive == "published" else Path(wanted.archive)
+    return Results(place, wanted.run, archived=True)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m analysis", description="Draw figures from stored results.")
     parser.add_argument("--results", type=Path, default=Path("results"), help="folder of the results (results)")
+    parser.add_argument(
+        "--from", dest="archive", metavar="FILE", help="draw from an archive (bns archive) instead; published: RESULTS/published"
+    )
     parser.add_argument("--only", metavar="NAME", help="one figure: " + ", ".join(FIGURES.names()))
     parser.add_argument("--run", metavar="ID", help="figures and table rows of one run alone")
     parser.add_argument("--out", type=Path, help="folder of the figures (RESULTS/figures)")

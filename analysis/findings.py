@@ -31,9 +31,12 @@ def draw(store: Results) -> list[FigureResult]:
     return [_drawn(store, chosen, table) for chosen, table in found]
 
 
-def checked(store: Results, chosen: Selection) -> pd.DataFrame:
-    """One row a finding and task: the dissertation's words, ours, verdict, section; one row a task with too few runs."""
-    ready = _with_enough_runs(store, chosen)
+def checked(store: Results, chosen: Selection, *, early: bool = False) -> pd.DataFrame:
+    """One row a finding and task: the dissertation's words, ours, verdict, section; one row a task with too few runs.
+
+    ``early``: findings of such a task have a row each as well, with the estimates that there are.
+    """
+    ready = set(chosen.tasks) if early else _with_enough_runs(store, chosen)
     numbers = {task_number(chosen.robot, task): task for task in chosen.tasks}
     made, waiting = [], Counter[int]()
     for finding in (one for one in source()["findings"] if one["robot"] == chosen.robot):

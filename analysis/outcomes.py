@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import pandas as pd
 
 from analysis.labels import CELL
-from analysis.results import Results, remembered
+from analysis.results import Results, among, remembered
 from analysis.selection import Selection
 from bns.store.schema import NEAR_CM
 
@@ -17,7 +17,7 @@ FEWEST = 5
 """Runs behind a curve or dot; thinner ones jump between 0 and 100 % and are left out."""
 FEWEST_PLANNED = 2
 """Runs behind a dot of a sweep that asks for no more: less can never be drawn of it, and the intervals say how little that is."""
-_KEPT = ("success", *NEAR, "diversity", "fitness_error", "fitness_world")
+_KEPT = ("success", *NEAR, "ever_success", "diversity", "fitness_error", "fitness_world")
 
 
 def fewest(store: Results, chosen: Selection) -> int:
@@ -28,7 +28,7 @@ def fewest(store: Results, chosen: Selection) -> int:
 
 def outcomes(store: Results, chosen: Selection) -> str:
     """Name of a table with a row an evaluation: task, the four parameters, seed, root_seed, evaluation, whether it is the
-    run's last, successes of the fittest controller, diversity, fitness_error, fitness_world."""
+    run's last, successes of the fittest controller, ever_success, diversity, fitness_error, fitness_world."""
     return _kept(store, chosen, "outcomes", "true")
 
 
@@ -88,6 +88,26 @@ def by_seed(store: Results, chosen: Selection, columns: Sequence[str], where: st
         "count(*) FILTER (isfinite(diversity)) AS diversities",
     )
     return _by_seed(store, chosen, columns, where, more)
+
+
+def ever_by_seed(store: Results, chosen: Selection, task: str) -> pd.DataFrame:
+    """As `successes_by_seed` by evaluation, of success so far."""
+    return store.query(f"""SELECT evaluation, root_seed, seed, count(*) AS runs, count(*) FILTER (ever_success) AS successes
+        FROM {outcomes(store, chosen)} WHERE {among("task", [task])} GROUP BY ALL ORDER BY ALL""")
+
+
+def lost_and_regained(store: Results, chosen: Selection, task: str) -> tuple[int, int]:
+    """In how many runs of a task the fittest succeeds (at the widest radius), later misses and succeeds again; all its runs."""
+    near, run = radii_cm(store, chosen), f"{', '.join(CELL)}, root_seed, seed"
+    good = f"success_{near[-1]}cm" if near else "success"
+    found = store.query(f"""
+        WITH known AS (SELECT {run}, evaluation, {good} AS good,
+                              min(evaluation) FILTER ({good}) OVER (PARTITION BY {run}) AS began
+                       FROM {outcomes(store, chosen)} WHERE {among("task", [task])}),
+             runs AS (SELECT min(evaluation) FILTER (NOT good AND evaluation > began) AS lost,
+                             max(evaluation) FILTER (good) AS last FROM known GROUP BY {run})
+        SELECT count(*) FILTER (last > lost) AS regained, count(*) AS runs FROM runs""")
+    return int(found.regained[0]), int(found.runs[0])
 
 
 def _by_seed(store: Results, chosen: Selection, columns: Sequence[str], where: str, more: Sequence[str]) -> pd.DataFrame:

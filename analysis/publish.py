@@ -14,6 +14,8 @@ from analysis.results import Results, among
 from bns.plotting.style import save
 from bns.store.disk.files import publish, remove
 
+DIGITS = "%.12g"
+"""Of numbers in tables: what follows depends on the order in which a database adds up."""
 KINDS = ("png", "svg", "csv", "json")
 
 
@@ -25,7 +27,7 @@ def publish_figure(drawn: FigureResult, paper: str, store: Results, out: Path) -
     """
     files: list[Path] = [*save(drawn.figure, out / drawn.name)] if drawn.figure is not None else []
     if drawn.data is not None:
-        files.append(_put(out / f"{drawn.name}.csv", drawn.data.to_csv(index=False)))
+        files.append(_put(out / f"{drawn.name}.csv", drawn.data.to_csv(index=False, float_format=DIGITS)))
     caption = {
         "name": drawn.name,
         "title": drawn.title,

@@ -15,11 +15,16 @@ from analysis.labels import CELL
 from bns import store as results_store
 from bns.errors import BnsError, SpecError, StoreError
 from bns.spec import FIELDS
+from bns.store.archive.kept import rounded_evals
+from bns.store.archive.read import archives, connect_archives
 from bns.sweep.expand.grid import parse_sweep
 
 BEGIN = "make sweep-khepera BUDGET=10m"
 OF_RUNS = ("runs", "evals", "paths", "generations", "probes")
 """Tables whose rows belong to a run."""
+PUBLISHED = Path("published") / "study.parquet"
+"""The archive in the repository, below the folder of the results."""
+FROM_RUNS = "carry out the sweep and draw it from the runs"
 _TRIES = 5
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -47,15 +52,18 @@ class Plan:
 class Results:
     """The results in one folder as they are now: all figures of one call show the same runs; with ``run``, that run alone.
 
+    The same from an archive (`bns archive`), which has fewer tables and columns. Measures of ``evals`` are rounded to what an
+    archive keeps, so both give the same numbers.
+
     Raises:
         StoreError: there is no run at all, or not this one; the message says what to do.
     """
 
-    def __init__(self, results: Path | str, run: str | None = None) -> None:
-        self.results, self.run = Path(results), run
+    def __init__(self, results: Path | str, run: str | None = None, *, archived: bool = False) -> None:
+        self.results, self.run, self.archived = Path(results), run, archived
         self._tables: dict[str, str] = {}
         self.memory: dict[tuple[Any, ...], Any] = {}
-        written = any((self.results / name).is_dir() for name in ("runs", "journal"))
+        written = archived or any((self.results / name).is_dir() for name in ("runs", "journal"))
         if not written or not self.query("SELECT count(*) AS n FROM runs").n[0]:
             what = "are no runs" if run is None else f"is no run {run}"
             raise StoreError(
@@ -67,6 +75,11 @@ class Results:
         for _ in range(_TRIES):
             try:
                 return self._connection.execute(sql).df()
+            except (duckdb.BinderException, duckdb.CatalogException) as lacking:
+                if not self.archived:
+                    raise
+                what = _first_line(lacking)
+                raise NoDataError(f"an archive does not hold what this is drawn from ({what}); {FROM_RUNS}") from None
             except duckdb.IOException as error:  # a compaction has replaced files: the new ones hold the same rows
                 fault = error
                 self.__dict__.pop("_connection", None)
@@ -81,11 +94,12 @@ class Results:
 
     @cached_property
     def _connection(self) -> duckdb.DuckDBPyConnection:
-        connection = results_store.connect(self.results)
-        if self.run is not None:
-            only = among("run_id", [self.run])
-            for table in OF_RUNS:
-                connection.execute(f"CREATE TEMP VIEW {table} AS SELECT * FROM memory.main.{table} WHERE {only}")
+        connection = connect_archives(archives(self.results)) if self.archived else results_store.connect(self.results)
+        only = "true" if self.run is None else among("run_id", [self.run])
+        for table in OF_RUNS[:2] if self.archived else OF_RUNS:
+            rows = f"memory.main.{table}"
+            rows = f"({rounded_evals(rows)})" if table == "evals" else rows
+            connection.execute(f"CREATE TEMP VIEW {table} AS SELECT * FROM {rows} WHERE {only}")
         for name, sql in self._tables.items():
             connection.execute(f"CREATE TABLE {name} AS {sql}")
         return connection
@@ -98,6 +112,10 @@ class Results:
             "FROM specs GROUP BY sweep ORDER BY sweep"
         )
         return {row.sweep: _plan(row.text, row.runs) for row in newest.itertuples()}
+
+
+def _first_line(fault: Exception) -> str:
+    return str(fault).partition("\n")[0].partition(": ")[2]
 
 
 def _plan(text: str, runs: float) -> Plan:

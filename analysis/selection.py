@@ -14,6 +14,8 @@ from bns.sweep.confirm import confirmed_name
 
 CONFIRMING = confirmed_name("")
 """Ending of the sweeps that rerun the best combinations of another on fresh seeds: they confirm, and compare nothing."""
+READINGS = "readings"
+"""Names of the sweeps that compare readings of the dissertation begin so: at settings of their own, whatever else they vary."""
 SETTING = (
     *("approach", "world", "world_digest", "training_algorithm", "evaluations", "min_commands", "max_commands"),
     *("generations_per_evaluation", "training_iterations_per_evaluation", "engine"),
@@ -73,6 +75,7 @@ def comparing(store: Results, parameter: str | None = None) -> list[str]:
         row.sweep
         for row in rows.itertuples()
         if not row.sweep.endswith(CONFIRMING)
+        and not row.sweep.startswith(READINGS)
         and (row.several or (row.sweep in store.plans and store.plans[row.sweep].varied & {*names}))
     ]
 

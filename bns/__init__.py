@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         TrialPausedError,
     )
     from bns.physics.effect import Effect, Parameter
+    from bns.store.archive.write import archive
     from bns.store.read.reader import load, query
 
 __version__ = "0.2.0"
@@ -76,6 +77,7 @@ __all__ = [
     "TrialResult",
     "__version__",
     "add",
+    "archive",
     "compare",
     "diagnose",
     "effects",
@@ -106,6 +108,7 @@ _HOMES = {
         *("StopNotConfirmedError", "StoreError", "TrialFileError", "TrialPausedError"),
     ),
     "physics.effect": ("Effect", "Parameter"),
+    "store.archive.write": ("archive",),
     "store.read.reader": ("load", "query"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -26,6 +26,8 @@ DISCARDED = "discarded"
 """1 of a drive that whoever watched it did not keep; it is judged by nobody."""
 RUN_UP = "run_up"
 """1 in rows that a trial takes along from before it begins: they hold commands and no poses, and their t_s is below 0."""
+LEFT_OUT = "left_out"
+"""1 in rows whose pose takes no part: their commands stay in force, and nothing is judged across them."""
 COLUMNS = ("trial", "t_s", *COMMANDS, *POSE)
 """A robot on two wheels. trial: number; t_s: since the trial began; wheel-surface speeds; heading counter-clockwise from x."""
 

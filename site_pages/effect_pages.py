@@ -51,7 +51,7 @@ def overview(effects: list[Effect]) -> str:
     """The list of all effects, a table a stage."""
     parts = [_LIST_HEAD]
     for stage, group in groupby(effects, key=lambda effect: effect.stage):
-        rows = [f"| [{e.name}](effects/{e.name}.md) | {e.in_words} | `{_code(e.equation)}` |" for e in group]
+        rows = [f"| [{e.name}](effects/{e.name}.md) | {e.in_words} | {_code(e.equation)} |" for e in group]
         parts.append(
             "\n".join(
                 [
@@ -71,7 +71,7 @@ def joints() -> str:
     loaded = [(name, JOINT_EFFECTS.load(name)) for name in JOINT_EFFECTS.names()]
     parts = [(name, getattr(part, "effect", part)) for name, part in loaded]
     rows = [
-        f"| {name} | {_placed(e.in_words)} | `{_code(e.equation)}` | {_placed(e.measurement)} |" for name, e in parts
+        f"| {name} | {_placed(e.in_words)} | {_code(e.equation)} | {_placed(e.measurement)} |" for name, e in parts
     ]
     head = ["| effect | what happens | equation | confirm it on the bench |", "|---|---|---|---|"]
     return "\n".join([_JOINTS_HEAD, *head, *rows, ""])
@@ -86,7 +86,10 @@ def _placed(text: str) -> str:
 
 
 def _code(text: str) -> str:
-    return text.replace("|", "\\|")
+    """Code in a cell of a table: a bar would end the cell, and between backticks its escape would be shown."""
+    for there, here in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("|", "&#124;"), ("*", "&#42;"), ("_", "&#95;")):
+        text = text.replace(there, here)
+    return f"<code>{text}</code>"
 
 
 def page(effect: Effect, shown: Demonstration) -> str:

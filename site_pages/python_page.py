@@ -13,7 +13,7 @@ Everything that `import bns` offers, from its docstrings. [From Python](../pytho
 _GROUPS = {
     "Measurements and models": ("Measurements", "Model", "Effect", "Parameter", "effects"),
     "Compare, diagnose, extend": ("compare", "diagnose", "add", "propose", "report", "explore"),
-    "Run and sweep": ("run", "Sweep", "trial", "load", "query"),
+    "Run and sweep": ("run", "Sweep", "trial", "load", "query", "archive"),
 }
 """Every other public name stands under "Results" or "Errors"."""
 

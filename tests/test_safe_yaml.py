@@ -42,11 +42,11 @@ def of_parameters(path):
 def test_every_reader_answers_bad_files_in_words_and_at_once(tmp_path, read, bad):
     path = tmp_path / "x.yaml"
     path.write_text(BAD[bad], encoding="utf-8")
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(BnsError) as caught:
         read(path)
     assert 10 < len(str(caught.value)) < 1000
-    assert time.perf_counter() - began < 8
+    assert time.process_time() - began < 8
 
 
 @pytest.mark.parametrize(("read", "error"), [(of_rig, HardwareError), (load_plan, HardwareError), (load_mapping, DataError)])

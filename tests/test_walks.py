@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from bns.cli.main import _parser, main
+from tests.conftest import remembering
 from tests.installed import ROOT, installed, shared_by_workers, without_us
 
 pytestmark = pytest.mark.timeout(1200)  # a page is many commands, and the first of each kind compiles
@@ -57,7 +58,7 @@ class Walk:
         done = subprocess.run(
             [*start, *words[1:]],
             cwd=self.folder,
-            env=without_us(self.package),
+            env=without_us(self.package) | remembering(),
             capture_output=True,
             text=True,
             timeout=600,

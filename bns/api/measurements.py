@@ -12,9 +12,11 @@ from typing import Any, Union
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from bns.api.common.shown import Shown, drawn
 from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.checks import left_out_rows, own_rows, rows_by_trial, rows_of_losses
 from bns.diagnose.data.cycles import CycleTracks
 from bns.diagnose.data.load import Measured, load_measured, measured_table, table_sha256
 from bns.diagnose.data.mapping import checked_mapping, load_mapping
@@ -22,12 +24,15 @@ from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.predict.check_robot import suggested_wheelbase_m
 from bns.diagnose.report.text import findings_text
 from bns.errors import DataError
+from bns.measurements import LEFT_OUT, POSE
 from bns.plotting.style import OKABE_ITO
 
 Log = Union[str, PathLike[str], pd.DataFrame, "Measurements", Sequence[str | PathLike[str]]]
 """A file (.csv, .csv.gz, .parquet), several, a table, or measurements already read."""
 Rules = Mapping[str, Any] | str | PathLike[str]
 """A mapping of columns and units, or its file."""
+MARGIN_S = 0.5
+"""What spoils a pose (a hidden marker, a push) often lasts, so so much before and after goes with it."""
 _TABLE = Path("table")
 """What a table that came from no file is called."""
 
@@ -91,17 +96,97 @@ class Measurements(Shown):
 
     def without(self, trials: Iterable[str]) -> Measurements:
         """The same measurements without some trials, by their names. DataError if there is no such trial, or none is left."""
-        left_out, table = set(map(str, trials)), self._measured.table
-        of = table["trial"].astype(str)
-        unknown = sorted(left_out - set(of))
+        left_out, there = set(map(str, trials)), self._rows_of_trials
+        unknown = sorted(left_out - set(there))
         if unknown:
-            raise DataError(f"There is no trial {', '.join(unknown)}; there are {', '.join(dict.fromkeys(of))}.")
+            raise DataError(f"There is no trial {', '.join(unknown)}; there are {', '.join(there)}.")
         if not left_out:
             return self
-        if set(of) <= left_out:
+        if set(there) <= left_out:
             raise DataError("All trials are left out; keep at least one.")
+        kept = np.ones(len(self._measured.table), dtype=bool)
+        kept[np.concatenate([there[name] for name in left_out])] = False
         fewer = copy(self)
-        fewer.__dict__ = {"_measured": measured_table(table[~of.isin(left_out)], self._measured.path)}
+        fewer.__dict__ = {"_measured": measured_table(self._measured.table[kept], self._measured.path)}
+        return fewer
+
+    def without_rows(self, rows: Iterable[int]) -> Measurements:
+        """The same measurements without the poses of some rows (of `frame`, from 0, as `findings` counts them).
+
+        Their commands stay in force, and no window spans them. `frame` marks them in a column ``left_out``, so that a saved table
+        reads the same. Of a robot in cycles the whole cycle is left out. DataError if there is no such row, or no pose is left.
+        """
+        chosen = np.unique(np.fromiter((int(row) for row in rows), dtype=np.int64))
+        count = len(self._measured.table)
+        if len(chosen) and not 0 <= chosen[0] <= chosen[-1] < count:
+            wrong = chosen[0] if chosen[0] < 0 else chosen[-1]
+            raise DataError(f"There is no row {wrong}; the table has the rows 0 to {count - 1}.")
+        return self._without(np.isin(np.arange(count), chosen))
+
+    def cut(self, kept: Mapping[str, tuple[float, float]]) -> Measurements:
+        """The same measurements with less of some trials: of each named one what lies from one time (s, of the trial) to another.
+
+        What was commanded before stays known, so that the robot is in motion where a trial begins in motion. DataError if there
+        is no such trial, or nothing of it is left.
+        """
+        out = np.zeros(len(self._measured.table), dtype=bool)
+        for name, (from_s, to_s) in kept.items():
+            rows, time_s = self.times_of(name)
+            inside = (time_s >= from_s) & (time_s <= to_s)
+            if not inside.any():
+                raise DataError(
+                    f"Trial {name} has nothing from {from_s:g} s to {to_s:g} s; it lasts from 0 s to {time_s[-1]:g} s."
+                )
+            out[rows[~inside]] = True
+        return self._without(out)
+
+    def times_of(self, trial: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The rows of a trial (of `frame`, from 0), and their times (s) since it began. DataError if there is no such trial."""
+        table, rows = self._measured.table, self._rows_of_trials.get(str(trial))
+        if rows is None:
+            raise DataError(f"There is no trial {trial}; there are {', '.join(self._rows_of_trials)}.")
+        time_s = pd.to_numeric(table["t_s"].iloc[rows], errors="coerce").to_numpy(dtype=float)
+        own = own_rows(table.iloc[rows])
+        return rows, time_s - time_s[own][0] if own.any() else time_s
+
+    def rows_around(self, *rows: int, margin_s: float = MARGIN_S) -> NDArray[np.int64]:
+        """The rows (n,) that findings are about, which are named by theirs: with all from ``margin_s`` before to as long after.
+
+        What a finding is about ends where the robot is seen again; of lost poses one finding counts all of a trial. All rows
+        are of the findings' own trials. DataError if there is no such row.
+        """
+        table = self._measured.table
+        for row in rows:
+            if not 0 <= row < len(table):
+                raise DataError(f"There is no row {row}; the table has the rows 0 to {len(table) - 1}.")
+        names = table["trial"].iloc[list(rows)].astype(str)
+        found = [self._around(name, np.array(rows)[(names == name).to_numpy()], margin_s) for name in dict.fromkeys(names)]
+        return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *found]))
+
+    def _around(self, trial: str, odd: NDArray[np.int64], margin_s: float) -> NDArray[np.int64]:
+        """The same for rows of one trial."""
+        rows, time_s = self.times_of(trial)
+        seen, about = _seen(self._measured.table.iloc[rows]), np.isin(rows, odd)
+        if not seen[about].all():
+            about |= rows_of_losses(time_s, seen)
+        ends = np.sort(time_s[about | np.append(False, about[:-1])])  # a gap ends with the row after it
+        at = np.searchsorted(ends, time_s)
+        before, after = ends[(at - 1).clip(min=0)], ends[at.clip(max=len(ends) - 1)]
+        return np.asarray(rows[np.minimum(np.abs(time_s - before), np.abs(after - time_s)) <= margin_s], dtype=np.int64)
+
+    @cached_property
+    def _rows_of_trials(self) -> dict[str, NDArray[np.int64]]:
+        """Rows of the table by the name of their trial."""
+        return {name: np.sort(at) for name, at in rows_by_trial(self._measured.table)}
+
+    def _without(self, out: NDArray[np.bool_]) -> Measurements:
+        """Rows (rows,) marked as left out, beside those that are."""
+        if not out.any():
+            return self
+        table = self._measured.table
+        marked = table.assign(**{LEFT_OUT: (out | left_out_rows(table)).astype(int)})
+        fewer = copy(self)
+        fewer.__dict__ = {"_measured": measured_table(marked, self._measured.path)}
         return fewer
 
     @cached_property
@@ -140,6 +225,13 @@ class Measurements(Shown):
             axes.set(aspect="equal", xlabel="x, east (m)", ylabel="y, north (m)", title=f"{self.name}: measured paths")
 
         return drawn(ax, draw)
+
+
+def _seen(table: pd.DataFrame) -> NDArray[np.bool_]:
+    """Rows that hold a whole pose, or all markers and sites; (rows,)."""
+    whole = set(POSE) <= set(table.columns)
+    places = list(POSE) if whole else [name for name in table.columns if str(name).endswith(("_x_m", "_y_m"))]
+    return np.asarray(table[places].notna().all(axis=1), dtype=bool)
 
 
 def as_measurements(log: Log) -> Measurements:

@@ -21,13 +21,13 @@ from bns.app.switches import Switches
 from bns.diagnose.adding import Memory, does_nothing
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.cross_validation import AS_GIVEN
+from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.estimate.trial_clock_test import steps_of
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import laid_paths
 from bns.diagnose.predict.paired_errors import PairedErrors, judged_windows, paired_errors
-from bns.diagnose.select.plausibility import implausible
 from bns.diagnose.values import numbers_of
 from bns.physics.effect import Effect
 from bns.physics.formula import formula_effect

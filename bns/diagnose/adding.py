@@ -17,12 +17,12 @@ from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_st
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.fit_set import Tried, fit_set
 from bns.diagnose.estimate.parallel import one_thread_each
+from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.estimate.trial_clock_test import steps_of, with_trial_clocks
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
-from bns.diagnose.select.plausibility import implausible
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.effects import effect_in_file

@@ -6,7 +6,7 @@ be computed again. The networks see a command together with the speeds of the on
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,20 @@ SPEEDS = 2
 """The first of them, which the networks are told of the command before, too."""
 _UNIT = 2.0**-32
 _PARENTS, _FIRST = np.uint32(Purpose.PARENTS), np.uint32(0)
+
+
+class Operators(NamedTuple):
+    """How crossover and mutation work, where section 4.3 can be read in more than one way; the defaults are those of bns."""
+
+    exact: tuple[bool, ...] = (False,) * COMPONENTS
+    """Components that mutate by their span exactly, down or up, instead of uniformly within it."""
+    one_component: bool = False
+    """A command mutates with the given probability, in one of its components; else every component by itself."""
+    cuts_inside: bool = False
+    """No list is cut before its first or behind its last command, so that a child has commands of both parents."""
+
+
+DEFAULT = Operators()
 
 
 @exact
@@ -54,6 +68,15 @@ def cut_places(how: Any, one: Any, other: Any, length_a: Any, length_b: Any) -> 
     if how * _UNIT >= IDENTICAL_CUT:
         return below(one, length_a + 1), below(other, length_b + 1)
     same = below(one, min(length_a, length_b) + 1)
+    return same, same
+
+
+@inline
+def inner_cut_places(how: Any, one: Any, other: Any, length_a: Any, length_b: Any) -> Any:
+    """As `cut_places`, never at an end; a list of a single command is cut behind it."""
+    if how * _UNIT >= IDENTICAL_CUT:
+        return 1 + below(one, max(length_a - 1, 1)), 1 + below(other, max(length_b - 1, 1))
+    same = 1 + below(one, max(min(length_a, length_b) - 1, 1))
     return same, same
 
 
@@ -132,8 +155,21 @@ def mutated(value: Any, word: Any, threshold: Any, low: Any, high: Any, span: An
     return min(max(moved, low), high)
 
 
+@inline
+def stepped(value: Any, word: Any, threshold: Any, low: Any, high: Any, span: Any) -> Any:
+    """A component moved by its whole span, down or up by a word that fell below the threshold."""
+    moved = value - span if np.float64(word) < 0.5 * np.float64(threshold) else value + span
+    return min(max(moved, low), high)
+
+
+@inline
+def _chosen(draws: Any, where: Any, component: Any, one_component: Any) -> Any:
+    """Whether a command that mutates does so in this component: always, or where the second word says so."""
+    return not one_component or below(draws[1, where], COMPONENTS) == component
+
+
 @exact
-def _mutate(children, origin, lengths, rate, low, high, span, step, k0, k1):  # type: ignore[no-untyped-def]  # compiled
+def _mutate(children, origin, lengths, rate, low, high, span, stepwise, one_component, step, k0, k1):  # type: ignore[no-untyped-def]  # compiled
     """Mutate all controllers but the first, which is the elite."""
     total = lengths.sum() - lengths[0]
     slot, individual = np.empty(total, np.uint32), np.empty(total, np.uint32)
@@ -147,13 +183,18 @@ def _mutate(children, origin, lengths, rate, low, high, span, step, k0, k1):  # 
     threshold, capacity = mutation_threshold(rate), origin.shape[1]
     every, every_origin = children.reshape(-1), origin.reshape(-1)
     for c in range(COMPONENTS):
-        row, least, most, most_moved = draws[c], low[c], high[c], span[c]
+        row, least, most, most_moved = draws[0 if one_component else c], low[c], high[c], span[c]
         for h in range(_hits(row, threshold, places)):
             drawn = np.uint64(places[h])  # without a sign no place is counted from the end
+            if not _chosen(draws, drawn, c, one_component):
+                continue
             whose, which = np.int64(individual[drawn]), np.int64(slot[drawn])
             command = whose * capacity + which
             at = np.uint64(command * COMPONENTS + c)
-            every[at] = mutated(every[at], row[drawn], threshold, least, most, most_moved)
+            if stepwise[c]:
+                every[at] = stepped(every[at], row[drawn], threshold, least, most, most_moved)
+            else:
+                every[at] = mutated(every[at], row[drawn], threshold, least, most, most_moved)
             every_origin[np.uint64(command)] = -1
             if c < SPEEDS and which + 1 < lengths[whose]:
                 every_origin[np.uint64(command + 1)] = -1
@@ -167,7 +208,8 @@ def _starts(lengths):  # type: ignore[no-untyped-def]  # compiled
 
 @exact
 def breed_into(  # type: ignore[no-untyped-def]  # compiled
-    commands, lengths, order, cdf, rate, low, high, span, shortest, step, k0, k1, children, child_lengths, origin
+    commands, lengths, order, cdf, rate, low, high, span, stepwise, one_component, cuts_inside, shortest, step, k0, k1,
+    children, child_lengths, origin,
 ):
     """Fill children with the best controller and the offspring of tournament winners; count those cut at the bound."""
     hits, n, best = 0, commands.shape[0], order[0]
@@ -181,7 +223,11 @@ def breed_into(  # type: ignore[no-untyped-def]  # compiled
     for pair in range(n // 2):
         first = 1 + 2 * pair
         a, b = winner(order, cdf, parents[0, pair]), winner(order, cdf, parents[1, pair])
-        cut_a, cut_b = cut_places(cuts[0, pair], cuts[1, pair], cuts[2, pair], lengths[a], lengths[b])
+        how, one, other = cuts[0, pair], cuts[1, pair], cuts[2, pair]
+        if cuts_inside:
+            cut_a, cut_b = inner_cut_places(how, one, other, lengths[a], lengths[b])
+        else:
+            cut_a, cut_b = cut_places(how, one, other, lengths[a], lengths[b])
         for child in range(first, min(first + 2, n)):
             length, kept = _cross(
                 every_child, every_origin, child, every, lengths, starts, numbers, a, b, cut_a, cut_b, shortest
@@ -189,7 +235,7 @@ def breed_into(  # type: ignore[no-untyped-def]  # compiled
             child_lengths[child] = kept
             hits += length > kept
             a, b, cut_a, cut_b = b, a, cut_b, cut_a
-    _mutate(children, origin, child_lengths, rate, low, high, span, step, k0, k1)
+    _mutate(children, origin, child_lengths, rate, low, high, span, stepwise, one_component, step, k0, k1)
     return hits
 
 
@@ -203,12 +249,13 @@ def breed(
     shortest: int,
     generation: int,
     children: Population,
+    operators: Operators = DEFAULT,
 ) -> int:
     """One generation into `children` (same shapes as parents); how many children were cut at the longest list allowed.
 
     Elitism: the best controller goes on unchanged. Two-parent crossover swaps the first segments; the cut is the same in
     80 % and independent in 20 % of the pairs. Every component mutates with probability `rate`, uniformly within its
-    span, and stays within its bounds (section 4.3).
+    span, and stays within its bounds (section 4.3). ``operators`` are other readings of these sentences.
     """
     return int(
         breed_into(
@@ -220,6 +267,9 @@ def breed(
             bounds.low,
             bounds.high,
             bounds.mutation_span,
+            np.array(operators.exact),
+            operators.one_component,
+            operators.cuts_inside,
             shortest,
             np.uint32(generation),
             *key.words,

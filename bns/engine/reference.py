@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bns.engine.breeding import DEFAULT, Operators
 from bns.engine.evolution import CommandBounds, Population
 from bns.engine.philox import Key, Purpose
 from bns.engine.rprop import GROW, INITIAL_STEP, LARGEST_STEP, SHRINK, SMALLEST_STEP
@@ -161,6 +162,7 @@ def breed(
     bounds: CommandBounds,
     shortest: int,
     generation: int,
+    operators: Operators = DEFAULT,
 ) -> tuple[list[np.ndarray], list[np.ndarray], int]:
     """The children as lists of commands, (length, 3) float32 each; their origins, (length,) each; how many were cut short."""
     capacity = parents.commands.shape[1]
@@ -170,13 +172,13 @@ def breed(
     for pair in range(len(parents) // 2):
         first, second = _parents(key, order, cdf, generation, pair)
         a, b = (old[first], numbers[first]), (old[second], numbers[second])
-        cut_a, cut_b = _cuts(key, len(a[0]), len(b[0]), generation, pair)
+        cut_a, cut_b = _cuts(key, len(a[0]), len(b[0]), generation, pair, operators.cuts_inside)
         families += [_crossed(a, b, cut_a, cut_b, shortest), _crossed(b, a, cut_b, cut_a, shortest)]
     families = families[: len(parents)]
     hits = sum(len(child) > capacity for child, _ in families)
     families = [(child[:capacity].copy(), origin[:capacity].copy()) for child, origin in families]
     for i, (child, origin) in enumerate(families[1:], start=1):
-        _mutate(key, child, origin, i, rate, bounds, generation)
+        _mutate(key, child, origin, i, rate, bounds, generation, operators)
     return [child for child, _ in families], [origin for _, origin in families], hits
 
 
@@ -186,8 +188,14 @@ def _parents(key: Key, order: list[int], cdf: np.ndarray, generation: int, pair:
     return order[first], order[second]
 
 
-def _cuts(key: Key, length_a: int, length_b: int, generation: int, pair: int) -> tuple[int, int]:
+def _cuts(key: Key, length_a: int, length_b: int, generation: int, pair: int, inside: bool) -> tuple[int, int]:
     which, first, second, _ = draw(key, Purpose.CUTS, generation, pair, 0)
+    if inside:
+        places_a, places_b = (range(1, max(length, 2)) for length in (length_a, length_b))
+        both = range(1, max(min(length_a, length_b), 2))
+        alike = both[first * len(both) // _WORD]
+        apart = places_a[first * len(places_a) // _WORD], places_b[second * len(places_b) // _WORD]
+        return (alike, alike) if which / _WORD < 0.8 else apart
     if which / _WORD < 0.8:  # section 4.3, written out here so that the kernel's number is checked too
         cut = first * (min(length_a, length_b) + 1) // _WORD
         return cut, cut
@@ -205,17 +213,29 @@ def _crossed(front: _Numbered, back: _Numbered, cut_front: int, cut_back: int, s
 
 
 def _mutate(
-    key: Key, child: np.ndarray, origin: np.ndarray, index: int, rate: float, bounds: CommandBounds, generation: int
+    key: Key,
+    child: np.ndarray,
+    origin: np.ndarray,
+    index: int,
+    rate: float,
+    bounds: CommandBounds,
+    generation: int,
+    operators: Operators,
 ) -> None:
     threshold = int(rate * _WORD)
     for j in range(len(child)):
         words = draw(key, Purpose.MUTATION, generation, index, j)
-        for c in range(child.shape[1]):
-            if words[c] < threshold:
-                move = np.float32((2.0 * words[c] / threshold - 1.0) * float(bounds.mutation_span[c]))
-                child[j, c] = min(max(child[j, c] + move, bounds.low[c]), bounds.high[c])
-                origin[j] = -1
-                origin[j + 1 : j + 2] = origin[j + 1 : j + 2] if c == 2 else -1  # the duration is not told to the next
+        hit = {c: words[c] for c in range(child.shape[1]) if words[c] < threshold}
+        if operators.one_component:
+            hit = {words[1] * child.shape[1] // _WORD: words[0]} if words[0] < threshold else {}
+        for c, word in hit.items():
+            share = 2.0 * word / threshold - 1.0
+            if operators.exact[c]:
+                share = -1.0 if share < 0 else 1.0
+            move = np.float32(share * float(bounds.mutation_span[c]))
+            child[j, c] = min(max(child[j, c] + move, bounds.low[c]), bounds.high[c])
+            origin[j] = -1
+            origin[j + 1 : j + 2] = origin[j + 1 : j + 2] if c == 2 else -1  # the duration is not told to the next
 
 
 def diversity(population: Population, bounds: CommandBounds) -> float:

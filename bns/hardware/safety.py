@@ -72,6 +72,22 @@ class Watch:
 
     def check(self, sight: Sight | None, picture_s: float | None = None) -> None:
         """DriveEnded or TrialPausedError if the drive must not go on; `picture_s`: when the newest picture came, if known."""
+        now_s = self._in_time()
+        if sight is not None:
+            self._seen_s = max(self._seen_s, sight.t_s)
+            x_m, y_m = float(sight.pose[0]), float(sight.pose[1])
+            if not self._limits.surface.holds(x_m, y_m):
+                raise DriveEnded(f"the robot left the surface at ({x_m:.2f}, {y_m:.2f}) m")
+        self._check_picture(now_s, picture_s)
+        if now_s - self._seen_s > self._limits.lost_s:
+            raise OutOfSight(f"the tracker has not seen the robot for {now_s - self._seen_s:.1f} s")
+
+    def still_filmed(self, picture_s: float | None) -> None:
+        """The part of `check` that concerns a robot which stands and may be out of sight: somebody looks, new pictures come."""
+        self._check_picture(self._in_time(), picture_s)
+
+    def _in_time(self) -> float:
+        """Now; TrialPausedError if a stop was asked for, or the last look was too long ago."""
         now_s = self._clock.now_s()
         self._stopping.check()
         late_s, self._looked_s = now_s - self._looked_s, now_s
@@ -80,15 +96,11 @@ class Watch:
                 f"nobody looked at the robot for {late_s:.1f} s: the computer is too busy, or the robot answers too slowly. "
                 "End other programs, bring the robot nearer, or allow more late_s in the rig."
             )
-        if sight is not None:
-            self._seen_s = max(self._seen_s, sight.t_s)
-            x_m, y_m = float(sight.pose[0]), float(sight.pose[1])
-            if not self._limits.surface.holds(x_m, y_m):
-                raise DriveEnded(f"the robot left the surface at ({x_m:.2f}, {y_m:.2f}) m")
+        return now_s
+
+    def _check_picture(self, now_s: float, picture_s: float | None) -> None:
         if picture_s is not None and now_s - max(picture_s, self._began_s) > self._limits.picture_s:
             raise DriveEnded(f"the camera has sent no new picture for {now_s - picture_s:.2f} s")
-        if now_s - self._seen_s > self._limits.lost_s:
-            raise OutOfSight(f"the tracker has not seen the robot for {now_s - self._seen_s:.1f} s")
 
 
 _SIGNALS = {

@@ -19,9 +19,9 @@ from bns.physics.effect import Effect, Parameter
 from bns.physics.formula_check import checked_formula
 from bns.physics.order import FORMULAS
 from bns.physics.signals import CREEP_M_S, Array, Body
-from bns.physics.wheels.scans import first_order, reversed_since, trailing
+from bns.physics.wheels.scans import carried_on, first_order, reversed_since, trailing
 
-SHARE, WHEELS = "share", "wheels"
+SHARE, WHEELS, LEFT, RIGHT = "share", "wheels", "left", "right"
 ON: Mapping[str, str] = {
     "v": "forward_m_s",
     "s": "sideways_m_s",
@@ -30,9 +30,13 @@ ON: Mapping[str, str] = {
     "north": "north",
     SHARE: SHARE,
     WHEELS: WHEELS,
+    LEFT: LEFT,
+    RIGHT: RIGHT,
 }
 """What a term can be added to: forward, sideways (to the right) and turning velocity, velocity in the world's frame, the factor
-of all velocities (`SHARE`), and the speed of each wheel, worked out for the left and for the right one (`WHEELS`)."""
+of all velocities (`SHARE`), the speed of each wheel, worked out for the left and for the right one (`WHEELS`), or of one."""
+WHICH_WHEELS: Mapping[str, tuple[bool, bool]] = {WHEELS: (True, True), LEFT: (True, False), RIGHT: (False, True)}
+"""Does a term act on the left, on the right wheel?"""
 VARIABLES: Mapping[str, str] = {
     "v": "forward velocity, m/s",
     "w": "turn rate, rad/s, left positive",
@@ -51,8 +55,10 @@ OF_A_WHEEL: Mapping[str, str] = {
     "u": "speed of this wheel, m/s",
     "since": "way of this wheel since it last changed direction, m; 1000 before",
     "fresh": "speed of this wheel less its mean over the last 0.15 s (fading exponentially), m/s",
+    "lately10": "way of this wheel over the last 10 s (fading exponentially), m; carried on from trial to trial",
+    "lately100": "the same over the last 100 s",
 }
-"""Further names in a term on `WHEELS`."""
+"""Further names in a term on `WHEELS`, `LEFT` or `RIGHT`."""
 RECENT_S = 0.15
 NEVER_M = 1e3
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
@@ -89,7 +95,7 @@ def formula_effect(
     if on not in ON:
         raise ModelError(f"formula {name}: " + unknown_name("velocity to add to (on)", on, ON))
     names, code = _parsed(name, term)
-    known = set(VARIABLES) | (set(OF_A_WHEEL) if on == WHEELS else set())
+    known = set(VARIABLES) | (set(OF_A_WHEEL) if on in WHICH_WHEELS else set())
     logged, unknown = _sorted(name, names - known, set(columns), None if numbers is None else set(numbers))
     if not unknown:
         raise ModelError(f"formula {name}: {term!r} has no number to fit; multiply it by one, as in k * ({term}).")
@@ -157,10 +163,10 @@ def _apply(name: str, code: Compiled, on: str, logged: list[str], body: Body, **
     if body.place is None and _needs(code, on):
         return body  # first round of a simulation: nobody knows yet where the robot goes
     values = {**_values(body, code), **{column: body.logged[column] for column in logged}, **numbers}
-    if on == WHEELS:
+    if on in WHICH_WHEELS:
         left, right = (
-            _added(name, code, {**values, **_of_wheel(body, speed, code)}, body)
-            for speed in (body.left_m_s, body.right_m_s)
+            _added(name, code, {**values, **_of_wheel(body, speed, code)}, body) if acts else np.zeros_like(speed)
+            for speed, acts in zip((body.left_m_s, body.right_m_s), WHICH_WHEELS[on], strict=True)
         )
         turned = body.with_added("yaw_rad_s", (right - left) / body.wheelbase_m)
         return turned.with_added("forward_m_s", (left + right) / 2.0)
@@ -225,8 +231,15 @@ def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Array]:
         "u": lambda: speed,
         "since": lambda: since_reversal(speed, _step_s(body)),
         "fresh": lambda: speed - first_order(speed, _step_s(body), RECENT_S),
+        "lately10": lambda: lately(body, speed, 10.0),
+        "lately100": lambda: lately(body, speed, 100.0),
     }
     return {name: make() for name, make in made.items() if name in code.code.co_names}
+
+
+def lately(body: Body, speed: Array, fade_s: float) -> Array:
+    """Way (m) of a wheel that has not faded yet, in every step; from trial to trial where the session's time is known."""
+    return carried_on(np.abs(speed), _step_s(body), body.conditions.session_s, fade_s)
 
 
 def swing(body: Body) -> Array:

@@ -51,6 +51,14 @@ def test_the_second_answer_is_the_first_and_costs_no_search(table, asked, tmp_pa
     assert len(asked) == 2
 
 
+def test_the_environment_names_another_folder(table, asked, tmp_path, monkeypatch):
+    monkeypatch.setenv("BNS_CACHE", str(tmp_path / "mine"))
+    for _ in range(2):
+        bns.compare(table, NOMINAL)
+    assert len(list((tmp_path / "mine").glob("*.pickle"))) == 1
+    assert not entries(tmp_path)
+
+
 def test_whatever_changes_is_asked_again(table, asked, monkeypatch):
     def ask(log=table, model=NOMINAL, **more):
         bns.diagnose(log, model, **more)

@@ -98,3 +98,29 @@ def test_honest_robots_leave_nothing(seed):
     tried = families(predictor, NOMINAL.wheelbase_m)
     assert len(tried) > 10
     assert significant(ranked(problem, fit, [*tried, rounding(problem, fit)])) == []
+
+
+@pytest.mark.parametrize(
+    ("on", "term", "value", "signal", "says"),
+    [
+        ("left", "-k * sign(u)", 0.012, "speed of the left wheel", r"the left wheel's .* 0\.0199 m/s gives 0\.008\d* m/s.*"),
+        ("wheels", "-k * min(u, 0)", 0.1, "speed of each wheel", r"a wheel's .* -0\.199 m/s gives -0\.179 m/s"),
+        ("w", "-k * moving * exp(-((x - 0.1)**2 + y**2) / 0.08)", 0.3, "place", "turning velocity depends on place .*"),
+    ],
+)
+def test_what_one_wheel_or_a_place_does_is_described(on, term, value, signal, says):
+    robot = hidden().with_active(formula_effect("rough", term, on), (value,))
+    predictor = predictor_of(robot, speeds=BOTH_WAYS, trials=24, commands=8)
+    found = stands(predictor)
+    assert [(one.signal, one.on) for one in found.terms] == [(signal, on)]
+    assert re.fullmatch(says, in_words(found.terms[0], predictor))
+
+
+def test_beside_a_curve_no_effect_has_numbers_that_no_robot_has():
+    """A robot that slides beyond a sideways acceleration: understeer is far beyond its range, and only bends the curve."""
+    slides = formula_effect("grip", "w * (min(1, k / max(abs(v * w), 0.02)) - 1)", "w")
+    robot = hidden().with_active(slides, (0.12,))
+    predictor = predictor_of(robot, speeds=BOTH_WAYS, trials=40, commands=8)
+    found = stands(predictor, "understeer")
+    assert found.names == ()
+    assert (found.terms[0].signal, found.terms[0].on) == ("speed with turn", "w")

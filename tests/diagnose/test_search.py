@@ -7,9 +7,9 @@ import pytest
 
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select.plausibility import implausible
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.decoys import DECOYS
 from bns.physics.formula import formula_effect

@@ -24,6 +24,7 @@ NO_SETTINGS = {
     ("predict/wheels.py", "_KEPT"): "the size of a cache: the answers are the same for any",
     ("report/page.py", "_PIXELS_IN_POINT"): "layout",
     ("report/plain_language.py", "_UNITS"): "factors between units, by definition",
+    ("residuals/words.py", "_WAYS"): "a metre, driven lately and before: where a curve is put in words",
     ("residuals/words.py", "_POINTS"): "points at which a curve is evaluated to be put in words",
 }
 """Numbers that stand in a module, and why they decide nothing that could be decided otherwise."""

@@ -102,6 +102,18 @@ def test_a_heading_that_swings_with_a_period_has_a_rhythm():
     assert (autocorrelation.direction, autocorrelation.scale) == ("heading", "within")
 
 
+@pytest.mark.parametrize("memory", [0.5, 0.6, 0.9])
+def test_a_tracker_whose_errors_have_a_memory_has_no_rhythm(memory):
+    """Frames share errors of the tracker, as under filters that smooth poses."""
+    table = measured(NOMINAL, trials=40, seed=2, commands=8, jitter=0.002)
+    rng, off = np.random.default_rng(1), np.zeros((len(table), 3))
+    fresh = rng.standard_normal(off.shape) * np.sqrt(1 - memory**2)
+    for k in range(1, len(off)):
+        off[k] = memory * off[k - 1] + fresh[k]
+    x_m, y_m, heading_rad = (np.array([0.005, 0.005, 0.05]) * off).T
+    assert largest(table.assign(x_m=table.x_m + x_m, y_m=table.y_m + y_m, heading_rad=table.heading_rad + heading_rad)) is None
+
+
 def variables_of(left_m_s, command_s=0.4):
     """Of one trial of these left speeds in turn; the right wheel stands."""
     t = np.arange(0, len(left_m_s) * command_s + 1e-9, FRAME_S)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bns.engine import reference
-from bns.engine.breeding import breed
+from bns.engine.breeding import DEFAULT, Operators, breed
 from bns.engine.evolution import CommandBounds, Population, random_population, tournament_cdf
 from bns.engine.philox import Key
 
@@ -18,12 +18,13 @@ def parents(n=40, capacity=20, seed=0, lengths=(4, 13)):
     return random_population(Key(seed, 1), n, *lengths, capacity, BOUNDS)
 
 
-def bred(old, rate=0.0, share=0.2, shortest=4, generation=1, key=KEY, order=None, bounds=BOUNDS):
+def bred(old, rate=0.0, share=0.2, shortest=4, generation=1, key=KEY, order=None, bounds=BOUNDS,
+         operators=DEFAULT):  # fmt: skip
     """Children and the number of those cut short."""
     children = Population(np.full_like(old.commands, -1e6), np.zeros_like(old.lengths))
     order = np.arange(len(old)) if order is None else order
     cdf = tournament_cdf(len(old), share)
-    hits = breed(key, old, order, cdf, rate, bounds, shortest, generation, children)
+    hits = breed(key, old, order, cdf, rate, bounds, shortest, generation, children, operators)
     return children, hits
 
 
@@ -40,18 +41,39 @@ def everyone(some):
     shortest=st.integers(1, 12),
     generation=st.integers(0, 2**32 - 1),
     seed=st.integers(0, 2**32 - 1),
+    operators=st.builds(Operators, st.tuples(*[st.booleans()] * 3), st.booleans(), st.booleans()),
 )
-def test_children_are_exactly_the_twins(n, capacity, rate, share, shortest, generation, seed):
+def test_children_are_exactly_the_twins(n, capacity, rate, share, shortest, generation, seed, operators):
     old, key = parents(n, capacity, seed), Key(seed, generation // 2)
     order = np.random.default_rng(seed).permutation(n)
-    children, hits = bred(old, rate, share, shortest, generation, key, order)
+    children, hits = bred(old, rate, share, shortest, generation, key, order, operators=operators)
     cdf = tournament_cdf(n, share)
-    slow, origins, slow_hits = reference.breed(key, old, order.tolist(), cdf, rate, BOUNDS, shortest, generation)
+    slow, origins, slow_hits = reference.breed(
+        key, old, order.tolist(), cdf, rate, BOUNDS, shortest, generation, operators
+    )
     assert len(children) == len(slow) == n
     for i, (child, origin) in enumerate(zip(slow, origins, strict=True)):
         np.testing.assert_array_equal(children.controller(i), child)
         np.testing.assert_array_equal(children.origin[i, : len(child)], origin)
     assert hits == slow_hits
+
+
+def test_readings_of_the_operators_do_what_they_say():
+    old = parents(200)
+    plain, exact = (everyone(bred(old, 1.0, operators=one)[0]) for one in (DEFAULT, Operators(exact=(False, False, True))))
+    np.testing.assert_array_equal(plain[:, :2], exact[:, :2])
+    copies = everyone(bred(old)[0])
+    kept, moved = copies[:, 2], np.abs(exact[:, 2] - copies[:, 2])
+    free = (kept > 13) & (kept < 17)
+    free[: old.lengths[0]] = False  # the elite's
+    assert set(np.round(moved[free], 4)) == {3.0}
+    assert len(set(np.round(plain[free, 2] - kept[free], 4))) > 100
+    changed = (everyone(bred(old, 1.0, operators=Operators(one_component=True))[0]) != copies).sum(axis=1)
+    assert changed.max() == 1
+    assert (changed == 1).mean() > 0.9
+    ends = bred(parents(400, lengths=(4, 4)), shortest=1, operators=Operators(cuts_inside=True))[0].lengths
+    assert ends.min() == 2  # a command of either parent at least
+    assert bred(parents(400, lengths=(4, 4)), shortest=1)[0].lengths.min() == 1
 
 
 def test_same_key_same_children_another_key_or_generation_others():

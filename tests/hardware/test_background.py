@@ -54,7 +54,7 @@ def test_rounds_go_on_until_the_drive_is_over_or_they_are_enough():
             third.set()
 
     rounds = Rounds(3)
-    assert rounds.while_driving(lambda: third.wait(10), work) == (True, 3)
+    assert rounds.while_driving(lambda: third.wait(60), work) == (True, 3)
     held = threading.Event()
     assert rounds.while_driving(lambda: "at once", lambda: held.wait(0.1)) == ("at once", 1)
     assert rounds.waited_s > 0.05

@@ -37,8 +37,8 @@ def test_a_reader_that_takes_it_meanwhile_holds_nobody_up(line):
     began_s = time.monotonic()
     for _ in range(20):
         line.send(b"x" * 1000)
-    reader.join(10)
-    assert time.monotonic() - began_s < 20 * 0.1  # as it was: a second each
+    reader.join(60)
+    assert time.monotonic() - began_s < 15  # a second each would be more
     os.close(near)
 
 
@@ -47,16 +47,16 @@ def test_a_line_can_be_cut_while_bytes_are_on_their_way(line, monkeypatch):
 
     def slow(*way):
         under_way.set()
-        go_on.wait(10)
+        go_on.wait(60)
         put_through(*way)
 
     monkeypatch.setattr("bns.hardware.emulators.devices.terminal.put_through", slow)
     sending = threading.Thread(target=line.send, args=(b"x",))
     sending.start()
-    under_way.wait(10)
+    under_way.wait(60)
     cutting = threading.Thread(target=line.cut)
     cutting.start()
-    cutting.join(5)
+    cutting.join(60)
     assert not cutting.is_alive()
     go_on.set()
-    sending.join(5)
+    sending.join(60)

@@ -16,8 +16,8 @@ from bns.diagnose.data.stretches import apart, poses_of, stretches_of_cycles
 from bns.diagnose.design.competing_models import competing_models_of
 from bns.diagnose.design.power import PastTrials
 from bns.diagnose.design.repeats import RepeatPlanner
+from bns.diagnose.estimate.plausibility import at_bound, implausible
 from bns.diagnose.predict.responses import Responses
-from bns.diagnose.select.plausibility import at_bound, implausible
 from bns.errors import DataError, ModelError
 from bns.physics.effect import Effect, Parameter
 from bns.physics.jointed.model_files import load_body

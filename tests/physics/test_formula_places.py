@@ -37,6 +37,23 @@ def test_a_term_on_wheels_is_worked_out_for_each():
     np.testing.assert_allclose(body.yaw_rad_s, [[(0.1 - 0.18) / BASE_M, 0.0]], atol=1e-15)
 
 
+@pytest.mark.parametrize(("on", "turn"), [("left", 0.02), ("right", -0.02)])
+def test_a_term_on_one_wheel_leaves_the_other(on, turn):
+    """A wheel that loses 2 cm/s turns the robot to its own side: arithmetic by hand."""
+    body = motion(with_term("k * sign(u)", on, -0.02), [0.1], [0.1])
+    np.testing.assert_allclose(body.forward_m_s, [[0.09]])
+    np.testing.assert_allclose(body.yaw_rad_s, [[turn / BASE_M]])
+
+
+def test_recent_work_fades_and_is_each_wheel_s_own():
+    """A wheel that did 0.1 m/s for long has 0.1 m/s times the time of fading behind it."""
+    body = motion(with_term("k * u * lately10", "wheels", 1.0), [0.1] * 200, [0.0] * 200)
+    left = body.forward_m_s[0] - body.yaw_rad_s[0] * BASE_M / 2
+    assert left[-1] == pytest.approx(0.1 + 0.1 * 0.1 * 10.0, rel=1e-3)
+    assert left[0] == pytest.approx(0.1 + 0.1 * 0.1 * STEP_S / 2, rel=0.05)
+    np.testing.assert_allclose(body.forward_m_s[0] + body.yaw_rad_s[0] * BASE_M / 2, 0.0, atol=1e-15)
+
+
 def test_names_of_a_wheel_are_numbers_elsewhere():
     assert [p.name for p in formula_effect("own", "k * u", "v").parameters] == ["k", "u"]
     assert [p.name for p in formula_effect("own", "k * u", "wheels").parameters] == ["k"]

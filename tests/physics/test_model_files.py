@@ -122,13 +122,13 @@ def deep(levels):
     ],
 )
 def test_formulas_that_cannot_be_calculated_are_refused_at_once(term, message):
-    began = time.perf_counter()
+    began = time.process_time()
     if term == deep(150):  # brackets alone are no levels
         formula_effect("f", term, "v")
         return
     with pytest.raises(ModelError, match=f"formula f.*({message})"):
         formula_effect("f", term, "v")
-    assert time.perf_counter() - began < 5
+    assert time.process_time() - began < 5
 
 
 @pytest.mark.parametrize("term", ["k / (k - k)", "(-k) ** 0.5 * v", "k * v / (t - t)", "k ** 400 ** 3"])
@@ -177,10 +177,10 @@ def test_aliases_that_stand_for_millions_are_refused_at_once():
     bomb = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
         f"{after}: &{after} [{','.join([f'*{before}'] * 9)}]\n" for before, after in zip("abcdefgh", "bcdefghi", strict=True)
     )
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(ModelError, match="keys and values with all aliases; 50000 are allowed"):
         parse_model(f"{HEAD}{bomb}", "m")
-    assert time.perf_counter() - began < 5
+    assert time.process_time() - began < 5
 
 
 def test_aliases_of_a_sensible_size_are_fine():

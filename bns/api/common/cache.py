@@ -2,7 +2,8 @@
 
 A key is a digest of the data's values, the model, the settings, the question, the program's own source and the libraries that
 compute: whatever changes one of them asks for another entry. An entry carries the digest of its bytes; one that does not match,
-does not read or belongs to somebody else is no entry. ``BNS_CACHE=off`` in the environment keeps nothing and asks nothing.
+does not read or belongs to somebody else is no entry. ``BNS_CACHE`` in the environment names another folder; with ``off`` nothing
+is kept and nothing is taken from before.
 """
 
 from __future__ import annotations
@@ -41,8 +42,11 @@ _OFF = {"off", "0", "no"}
 
 def folder() -> Path | None:
     """Where entries are; None where nothing is kept."""
-    if os.environ.get("BNS_CACHE", "").lower() in _OFF:
+    chosen = os.environ.get("BNS_CACHE", "")
+    if chosen.lower() in _OFF:
         return None
+    if chosen:
+        return Path(chosen)
     home = os.environ.get("XDG_CACHE_HOME") or str(Path("~/.cache").expanduser())
     return Path(home) / "bns" / "diagnose"
 

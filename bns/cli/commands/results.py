@@ -1,10 +1,11 @@
-"""The commands that look at what there is: status, query, compact, figures, watch."""
+"""The commands that look at what there is: status, query, compact, archive, figures, watch."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from dataclasses import asdict
+from pathlib import Path
 
 from bns.cli.commands.diagnose import Adder
 from bns.cli.options.option_types import as_json, interval
@@ -21,7 +22,14 @@ def add_commands(command: Adder) -> None:
     for one in (far, ask):
         one.add_argument("--json", action="store_true", help="a list of JSON objects on stdout, one a row")
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
+    keep = command("archive", archive, "write what figures and findings need of all runs into one small file")
+    keep.add_argument("results", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="folder of all results")
+    keep.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.parquet", help="file to write")
+    keep.add_argument("--sweep", action="append", metavar="NAME", help="keep this sweep (again for more); default: all")
     drawn = command("figures", figures, "draw whatever the results allow onto one page, DIR/figures/index.html")
+    drawn.add_argument(
+        "--from", dest="archive", metavar="FILE", help="draw from what bns archive wrote; published: DIR/published/study.parquet"
+    )
     drawn.add_argument("--only", metavar="NAME", help="one figure: success-by-mutation, …")
     look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
     look.add_argument("--every", type=interval, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
@@ -67,11 +75,20 @@ def compact(options: argparse.Namespace) -> int:
     return 0
 
 
+def archive(options: argparse.Namespace) -> int:
+    """One file of what figures need."""
+    from bns.store.archive.write import archive as write
+
+    print(write(options.results, options.output, options.sweep))
+    return 0
+
+
 def figures(options: argparse.Namespace) -> int:
     """The page of figures, drawn once; the code is that of the figures' scripts."""
     from bns.plotting.scripts import carry_out
 
-    return carry_out(options.results, *(["--only", options.only] if options.only else []))
+    only = ["--only", options.only] if options.only else []
+    return carry_out(options.results, *(["--from", options.archive] if options.archive else []), *only)
 
 
 def watch(options: argparse.Namespace) -> int:

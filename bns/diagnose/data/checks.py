@@ -5,9 +5,8 @@ Every finding names trial and row; nothing goes in silence.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -16,7 +15,7 @@ from bns.diagnose.data.apply_mapping import repeated
 from bns.diagnose.data.merge_topics import without_commands
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
-from bns.measurements import COLUMNS, COMMANDS, POSE, RUN_UP
+from bns.measurements import COLUMNS, COMMANDS, LEFT_OUT, POSE, RUN_UP
 
 _HELD = DEFAULTS.data.held_share
 _JUMP_M = DEFAULTS.data.jump_m
@@ -41,10 +40,11 @@ class Finding:
 
 
 def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
-    """The rows that can be used, in order, and what was found. DataError where going on would be guessing."""
+    """The rows that can be used, by their numbers in the table, and findings. DataError where going on would be guessing."""
     check_columns(table, COLUMNS)
     table = table.reset_index(drop=True)
     to_numbers(table, COLUMNS[1:])
+    table.loc[left_out_rows(table), list(POSE)] = np.nan
     findings: list[Finding] = []
     _held(table, findings)
     t, pose, own = table["t_s"].to_numpy(), table[list(POSE)].to_numpy(), own_rows(table)
@@ -61,7 +61,7 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     if not _tracked(usable).any():
         raise DataError("There is no tracked pose in these measurements: every x_m, y_m or heading_rad is empty.")
     _units(usable)
-    return usable.reset_index(drop=True), findings
+    return usable, findings
 
 
 def rows_by_trial(table: pd.DataFrame) -> list[tuple[str, np.ndarray]]:
@@ -75,6 +75,13 @@ def rows_by_trial(table: pd.DataFrame) -> list[tuple[str, np.ndarray]]:
 def own_rows(table: pd.DataFrame) -> np.ndarray:
     """Rows that are no run-up, (rows,) of bool."""
     return (table[RUN_UP] != 1).to_numpy() if RUN_UP in table.columns else np.ones(len(table), dtype=bool)
+
+
+def left_out_rows(table: pd.DataFrame) -> np.ndarray:
+    """Rows whose poses the user left out, (rows,) of bool."""
+    if LEFT_OUT not in table.columns:
+        return np.zeros(len(table), dtype=bool)
+    return np.asarray(pd.to_numeric(table[LEFT_OUT], errors="coerce") > 0)
 
 
 def _is_sound(t: np.ndarray, pose: np.ndarray) -> bool:
@@ -216,15 +223,18 @@ def _beyond(values: np.ndarray, t: np.ndarray, at: int, one: int, two: int) -> n
 
 
 def _gaps_and_losses(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> None:
-    t = rows["t_s"].to_numpy()
+    t, left_out = rows["t_s"].to_numpy(), left_out_rows(rows)
     if len(t) > 2:
         usual = float(np.median(np.diff(t)))
-        for i in map(int, np.flatnonzero(np.diff(t) > max(5 * usual, 0.2))):
+        between = ~left_out[1:] & ~left_out[:-1]
+        for i in map(int, np.flatnonzero((np.diff(t) > max(5 * usual, 0.2)) & between)):
             if usual < 0.2:
                 findings.append(Finding(trial, int(rows.index[i]), f"no row for {t[i + 1] - t[i]:.2f} s"))
-    lost, first = poses_lost(t, _tracked(rows).to_numpy())
-    if lost:
-        findings.append(Finding(trial, int(rows.index[first]), f"{lost} poses lost, the first here"))
+    looked_at = rows[~left_out]
+    if len(looked_at):
+        lost, first = poses_lost(t[~left_out], _tracked(looked_at).to_numpy())
+        if lost:
+            findings.append(Finding(trial, int(looked_at.index[first]), f"{lost} poses lost, the first here"))
 
 
 def poses_lost(t_s: np.ndarray, tracked: np.ndarray) -> tuple[int, int]:
@@ -233,16 +243,29 @@ def poses_lost(t_s: np.ndarray, tracked: np.ndarray) -> tuple[int, int]:
     Rows without a pose between two poses that follow each other as quickly as usual hold commands alone: nothing is lost there.
     ``t_s`` (rows,), ``tracked`` (rows,) of bool: does the row hold a whole pose?
     """
+    if tracked.sum() < 2:
+        return int((~tracked).sum()), int(np.argmin(tracked))
+    lost, marks = _losses(t_s, tracked)
+    return int(lost.sum()), int(marks[np.argmax(lost > 0)] + 1)
+
+
+def rows_of_losses(t_s: np.ndarray, tracked: np.ndarray) -> np.ndarray:
+    """Rows (rows,) without a pose, of stretches in which poses are lost; arguments as of `poses_lost`."""
+    if tracked.sum() < 2:
+        return ~tracked
+    lost, _ = _losses(t_s, tracked)
+    return np.asarray(~tracked & (lost > 0)[np.cumsum(tracked)])
+
+
+def _losses(t_s: np.ndarray, tracked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Between one pose and the next (poses + 1,): how many are lost; and the rows of the poses, -1 and the end around them."""
     at = np.flatnonzero(tracked)
-    if len(at) < 2:
-        return len(t_s) - len(at), int(np.argmin(tracked))
     usual = float(np.median(np.diff(t_s[at])))
     marks = np.concatenate([[-1], at, [len(t_s)]])
     most = 0.6 * usual  # before the first and after the last pose one is due only where nearly a whole interval passes
     times = np.concatenate([[t_s[0] - most], t_s[at], [t_s[-1] + most]])
     due = np.maximum(np.round(np.diff(times) / usual) - 1, 0)
-    lost = np.minimum(np.diff(marks) - 1, due).astype(int)
-    return int(lost.sum()), int(marks[np.argmax(lost > 0)] + 1)
+    return np.minimum(np.diff(marks) - 1, due).astype(int), marks
 
 
 def _units(table: pd.DataFrame) -> None:
@@ -253,7 +276,7 @@ def _units(table: pd.DataFrame) -> None:
         unit = next(unit for least, unit in _FINER if step > least)
         raise DataError(f"Successive rows are {step:g} s apart: t_s looks like {unit}; it must be seconds.")
     _check_length(table)
-    ways = np.array(list(_driven(table)))
+    ways = _driven(table)
     speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
     ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
     untold = without_commands(table)
@@ -310,9 +333,10 @@ def _ratio(commanded: np.ndarray, seen: np.ndarray) -> float:
     return float(seen.sum() / commanded.sum()) if commanded.sum() > 0 else float("nan")
 
 
-def _driven(table: pd.DataFrame) -> Iterator[tuple[float, float, float, float]]:
-    """For windows of about a second: way and turn commanded (base of 1 m), way and turn seen."""
+def _driven(table: pd.DataFrame) -> np.ndarray:
+    """For windows of about a second (windows, 4): way and turn commanded (base of 1 m), way and turn seen."""
     times, commands, poses = table["t_s"].to_numpy(), table[list(COMMANDS)].to_numpy(), table[list(POSE)].to_numpy()
+    found = [np.zeros((0, 4))]
     for _, at in rows_by_trial(table):
         t, pose = times[at], poses[at]
         left, right = np.nan_to_num(commands[at]).T
@@ -320,23 +344,12 @@ def _driven(table: pd.DataFrame) -> Iterator[tuple[float, float, float, float]]:
         way = np.concatenate([[0], np.cumsum((np.abs(left + right) / 2 * span)[:-1])])
         turn = np.concatenate([[0], np.cumsum(((right - left) * span)[:-1])])
         seen = np.flatnonzero(np.isfinite(pose).all(axis=1))
-        marks = (
-            seen[np.unique(np.searchsorted(t[seen], np.arange(t[0], t[-1] + 1e-9, 1.0)).clip(max=len(seen) - 1))]
-            if len(seen)
-            else seen
-        )
-        heading = np.full(len(t), np.nan)
-        if len(seen):
-            heading[seen] = pose[seen, 2]
-        for a, b in pairwise(marks):
-            yield (
-                way[b] - way[a],
-                float(np.hypot(*(pose[b, :2] - pose[a, :2]))),
-                turn[b] - turn[a],
-                float(_turned(heading[a : b + 1])),
-            )
-
-
-def _turned(heading: np.ndarray) -> float:
-    known = heading[np.isfinite(heading)]
-    return float(np.diff(np.unwrap(known)).sum()) if len(known) > 1 else 0.0
+        if not len(seen):
+            continue
+        marks = seen[np.unique(np.searchsorted(t[seen], np.arange(t[0], t[-1] + 1e-9, 1.0)).clip(max=len(seen) - 1))]
+        heading = np.zeros(len(t))
+        heading[seen] = np.unwrap(pose[seen, 2])
+        a, b = marks[:-1], marks[1:]
+        went = np.hypot(*(pose[b, :2] - pose[a, :2]).T)
+        found.append(np.column_stack([way[b] - way[a], went, turn[b] - turn[a], heading[b] - heading[a]]))
+    return np.concatenate(found)

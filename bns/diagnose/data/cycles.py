@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bns.diagnose.data.checks import Finding, check_columns, forward_in_time, to_numbers
+from bns.diagnose.data.checks import Finding, check_columns, forward_in_time, left_out_rows, to_numbers
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
@@ -73,7 +73,8 @@ def checked_cycles(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     for trial, rows in table.groupby("trial", sort=False):
         good = forward_in_time(str(trial), rows, findings)
         for number in sorted(good["cycle"].dropna().astype(int).unique()):
-            row = _cycle(str(trial), number, good[good["cycle"] == number], findings)
+            rows_of = good[good["cycle"] == number]
+            row = None if left_out_rows(rows_of).any() else _cycle(str(trial), number, rows_of, findings)
             if row is not None:
                 found.append({"trial": trial, "cycle": number, **row})
     if not found:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.data.checks import Finding, check_columns, forward_in_time, to_numbers
+from bns.diagnose.data.checks import Finding, check_columns, forward_in_time, left_out_rows, to_numbers
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.errors import DataError
 
@@ -48,12 +48,13 @@ def joint_tracks(table: pd.DataFrame) -> tuple[JointTracks, list[Finding]]:
     table = table.reset_index(drop=True)
     to_numbers(table, numbers)
     findings: list[Finding] = []
-    names, times, points, rows = [], [], [], []
+    names, times, points, rows, again = [], [], [], [], []
     for trial, given in table.groupby("trial", sort=False):
         good = forward_in_time(str(trial), given, findings)
         told = good[[name + SET for name in joints]].ffill().bfill().to_numpy(float)
         seen = good[[name + end for name in sites for end in (X, Y)]].to_numpy(float)
-        whole = np.isfinite(seen).all(axis=1)
+        left_out = left_out_rows(good)
+        whole = np.isfinite(seen).all(axis=1) & ~left_out
         if np.isnan(told).any() or whole.sum() < 2:
             findings.append(Finding(str(trial), int(given.index[0]), "no set points, or hardly seen; the trial is left out"))
             continue
@@ -62,6 +63,7 @@ def joint_tracks(table: pd.DataFrame) -> tuple[JointTracks, list[Finding]]:
         times.append((t - t[0])[whole])
         points.append(seen[whole].reshape(-1, len(sites), 2))
         rows.append((t - t[0], told))
+        again.append(np.diff(np.cumsum(left_out)[whole], prepend=0) > 0)
     if not names:
         raise DataError("No trial has set points of all joints and two rows in which all sites were seen.")
     first = np.concatenate([[0], np.cumsum([len(t) for t in times])]).astype(np.int64)
@@ -77,6 +79,7 @@ def joint_tracks(table: pd.DataFrame) -> tuple[JointTracks, list[Finding]]:
         duration_s=nothing,
         start_s=np.zeros(len(names)),
         start_known=False,
+        jumped=np.concatenate(again) if np.concatenate(again).any() else None,
         joints=joints,
         sites=sites,
         points_m=points_m,

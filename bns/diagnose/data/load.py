@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import Finding, checked
@@ -98,13 +99,14 @@ def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:
         return joint_tracks(table)
     usable, findings = checked(table)
     tracks = tracks_of(usable)
-    return without_faults(tracks), [*findings, *_jump_findings(tracks, usable)]
+    found = jumps(tracks)
+    return without_faults(tracks, found), [*findings, *_jump_findings(tracks, usable, found)]
 
 
-def _jump_findings(tracks: Tracks, usable: pd.DataFrame) -> Iterator[Finding]:
+def _jump_findings(tracks: Tracks, usable: pd.DataFrame, found: NDArray[np.bool_]) -> Iterator[Finding]:
     """A jump that lasts, in words; ``usable``: the rows that the tracks were made of."""
-    rows = np.flatnonzero(usable[list(POSE)].notna().all(axis=1))
-    for frame in np.flatnonzero(jumps(tracks)):
+    rows = usable.index.to_numpy()[usable[list(POSE)].notna().all(axis=1).to_numpy()]
+    for frame in np.flatnonzero(found):
         moved = float(np.hypot(*(tracks.pose[frame] - tracks.pose[frame - 1])[:2]))
         trial = tracks.names[tracks.trial[frame]]
         if tracks.relative:

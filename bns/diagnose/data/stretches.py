@@ -179,8 +179,8 @@ def stretches_of_joints(tracks: JointTracks, mechanism: Mechanism, joints: Seque
         rows = tracks.rows[trial]
         for begin in np.arange(t[0] + RUN_UP_S, t[-1] - _LASTS_S / 2, _LASTS_S):
             inside = frames[(t >= begin) & (t < begin + _LASTS_S)]
-            if len(inside) < 2:
-                continue
+            if len(inside) < 2 or (tracks.jumped is not None and tracks.jumped[inside[1:]].any()):
+                continue  # too few poses, or some in between were left out
             from_s, to_s = tracks.t_s[inside[0]], tracks.t_s[inside[-1]]
             points.append(tracks.points_m[inside][:, order])
             since.append(tracks.t_s[inside] - from_s)

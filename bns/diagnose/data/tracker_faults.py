@@ -24,25 +24,25 @@ FEWEST_FRAMES = DEFAULTS.data.fault_fewest_frames
 AROUND_S = DEFAULTS.data.fault_around_s
 
 
-def without_faults(tracks: Tracks) -> Tracks:
+def without_faults(tracks: Tracks, found: NDArray[np.bool_] | None = None) -> Tracks:
     """The tracks without what comes after a jump in its trial: where the marker is wrong, its heading is wrong as well.
 
     Where that would take more than `MOST_CUT` of all poses, jumps are the tracker's habit: they are marked (`Tracks.jumped`),
-    and everything goes on from where the tracker sees the robot.
+    and everything goes on from where the tracker sees the robot. ``found``: what `jumps` gave, where that is known.
     """
-    found = jumps(tracks)
+    found = jumps(tracks) if found is None else found
     if not found.any():
         return tracks
     count = np.cumsum(found)
     since_start: NDArray[np.int64] = count - np.repeat(count[tracks.first[:-1]], np.diff(tracks.first))
     seen_before: NDArray[np.bool_] = np.asarray(since_start > 0)
     if seen_before.mean() > MOST_CUT:
-        return replace(tracks, jumped=found)
+        return replace(tracks, jumped=found if tracks.jumped is None else found | tracks.jumped)
     return tracks.at_frames([np.flatnonzero(~seen_before[a:b]) + a for a, b in pairwise(tracks.first)])
 
 
 def jumps(tracks: Tracks) -> NDArray[np.bool_]:
-    """Frames (frames,) whose pose no drive leads to from the frame before."""
+    """Frames (frames,) whose pose no drive leads to from the frame before; where poses were left out, nobody asks."""
     found = np.zeros(len(tracks.t_s), dtype=bool)
     moved, turned = _changes(tracks.pose)
     inner = np.ones(len(moved), dtype=bool)
@@ -51,7 +51,7 @@ def jumps(tracks: Tracks) -> NDArray[np.bool_]:
     for trial, (a, b) in enumerate(pairwise(tracks.first)):
         if b - a > 1:
             found[a + 1 : b] = _of_trial(tracks, trial, slice(int(a), int(b)), usual)
-    return found
+    return found if tracks.jumped is None else found & ~tracks.jumped
 
 
 def spans_jump(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -95,4 +95,5 @@ def _fastest(tracks: Tracks, trial: int, t_s: Array) -> Array:
     speed = np.maximum(np.abs(tracks.left_m_s[trial]), np.abs(tracks.right_m_s[trial]))
     first = np.searchsorted(ends, t_s - AROUND_S).clip(max=len(ends) - 1)
     last = np.searchsorted(ends, t_s + AROUND_S).clip(max=len(ends) - 1)
-    return np.array([speed[i : j + 1].max() for i, j in zip(first, last, strict=True)])
+    spans = np.column_stack([first, last + 1]).ravel()  # of each pair, reduceat gives the largest between
+    return np.asarray(np.maximum.reduceat(np.append(speed, 0.0), spans)[::2])

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bns.diagnose.data.checks import own_rows, rows_by_trial
+from bns.diagnose.data.checks import left_out_rows, own_rows, rows_by_trial
 from bns.diagnose.settings import DEFAULTS
-from bns.measurements import BEFORE, COMMANDS, POSE, RUN_UP, SESSION
+from bns.measurements import BEFORE, COMMANDS, LEFT_OUT, POSE, RUN_UP, SESSION
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,8 @@ class Tracks:
     start_known: bool
     extra: Mapping[str, Array] = field(default_factory=dict)
     jumped: NDArray[np.bool_] | None = None
-    """Frames (frames,) whose pose no drive leads to from the frame before (`tracker_faults`); None: there are none."""
+    """Frames (frames,) whose pose no drive leads to from the frame before (`tracker_faults`), or before which poses were left
+    out; None: there are none."""
 
     lead_s: Array | None = None
 
@@ -69,7 +70,7 @@ class Tracks:
 
     @cached_property
     def is_first(self) -> NDArray[np.bool_]:
-        """Frames that begin a trial, or go on elsewhere after a jump of the tracker; (frames,)."""
+        """Frames that begin a trial, or go on after a jump of the tracker or after poses that were left out; (frames,)."""
         found = np.zeros(len(self.t_s), dtype=bool)
         found[self.first[:-1]] = True
         return found if self.jumped is None else found | self.jumped
@@ -142,7 +143,8 @@ def tracks_of(table: pd.DataFrame) -> Tracks:
     lead = np.array([since[at[own[at]][0]] if own[at].any() else since[at[-1]] for at in rows])
     commands = _commands(table, rows, t)
     start, known = _session(table, rows, since, lead)
-    others = [name for name in table.columns if name not in {"trial", "t_s", *COMMANDS, *POSE, *BEFORE, RUN_UP}]
+    own_names = {"trial", "t_s", *COMMANDS, *POSE, *BEFORE, RUN_UP, LEFT_OUT}
+    others = [name for name in table.columns if name not in own_names]
     numeric = [name for name in others if pd.api.types.is_numeric_dtype(table[name])]
     return Tracks(
         names=tuple(name for name, _ in trials),
@@ -156,7 +158,19 @@ def tracks_of(table: pd.DataFrame) -> Tracks:
         start_known=known,
         lead_s=lead if lead.any() else None,
         extra={name: _at_poses(table[name].to_numpy(dtype=float), t, rows, tracked)[seen] for name in numeric},
+        jumped=_begun_again(left_out_rows(table), rows, tracked),
     )
+
+
+def _begun_again(
+    left_out: NDArray[np.bool_], rows: list[NDArray[np.int64]], tracked: NDArray[np.bool_]
+) -> NDArray[np.bool_] | None:
+    """Frames that come after poses which were left out; None where there are none."""
+    if not left_out.any():
+        return None
+    before = [np.cumsum(left_out[at])[tracked[at]] for at in rows]
+    found = np.concatenate([np.diff(count, prepend=count[:1]) > 0 for count in before])
+    return found if found.any() else None
 
 
 def _at_poses(values: Array, t_s: Array, rows: list[NDArray[np.int64]], tracked: NDArray[np.bool_]) -> Array:

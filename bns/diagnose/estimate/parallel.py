@@ -20,6 +20,8 @@ MOST = 8
 
 def each(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
     """``work`` of every item, in their order; the answers are the same for any number of cores."""
+    if cores() == 1 or len(items) == 1:
+        return [work(item) for item in items]
     with ThreadPoolExecutor(min(cores(), MOST)) as pool:
         return list(pool.map(work, items))
 

@@ -136,16 +136,16 @@ def _path(tracks: Tracks, steps: Steps) -> Array:
 
 
 def laid_paths(tracks: Tracks, steps: Steps) -> Array:
-    """Predicted poses (frames, 3) of every trial, each path begun at the trial's first measured pose."""
-    path = _path(tracks, steps)
-    begin = tracks.first[:-1]
-    start = tracks.pose[begin][tracks.trial]
-    cos, sin = np.cos(start[:, 2]), np.sin(start[:, 2])
-    drift = np.cumsum(steps.drift_m, axis=0)
-    drift = drift - drift[begin][tracks.trial]
-    x = start[:, 0] + cos * path[:, 0] - sin * path[:, 1] + drift[:, 0]
-    y = start[:, 1] + sin * path[:, 0] + cos * path[:, 1] + drift[:, 1]
-    return np.stack([x, y, start[:, 2] + path[:, 2]], axis=1)
+    """Predicted poses (frames, 3) of every trial, begun at its first measured pose, and again where it goes on elsewhere."""
+    path, drift = _path(tracks, steps), np.cumsum(steps.drift_m, axis=0)
+    begin = np.maximum.accumulate(np.where(tracks.is_first, np.arange(len(tracks.t_s)), 0))
+    start = tracks.pose[begin]
+    turn = start[:, 2] - path[begin, 2]
+    cos, sin = np.cos(turn), np.sin(turn)
+    way, drift = path - path[begin], drift - drift[begin]
+    x = start[:, 0] + cos * way[:, 0] - sin * way[:, 1] + drift[:, 0]
+    y = start[:, 1] + sin * way[:, 0] + cos * way[:, 1] + drift[:, 1]
+    return np.stack([x, y, start[:, 2] + way[:, 2]], axis=1)
 
 
 def noise_floor(predictor: Predictor, noise: Array, horizon: str) -> dict[str, float]:

@@ -11,8 +11,7 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.stretch_noise import predicted_since_begin
-from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import laid_paths
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
@@ -28,13 +27,14 @@ def shown_paths(predictor: Predictor, model: Model, d: Diagnosis) -> list[dict[s
     First those in which the extended model is more right by most; without one, the worst predicted. What comes after is predicted
     for each trial by a model fitted to others.
     """
-    before = _laid(predictor, predictor.steps(model))
+    tracks = predictor.tracks
+    before = laid_paths(tracks, predictor.steps(model))
     after = None
     if d.selection is not None and d.model is not None and d.effects:
-        after = _laid(predictor, held_out_steps(predictor, d.selection.problem.pose_filter, d.selection.fit.model))
+        after = laid_paths(tracks, held_out_steps(predictor, d.selection.problem.pose_filter, d.selection.fit.model))
     elif d.formula is not None and d.selection is not None:
         pose_filter = problem_for(predictor, d.formula.fit.model).pose_filter
-        after = _laid(predictor, held_out_steps(predictor, pose_filter, d.formula.fit.model))
+        after = laid_paths(tracks, held_out_steps(predictor, pose_filter, d.formula.fit.model))
     off = _mean_error(predictor, before)
     strange = off > _STRANGE * np.median(off)
     better = off - (_mean_error(predictor, after) if after is not None else 0.0)
@@ -42,17 +42,6 @@ def shown_paths(predictor: Predictor, model: Model, d: Diagnosis) -> list[dict[s
     count = min(len(order), MOST_TRIALS)
     chosen = order[np.unique(np.linspace(0, len(order) - 1, count).round().astype(int))]
     return [_trial(predictor, int(trial), before, after) for trial in chosen]
-
-
-def _laid(predictor: Predictor, steps: Steps) -> Array:
-    """Predicted poses (frames, 3), from the first pose of each trial; of robots on joints from the begin of each cycle."""
-    tracks, luck = predictor.tracks, predictor.luck
-    if luck is None:
-        return laid_paths(tracks, steps)
-    begin, (forward, left, turned) = tracks.pose[luck.begins][luck.stretch], predicted_since_begin(luck, tracks.pose, steps).T
-    cos, sin = np.cos(begin[:, 2]), np.sin(begin[:, 2])
-    x, y = begin[:, 0] + cos * forward - sin * left, begin[:, 1] + sin * forward + cos * left
-    return np.column_stack([x, y, begin[:, 2] + turned])
 
 
 def _mean_error(predictor: Predictor, poses: Array) -> Array:

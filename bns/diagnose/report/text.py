@@ -104,7 +104,7 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
             yield f"  {horizon if index == 0 else '':10}{name:26}{error}{change:>30}{ends}".rstrip()
     if any(e.left_out for e in errors.horizons.values()):
         left_out = ", ".join(f"{e.left_out} at {h}" for h, e in errors.horizons.items() if e.left_out)
-        yield f"  (left out, since the tracker jumps within them: {left_out})"
+        yield f"  (left out, since within them the tracker jumps or poses were left out: {left_out})"
     if errors.noise is None:
         yield "  (noise: these poses are too far apart in time to show it)"
     else:

@@ -3,6 +3,10 @@
 Foreseen well, frames are independent. Honest motors are a little faster or slower from one command to the next, and from
 trial to trial; that is taken out first, so that it does not look like an autocorrelation: inside commands each command's mean,
 between commands each trial's.
+
+Errors of a tracker that share something with those of the frames before are no motion, and correlate as well where a filter
+takes them for independent. They add up to nothing: what they add to the way in some frames, they take away later. So a
+correlation counts only if ways that do not touch each other are alike too, by the track alone; opposed ones beside such a one.
 """
 
 from __future__ import annotations
@@ -13,15 +17,19 @@ from itertools import pairwise
 
 import numpy as np
 
+from bns.diagnose.data.tracking_noise import robust_sd
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.settings import DEFAULTS
+from bns.engine.pose_filter import displacements
 
 LAGS = DEFAULTS.residuals.lags
 LEAST_ALIKE = DEFAULTS.residuals.least_alike
 LEAST_OPPOSED = DEFAULTS.residuals.least_opposed
 LEAST_BETWEEN = DEFAULTS.residuals.least_between
 LEAST_Z = DEFAULTS.residuals.correlation_z
+APART = DEFAULTS.residuals.ways_apart
+MOVES_Z = DEFAULTS.residuals.moves_z
 _CLIP = DEFAULTS.residuals.clip
 _DIRECTIONS = ("forward", "left", "heading")
 
@@ -47,13 +55,46 @@ class Autocorrelation:
 
 def autocorrelations(problem: Problem, fit: Fit) -> list[Autocorrelation]:
     """Every direction and time scale, the largest in proportion to its threshold first."""
-    found = []
+    found, moved = [], _unforeseen_ways(problem, fit)
     for index, direction in enumerate(_DIRECTIONS):
         trials = list(_by_command(problem, fit, index))
-        for lag in LAGS:
-            found.append(_pooled(direction, "within", lag, [_within(commands, lag) for commands in trials]))
+        within = [_pooled(direction, "within", lag, [_within(commands, lag) for commands in trials]) for lag in LAGS]
+        alike = [r for r in within if r.correlation > 0 and (not r.significant or _moves(moved, index, r.lag))]
+        swings = any(r.significant for r in alike)
+        found += [*alike, *(r for r in within if swings and r.correlation <= 0)]
         found.append(_pooled(direction, "between", 1, [_between(commands) for commands in trials]))
     return sorted(found, key=lambda r: (not r.significant, -abs(r.z)))
+
+
+def _unforeseen_ways(problem: Problem, fit: Fit) -> list[Array]:
+    """For each trial what the track moved beyond the model in each frame, (frames, 3), each command's mean taken off."""
+    tracks, steps = problem.predictor.tracks, problem.predictor.steps(fit.model)
+    heading = np.roll(tracks.pose[:, 2], 1)
+    east, north = steps.drift_m.T
+    drift = [np.cos(heading) * east + np.sin(heading) * north, np.cos(heading) * north - np.sin(heading) * east]
+    off = displacements(tracks.pose, tracks.is_first) - steps.body
+    off[:, :2] -= np.stack(drift, axis=1)
+    off[:, 2] = np.angle(np.exp(1j * off[:, 2]))
+    usual = np.maximum(robust_sd(off, axis=0), 1e-12)
+    out = []
+    for trial, (a, b) in enumerate(pairwise(tracks.first)):
+        ways = np.clip(off[a + 1 : b] / usual, -_CLIP, _CLIP)
+        command = np.searchsorted(np.cumsum(tracks.duration_s[trial]), tracks.t_s[a + 1 : b] - 1e-9)
+        _, of, count = np.unique(command, return_inverse=True, return_counts=True)
+        means = np.stack([np.bincount(of, ways[:, i]) / count for i in range(3)], axis=1) if len(ways) else ways
+        out.append(ways - means[of])
+    return out
+
+
+def _moves(moved: list[Array], direction: int, frames: int) -> bool:
+    """Are ways of so many frames like those a little later? Errors that add up to nothing make them opposed."""
+    sums = []
+    for ways in moved:
+        way = np.concatenate([[0.0], np.cumsum(ways[:, direction])])
+        values = way[frames:] - way[:-frames]
+        if len(values) > frames + APART + 6:
+            sums.append((float(values[frames + APART :] @ values[: -frames - APART]), float(values @ values)))
+    return _pooled("", "", frames, sums).z > MOVES_Z
 
 
 def _by_command(problem: Problem, fit: Fit, direction: int) -> Iterator[list[Array]]:

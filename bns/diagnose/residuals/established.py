@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
 from bns.diagnose.estimate.starts import fit_with
@@ -59,6 +60,10 @@ class _State:
     fit: Fit
     names: tuple[str, ...] = ()
     terms: tuple[Formula, ...] = ()
+
+    def without(self, predictor: Predictor, name: str, lacking: Fit) -> _State:
+        """The same without an effect; ``lacking``: fitted without it."""
+        return replace(self.settled(predictor, lacking), names=tuple(n for n in self.names if n != name))
 
     def settled(self, predictor: Predictor, fit: Fit) -> _State:
         """The same with a larger fit, its noise estimated again."""
@@ -195,6 +200,8 @@ def _pruned(predictor: Predictor, state: _State, level: float, alone: Mapping[st
         least = min(kept, key=lambda name: kept[name])
         if _earns(worth[least], lacking[least], level) and not (alone and kept[least] < KEPT):
             break
-        names = tuple(name for name in state.names if name != least)
-        state = replace(state.settled(predictor, lacking[least]), names=names)
+        state = state.without(predictor, least, lacking[least])
+    while state.terms and (absurd := next((name for name in state.names if implausible(state.fit, name)), "")):
+        # beside a curve no effect needs numbers that no robot has: it bends the curve
+        state = state.without(predictor, absurd, state.problem.fit(state.fit.model.without(absurd)))
     return state

@@ -20,10 +20,10 @@ from bns.diagnose.estimate.significance import MIN_Z, PairedComparison
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.along_variables import earned_by_columns, losses_with_columns
 from bns.diagnose.settings import DEFAULTS
-from bns.physics.formula import SHARE, WHEELS, formula_effect
+from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, formula_effect
 
 NAME = "unlisted"
-PLACE, STEPPED = "place", "speed in steps"
+PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 CHANCE = DEFAULTS.residuals.chance
 LEAST = DEFAULTS.residuals.least
 LARGE, LARGE_Z = DEFAULTS.residuals.large, DEFAULTS.residuals.large_z
@@ -33,6 +33,7 @@ SPEED_KNOTS = DEFAULTS.residuals.speed_knots
 SESSION_KNOTS = DEFAULTS.residuals.session_knots
 TIME_KNOTS = DEFAULTS.residuals.time_knots
 REVERSAL_KNOTS = DEFAULTS.residuals.reversal_knots
+SURFACE_KNOTS = DEFAULTS.residuals.surface_knots
 SWING_KNOTS = DEFAULTS.residuals.swing_knots
 FLOOR_SIDE = DEFAULTS.residuals.floor_side
 _SMALL = 1e-4
@@ -69,11 +70,15 @@ def families(predictor: Predictor, wheelbase_m: float) -> list[Family]:
     if "left_m_s" not in seen:
         return []
     wheels = np.concatenate([seen["left_m_s"].ravel(), seen["right_m_s"].ravel()])
+    of_speed = _of_speed(float(np.abs(wheels).max()), bool((wheels < 0.0).any()))
     found = [
-        Family("speed of each wheel", WHEELS, _of_speed(float(np.abs(wheels).max()), bool((wheels < 0.0).any()))),
+        Family("speed of each wheel", WHEELS, of_speed),
+        Family("speed of the left wheel", LEFT, of_speed),
+        Family("speed of the right wheel", RIGHT, of_speed),
         Family("speed and turn", "v", ("v * w", "v * w**2", "v * abs(v)", "v**3", "moving * abs(w)")),
         Family("speed and turn", "w", ("w * abs(w)", "w * abs(v)", "w**3", "w * v**2", "w * v", "v * abs(w)")),
         Family("speed and turn", "s", ("v * w * abs(w)", "v * w * abs(v)", "w")),
+        *_surfaces(seen, wheelbase_m),
         Family("side of the turn", "v", ("v * max(w, 0)", "v * min(w, 0)", "moving * max(w, 0)", "moving * min(w, 0)")),
     ]
     return [*found, *_of_tracks(predictor, seen, wheelbase_m)] if not predictor.tracks.relative else found
@@ -85,6 +90,17 @@ def _of_speed(fastest_m_s: float, reverses: bool) -> tuple[str, ...]:
     return (*(f"sign(u) * {h}" for h in hats), *(("min(u, 0)",) if reverses else ()))
 
 
+def _surfaces(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
+    """Free surfaces over speed and turn: limits of grip and the like, which no polynomial follows."""
+    left, right = seen["left_m_s"], seen["right_m_s"]
+    fastest, sharpest = float(np.abs(left + right).max()) / 2, float(np.abs(right - left).max()) / wheelbase_m
+    speeds = _hats("abs(v)", [share * fastest for share in SURFACE_KNOTS[0]])
+    turns = _hats("abs(w)", [share * sharpest for share in SURFACE_KNOTS[1]])
+    if fastest > 0.0 and sharpest > 0.0:
+        yield Family(SURFACE, "w", tuple(f"sign(w) * {v} * {w}" for v in speeds for w in turns[1:]))
+        yield Family(SURFACE, "v", tuple(f"sign(v) * {v} * {w}" for v in speeds[1:] for w in turns))
+
+
 def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
     """Families of what single motions have not: times, memories, places."""
     yield Family(
@@ -93,6 +109,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0:
         ways = [share * wheelbase_m for share in REVERSAL_KNOTS]
         yield Family("way since each wheel reversed", WHEELS, tuple(f"u * {h}" for h in _hats("since", ways)[:-1]))
+    yield Family("recent work of each wheel", WHEELS, ("u * lately10", "u * lately100"))
     yield Family("direction of motion", SHARE, tuple(_hats("swing", SWING_KNOTS)[1:]))
     longest = float(seen["time_in_trial_s"].max())
     times = [share * longest for share in TIME_KNOTS]
@@ -106,7 +123,9 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     yield Family("heading", "v", tuple(f"v * {t}" for t in turns))
     yield Family("heading", "w", tuple(f"moving * {t}" for t in turns))
     (x0, x1), (y0, y1) = (np.quantile(predictor.tracks.pose[:, i], [0.02, 0.98]) for i in (0, 1))
-    yield Family(PLACE, SHARE, tuple(_bumps(x0, x1, y0, y1)))
+    bumps = tuple(_bumps(x0, x1, y0, y1))
+    yield Family(PLACE, SHARE, bumps)
+    yield Family(PLACE, "w", tuple(f"moving * {bump}" for bump in bumps))
     x, y = f"(x - {(x0 + x1) / 2:.3g})", f"(y - {(y0 + y1) / 2:.3g})"
     bends = (x, y, f"{x}**2", f"{x} * {y}", f"{y}**2")
     askew = [f"v * {b} * {t}" for b in bends for t in turns[2:]]

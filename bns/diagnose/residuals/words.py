@@ -9,9 +9,11 @@ import numpy as np
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.symbolic import Formula
-from bns.physics.formula import NEVER_M, SHARE, value_of
+from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, value_of
 
 _POINTS = 400
+_WAYS = ({"lately10": 1.0, "lately100": 1.0}, {"lately10": 0.0, "lately100": 1.0})
+"""Of a wheel that drove a metre just now; and of one that did so more than 10 s ago."""
 
 
 def in_words(term: Formula, predictor: Predictor) -> str:
@@ -35,6 +37,8 @@ _VELOCITIES = {
     "north": "velocity north",
     "share": "the share of the commanded motion that is driven",
     "wheels": "the speed of each wheel",
+    "left": "the speed of the left wheel",
+    "right": "the speed of the right wheel",
 }
 
 
@@ -84,8 +88,20 @@ def _speed(term: Formula, predictor: Predictor) -> str:
     fastest = float(max(np.abs(seen["left_m_s"]).max(), np.abs(seen["right_m_s"]).max()))
     at = fastest * np.array([0.1, 0.3, 1.0])
     got = at + _curve(term, "u", at, since=NEVER_M)
+    back = -fastest + _curve(term, "u", np.array([-fastest]), since=NEVER_M)
+    if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0 and abs(back[0] + got[-1]) > 0.01 * fastest:
+        at, got = np.append(at, -fastest), np.append(got, back)
     pairs = ", ".join(f"{a:.3g} m/s gives {b:.3g} m/s" for a, b in zip(at, got, strict=True))
-    return f"a wheel's speed is no multiple of what it is told: {pairs}"
+    whose = {LEFT: "the left wheel", RIGHT: "the right wheel"}.get(term.on, "a wheel")
+    return f"{whose}'s speed is not in proportion to its command: {pairs}"
+
+
+def _work(term: Formula, _: Predictor) -> str:
+    per_m = [-float(_curve(term, "u", np.ones(1), **ways)[0]) for ways in _WAYS]
+    return (
+        f"a wheel is {_slower(per_m[0])} for each metre that it drove in the last 10 s, and {_slower(per_m[1])} for each "
+        "metre of the 90 s before"
+    )
 
 
 def _steps(term: Formula, _: Predictor) -> str:
@@ -124,6 +140,9 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("way since each wheel reversed", "wheels"): _reversal,
     ("direction of motion", "share"): _swing,
     ("speed of each wheel", "wheels"): _speed,
+    ("speed of the left wheel", "left"): _speed,
+    ("speed of the right wheel", "right"): _speed,
+    ("recent work of each wheel", "wheels"): _work,
     ("speed in steps", "wheels"): _steps,
     ("changes of speed of each wheel", "wheels"): _changes,
 }

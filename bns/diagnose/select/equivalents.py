@@ -16,8 +16,8 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.parallel import each
+from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.select.indistinguishable import indistinguishable
-from bns.diagnose.select.plausibility import implausible
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 from bns.physics.model import Model

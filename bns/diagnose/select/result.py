@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.predict.paired_errors import paired_errors
-from bns.diagnose.select.plausibility import implausible
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,15 @@ class Residuals:
         "standard errors",
         f"Less certain correlations are those of honest robots as well; the number is {BY_HAND}.",
     )
+    ways_apart: int = setting(
+        3, "frames", "Ways that are compared lie so far apart, as `lags`: neighbours share errors of the camera."
+    )
+    moves_z: float = setting(
+        2.0,
+        "standard errors",
+        "Ways are alike from here on. Tracking errors with a memory of 0.4 to 0.9 a frame (AR(1), up to 5 mm and 0.05 rad) stay "
+        "below 0; a heading that swings by 0.02 rad in 1.5 s reaches more than 10.",
+    )
     clip: float = setting(
         4.0,
         "standard deviations",
@@ -120,6 +129,12 @@ class Residuals:
         "wheelbases",
         "Bends of a curve along a wheel's way since it changed direction: play in gears is a few hundredths of a wheelbase; "
         "it is nothing at the last one.",
+    )
+    surface_knots: tuple[tuple[float, ...], tuple[float, ...]] = setting(
+        ((0.0, 0.4, 1.0), (0.0, 0.3, 0.6, 1.0)),
+        "of the highest speed, and of the sharpest turn",
+        f"Knots of a free surface over both, as many as a formula may be long; {BY_HAND}. With them a robot that slides "
+        "beyond a lateral acceleration is described.",
     )
     swing_knots: tuple[float, ...] = setting(
         (0.0, 0.1, 0.3, 0.6, 1.0),

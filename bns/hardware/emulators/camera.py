@@ -19,7 +19,7 @@ with extra("robot"):
 _BOUNDARY = b"frame"
 _QUALITY = 92
 _AGAIN_S = 0.1  # by the computer's clock
-_LONGEST_WAY_S = 5.0  # somebody who has not taken a frame by then has gone
+_LONGEST_WAY_S = 20.0  # somebody who has not taken a frame by then has gone
 
 
 class CameraEmulator:

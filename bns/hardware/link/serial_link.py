@@ -20,6 +20,8 @@ with extra("robot"):
     from serial.tools.list_ports import comports
 
 _LONGEST_LINE = 256
+_WRITE_S = 20.0
+"""For hangs alone: a frame fits into the port's buffer, and the waits for its answer say sooner that nobody hears it."""
 _OWED_S = 3.0
 """An answer that has not come after so long was lost."""
 
@@ -121,7 +123,7 @@ def open_port(port: str, baud: int) -> serial.Serial:
     if not Path(port).exists():
         raise HardwareError(no_port(port))
     try:
-        return serial.Serial(port, baud, timeout=GRANULARITY_S, write_timeout=1.0, exclusive=True)
+        return serial.Serial(port, baud, timeout=GRANULARITY_S, write_timeout=_WRITE_S, exclusive=True)
     except serial.SerialException as error:
         raise HardwareError(why_not_opened(port, error)) from error
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 
@@ -83,8 +83,9 @@ class BridgeChain:
         if self._serial is not None:
             self._serial.close()
 
-    def arm(self) -> None:
-        """Torque on where the joints are, grown in steps by the bridge up to the limits' share of it."""
+    def arm(self, meanwhile: Callable[[], object] = lambda: None) -> None:
+        """Torque on where the joints are, grown in steps by the bridge up to the limits' share of it, after this one question."""
+        meanwhile()
         self._ask(ARM, bytes([round(100 * self.limits.torque)]), 0)
 
     def move(self, angles_rad: Sequence[float], speeds_rad_s: Sequence[float]) -> list[float]:

@@ -116,15 +116,20 @@ class Ax12Chain:
         if not self._port.is_open:
             self._port.setBaudRate(BAUD)
 
-    def arm(self) -> None:
-        """Torque on without a jerk: the goal is where the joint is, and the torque grows in steps to its limit."""
+    def arm(self, meanwhile: Callable[[], object] = lambda: None) -> None:
+        """Torque on without a jerk: the goal is where the joint is, and the torque grows in steps to its limit.
+
+        `meanwhile` is called for each servo and step.
+        """
         for number in self.ids:
+            meanwhile()
             here = self.read(number, "present_position")
             self.write(number, "torque_limit", 0)
             self.write(number, "goal_position", here)
             self.write(number, "moving_speed", 1)
         for share in (0.25, 0.5, 0.75, 1.0):
             for number in self.ids:
+                meanwhile()
                 self.write(number, "torque_limit", round(1023 * self.limits.torque * share))
                 self.write(number, "torque_enable", 1)
             self._clock.sleep(0.05)

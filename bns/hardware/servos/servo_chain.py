@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -70,8 +70,11 @@ class ServoChain(Protocol):
     retries: int
     limits: ServoLimits
 
-    def arm(self) -> None:
-        """Torque on without a jerk: goals are where the joints are, and the torque grows in steps to its limit."""
+    def arm(self, meanwhile: Callable[[], object] = lambda: None) -> None:
+        """Torque on without a jerk: goals are where the joints are, and the torque grows in steps to its limit.
+
+        `meanwhile` is called at least every 0.1 s of that; what it raises ends it.
+        """
 
     def move(self, angles_rad: Sequence[float], speeds_rad_s: Sequence[float]) -> list[float]:
         """Set goals and speeds of all joints; the angles really sent, after clipping, once all confirmed them."""

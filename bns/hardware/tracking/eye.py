@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from bns.errors import HardwareError, TrialPausedError
@@ -49,12 +51,16 @@ class Eye:
         self._journal.note("seen", pose=rounded, residual_m=residual_m, points=points, filmed_s=round(filmed_s, 6))
         return Sight(filmed_s, pose, sight.residual_m, sight.points)
 
-    def standing(self) -> Sight | None:
-        """Mean of some looks, from now on, at a robot that stands; None if it is not seen often enough."""
+    def standing(self, meanwhile: Callable[[], None] = lambda: None) -> Sight | None:
+        """Mean of some looks, from now on, at a robot that stands; None if it is not seen often enough.
+
+        `meanwhile` is called after each look; what it raises ends the looking.
+        """
         sights: list[Sight] = []
         began_s = self._clock.now_s()
         for _ in range(5 * _LOOKS):
             sight = self.look()
+            meanwhile()
             if sight is not None and sight.t_s >= began_s:  # an older one may be from before it was put there
                 sights.append(sight)
             if len(sights) == _LOOKS:

@@ -10,7 +10,7 @@ import numpy as np
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
-from bns.physics.wheels.scans import accumulated
+from bns.physics.wheels.scans import carried_on
 
 
 def apply(wheels: Wheels, loss_per_m: float, cool_s: float) -> Wheels:
@@ -20,19 +20,9 @@ def apply(wheels: Wheels, loss_per_m: float, cool_s: float) -> Wheels:
 
 
 def _kept(wheels: Wheels, speed: Array, loss_per_m: float, cool_s: float) -> Array:
-    rate, session = np.abs(speed), wheels.conditions.session_s
-    if session is None:
-        trials = [accumulated(rate[i : i + 1], wheels.step_s[i : i + 1], *_one(), cool_s) for i in range(len(rate))]
-        warmth = np.concatenate(trials) if trials else rate
-    else:
-        begin = session[:, 0] - wheels.step_s[:, 0] / 2.0
-        warmth = accumulated(rate, wheels.step_s, begin, np.argsort(begin, kind="stable"), cool_s)
+    warmth = carried_on(np.abs(speed), wheels.step_s, wheels.conditions.session_s, cool_s)
     kept: Array = np.maximum(1.0 - loss_per_m * warmth, 0.0)
     return kept
-
-
-def _one() -> tuple[Array, np.ndarray]:
-    return np.zeros(1), np.zeros(1, dtype=np.int64)
 
 
 EFFECT = Effect(

@@ -90,6 +90,11 @@ class SnakeParameters:
         return int(self.links) - 1
 
     @property
+    def joints_between_markers(self) -> slice:
+        """Joint k is between links k and k + 1; the joints beyond swing an end of the body, and move no marker by themselves."""
+        return slice(*(int((self.length_m + sign * self.marker_gap_m) / 2 / self.pitch_m) for sign in (-1, 1)))
+
+    @property
     def heavy_link(self) -> int:
         """The link that carries the Arduino and drags the tether: the first is at yellow's end, the last at green's."""
         return 0 if self.tether_at_yellow else int(self.links) - 1

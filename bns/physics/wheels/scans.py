@@ -187,3 +187,13 @@ def accumulated(rate: Array, step_s: Array, begin_s: Array, order: NDArray[np.in
             s += (end - s) * settled
             now += h
     return mean
+
+
+def carried_on(rate: Array, step_s: Array, session_s: Array | None, fade_s: float) -> Array:
+    """`accumulated` from trial to trial by the time of the session in every step; each trial from 0 where that is not known."""
+    if session_s is not None:
+        begin = session_s[:, 0] - step_s[:, 0] / 2.0
+        return accumulated(rate, step_s, begin, np.argsort(begin, kind="stable"), fade_s)
+    first, alone = np.zeros(1), np.zeros(1, dtype=np.int64)
+    trials = [accumulated(rate[i : i + 1], step_s[i : i + 1], first, alone, fade_s) for i in range(len(rate))]
+    return np.concatenate(trials) if trials else rate

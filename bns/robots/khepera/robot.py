@@ -17,13 +17,13 @@ from bns.engine.philox import Key, Purpose, uniforms
 from bns.engine.snn import INPUTS
 from bns.measurements import COLUMNS, trial_table
 from bns.robots.base import RandomStream, Scores, rotate
+from bns.robots.khepera.options import READINGS, Options
 from bns.robots.khepera.rollout import inputs, roll_out, walked
 from bns.robots.khepera.rules import (
     GOAL_RADIUS_M,
     HIGH,
     LARGEST_HEADING_RAD,
     LOW,
-    MISSED_GOAL_M,
     SCALE,
     SMALLEST_SUM_M,
     START,
@@ -34,7 +34,7 @@ UNITS_PER_M_S = 144_010.0
 
 
 class Khepera:
-    """Implements `bns.robots.base.TwoWheeled`."""
+    """Implements `bns.robots.base.TwoWheeled`. Other readings of the dissertation: `bns.robots.khepera.options`."""
 
     name = "khepera"
     networks = ("dx", "dy", "dtheta")
@@ -50,9 +50,8 @@ class Khepera:
     given_columns: Mapping[str, tuple[float, float]] = {
         "left_m_s": (-0.3, 0.3), "right_m_s": (-0.3, 0.3), "duration_s": (0.001, 60.0),
     }  # fmt: skip
-    options: tuple[str, ...] = ()
-    switched_on: tuple[str, ...] = ()
-    nguyen_widrow, flat_spot = False, 0.0
+    options: tuple[str, ...] = tuple(sorted(READINGS))
+    nguyen_widrow = False
     substitute_sd_m = None
     physics = "bns.physics.wheels.khepera_drive"
     world_model = "khepera-world"
@@ -60,9 +59,15 @@ class Khepera:
     two_wheeled = True
     marks_unstable = False
 
+    def __init__(self, switched_on: tuple[str, ...] = ()) -> None:
+        self.switched_on, self._options = switched_on, Options(switched_on)
+        self.flat_spot, self._operators, self._penalty_m = (
+            self._options.flat_spot, self._options.operators, self._options.penalty_m,
+        )  # fmt: skip
+
     def with_options(self, names: tuple[str, ...]) -> Khepera:
-        """There are none."""
-        return self
+        """The Khepera with some of `options` switched on."""
+        return type(self)(names)
 
     def initial_population(self, key: Key, size: int, shortest: int, capacity: int) -> Population:
         """4 to 13 random commands a controller; more where the shortest list allowed is longer."""
@@ -147,7 +152,7 @@ class Khepera:
         children: Population,
     ) -> int:
         """First segments of two lists swapped, and mutation (section 4.3)."""
-        return breed(key, parents, order, cdf, rate, self.bounds, shortest, generation, children)
+        return breed(key, parents, order, cdf, rate, self.bounds, shortest, generation, children, self._operators)
 
     def diversity(self, population: Population, scores: Scores) -> float:
         """Equation 4.1."""
@@ -159,14 +164,14 @@ class Khepera:
     ) -> Scores:
         """Fitness on simulator networks (algorithm 2), without noise."""
         known = None if parents is None else parents.outputs
-        fitness, reached, failures, outputs = roll_out(population, weights, task.goals_m, known)
+        fitness, reached, failures, outputs = roll_out(population, weights, task.goals_m, known, self._penalty_m)
         return Scores(fitness, reached, failures, outputs=outputs)
 
     def walk(
         self, population: Population, displacements: np.ndarray, task: Task, stream: RandomStream | None = None
     ) -> Scores:
         """As `score`, from displacements (commands, 3)."""
-        return Scores(*walked(population, self.targets(displacements), task.goals_m))
+        return Scores(*walked(population, self.targets(displacements), task.goals_m, self._penalty_m))
 
     def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
         """Fitness per metre, and goals reached, of one path; 0 where `score` would call the arithmetic failed."""
@@ -179,7 +184,7 @@ class Khepera:
                 goal += 1
                 distance = math.hypot(*(task.goals_m[min(goal, last)] - (x, y)))
             total += distance
-        total += MISSED_GOAL_M * (len(task.goals_m) - goal)
+        total += self._penalty_m * (len(task.goals_m) - goal)
         return (1.0 / max(total, SMALLEST_SUM_M) if math.isfinite(total) else 0.0), goal
 
     def succeeded(self, poses: np.ndarray, task: Task) -> bool:

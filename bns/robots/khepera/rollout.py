@@ -13,6 +13,7 @@ from bns.engine.snn import INPUTS, predict_into
 from bns.robots.khepera.rules import (
     CENTRE,
     LARGEST_HEADING_RAD,
+    MISSED_GOAL_M,
     PER_UNIT,
     SCALE,
     SQUARED_REACH_M2,
@@ -144,8 +145,8 @@ def _distances(step_x, step_y, starts, lengths, goals, reached, distance):  # ty
 
 
 @exact
-def _walk(outputs, lengths, scale, goals, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
-    """Algorithm 2 for every controller; how many could not be computed."""
+def _walk(outputs, lengths, scale, goals, extra_m, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+    """Algorithm 2 for every controller; how many could not be computed. extra_m: by how much the penalty is another one."""
     count, starts = outputs.shape[1], np.cumsum(lengths) - lengths
     heading, step_y, step_x = np.empty(count), np.empty(count), np.empty(count)
     astray = np.empty(lengths.size)
@@ -158,6 +159,7 @@ def _walk(outputs, lengths, scale, goals, fitness, reached):  # type: ignore[no-
         total = astray[i]
         for c in range(starts[i], starts[i] + lengths[i]):
             total += heading[c]
+        total += extra_m * (goals.shape[0] - reached[i])
         fitness[i] = fitness_of(total, reached[i], goals)
         failures += fitness[i] == 0.0
     return failures
@@ -183,9 +185,9 @@ def _outputs(commands, lengths, origin, known, weights, centre, per_unit):  # ty
 
 
 @exact
-def _rolled_out(commands, lengths, origin, known, weights, centre, per_unit, scale, goals, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+def _rolled_out(commands, lengths, origin, known, weights, centre, per_unit, scale, goals, extra_m, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
     outputs = _outputs(commands, lengths, origin, known, weights, centre, per_unit)
-    return outputs, _walk(outputs, lengths, scale, goals, fitness, reached)
+    return outputs, _walk(outputs, lengths, scale, goals, extra_m, fitness, reached)
 
 
 class Rollout(NamedTuple):
@@ -198,8 +200,14 @@ class Rollout(NamedTuple):
     outputs: np.ndarray
 
 
-def roll_out(population: Population, weights: np.ndarray, goals_m: np.ndarray, known: np.ndarray | None) -> Rollout:
-    """Algorithm 2 on networks (3, W).
+def roll_out(
+    population: Population,
+    weights: np.ndarray,
+    goals_m: np.ndarray,
+    known: np.ndarray | None,
+    penalty_m: float = MISSED_GOAL_M,
+) -> Rollout:
+    """Algorithm 2 on networks (3, W), with ``penalty_m`` for every goal missed.
 
     known (3, commands): what the same networks said of all commands of the generation that this one was bred from. An output
     does not depend on where in a batch its command stands, so taking it over and computing it anew give the same number.
@@ -215,16 +223,20 @@ def roll_out(population: Population, weights: np.ndarray, goals_m: np.ndarray, k
         PER_UNIT,
         SCALE,
         goals_m,
+        penalty_m - MISSED_GOAL_M,
         fitness,
         reached,
     )
     return Rollout(fitness, reached, int(failures), outputs)
 
 
-def walked(population: Population, outputs: np.ndarray, goals_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+def walked(
+    population: Population, outputs: np.ndarray, goals_m: np.ndarray, penalty_m: float = MISSED_GOAL_M
+) -> tuple[np.ndarray, np.ndarray, int]:
     """Algorithm 2 on outputs (3, commands) that are known: fitness (n,), goals reached (n,), how many failed."""
     fitness, reached = np.empty(len(population)), np.empty(len(population), np.int32)
-    failures = _walk(np.ascontiguousarray(outputs), population.lengths, SCALE, goals_m, fitness, reached)
+    extra_m = penalty_m - MISSED_GOAL_M
+    failures = _walk(np.ascontiguousarray(outputs), population.lengths, SCALE, goals_m, extra_m, fitness, reached)
     return fitness, reached, int(failures)
 
 

@@ -32,6 +32,7 @@ class MyRobot(Khepera):
     """Implements `bns.robots.base.TwoWheeled`."""
 
     name = "my-robot"
+    options = ()
     world_model = str(Path(__file__).with_name("world.yaml"))
     simulators = "my_robot"
     bounds = CommandBounds(LOW, HIGH, np.array([30.0, 30.0, 500.0], np.float32))

@@ -1,0 +1,95 @@
+"""Archives as the tables that figures ask: ``runs``, ``evals`` and ``specs``, with the columns that an archive keeps."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pandas as pd
+import pyarrow.parquet as pq
+
+from bns.errors import StoreError
+from bns.store.archive.kept import DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE
+from bns.store.disk.digest import is_intact, is_sealed
+from bns.store.disk.parquet import READ_FAULTS
+from bns.store.read.views import pattern
+from bns.store.schema import METADATA_KEY, PARAMETERS
+
+_SPECS = ("sweep", "spec_hash", "written_at", "text", "runs")
+
+
+def archives(place: Path | str) -> list[Path]:
+    """The archives that ``place`` names: itself if it is a file, else the parquet files in that folder, by name.
+
+    Raises:
+        StoreError: there is none.
+    """
+    path = Path(place)
+    found = [path] if path.is_file() else sorted(path.glob("*.parquet"))
+    if not found:
+        raise StoreError(
+            f"there is no archive at {path}: give a file that bns archive wrote, or a folder of such files (*.parquet)."
+        )
+    return found
+
+
+def described(path: Path) -> dict[str, Any]:
+    """What an archive says of itself: runs, engine_versions, spec_hashes, git_sha, versions, specs (the sweeps' files).
+
+    Raises:
+        StoreError: it is no archive, one of another format, or not as it was written.
+    """
+    try:
+        said = json.loads((pq.read_metadata(path).metadata or {})[METADATA_KEY])
+        if "archive" in said and is_sealed(path) and not is_intact(path):
+            raise StoreError(f"{path} is not as it was written: it was changed or cut short. Fetch or make it again.")
+    except READ_FAULTS:
+        said = {}
+    if said.get("archive") != FORMAT:
+        why = f"has format {said['archive']}, and this bns reads {FORMAT}" if "archive" in said else "is no archive"
+        raise StoreError(f"{path} {why}. Make one from the results: bns archive results -o {path.name}")
+    return dict(said)
+
+
+def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:
+    """A DuckDB connection with the views runs, evals and specs over archives. A run that several of them have counts once.
+
+    Raises:
+        StoreError: a file is no archive, or not as it was written.
+    """
+    plans = [plan for path in paths for plan in described(path)["specs"]]
+    connection = duckdb.connect()
+    connection.execute("SET TimeZone = 'UTC'")
+    files = ", ".join(pattern(path) for path in paths)
+    connection.execute(f"""CREATE TABLE archived AS SELECT * FROM read_parquet([{files}])
+        QUALIFY row_number() OVER (PARTITION BY sweep, run_id ORDER BY status <> 'ok') = 1""")
+    connection.execute(f"CREATE VIEW runs AS SELECT {', '.join(RUN_COLUMNS)} FROM archived")
+    connection.execute(f"CREATE VIEW evals AS {_evals()}")
+    connection.register("plans", pd.DataFrame(plans, columns=list(_SPECS)).astype(dict.fromkeys(_SPECS[:4], str)))
+    connection.execute("CREATE TABLE specs AS SELECT DISTINCT * REPLACE (written_at::TIMESTAMPTZ AS written_at) FROM plans")
+    return connection
+
+
+def _evals() -> str:
+    """SELECT of a row an evaluation."""
+    parameters = ", ".join(PARAMETERS)
+    lists = ", ".join(f"unnest({name}) AS {name}" for name in (*WHOSE, *DECIMALS))
+    successes = [
+        _bit(column, place, f"{prefix}{name}", known=not place)
+        for column, prefix in WHOSE.items()
+        for place, name in enumerate(("success", *NEAR))
+    ]
+    measures = [f"{name} / {10**decimals}.0 AS {name}" for name, decimals in DECIMALS.items()]
+    return f"""SELECT run_id, sweep, robot, task, {parameters}, evaluation::INTEGER AS evaluation,
+        {", ".join((*successes, *measures))} FROM (
+            SELECT run_id, sweep, robot, task, {parameters}, radii,
+                   unnest(range(1, len(success_bits) + 1)) AS evaluation, {lists} FROM archived)"""
+
+
+def _bit(column: str, place: int, name: str, *, known: bool) -> str:
+    """A success out of its bits; empty, unless ``known``, where a task has no goal point."""
+    value = f"({column} & {1 << place}) > 0"
+    return f"{value} AS {name}" if known else f"CASE WHEN radii THEN {value} END AS {name}"

@@ -1,0 +1,122 @@
+"""An archive of results: every run of some sweeps as one row of a parquet file, with the sweeps' own files beside."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from bns.errors import StoreError, unknown_name
+from bns.store.archive.kept import DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE, bits, whole
+from bns.store.disk.digest import BLANK, FIELD, sealed
+from bns.store.disk.files import publish
+from bns.store.read.reader import connect
+from bns.store.schema import METADATA_KEY, PARAMETERS, SCHEMA_VERSION
+
+_LEVEL = 19
+"""Of zstd: an archive is written once and kept."""
+_ENGINE = re.compile(r'"engine_version":(\d+)')
+
+
+@dataclass(frozen=True)
+class ArchiveSummary:
+    """What was archived: ``path``, ``runs``, ``sweeps`` (name -> runs) and ``size_bytes``."""
+
+    path: Path
+    runs: int
+    sweeps: dict[str, int]
+    size_bytes: int
+
+    def __str__(self) -> str:
+        listed = ", ".join(f"{name} {count:,}" for name, count in self.sweeps.items())
+        return f"{self.runs:,} runs ({listed}) in {self.path}, {self.size_bytes / 1e6:.2f} MB"
+
+
+def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | None = None) -> ArchiveSummary:
+    """Write one parquet file from which figures and findings are drawn as from the results themselves.
+
+    Args:
+        results: the folder of all results; it is only read, and may grow meanwhile.
+        output: the file to write; an older one is replaced as a whole.
+        sweeps: names of the sweeps to keep; all by default.
+
+    Kept of every run: parameters, seed, spec, versions, commit and, for every evaluation, successes at all radii (of the
+    fittest, the evaluated, and so far), diversity, fitness error and fitness in the world of the fittest (to 0.001 per
+    metre) and the length of its list. Paths, probes, times and everything else stay in the results.
+
+    Raises:
+        StoreError: there are no results, no such sweep, or the file cannot be written.
+    """
+    path = Path(output)
+    if path.suffix != ".parquet":
+        raise StoreError(f"the archive is {str(path)!r}; it must be a file that ends in .parquet, for example study.parquet.")
+    with connect(results) as connection:
+        there = [row[0] for row in connection.execute("SELECT DISTINCT sweep FROM runs ORDER BY sweep").fetchall()]
+        for name in sweeps or ():
+            if name not in there:
+                raise StoreError(unknown_name(f"sweep in {results}", name, there))
+        chosen = sorted(set(sweeps or there))
+        connection.execute("CREATE TEMP TABLE chosen AS SELECT unnest(?::VARCHAR[]) AS sweep", [chosen])
+        table = connection.sql(_select()).to_arrow_table()
+        plans = connection.sql("SELECT * FROM specs SEMI JOIN chosen USING (sweep) ORDER BY ALL").to_arrow_table()
+    data = _file_bytes(table, plans.to_pylist())
+    publish(data, path.with_name(f".{path.name}.part"), path)
+    names = table["sweep"].to_pylist()
+    return ArchiveSummary(path, len(names), {name: names.count(name) for name in chosen}, len(data))
+
+
+def _select() -> str:
+    """SELECT of one row a run, with a list of each thing that is kept of its evaluations."""
+    lists = {column: f"({bits(prefix)})::UTINYINT" for column, prefix in WHOSE.items()}
+    lists |= {name: whole(name) for name in DECIMALS}
+    listed = ", ".join(f"list({value} ORDER BY evaluation) AS {name}" for name, value in lists.items())
+    return f"""
+        SELECT {", ".join(f"runs.{name}" for name in RUN_COLUMNS)}, coalesce(radii, false) AS radii,
+               {", ".join(f"coalesce(kept.{name}, []) AS {name}" for name in lists)}
+        FROM runs SEMI JOIN chosen USING (sweep)
+        LEFT JOIN (SELECT run_id, sweep, count({NEAR[0]}) > 0 AS radii, {listed}
+                   FROM evals SEMI JOIN chosen USING (sweep) GROUP BY run_id, sweep) AS kept USING (run_id, sweep)
+        ORDER BY sweep, task, {", ".join(f"runs.{name}" for name in PARAMETERS if name not in ("seed", "root_seed"))},
+                 root_seed, seed, run_id"""
+
+
+def _file_bytes(table: pa.Table, plans: list[dict[str, Any]]) -> bytes:
+    measures = list(DECIMALS)
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table.replace_schema_metadata({METADATA_KEY: _metadata(table, plans)}),
+        sink,
+        compression="zstd",
+        compression_level=_LEVEL,
+        use_dictionary=[name for name in table.column_names if name not in measures],
+        column_encoding={f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in measures},
+        write_page_checksum=True,
+    )
+    return sealed(bytes(sink.getvalue()))
+
+
+def _metadata(table: pa.Table, plans: list[dict[str, Any]]) -> bytes:
+    """The sweeps' files and where the runs come from, as JSON; the digest of the file is added last."""
+    texts = [{**plan, "written_at": plan["written_at"].isoformat()} for plan in plans]
+    engines = {found[1] for text in table["spec"].to_pylist() if (found := _ENGINE.search(text or ""))}
+    said = {
+        "archive": FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        "runs": table.num_rows,
+        "engine_versions": sorted(map(int, engines)),
+        "spec_hashes": sorted({plan["spec_hash"] for plan in plans}),
+        **{name: _all_of(table, name) for name in ("git_sha", "git_clean", "bns_version", "versions", "world_digest")},
+        "specs": texts,
+        FIELD: BLANK,
+    }
+    return json.dumps(said).encode()
+
+
+def _all_of(table: pa.Table, column: str) -> list[Any]:
+    return sorted({value for value in table[column].to_pylist() if value is not None}, key=str)

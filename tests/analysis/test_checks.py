@@ -1,0 +1,199 @@
+"""Each check on a made-up store where the finding holds and on one where it does not: agrees, differs."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from figure_helpers import with_evals, written
+from store.synthetic import publish_chunk, record
+
+from analysis import checks
+from analysis.results import NoDataError, Results
+from analysis.selection import selections
+from bns.spec import RunSpec
+
+EVALUATIONS, SEEDS = 12, 8
+RATES, SIZES = (0.1, 0.3, 0.5, 0.7, 0.9), (50, 100, 200, 400)
+NEAR = tuple(f"success_{cm}cm" for cm in (7, 10, 14, 20))
+steps = np.arange(1, EVALUATIONS + 1)
+
+
+def store_of(place, runs, robot="khepera", task="circle"):
+    """Twenty combinations of mutation rate and population on some seeds; ``runs(rate, size, seed)`` gives columns of evals."""
+    specs, rows = [], []
+    for rate, size, seed in itertools.product(RATES, SIZES, range(SEEDS)):
+        named = {"robot": robot, "task": task, "seed": seed, "mutation_rate": rate, "population_size": size}
+        specs.append(RunSpec(evaluations=EVALUATIONS, **named))
+        given = runs(rate, size, seed)
+        success = np.broadcast_to(given.get("success", False), EVALUATIONS).astype(bool)
+        near = dict.fromkeys(NEAR, success if robot == "khepera" else np.full(EVALUATIONS, None))
+        ever = np.logical_or.accumulate(success)
+        plain = {"ever_success": ever, "diversity": 1.0 + 0.001 * seed, "fitness_world": 0.001 * size - rate}
+        row = near | plain | given | {"success": success}
+        rows.append({name: np.broadcast_to(value, EVALUATIONS) for name, value in row.items()})
+    together = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+    publish_chunk(place, f"made-{task}", f"part-j{0:032x}-0", specs, np.random.default_rng(0), **together)
+
+
+def checked(place, check, task="circle", **arguments):
+    store = Results(place)
+    return getattr(checks, check)(store, selections(store)[0], task, **arguments)
+
+
+def both(tmp_path, holds, fails, check, robot="khepera", task="circle", **arguments):
+    """Verdicts where it holds and where it does not."""
+    found = []
+    for name, runs in (("holds", holds), ("fails", fails)):
+        store_of(tmp_path / name, runs, robot, task)
+        found.append(checked(tmp_path / name, check, task, **arguments).verdict)
+    return found
+
+
+def mixed(share, seed, rate, size):
+    """Success in about this share of the evaluations, another one for each run."""
+    random = np.random.default_rng([seed, int(100 * rate), size])
+    return {"success": random.random(EVALUATIONS) < share}
+
+
+def test_the_worst_and_the_second_best_value(tmp_path):
+    shares = {0.1: 0.9, 0.3: 0.7, 0.5: 0.5, 0.7: 0.5, 0.9: 0.1}
+    store_of(tmp_path, lambda rate, size, seed: mixed(shares[rate], seed, rate, size))
+    name = {"parameter": "mutation_rate"}
+    assert checked(tmp_path, "worst_value", **name, value=0.9).verdict == "agrees"
+    assert checked(tmp_path, "worst_value", **name, value=0.1).verdict == "differs"
+    assert checked(tmp_path, "second_best", **name, value=0.3).verdict == "agrees"
+    assert checked(tmp_path, "second_best", **name, value=0.1).verdict == "differs"
+    assert checked(tmp_path, "values_alike", **name, values=[0.5, 0.7], points=15).verdict == "agrees"
+    assert checked(tmp_path, "values_alike", **name, values=[0.1, 0.7], points=15).verdict == "differs"
+    assert checked(tmp_path, "no_trend", **name, points=3).verdict == "differs"
+    assert checked(tmp_path, "no_trend", parameter="population_size", points=15).verdict == "agrees"
+    assert checked(tmp_path, "worst_value", **name, value=0.2).verdict == "undecided"  # nobody has it
+
+
+def test_each_of_the_best_has_half_by_an_evaluation_and_sooner_is_as_good(tmp_path):
+    holds = lambda rate, size, seed: {"success": (steps >= 3) & (rate <= 0.5)}  # noqa: E731
+    fails = lambda rate, size, seed: {"success": (steps >= 3 + 8 * (size == 400)) & (rate <= 0.5)}  # noqa: E731  # some are late
+    assert both(tmp_path, holds, fails, "half_by", evaluation=6) == ["agrees", "differs"]
+    assert checked(tmp_path / "holds", "half_by", evaluation=3).verdict == "agrees"
+    assert checked(tmp_path / "holds", "half_by", evaluation=2).verdict == "differs"
+
+
+def test_the_worst_never_succeed(tmp_path):
+    holds = lambda rate, size, seed: {"success": rate < 0.5}  # noqa: E731
+    assert both(tmp_path, holds, lambda *_: {"success": steps > 5}, "worst_never_succeed") == ["agrees", "differs"]
+
+
+def test_success_is_lost_and_regained(tmp_path):
+    holds = lambda *_: {"success": (steps > 3) & (steps != 7)}  # noqa: E731
+    fails = lambda *_: {"success": (steps > 3) & (steps < 9)}  # noqa: E731  # lost for good
+    assert both(tmp_path, holds, fails, "convergence_is_lost_and_regained") == ["agrees", "differs"]
+
+
+def graded(diversity):
+    """The lower the mutation rate the better; diversity as given."""
+    return lambda rate, size, seed: {
+        "success": (steps > 2) & (rate <= 0.5), "diversity": diversity(rate, size) + 0.002 * seed,
+    }  # fmt: skip
+
+
+def test_as_many_of_the_best_as_said_lie_in_a_range(tmp_path):
+    holds = graded(lambda rate, size: 0.6 if size > 50 else 3.0)
+    fails = graded(lambda rate, size: 3.0)
+    assert both(tmp_path, holds, fails, "best_in_range", range=[0.5, 0.7], count=8) == ["agrees", "differs"]
+
+
+def test_the_best_have_the_wider_range(tmp_path):
+    wide = graded(lambda rate, size: 1 + (0.01 * size if rate < 0.5 else 0))
+    narrow = graded(lambda rate, size: 1 + (0.01 * size if rate > 0.5 else 0))
+    assert both(tmp_path, wide, narrow, "best_have_a_range", than_worst="wider") == ["agrees", "differs"]
+    assert checked(tmp_path / "fails", "best_have_a_range", than_worst="narrower").verdict == "agrees"
+
+
+def test_the_worst_end_near_the_largest_diversity_or_wander(tmp_path):
+    holds = graded(lambda rate, size: 1 + rate)
+    fails = graded(lambda rate, size: 5 - 4 * rate)
+    assert both(tmp_path, holds, fails, "diversity_of_worst_saturates") == ["agrees", "differs"]
+    rising = lambda rate, size, seed: {"success": steps > 12 * rate, "diversity": 1 + steps / 5 + 0.01 * seed}  # noqa: E731
+    store_of(tmp_path / "rising", rising)
+    assert checked(tmp_path / "holds", "diversity_of_worst_goes_nowhere").verdict == "agrees"
+    assert checked(tmp_path / "rising", "diversity_of_worst_goes_nowhere").verdict == "differs"
+
+
+def test_low_diversity_spreads_error_and_success(tmp_path):
+    def spread(low):
+        def runs(rate, size, seed):
+            number = RATES.index(rate) * 4 + SIZES.index(size)
+            odd = (number % 2) * ((number < 5) == low)
+            return {"diversity": 1.0 + number, "fitness_error": 1.0 + odd + 0.01 * number, "success": steps > 6 * odd}
+
+        return runs
+
+    assert both(tmp_path, spread(True), spread(False), "low_diversity_spreads", measure="fitness_error") == ["agrees", "differs"]
+
+
+def test_two_clusters_and_whose_the_lower_one_is(tmp_path):
+    def at(middle):
+        return lambda rate, size, seed: {"diversity": middle(rate, size) + 0.0005 * size + 0.01 * seed}
+
+    two, one = at(lambda rate, size: 2.0 if rate == 0.1 else 3.4), at(lambda rate, size: 2.0 + 0.1 * rate)
+    where = {"robot": "snake", "task": "two-regions"}
+    assert both(tmp_path, two, one, "two_clusters", **where, centres=[2, 3.4]) == ["agrees", "differs"]
+    lower = [
+        checked(tmp_path / "holds", "lower_cluster_is", "two-regions", parameter="mutation_rate", value=value).verdict
+        for value in (0.1, 0.9)
+    ]
+    assert lower == ["undecided", "differs"]  # 20 combinations of 20 leave a lower end of 84 %
+
+
+def test_a_large_population_has_fewer_bad_combinations(tmp_path):
+    holds = lambda rate, size, seed: {"success": size == 400 or rate < 0.2}  # noqa: E731
+    fails = lambda rate, size, seed: {"success": size < 400}  # noqa: E731
+    assert both(tmp_path, holds, fails, "large_population_has_fewer_bad") == ["agrees", "differs"]
+
+
+def test_a_task_needs_more_evaluations_than_another(tmp_path):
+    for name, late in (("holds", 10), ("fails", 4)):
+        store_of(tmp_path / name, lambda *_: {"success": steps >= 3}, "snake", "two-regions")
+        store_of(tmp_path / name, lambda *_, late=late: {"success": steps >= late}, "snake", "three-regions")
+    found = [checked(tmp_path / name, "needs_more_than", "three-regions", times=2, of=1) for name in ("holds", "fails")]
+    assert [one.verdict for one in found] == ["agrees", "differs"]
+    assert found[0].ours == "3.3 (3.3 to 3.3) times"
+    store_of(tmp_path / "alone", lambda *_: {"success": steps >= 3}, "snake", "three-regions")
+    with pytest.raises(NoDataError, match="no runs of task 1"):
+        checked(tmp_path / "alone", "needs_more_than", "three-regions", times=2, of=1)
+
+
+def test_what_single_runs_show_over_time(tmp_path):
+    for name, good in (("holds", True), ("fails", False)):
+        runs = []
+        for seed, rate in itertools.product(range(10), (0.1, 0.5)):
+            spec = RunSpec(seed=seed, mutation_rate=rate, evaluations=EVALUATIONS, record="full")
+            made = record(spec, ("evals", "generations", "probes"))
+            order = steps if good else steps[::-1]
+            of_probes = made.tables["probes"]["evaluation"].astype(int)
+            shrinking = 1 / order[of_probes - 1]
+            made.tables["probes"] |= {"distance_m": shrinking, "change_m": shrinking}
+            many = len(made.tables["generations"]["evaluation"])
+            in_world = np.full(many, 0.5 if good else 1.5)
+            made.tables["generations"] |= {"best_fitness": np.ones(many), "best_fitness_world": in_world}
+            runs.append(made)
+        written(tmp_path / name, "made", runs)
+    for check in ("world_is_mostly_below", "probes_settle", "simulators_change_less"):
+        assert [checked(tmp_path / name, check).verdict for name in ("holds", "fails")] == ["agrees", "differs"], check
+    store_of(tmp_path / "plain", lambda *_: {})
+    with pytest.raises(NoDataError, match="no run here has its generations and probes"):
+        checked(tmp_path / "plain", "world_is_mostly_below")
+
+
+def test_from_too_few_seeds_there_are_estimates_and_no_verdict(tmp_path):
+    made = []
+    for rate, size in itertools.product(RATES, SIZES):
+        for seed in range(2):
+            spec = RunSpec(seed=seed, evaluations=EVALUATIONS, mutation_rate=rate, population_size=size)
+            made.append(with_evals(spec, **dict.fromkeys((*NEAR, "success"), steps > 12 * rate)))
+    written(tmp_path, "few", made, sweep_text=f"name: few\nrobot: khepera\nseeds: 2\ngrid: {{mutation_rate: {list(RATES)}}}\n")
+    found = checked(tmp_path, "worst_value", parameter="mutation_rate", value=0.9)
+    assert (found.verdict, found.ours) == ("undecided", "worst 90 % over all evaluations")
+    assert checked(tmp_path, "half_by", evaluation=6).verdict == "undecided"

@@ -1,0 +1,133 @@
+"""A snake under a camera that hangs: found soon, and never by mistake."""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bns.errors import TrialPausedError
+from bns.hardware.emulators.faults import Fault, FaultPlan
+from bns.hardware.link.hardware_log import HardwareLog, events
+from bns.hardware.platforms import snake
+from bns.hardware.rig import shipped_rig
+from bns.hardware.safety import DriveEnded, Limits, Stopping, Surface, Watch
+from bns.hardware.servos.servo_chain import Health
+from bns.hardware.servos.snake_drive import SnakeDrive
+from bns.hardware.servos.snake_settings import snake_settings
+from bns.hardware.tracking.eye import Eye
+from bns.hardware.tracking.sight import Sight
+
+GENTLE = np.array([0.5, 0.1, 0.6, 0.7, 1.0])
+WIDE = np.array([1.2, 0.0, 0.9, 0.0, 1.0])
+TRACKING_M = 0.0005
+BEYOND, BETWEEN = [0, 1, 10, 11], list(range(2, 10))
+
+
+class Chain:
+    """Servos that are at once where they were sent; only some of them obey. They take a while to get their torque."""
+
+    def __init__(self, clock, obey):
+        self._clock, self._obey, self._at = clock, obey, np.zeros(12)
+
+    def arm(self, meanwhile):
+        for _ in range(10):
+            meanwhile()
+            self._clock.sleep(0.08)
+
+    def move(self, angles_rad, _speeds):
+        self._at[self._obey] = np.array(angles_rad)[self._obey]
+        return list(angles_rad)
+
+    def health(self):
+        return {n: Health(float(self._at[n - 1]), 0.1, 12.0, 30.0) for n in range(1, 13)}
+
+
+class Pictures:
+    """A tracker at 15 pictures a second that sees both markers at rest, as far as its noise lets it, until `ends_s`."""
+
+    def __init__(self, clock, ends_s):
+        self._clock, self._ends_s, self._draw = clock, ends_s, np.random.default_rng(4)
+        self.picture_s, self._last = None, None
+
+    def look(self):
+        filmed_s = np.floor(min(self._clock.now_s(), self._ends_s) * 15) / 15
+        if filmed_s != self.picture_s:
+            seen = [np.array(place) + TRACKING_M * self._draw.standard_normal(2) for place in ((0, -0.3), (0, 0.3))]
+            self._last = Sight(filmed_s, np.array([0.0, 0.0, np.pi / 2]), 0.0, dict(zip(("yellow", "green"), seen, strict=True)))
+        self.picture_s = filmed_s
+        return self._last
+
+
+@pytest.fixture
+def drive(clock):
+    """drive(joints that obey, when the pictures end) -> a drive of a robot whose markers are seen to stand still."""
+
+    def build(obey, ends_s=np.inf):
+        journal = HardwareLog(None, clock)
+        eye = Eye(Pictures(clock, ends_s), clock, journal, 0.0)
+        watch = Watch(Limits(Surface(-9, 9, -9, 9)), clock, Stopping())
+        watch.begin()
+        return SnakeDrive(Chain(clock, obey), eye, watch, snake_settings({"joint_speed_rad_s": 1.5}), clock, journal)
+
+    return build
+
+
+def test_an_end_of_the_body_that_swings_moves_no_marker(drive):
+    """The picture is right: the tail turns by more than a radian, over and over."""
+    on = drive(BEYOND)
+    on.straighten()
+    for _ in range(3):
+        on.carry_out(WIDE)
+    assert len(on.done()) == 3
+
+
+def test_a_joint_that_was_held_and_springs_loose_is_none_that_was_driven(drive, clock):
+    """By 2 rad at once: more than its servo turns until the next picture."""
+    on = drive([])
+    on.straighten()
+    on._look()
+    on._chain._at[5] += 2.0
+    clock.sleep(0.1)
+    on._look()
+
+
+def test_joints_between_the_markers_that_turn_unseen_are_a_picture_that_hangs(drive, clock):
+    on = drive(BETWEEN)
+    on.straighten()
+    began_s = clock.now_s()
+    with pytest.raises(TrialPausedError, match="the picture shows both markers where they were"):
+        on.carry_out(WIDE)
+    assert clock.now_s() - began_s < 2.0
+
+
+@pytest.mark.parametrize("ends_s", [0.2, 0.5, 0.9])
+def test_a_camera_that_stops_while_the_servos_get_their_torque_is_noticed(drive, clock, ends_s):
+    """By 0.8 s they have it; then the robot is looked for, for another second."""
+    with pytest.raises(DriveEnded, match="the camera has sent no new picture"):
+        drive(BETWEEN, ends_s).straighten()
+    assert clock.now_s() - ends_s < 0.45
+
+
+@pytest.mark.parametrize(("kind", "within_s"), [("stuck-marker", 0.6), ("frozen-scene", 1.2)])
+@pytest.mark.parametrize("at_s", [3.1, 4.4])
+def test_an_emulated_robot_is_stopped_when_its_camera_hangs(tmp_path, clock, kind, within_s, at_s):
+    """Bits and scene; the emulated camera takes a picture every 0.2 s."""
+    rig = shipped_rig("snake")
+    on = snake.emulate(rig, Path(tempfile.mkdtemp(dir=tmp_path)), clock, FaultPlan((Fault(kind, at_s=at_s, for_s=99.0),)), 0)
+    journal = HardwareLog(tmp_path / "journal.jsonl", clock)
+    platform = snake.open_platform(replace(on.rig, limits=rig.limits), clock, journal, Stopping())
+    try:
+        if kind == "frozen-scene":
+            with pytest.raises(TrialPausedError, match="the picture shows both markers where they were"):
+                platform.drive(np.array([GENTLE] * 5, np.float32))
+        else:
+            assert "no new picture" in platform.drive(np.array([GENTLE] * 5, np.float32)).ended
+    finally:
+        platform.close()
+        on.close()
+        journal.close()
+    stop = next(event for event in events(tmp_path / "journal.jsonl", "stop") if event["t_s"] > at_s)
+    assert stop["confirmed"]
+    assert stop["t_s"] - stop["seconds"] - at_s < within_s

@@ -1,0 +1,109 @@
+"""An archive gives back what it keeps of the results, to the last digit that it promises, and nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.cli.main import main
+from bns.errors import StoreError
+from bns.spec import RunSpec
+from bns.store import Writer, connect
+from bns.store.archive.kept import DECIMALS, EVAL_COLUMNS, RUN_COLUMNS, rounded_evals
+from bns.store.archive.read import archives, connect_archives, described
+from bns.store.archive.write import archive
+from store.synthetic import failed, record, records, specs
+
+TEXT = "name: grid\nrobot: khepera\nseeds: 2\ngrid: {mutation_rate: [0.1, 0.5]}\n"
+
+
+@pytest.fixture
+def results(tmp_path):
+    """Five runs of one sweep, one of them with a diversity that is no number, one failed; one run of a snake."""
+    snake = record(RunSpec(robot="snake", task="two-regions", evaluations=4))
+    for name in snake.tables["evals"]:
+        if name.endswith("cm"):
+            snake.tables["evals"][name] = np.full(4, None)
+    odd = record(next(specs(1, evaluations=5, task="complex")))
+    odd.tables["evals"]["diversity"][:2] = np.nan, np.inf
+    with Writer(tmp_path / "results", "grid", sweep_text=TEXT, sweep_runs=4) as writer:
+        for one in (*records(3, evaluations=3), odd, failed(RunSpec(seed=77))):
+            writer.append(one)
+    with Writer(tmp_path / "results", "regions") as writer:
+        writer.append(snake)
+    return tmp_path / "results"
+
+
+def of(connection, table, columns, order):
+    return connection.sql(f"SELECT {', '.join(columns)} FROM {table} ORDER BY {order}").to_arrow_table().to_pandas()
+
+
+def test_an_archive_gives_back_runs_evaluations_and_sweep_files(results, tmp_path):
+    made = archive(results, tmp_path / "study.parquet")
+    assert (made.runs, made.sweeps) == (6, {"grid": 5, "regions": 1})
+    assert str(made).startswith("6 runs (grid 5, regions 1)")
+    there, back = connect(results), connect_archives([made.path])
+    for columns, table, order in (
+        (RUN_COLUMNS, "runs", "run_id"),
+        (("sweep", "spec_hash", "written_at", "text", "runs"), "specs", "sweep"),
+    ):
+        pd.testing.assert_frame_equal(of(there, table, columns, order), of(back, table, columns, order), check_dtype=False)
+    rows = of(back, "evals", EVAL_COLUMNS, "run_id, evaluation")
+    plain = of(there, f"({rounded_evals('evals')})", EVAL_COLUMNS, "run_id, evaluation")
+    pd.testing.assert_frame_equal(rows, plain, check_dtype=False, check_exact=True)
+    exact = of(there, "evals", EVAL_COLUMNS, "run_id, evaluation")
+    for name, decimals in DECIMALS.items():
+        known = np.isfinite(exact[name])
+        assert np.abs(rows[name] - exact[name])[known].max() <= 0.5 * 10**-decimals + 1e-12
+        assert rows[name][~known].isna().all()
+    assert (~np.isfinite(exact.diversity)).sum() == 2
+    assert rows[rows.robot == "snake"].success_7cm.isna().all()
+    assert rows[rows.robot == "khepera"].ever_success_20cm.notna().all()
+
+
+def test_an_archive_says_where_it_comes_from_and_is_the_same_each_time(results, tmp_path):
+    first, second = (archive(results, tmp_path / f"{name}.parquet", ["grid"]) for name in "ab")
+    assert first.path.read_bytes() == second.path.read_bytes()
+    said = described(first.path)
+    assert (said["runs"], said["engine_versions"], len(said["spec_hashes"])) == (5, [3], 1)
+    assert said["specs"][0]["text"] == TEXT
+    assert said["world_digest"] == ["", "w0"]
+
+
+def test_a_run_of_several_archives_counts_once_and_a_good_one_before_a_broken_one(results, tmp_path):
+    folder = tmp_path / "published"
+    archive(results, folder / "a.parquet")
+    with Writer(results, "grid") as writer:
+        writer.append(record(RunSpec(seed=77)))
+    archive(results, folder / "b.parquet", ["grid"])
+    back = connect_archives(archives(folder))
+    assert back.execute("SELECT count(*), count(*) FILTER (status = 'ok') FROM runs").fetchall() == [(6, 6)]
+
+
+def test_what_is_no_archive_is_refused_in_words(results, tmp_path):
+    with pytest.raises(StoreError, match=r"must be a file that ends in \.parquet"):
+        archive(results, tmp_path / "study.csv")
+    with pytest.raises(StoreError, match=r"grdi.*grid, regions"):
+        archive(results, tmp_path / "study.parquet", ["grdi"])
+    with pytest.raises(StoreError, match="there is no archive at"):
+        archives(tmp_path / "none")
+    whole = archive(results, tmp_path / "study.parquet").path
+    changed = bytearray(whole.read_bytes())
+    changed[len(changed) // 3] ^= 1
+    (tmp_path / "changed.parquet").write_bytes(changed)
+    (tmp_path / "text.parquet").write_text("not a table")
+    part = next((results / "journal").glob("*"), None)
+    assert part is not None
+    with pytest.raises(StoreError, match="is not as it was written"):
+        connect_archives([tmp_path / "changed.parquet"])
+    with pytest.raises(StoreError, match=r"is no archive\. Make one from the results: bns archive results -o text\.parquet"):
+        connect_archives([tmp_path / "text.parquet"])
+
+
+def test_the_command_writes_the_file_or_says_why_not(results, tmp_path, capsys):
+    assert main(["archive", str(results), "-o", str(tmp_path / "s.parquet"), "--sweep", "regions"]) == 0
+    assert "1 runs (regions 1)" in capsys.readouterr().out
+    assert main(["archive", str(tmp_path / "nowhere"), "-o", str(tmp_path / "t.parquet")]) == 2
+    assert "there are no results in" in capsys.readouterr().err
+    assert not (tmp_path / "t.parquet").exists()
