@@ -23,6 +23,7 @@ from bns.diagnose.design.limits import arena_of, bounds_of
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.design.proposal import propose as search
 from bns.diagnose.design.search import GENERATIONS
+from bns.diagnose.design.sequences import Arena, Bounds
 from bns.diagnose.report.proposal_figure import trial_axes
 from bns.diagnose.report.proposal_text import proposal_text
 from bns.diagnose.settings.chosen import in_force
@@ -136,18 +137,30 @@ def proposed(
 ) -> ProposeResult:
     """The experiment for a diagnosis that is there."""
     checked_minutes(minutes)
-    if isinstance(found.ready.model, JointedModel):
-        raise DataError(
-            f"No experiment is proposed for {found.ready.model.name}, a body on joints: commands are planned for wheels only. "
-            "More random trials settle what is open; so does a measurement with a ruler or a scale (docs/snake-diagnosis.md)."
-        )
-    tracks = found.ready.predictor.tracks
-    inside, bounds = arena_of(tracks, arena, start), bounds_of(tracks, found.ready.model, speeds)
+    inside, bounds = _limits(found, arena, start, speeds)
     meter = Meter(progress, PHASES, pace=GENERATIONS)
     with in_force(found.settings):
         result = ProposeResult(found, search(found.diagnosis, inside, bounds, minutes, tick=meter))
     meter.done()
     return result
+
+
+def _limits(
+    found: DiagnoseResult,
+    arena: tuple[float, ...] | None,
+    start: tuple[float, float, float] | None,
+    speeds: tuple[float, float] | None,
+) -> tuple[Arena | None, Bounds | None]:
+    """Where a robot on wheels may be and how fast; nothing for one on joints, which repeats what it drove."""
+    tracks, model = found.ready.predictor.tracks, found.ready.model
+    if not isinstance(model, JointedModel):
+        return arena_of(tracks, arena, start), bounds_of(tracks, model, speeds)
+    if (arena, start, speeds) != (None, None, None):
+        raise DataError(
+            f"arena, start and speeds are for wheels, and {model.name} is a body on joints: an experiment repeats cycles "
+            "that it drove. Leave out --arena, --start and --speeds."
+        )
+    return None, None
 
 
 def checked_minutes(minutes: float) -> None:

@@ -46,6 +46,8 @@ class Parameter:
     """What is plausible, and where a fit begins, grows with this power of the wheelbase: 1 for lengths and speeds."""
     floor_share: float = 0.0
     """A length that is no more than this share of the diagonal of where the robot was seen; 0: as large as it likes."""
+    reached: tuple[float, ...] = ()
+    """Bounds that robots do reach, so that a fit may end there: the strength of a servo that is silent."""
     resolution: float = 0.0
     """A change that shows and is still small; 0: a thousandth of the plausible range."""
 

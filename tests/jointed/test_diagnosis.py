@@ -2,8 +2,10 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import bns
@@ -11,6 +13,10 @@ from bns.api.common.prepared import prepared
 from bns.cli.main import main
 from bns.diagnose.data.cycles import checked_cycles, cycle_tracks
 from bns.diagnose.data.stretches import apart, poses_of, stretches_of_cycles
+from bns.diagnose.design.competing_models import competing_models_of
+from bns.diagnose.design.power import PastTrials
+from bns.diagnose.design.repeats import RepeatPlanner
+from bns.diagnose.estimate.plausibility import at_bound, implausible
 from bns.diagnose.predict.responses import Responses
 from bns.errors import DataError, ModelError
 from bns.physics.effect import Effect, Parameter
@@ -19,7 +25,7 @@ from bns.physics.model import ActiveEffect
 from tests.hidden_snake.__main__ import judged
 from tests.hidden_snake.body import Hidden
 from tests.hidden_snake.worlds import World, driven
-from tests.jointed.arm import log, xml
+from tests.jointed.arm import JOINTS, log, xml
 
 SNAKE = load_body("snake")
 
@@ -63,6 +69,36 @@ def test_responses_are_exact_at_nodes_and_anchors_and_ask_for_few_simulations():
     assert bent.calls == before  # read between nodes; the model near an anchor is not simulated again
 
 
+def test_a_model_of_one_number_that_was_simulated_bends_its_curve():
+    bare = replace(SNAKE, effects=())
+    bent.calls = 0
+
+    def off(responses, value):
+        model = replace(bare, effects=(ActiveEffect(A, (value,)),))
+        return abs(responses.seen(model)[1] - bent(model)[1])
+
+    straight, refined = Responses(bent, bare, None, (0.5, 1.0)), Responses(bent, bare, None, (0.5, 1.0))
+    for value in (0.6, 0.75, 0.9):
+        assert off(straight, value) > 1e-6
+    assert refined.anchor(replace(bare, effects=(ActiveEffect(A, (0.75,)),)))
+    assert off(refined, 0.75) == pytest.approx(0.0, abs=1e-12)
+    for value in (0.6, 0.9):
+        assert off(refined, value) < 0.7 * off(straight, value)
+    before = set(refined._curves["a", "x"])
+    assert 0.75 in before
+    refined.anchor(replace(bare, effects=(ActiveEffect(A, (0.85,)),)))
+    assert set(refined._curves["a", "x"]) == before  # too near to another for its slope to mean anything
+
+
+def test_a_silent_joint_may_be_found_and_other_bounds_stay_bounds():
+    silent, stopped = SNAKE.effect_named("weak-joint-joint5").parameters[0], effect("a").parameters[0]
+    for parameter, value, rejected in ((silent, 0.0, False), (silent, 1.0, True), (stopped, -10.0, True)):
+        free = (SimpleNamespace(effect="e", parameter=parameter),)
+        fit = SimpleNamespace(free=free, values=[value], interval=lambda index: (-np.inf, np.inf))
+        assert at_bound(fit, "e") is rejected
+        assert bool(implausible(fit, "e")) is rejected
+
+
 def test_distances_hold_what_a_pose_does_not():
     points = np.array([[[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]], [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]])
     assert apart(points) == pytest.approx(np.array([[2**0.5, 2, 2**0.5], [1, 2, 1]]))
@@ -101,9 +137,20 @@ def test_a_sound_arm_lacks_nothing(arm):
     assert (found.verdict, found.effects) == ("none", ())
 
 
-def test_a_joint_of_an_arm_whose_zero_is_off_is_ranked_first(arm):
-    found = bns.diagnose(log(12, seed=1, zero_rad=0.08), bns.Model(arm))
-    assert found.ranking.index[0] == "joint-zero-elbow"
+@pytest.fixture(scope="module")
+def bent_arm(arm):
+    return bns.diagnose(log(12, seed=1, zero_rad=0.08), bns.Model(arm))
+
+
+def test_a_joint_of_an_arm_whose_zero_is_off_is_named(bent_arm):
+    assert (bent_arm.verdict, bent_arm.effects) == ("effects", ("joint-zero-elbow",))
+    assert bent_arm.diagnosis.numbers["joint-zero-elbow"]["offset_rad"]["value"] == pytest.approx(0.08, abs=0.005)
+
+
+def test_a_weak_joint_of_an_arm_is_named_with_its_strength(arm):
+    found = bns.diagnose(log(10, seed=2, strength=0.5), bns.Model(arm))
+    assert found.effects == ("weak-joint-elbow",)
+    assert found.diagnosis.numbers["weak-joint-elbow"]["strength"]["value"] == pytest.approx(0.5, abs=0.05)
 
 
 def test_an_offset_is_added_by_the_command_line_and_read_back(arm, tmp_path, capsys):
@@ -117,9 +164,39 @@ def test_an_offset_is_added_by_the_command_line_and_read_back(arm, tmp_path, cap
     assert after["stretch"] < 0.5 * bns.compare(data, before.model).errors["position_m"]["stretch"]
 
 
-def test_no_experiment_is_planned_for_a_body(arm):
-    with pytest.raises(DataError, match="planned for wheels only"):
-        bns.propose(log(12, seed=1), bns.Model(arm))
+def test_an_experiment_repeats_the_stretches_that_tell_most(bent_arm, tmp_path):
+    proposed = bent_arm.propose(minutes=1)
+    assert proposed.proposal.competing_models[0].names == ("joint-zero-elbow",)
+    written = pd.read_csv(proposed.to_csv(tmp_path / "next.csv"))
+    assert list(written.columns) == ["trial", "t_s", *(f"{j}_set_rad" for j in JOINTS)]
+    assert written["trial"].nunique() == len(proposed.proposal.plan) == proposed.to_json()["trials"]
+    lasting = proposed.proposal.plan.lasting_s
+    assert lasting.sum() < 60 + lasting.max()
+    assert (np.abs(written[f"{JOINTS[1]}_set_rad"]) <= 1.2).all()
+    assert "what was driven before" in proposed.summary(str(tmp_path / "next.csv"))
+    assert proposed.plot().get_xlabel() == "ahead (cm)"
+
+
+def test_what_is_planned_tells_more_than_stretches_by_lot(bent_arm):
+    d = bent_arm.diagnosis
+    models = competing_models_of(d)
+    planner = RepeatPlanner(d.selection.problem, ((0, 1),))
+    best = planner.best(np.random.default_rng(0), models, 60.0, {(0, 1): PastTrials()})
+    by_lot = planner.random(np.random.default_rng(0), models, len(best.plan))
+    totals = [sum(one.total() for one in pool.discriminations[0, 1]) for pool in (best, by_lot)]
+    assert totals[0] > 1.1 * totals[1]
+
+
+def test_limits_of_wheels_are_refused_for_a_body(bent_arm):
+    with pytest.raises(DataError, match="for wheels"):
+        bent_arm.propose(arena=(2.0, 2.0))
+
+
+def test_a_body_has_a_report_with_an_experiment(bent_arm, tmp_path):
+    page = bent_arm.report(tmp_path / "report.html", minutes=1).path.read_text()
+    for said in ("joint-zero-elbow", "shoulder_set_rad", "what was driven before", "bns propose"):
+        assert said in page
+    assert "bns trial" not in page
 
 
 def test_networks_of_the_snake_are_named_apart_from_its_body(tmp_path):

@@ -111,12 +111,13 @@ def _prepared_body(read: Measurements, model: Model) -> Prepared:
 
 def _used_in_words(tracks: Tracks, predictor: JointedPredictor) -> str:
     """Which stretches are compared."""
-    used, wild = len(predictor.windows(predictor.near)[0]), predictor.left_out
+    used, wild, aside = len(predictor.windows(predictor.near)[0]), predictor.left_out, predictor.not_taken
     unstable = int((~tracks.stable).sum()) if isinstance(tracks, CycleTracks) else 0
-    what, more = f"{predictor.near}s", f"{unstable} were not stable, and " if unstable else ""
+    what = "stretches" if predictor.near == "stretch" else f"{predictor.near}s"
+    more = f"{unstable} were not stable, and " if unstable else ""
     return (
-        f"{used} of {used + wild + unstable} {what} are compared; {more}{wild} nobody can foresee: a little luck moves the robot "
-        "far in them"
+        f"{used} of {used + wild + unstable + aside} {what} are compared; {more}{wild} nobody can foresee: a little luck moves "
+        f"the robot far in them{f'; {aside} are left aside, evenly chosen, for speed' if aside else ''}"
     )
 
 

@@ -21,6 +21,7 @@ from bns.robots.snake.gait import joint_angles
 from bns.robots.snake.table import GAIT
 
 _LASTS_S = DEFAULTS.data.stretch_s
+_RUN_UP = DEFAULTS.data.run_up_postures
 MOST_ABOUT = DEFAULTS.data.stretch_variables
 
 
@@ -30,17 +31,26 @@ class Told(Protocol):
     def drive(self, dt_s: float, begin: Array, looks: int) -> Drive:
         """The same in steps of a simulation, from where the robot was seen; looked at so many times."""
 
+    def commands(self) -> dict[str, Array]:
+        """The same as columns of a trial file."""
+
 
 @dataclass(frozen=True)
 class Postures:
-    """From posture (postures, joints) to posture; the second one is where the stretch is first seen."""
+    """From posture (postures, joints) to posture; it is first seen in the one that comes after the first ``before``."""
 
     mechanism: Mechanism
     postures: Array
+    before: int
+    gait: Array
 
     def drive(self, dt_s: float, begin: Array, looks: int) -> Drive:
         """As of `Told`."""
-        return through_postures(self.mechanism, self.postures, dt_s, begin, looks)
+        return through_postures(self.mechanism, self.postures, dt_s, begin, looks, self.before)
+
+    def commands(self) -> dict[str, Array]:
+        """One cycle of the gait."""
+        return {"cycle": np.ones(1), **{name: self.gait[k : k + 1] for k, name in enumerate(GAIT)}}
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,7 @@ class SetPoints:
     set_points: Array
     from_s: float
     to_s: float
+    joints: tuple[str, ...]
 
     @property
     def at_begin(self) -> Array:
@@ -61,6 +72,14 @@ class SetPoints:
     def drive(self, dt_s: float, begin: Array, looks: int) -> Drive:
         """As of `Told`."""
         return at_times(self.t_s, self.set_points, (self.from_s, self.to_s), dt_s, begin, looks)
+
+    def commands(self) -> dict[str, Array]:
+        """Rows from what is in force when the joints are brought to where they are, to the last one."""
+        start = max(self.from_s - RUN_UP_S, float(self.t_s[0]))
+        first = int(np.searchsorted(self.t_s, start, side="right")) - 1
+        rows = slice(max(first, 0), int(np.searchsorted(self.t_s, self.to_s, side="left")))
+        told = {f"{name}{SET}": self.set_points[rows, k] for k, name in enumerate(self.joints)}
+        return {"t_s": np.maximum(self.t_s[rows] - start, 0.0), **told}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +163,7 @@ def stretches_of_cycles(tracks: CycleTracks, mechanism: Mechanism, joints: int) 
         begin, end = tracks.t_s[2 * cycle], tracks.t_s[2 * cycle + 1]
         times.append(np.concatenate([[begin], begin + inner[0], [end]]))
     about = {name: tracks.gait[chosen, i] for i, name in enumerate(GAIT)} | {"cycle": tracks.number[chosen].astype(float)}
-    told = [Postures(mechanism, _postures(tracks, int(c), joints)) for c in chosen]
+    told = [Postures(mechanism, *_postures(tracks, int(c), joints), tracks.gait[c]) for c in chosen]
     return _joined(tracks, tracks.trial[2 * chosen], points, since, number, times, told, about)
 
 
@@ -167,7 +186,7 @@ def stretches_of_joints(tracks: JointTracks, mechanism: Mechanism, joints: Seque
             since.append(tracks.t_s[inside] - from_s)
             times.append(tracks.t_s[inside])
             number.append(np.full(len(inside), len(told)))
-            told.append(SetPoints(rows[0], rows[1][:, columns], from_s, to_s))
+            told.append(SetPoints(rows[0], rows[1][:, columns], from_s, to_s, tuple(joints)))
             of.append(trial)
     if not told:
         raise DataError(f"No trial lasts {RUN_UP_S + _LASTS_S:g} s, for a stretch and what came before it; give longer ones.")
@@ -212,13 +231,13 @@ def _joined(
     )
 
 
-def _postures(tracks: CycleTracks, cycle: int, joints: int) -> Array:
-    """Where the cycle before ended, then those of the cycle."""
+def _postures(tracks: CycleTracks, cycle: int, joints: int) -> tuple[Array, int]:
+    """The last postures of the cycle before, then those of the cycle; and how many the former are."""
     t, gait, number = np.arange(COMMANDS_A_CYCLE), tracks.gait, tracks.number
     angles = joint_angles(gait[cycle], t, joints)
     begins = 2 * cycle in tracks.first
     if not begins and number[cycle] == number[cycle - 1] + 1:
-        before = joint_angles(gait[cycle - 1], t[-1:], joints)
+        before = joint_angles(gait[cycle - 1], t[-_RUN_UP:], joints)
     else:
         before = np.zeros((1, joints)) if number[cycle] == 1 else angles[:1]
-    return np.vstack([before, angles])
+    return np.vstack([before, angles]), len(before)

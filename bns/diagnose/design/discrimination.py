@@ -25,7 +25,8 @@ from bns.diagnose.design.competing_models import CompetingModel
 from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
 from bns.diagnose.design.sequences import Arena, Sequences
 from bns.diagnose.estimate.fit import Fit, Problem
-from bns.diagnose.estimate.noise import filter_for, huber
+from bns.diagnose.estimate.noise import huber
+from bns.diagnose.estimate.problem import problem_with_noise
 from bns.physics.model import Model
 
 Pair = tuple[int, int]
@@ -129,7 +130,7 @@ def discriminations(
     for true in competing_models:
         predictor = noise_free_predictor(true.fit.model, tracks)
         steps = predictor.steps(true.fit.model)
-        problem = Problem(predictor, filter_for(predictor, steps, noise))
+        problem = problem_with_noise(predictor, steps, noise)
         problems.append(problem)
         held = setup.arena.holds(predictor.tracks.pose[:, 0], predictor.tracks.pose[:, 1], 0.0)
         inside &= problem.per_trial((~held).astype(float)) == 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,9 @@ import pandas as pd
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.design.competing_models import CompetingModel, competing_models_of, model_pairs_of, without_last
-from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, Pair, discriminations
+from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, Pair
 from bns.diagnose.design.independent_measurement import independent_measurements
+from bns.diagnose.design.planners import Planner, WheelPlanner
 from bns.diagnose.design.power import (
     ExpectedGain,
     PastTrials,
@@ -21,12 +22,14 @@ from bns.diagnose.design.power import (
     negligible_difference,
     overdispersion_of,
 )
-from bns.diagnose.design.search import Pool, design_trials, random_pool
+from bns.diagnose.design.repeats import RepeatPlanner, Repeats
+from bns.diagnose.design.search import Pool
 from bns.diagnose.design.sequences import Arena, Bounds, Sequences
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.significance import fewest_trials
+from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.stepwise import FALSE_ALARM
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
@@ -62,15 +65,20 @@ class ModelPair:
 
 @dataclass(frozen=True)
 class Proposal:
-    """An experiment. ``plan`` has no trials where no commands would tell anything."""
+    """An experiment. ``plan`` has no trials where no commands would tell anything.
+
+    ``arena``, ``bounds``: of a robot on wheels; None for one on joints, which repeats cycles.
+    """
 
     verdict: str
     competing_models: tuple[CompetingModel, ...]
     model_pairs: tuple[ModelPair, ...]
-    plan: Sequences
-    arena: Arena
-    bounds: Bounds
+    plan: Sequences | Repeats
+    arena: Arena | None
+    bounds: Bounds | None
     minutes: float
+    predictor: Predictor | None = None
+    """Of a robot on joints: what foresees its cycles."""
 
     @property
     def power(self) -> float:
@@ -78,7 +86,10 @@ class Proposal:
         return min((c.power for c in self.model_pairs if not c.indistinguishable), default=0.0)
 
     def commands(self) -> pd.DataFrame:
-        """The trial file: trial, left_m_s, right_m_s, duration_s, and the pose each trial starts from."""
+        """The trial file: trial, left_m_s, right_m_s, duration_s, and the pose each trial starts from; or `Repeats.commands`."""
+        if isinstance(self.plan, Repeats):
+            return self.plan.commands()
+        assert self.arena is not None
         rows = [
             (trial, left, right, lasts, *self.arena.start)
             for trial in range(len(self.plan))
@@ -93,17 +104,26 @@ class Proposal:
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values."""
+        commands = self.commands()
+        if self.arena is not None:
+            commands = commands.iloc[:, :4]
         return {
             "verdict": self.verdict,
             "competing_models": [list(r.names) for r in self.competing_models],
             "power": self.power,
             "minutes": float(self.plan.lasting_s.sum() / 60),
             "model_pairs": [{name: _plain(value) for name, value in vars(c).items()} for c in self.model_pairs],
-            "start": {"x_m": self.arena.start[0], "y_m": self.arena.start[1], "heading_rad": self.arena.start[2]},
-            "arena": {k: v for k, v in vars(self.arena).items() if k != "start"},
+            **({} if self.arena is None else _arena_json(self.arena)),
             "trials": len(self.plan),
-            "commands": self.commands().iloc[:, :4].to_dict("records"),
+            "commands": commands.to_dict("records"),
         }
+
+
+def _arena_json(arena: Arena) -> dict[str, Any]:
+    return {
+        "start": {"x_m": arena.start[0], "y_m": arena.start[1], "heading_rad": arena.start[2]},
+        "arena": {k: v for k, v in vars(arena).items() if k != "start"},
+    }
 
 
 def _plain(value: Any) -> Any:
@@ -113,14 +133,17 @@ def _plain(value: Any) -> Any:
 @one_thread_each()
 def propose(
     d: Diagnosis,
-    arena: Arena,
-    bounds: Bounds,
+    arena: Arena | None,
+    bounds: Bounds | None,
     minutes: float,
     *,
     seed: int = 0,
     tick: Callable[[str], None] = lambda _: None,
 ) -> Proposal:
-    """The experiment of about ``minutes`` that discriminates between the diagnosis' models; DataError if there are none."""
+    """The experiment of about ``minutes`` that discriminates between the diagnosis' models; DataError if there are none.
+
+    ``arena``, ``bounds``: of a robot on wheels.
+    """
     tick("competing models")
     competing_models = competing_models_of(d)
     if len(competing_models) < 2:
@@ -128,29 +151,38 @@ def propose(
         raise DataError(
             f"There are no two explanations that an experiment could tell apart (verdict {d.verdict}): {why}"
         )
-    assert d.selection is not None
-    setup = ExperimentSetup(
-        d.selection.problem,
-        arena,
-        _frame_s(d),
-        lambda plan: np.linspace(0, 60 * minutes, len(plan), endpoint=False),
-        model_pairs_of(d, competing_models),
-    )
+    planner = _planner(d, competing_models, arena, bounds, minutes, tick)
     rng = np.random.default_rng(seed)
-    past = {(a, b): _past(d, competing_models[a], competing_models[b]) for a, b in setup.pairs}
-    best = design_trials(rng, competing_models, setup, bounds, 60 * minutes, past, tick)
-    if not len(best.plan):
-        raise DataError(
-            f"No trial of {bounds.trial_s:g} s stays inside the arena from its start at x = {arena.start[0]:.2f}, y = "
-            f"{arena.start[1]:.2f} m. Give a larger one (--arena 2x1.5) or another start (--start 0,0,90)."
-        )
+    past = {(a, b): _past(d, competing_models[a], competing_models[b]) for a, b in planner.pairs}
+    best = planner.best(rng, competing_models, 60 * minutes, past)
     tick("random commands, for comparison")
-    plain = random_pool(rng, competing_models, setup, bounds, len(best.plan))
+    plain = planner.random(rng, competing_models, len(best.plan))
     tick("power")
-    model_pairs = _model_pairs(d, competing_models, best, plain, setup, past)
+    model_pairs = _model_pairs(d, competing_models, best, plain, planner, past)
     decidable = any(not c.indistinguishable for c in model_pairs)
     plan = best.plan if decidable else best.plan.only(np.array([], dtype=np.int64))
-    return Proposal(d.verdict, competing_models, tuple(model_pairs), plan, arena, bounds, minutes)
+    assert isinstance(plan, Sequences | Repeats)
+    predictor = planner.problem.predictor if isinstance(planner, RepeatPlanner) else None
+    return Proposal(d.verdict, competing_models, tuple(model_pairs), plan, arena, bounds, minutes, predictor)
+
+
+def _planner(
+    d: Diagnosis,
+    competing_models: Sequence[CompetingModel],
+    arena: Arena | None,
+    bounds: Bounds | None,
+    minutes: float,
+    tick: Callable[[str], None],
+) -> Planner:
+    assert d.selection is not None
+    problem, pairs = d.selection.problem, model_pairs_of(d, competing_models)
+    if arena is None or bounds is None:
+        return RepeatPlanner(problem, pairs)
+
+    def session_s(plan: Sequences) -> Array:
+        return np.linspace(0, 60 * minutes, len(plan), endpoint=False)
+
+    return WheelPlanner(ExperimentSetup(problem, arena, _frame_s(d), session_s, pairs), bounds, tick)
 
 
 def _model_pairs(
@@ -158,16 +190,17 @@ def _model_pairs(
     competing_models: tuple[CompetingModel, ...],
     best: Pool,
     plain: Pool,
-    setup: ExperimentSetup,
+    planner: Planner,
     past: Mapping[Pair, PastTrials],
 ) -> list[ModelPair]:
     assert d.selection is not None
     nothing = CompetingModel((), d.selection.problem.fit(without_last(d.selection)))
     last = len(competing_models)
-    more = replace(setup, pairs=(*setup.pairs, *((a, last) for a in range(last))))
-    planned, random = (discriminations([*competing_models, nothing], pool.plan, more)[0] for pool in (best, plain))
+    more = (*planner.pairs, *((a, last) for a in range(last)))
+    models = [*competing_models, nothing]
+    planned, random = (planner.discriminations(models, pool.plan, more) for pool in (best, plain))
     out = []
-    for a, b in setup.pairs:
+    for a, b in planner.pairs:
         one, other = competing_models[a], competing_models[b]
         scatter = past[(a, b)].scatter
         both, as_random = (

@@ -14,6 +14,7 @@ from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, 
 from bns.diagnose.design.power import PastTrials
 from bns.diagnose.design.sequences import (
     Bounds,
+    Plan,
     Sequences,
     draw_sequences,
     extreme,
@@ -36,7 +37,7 @@ URGENT = DEFAULTS.design.urgent
 class Pool:
     """Trials that were evaluated, and what each does for every pair in both directions."""
 
-    plan: Sequences
+    plan: Plan
     discriminations: Mapping[Pair, tuple[Discrimination, Discrimination]]
 
     def only(self, chosen: NDArray[np.int64]) -> Pool:
@@ -97,6 +98,7 @@ def design_trials(
         tick(f"generation {generation + 1} of {GENERATIONS}")
         best = np.unique(select_trials(pool, min(seconds, POOL / 8 * bounds.trial_s), past))
         parents = pool.plan.only(np.resize(best, POOL // 2))
+        assert isinstance(parents, Sequences)
         pool = pool.joined(evaluated(competing_models, mutate_sequences(rng, parents, bounds, extreme(bounds)), setup))
     return pool.only(select_trials(pool, seconds, past))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,23 @@ class Bounds:
     longest_s: float
     trial_s: float
     grid_s: float = 0.04
+
+
+class Plan(Protocol):
+    """Trials that may be driven next."""
+
+    def __len__(self) -> int:
+        """How many there are."""
+
+    @property
+    def lasting_s(self) -> Array:
+        """How long each takes, (trials,)."""
+
+    def only(self, chosen: NDArray[np.int64]) -> Self:
+        """Some of them, in the order of ``chosen``."""
+
+    def joined(self, others: Self) -> Self:
+        """These, then the others."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.estimate.fit import Problem
-from bns.diagnose.estimate.noise import Filter
+from bns.diagnose.estimate.noise import Whitening
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.trial_clock_test import steps_of
 from bns.diagnose.predict.base import Predictor, Steps
@@ -22,7 +22,7 @@ AS_GIVEN = "as given"
 """The name of the model that was handed in, in tables of errors."""
 
 
-def held_out_steps(predictor: Predictor, pose_filter: Filter, model: Model) -> Steps:
+def held_out_steps(predictor: Predictor, pose_filter: Whitening, model: Model) -> Steps:
     """Steps of every trial under the model's effects, their numbers fitted to the trials of the other folds.
 
     What belongs to one trial alone (its clock) is set as `trial_clock_test` says: by other poses of that trial.
@@ -57,7 +57,7 @@ class Judged:
 
     name: str
     model: Model
-    pose_filter: Filter
+    pose_filter: Whitening
     steps: Steps | None = None
 
     def held_out(self, predictor: Predictor) -> Steps:
@@ -65,7 +65,7 @@ class Judged:
         return held_out_steps(predictor, self.pose_filter, self.model) if self.steps is None else self.steps
 
 
-def judged_errors(predictor: Predictor, pose_filter: Filter, given: Model, extended: Sequence[Judged]) -> PairedErrors:
+def judged_errors(predictor: Predictor, pose_filter: Whitening, given: Model, extended: Sequence[Judged]) -> PairedErrors:
     """Errors of a model as given, and of models whose numbers were fitted, each on trials held out; all on the same windows.
 
     The first one is `AS_GIVEN`: what `bns compare` shows of the same model and data.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.noise import Filter, huber
+from bns.diagnose.estimate.noise import Whitening, huber
 from bns.diagnose.estimate.normal_equations import (
     NormalEquations,
     innovations_after,
@@ -97,7 +97,7 @@ class _Point:
 class Problem:
     """Tracks, a filter that follows them, and which numbers may be fitted."""
 
-    def __init__(self, predictor: Predictor, pose_filter: Filter, counted: Array | None = None) -> None:
+    def __init__(self, predictor: Predictor, pose_filter: Whitening, counted: Array | None = None) -> None:
         """``counted`` (frames,): what each frame counts; 1 for all where it is not given."""
         self.predictor = predictor
         self.pose_filter = pose_filter

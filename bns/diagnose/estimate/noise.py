@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.optimize import minimize
@@ -36,6 +37,17 @@ def weights(whitened: Array) -> Array:
 
 def _length(whitened: Array) -> Array:
     return np.sqrt(np.asarray(np.einsum("kc,kc->k", whitened, whitened), dtype=np.float64))
+
+
+class Whitening(Protocol):
+    """Makes errors of predictions independent, each with a standard deviation of 1."""
+
+    @property
+    def noise(self) -> Array:
+        """The numbers that it was made with."""
+
+    def whitened(self, tracks: Tracks, steps: Steps) -> Array:
+        """Whitened errors under some steps, (frames, 3 + k)."""
 
 
 @dataclass(frozen=True)

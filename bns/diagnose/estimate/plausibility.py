@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bns.diagnose.estimate.fit import Fit
+from bns.physics.effect import Parameter
 
 
 def at_bound(fit: Fit, name: str) -> bool:
@@ -14,7 +15,7 @@ def at_bound(fit: Fit, name: str) -> bool:
         for number, value in zip(fit.free, fit.values, strict=True)
         if number.effect == name
     ]
-    return any(value in {p.low, p.high} for p, value in numbers)
+    return any(_stopped(p, value) for p, value in numbers)
 
 
 def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
@@ -24,8 +25,13 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
         if number.effect != name:
             continue
         value, (low, high) = float(fit.values[index]), fit.interval(index)
-        if bounds and value in {p.low, p.high}:
+        if bounds and _stopped(p, value):
             return f"{p.name} is at its bound, {value:g} {p.unit}"
         if np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
             return f"{p.name} = {value:g} {p.unit} is outside of what is plausible, {p.plausible[0]:g} to {p.plausible[1]:g}"
     return ""
+
+
+def _stopped(p: Parameter, value: float) -> bool:
+    """Whether a fit ended at a bound that only the model has."""
+    return value in {p.low, p.high} and value not in p.reached

@@ -12,7 +12,7 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.estimate.fit import Fit, Problem
-from bns.diagnose.estimate.noise import Filter, huber
+from bns.diagnose.estimate.noise import Whitening, huber
 from bns.diagnose.estimate.significance import PairedComparison, paired_elpd_diff, sign_flip_p
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.estimate.trial_clocks import with_fitted_clocks
@@ -35,7 +35,7 @@ class TrialClocks:
     scatter_s: float
 
 
-def steps_of(predictor: Predictor, pose_filter: Filter, model: Model) -> Steps:
+def steps_of(predictor: Predictor, pose_filter: Whitening, model: Model) -> Steps:
     """What a model predicts; where trials have clocks of their own, each block of a trial with the clock of its neighbours."""
     return predictor.steps(model) if model.per_trial_effect is None else _crossed(predictor, pose_filter, model)[0]
 
@@ -94,7 +94,7 @@ def every_other_block(tracks: Tracks) -> np.ndarray:
     return (frame * BLOCKS // lengths[tracks.trial]) % 2 == 1
 
 
-def _crossed(predictor: Predictor, pose_filter: Filter, model: Model) -> tuple[Steps, tuple[Array, Array]]:
+def _crossed(predictor: Predictor, pose_filter: Whitening, model: Model) -> tuple[Steps, tuple[Array, Array]]:
     """Steps with the clocks of the other blocks, and the clocks (trials,) that odd and even blocks ask for."""
     even = every_other_block(predictor.tracks)
     problems = [Problem(predictor, pose_filter, (even == which).astype(float)) for which in (False, True)]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.predict.luck import Luck
 from bns.physics.model import Model
 
 
@@ -33,7 +34,8 @@ class Predictor(Protocol):
     ``way_m`` (frames,): how far the robot was driven since the frame before, or how strongly its drive scatters, in metres.
     ``horizons``: names of the times over which predictions are judged; ``near``: the one of them that curves and worst moments
     are about. ``tracking``: noise of a tracked position (m) and heading (rad), where the tracks tell it by themselves; None: it
-    is estimated under a model. ``counted`` (frames,): what each frame counts in a fit; None: all of them 1.
+    is estimated under a model. ``counted`` (frames,): what each frame counts in a fit; None: all of them 1. ``luck``: what chance
+    does to each stretch, where frames are predicted from the begin of theirs; None: where a filter follows the track.
     """
 
     tracks: Tracks
@@ -42,6 +44,7 @@ class Predictor(Protocol):
     near: str
     tracking: tuple[float, float] | None
     counted: Array | None
+    luck: Luck | None
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Frames at which the windows of a horizon begin and end."""
@@ -49,8 +52,11 @@ class Predictor(Protocol):
     def steps(self, model: Model) -> Steps:
         """What the model predicts between successive frames."""
 
-    def anchor(self, model: Model) -> None:
-        """Models near this one are asked for next: what is worked out roughly is worked out well here."""
+    def anchor(self, model: Model) -> bool:
+        """Models near this one are asked for next: what is worked out roughly is worked out well here.
+
+        Returns whether `steps` may say something else now.
+        """
 
     @property
     def screening(self) -> Predictor | None:

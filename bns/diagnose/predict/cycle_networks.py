@@ -46,7 +46,7 @@ class CyclePredictor:
         self._moved = robot.displacements(outputs)
         self._changes = robot.changes(tracks.gait) if robot.with_changes else None
         self._networks = self._driven()
-        self.tracking, self.counted = self._tracking(), None
+        self.tracking, self.counted, self.luck = self._tracking(), None, None
         self.way_m = np.hypot(*self._since_previous(tracks.pose)[:, :2].T)
         self._at = np.arange(len(tracks.t_s)) - tracks.first[:-1][tracks.trial]
         self._step_s = self._on_grid(np.diff(tracks.t_s, append=tracks.t_s[-1]), fill=0.0)
@@ -62,8 +62,9 @@ class CyclePredictor:
         added[self.tracks.is_first] = 0.0
         return Steps(self._networks + added, np.zeros((len(added), 2)))
 
-    def anchor(self, model: Model) -> None:
+    def anchor(self, model: Model) -> bool:
         """Every answer is exact."""
+        return False
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Begins and ends of stable cycles, of changes between two, of several in a row, of all a trial began with."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bns.diagnose.data.stretches import StretchTracks
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS
@@ -29,16 +30,20 @@ class Errors:
     forward_m: Array
     left_m: Array
     heading_rad: Array
+    points_m: Array | None = None
+    """Of several tracked points: how far these are off beside their middle, by the turn and by their distances, (windows,)."""
 
     def only(self, kept: NDArray[np.bool_]) -> Errors:
         """Some of the windows."""
         frames = self.trial[kept], self.start[kept], self.end[kept]
-        return Errors(*frames, self.forward_m[kept], self.left_m[kept], self.heading_rad[kept])
+        points_m = None if self.points_m is None else self.points_m[kept]
+        return Errors(*frames, self.forward_m[kept], self.left_m[kept], self.heading_rad[kept], points_m)
 
     @property
     def position_m(self) -> Array:
-        """Distance between predicted and measured position, (windows,)."""
-        return np.hypot(self.forward_m, self.left_m)
+        """Distance between predicted and measured position, (windows,); of several tracked points the root mean square."""
+        middle_m: Array = np.hypot(self.forward_m, self.left_m)
+        return middle_m if self.points_m is None else np.hypot(middle_m, self.points_m)
 
     def summary(self, trials: int) -> dict[str, float]:
         """Root mean squares, the median position error, its standard error by trial, and the number of windows."""
@@ -106,7 +111,16 @@ def errors_of(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
     eh = pose[end, 2] - (pose[start, 2] + path[end, 2] - path[start, 2])
     eh -= 2 * np.pi * np.round(eh / (2 * np.pi))
     c, s = np.cos(pose[end, 2]), np.sin(pose[end, 2])
-    return Errors(tracks.trial[start], start, end, c * ex + s * ey, c * ey - s * ex, eh)
+    points_m = None
+    if isinstance(tracks, StretchTracks) and steps.apart_m is not None:
+        points_m = np.sqrt((_radius_m(tracks)[end] * eh) ** 2 + (steps.apart_m[end] ** 2).mean(axis=1) / 4)
+    return Errors(tracks.trial[start], start, end, c * ex + s * ey, c * ey - s * ex, eh, points_m)
+
+
+def _radius_m(tracks: StretchTracks) -> Array:
+    """How far tracked points are from their middle, (frames,); root mean square."""
+    off = tracks.points_m - tracks.points_m.mean(axis=1, keepdims=True)
+    return np.asarray(np.sqrt((off**2).sum(axis=2).mean(axis=1)))
 
 
 def _path(tracks: Tracks, steps: Steps) -> Array:

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.stretches import StretchTracks, apart, poses_of
+from bns.diagnose.data.tracking_noise import robust_sd
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.predict.luck import Luck, luck_of
 from bns.diagnose.predict.responses import Responses
 from bns.diagnose.predict.stretches import Simulations
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements
 from bns.physics.effect import Effect
 from bns.physics.jointed.model import JointedModel
-from bns.physics.jointed.plant import Sighting
+from bns.physics.jointed.plant import Plant, Sighting
 from bns.physics.model import ActiveEffect, Model
 from bns.physics.signals import Body
 from bns.physics.wheels.differential_drive import taken_at
@@ -26,10 +28,42 @@ from bns.physics.wheels.differential_drive import taken_at
 _SHARES = DEFAULTS.predict.response_shares
 _LIGHT_SHARES = DEFAULTS.predict.screening_shares
 _LIGHT = DEFAULTS.predict.screening_cycles
+_MOST = DEFAULTS.predict.most_stretches
 _WILD_M = DEFAULTS.predict.wild_m
+_MARKER_LEAST_M = DEFAULTS.predict.marker_least_m
 _STILL_M = DEFAULTS.predict.still_m
-LUCK = (("floor-friction", "factor"), ("floor-slope", "east_rad"), ("floor-slope", "north_rad"))
-"""What chance does to a robot on a floor: a little rougher here, a little fall there; by the first node of each curve."""
+_FRICTION = DEFAULTS.predict.luck_friction
+_SLOPE_RAD = DEFAULTS.predict.luck_slope_rad
+_DRAWS = DEFAULTS.predict.luck_draws
+_LUCK_SEED = DEFAULTS.predict.luck_seed
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Luck that is an effect, but small and another one in every stretch: how large it usually is."""
+
+    effect: str
+    parameter: str
+    usual: float
+
+
+LUCK = (
+    (_Piece("floor-friction", "factor", _FRICTION),),
+    (_Piece("floor-slope", "east_rad", _SLOPE_RAD), _Piece("floor-slope", "north_rad", _SLOPE_RAD)),
+)
+"""What chance does to a robot on a floor, by kind: a little rougher here, a little fall there."""
+
+
+@dataclass(frozen=True)
+class _Chance:
+    """Luck of stretches, and how far the first nodes of `LUCK`'s curves move each one's end, (stretches,)."""
+
+    luck: Luck
+    far_m: Array
+
+    def only(self, chosen: NDArray[np.int64], frames: NDArray[np.int64], tracks: StretchTracks) -> _Chance:
+        """Of some stretches, those of ``tracks``."""
+        return _Chance(self.luck.only(frames, tracks), self.far_m[chosen])
 
 
 class JointedPredictor:
@@ -46,26 +80,34 @@ class JointedPredictor:
     ) -> None:
         self.near, self._tracking_m = near, tracking_m
         self.horizons: tuple[str, ...] = (near,)
+        there = len(tracks.told)
+        if there > _MOST:
+            tracks = tracks.of(np.unique(np.linspace(0, there - 1, _MOST).round().astype(np.int64)))
+        self.not_taken = there - len(tracks.told)
+        """Stretches that were left aside for speed: of very many, some evenly chosen ones are simulated."""
         simulations, bare = Simulations.of(tracks, model.mechanism), replace(model, effects=())
-        self._setup(simulations, bare, Responses(simulations.seen, bare, simulations.exactly, _SHARES))
-        wild = self._luck_m() > _WILD_M
+        responses = Responses(simulations.seen, bare, simulations.exactly, _SHARES)
+        self._setup(simulations, bare, responses)
+        chance = self._chance()
+        wild = chance.far_m > _WILD_M
         self.left_out = int(wild.sum())
         """Stretches that nobody can foresee: a little luck moves the robot far."""
         if wild.any() and not wild.all():
             kept = np.flatnonzero(~wild)
-            looks, simulations = simulations.looks_of(kept), simulations.only(kept)
-            self._setup(simulations, bare, self._responses.only(looks, simulations.seen))
-        every = max(len(simulations) // _LIGHT, 1)
-        self.screening: Predictor | None = None
-        if every > 1:
-            self.screening = self._light(np.arange(every // 2, len(simulations), every))
+            looks, frames, simulations = simulations.looks_of(kept), self._frames_of(kept), simulations.only(kept)
+            self._setup(simulations, bare, responses.only(looks, simulations.seen))
+            chance = chance.only(kept, frames, self._stretches)
+        self._foresee(chance)
+        few = np.unique(np.linspace(0, len(simulations) - 1, min(_LIGHT, len(simulations))).round().astype(np.int64))
+        self.screening: Predictor | None = self._light(few, chance)
 
-    def _light(self, chosen: NDArray[np.int64]) -> JointedPredictor:
+    def _light(self, chosen: NDArray[np.int64], chance: _Chance) -> JointedPredictor:
         light = object.__new__(JointedPredictor)
         light.near, light.horizons, light._tracking_m = self.near, self.horizons, self._tracking_m
-        light.left_out, light.screening = 0, None
-        simulations = self._simulations.only(chosen)
+        light.left_out, light.not_taken, light.screening = 0, 0, None
+        simulations, frames = self._simulations.only(chosen), self._frames_of(chosen)
         light._setup(simulations, self._bare, Responses(simulations.seen, self._bare, simulations.exactly, _LIGHT_SHARES))
+        light._foresee(chance.only(chosen, frames, light._stretches))
         return light
 
     def _setup(self, simulations: Simulations, bare: JointedModel, responses: Responses) -> None:
@@ -73,19 +115,32 @@ class JointedPredictor:
         self._stretches = simulations.tracks
         self.tracks: Tracks = self._stretches
         self._measured_apart = apart(self._stretches.points_m)
-        self.tracking: tuple[float, float] | None = None
-        if self._tracking_m is not None and self._measured_apart.shape[1]:
-            gap = float(np.median(self._measured_apart[:, -1]))
-            self.tracking = self._tracking_m / np.sqrt(2), self._tracking_m * np.sqrt(2) / gap
+        self.tracking = self._tracking()
         self._at = np.arange(len(self.tracks.t_s)) - self.tracks.first[:-1][self.tracks.trial]
         self._step_s = self._on_grid(np.diff(self.tracks.t_s, append=self.tracks.t_s[-1]), fill=0.0)
-        frames = np.bincount(self._stretches.stretch) - 1
-        scatter = (self._luck_m() ** 2 / _STILL_M + _STILL_M) / frames
+
+    def _tracking(self) -> tuple[float, float] | None:
+        """Noise of a tracked pose where cycles end in the posture in which they began: by what their distances change, too."""
+        if self._tracking_m is None or not self._measured_apart.shape[1]:
+            return None
+        gap = self._measured_apart[:, -1]
+        off = gap - apart(self._tracked(self._responses.bare))[:, -1]
+        begins, ends = self.windows(self.near)
+        marker_m = min(self._tracking_m, max(float(robust_sd(off[ends] - off[begins])) / 2, _MARKER_LEAST_M))
+        return marker_m / np.sqrt(2), marker_m * np.sqrt(2) / float(np.median(gap))
+
+    def _foresee(self, chance: _Chance) -> None:
+        """What chance does to these stretches."""
+        self.luck: Luck | None = chance.luck
+        scatter = (chance.far_m**2 / _STILL_M + _STILL_M) / (np.bincount(self._stretches.stretch) - 1)
         self.way_m = np.where(self.tracks.is_first, 0.0, scatter[self._stretches.stretch])
 
-    def anchor(self, model: Model) -> None:
+    def _frames_of(self, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
+        return np.flatnonzero(np.isin(self._stretches.stretch, chosen))
+
+    def anchor(self, model: Model) -> bool:
         """Simulate this model itself: later answers nearby start from it."""
-        self._responses.anchor(model)
+        return self._responses.anchor(model)
 
     def steps(self, model: Model) -> Steps:
         """What the body does from frame to frame, and how far the distances of its points are off."""
@@ -148,21 +203,28 @@ class JointedPredictor:
         out[self.tracks.is_first] = 0.0
         return out
 
-    def _luck_m(self) -> Array:
-        """How far a little luck moves each stretch's end, (stretches,)."""
-        square = np.zeros(len(self._simulations))
-        known, (begins, ends) = self._bare.catalogue(), self.windows(self.near)
-        before = self._moved(self._bare, begins, ends)
-        for name, parameter in LUCK:
-            if name in known:
-                moved = self._moved(_a_little(self._bare, known[name], parameter), begins, ends)
-                square += ((moved - before) ** 2).sum(axis=(1, 2)) / before.shape[1]
-        return np.asarray(np.sqrt(square))
+    def _chance(self) -> _Chance:
+        """Each piece of luck simulated once: a rougher floor, floors that fall, uneven links, and steps half as long."""
+        r, known = self._responses, self._bare.catalogue()
+        exact, usual = self._tracked(r.bare), self._tracked(r.coarse)
+        pieces, far = [[usual]], np.zeros(len(self._simulations))
+        begins, ends = self.windows(self.near)
+        for kind in LUCK if LUCK[0][0].effect in known else ():
+            pieces.append([])
+            for one in kind:
+                near, there = _a_little(self._bare, known[one.effect], one.parameter)
+                moved = self._tracked(r.seen(near)) - exact
+                far += ((moved[ends] - moved[begins]) ** 2).sum(axis=(1, 2)) / moved.shape[1]
+                pieces[-1].append(usual + one.usual / there * moved)
+        if len(pieces) > 1:
+            uneven = [self._tracked(self._simulations.seen_of(plant)) for plant in _uneven(self._simulations.plant)]
+            pieces.append([usual + (points - usual) / np.sqrt(len(uneven)) for points in uneven])
+        pieces[0] = [exact]
+        return _Chance(luck_of(self._stretches, usual, pieces), np.sqrt(far))
 
-    def _moved(self, model: Model, begins: NDArray[np.int64], ends: NDArray[np.int64]) -> Array:
-        points = self._points(model)
-        moved: Array = points[ends] - points[begins]
-        return moved
+    def _tracked(self, seen: Array) -> Array:
+        """Tracked points (frames, sites, 2) of what was looked at."""
+        return self._simulations.at(seen[:, 0], self._stretches.since_s)
 
     def _on_grid(self, values: Array, fill: float | None = None) -> Array:
         """Values (frames,) at the frame that begins each step, (trials, steps); padded with each trial's last, or ``fill``."""
@@ -175,8 +237,16 @@ class JointedPredictor:
         return np.array(rows)
 
 
-def _a_little(bare: JointedModel, effect: Effect, parameter: str) -> Model:
-    """The model with one number of an effect at the first node of its curve."""
+def _a_little(bare: JointedModel, effect: Effect, parameter: str) -> tuple[Model, float]:
+    """The model with one number of an effect at the first node of its curve, and how far from neutral that is."""
     p = next(p for p in effect.parameters if p.name == parameter)
     value = p.neutral + _SHARES[0] * (p.plausible[1] - p.neutral)
-    return replace(bare, effects=(ActiveEffect(effect, tuple(value if q is p else q.neutral for q in effect.parameters)),))
+    values = tuple(value if q is p else q.neutral for q in effect.parameters)
+    return replace(bare, effects=(ActiveEffect(effect, values),)), value - p.neutral
+
+
+def _uneven(plant: Plant) -> list[Plant]:
+    """Links that grip unevenly, by lot."""
+    rng, links = np.random.default_rng(_LUCK_SEED), len(plant.grip)
+    drawn = np.clip(1 + _FRICTION * rng.normal(size=(_DRAWS, links)), _FRICTION, None)
+    return [replace(plant, grip=grip) for grip in drawn]

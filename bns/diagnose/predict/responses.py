@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from threading import RLock
 
 import numpy as np
@@ -24,6 +25,8 @@ from bns.physics.model import ActiveEffect, Model
 
 Number = tuple[str, str]
 """Effect and parameter."""
+_LONG = DEFAULTS.predict.node_long
+_BESIDE = DEFAULTS.predict.node_beside
 _NEAR = DEFAULTS.predict.anchor_near
 _CLIPPED_M = DEFAULTS.predict.response_clipped_m
 
@@ -56,6 +59,11 @@ class Responses:
         """What is seen without effects."""
         return self._anchors[0].seen
 
+    @property
+    def coarse(self) -> Array:
+        """The same, simulated as coarsely as what differences are taken of."""
+        return self._sound
+
     def seen(self, model: Model) -> Array:
         """What is seen of a model: an anchor, and along the curves from there."""
         with self._lock:
@@ -69,13 +77,30 @@ class Responses:
                     out += self._curve(number, there) - self._curve(number, here)
             return out
 
-    def anchor(self, model: Model) -> None:
-        """Simulate this model itself, unless one was that is hardly another."""
+    def anchor(self, model: Model) -> bool:
+        """Simulate this model itself, unless one was that is hardly another, and refine the curves of its numbers around it.
+
+        Returns whether what is answered near it may have changed.
+        """
         with self._lock:
             wanted = self._values(model)
-            if min(self._distance(a.values, wanted) for a in self._anchors) > _NEAR:
-                change = self._simulate(model) - self._sound
-                self._anchors.append(_Anchor(wanted, self._anchors[0].seen + change))
+            refined = [self._refined(number, value) for number, value in wanted.items()]
+            if min(self._distance(a.values, wanted) for a in self._anchors) <= _NEAR:
+                return any(refined)
+            change = self._simulate(model) - self._sound
+            self._anchors.append(_Anchor(wanted, self._anchors[0].seen + change))
+            return True
+
+    def _refined(self, number: Number, value: float) -> bool:
+        """Halve the long stretches of a curve that a value lies in, or next to; not short ones, whose slopes are chance."""
+        effect, p = self._known[number]
+        long = _LONG * (p.plausible[1] - p.plausible[0])
+        nodes = sorted({p.neutral, *self._planned(p, 1.0), *self._planned(p, -1.0), *self._curves.get(number, {})})
+        reach = [(a, b) for a, b in pairwise(nodes) if a - _BESIDE * long <= value <= b + _BESIDE * long and b - a > long]
+        for low, high in reach:
+            self._curves.setdefault(number, {})
+            self._node(number, effect, p, (low + high) / 2)
+        return bool(reach)
 
     def only(self, frames: NDArray[np.int64], simulate: Callable[[Model], Array]) -> Responses:
         """The same of some of the frames; ``simulate`` gives these alone."""
@@ -106,25 +131,26 @@ class Responses:
     def _curve(self, number: Number, value: float) -> Array:
         """What this number alone changes: straight between the nodes on either side, and on beyond the last."""
         effect, p = self._known[number]
-        side, step = (1.0 if value > p.neutral else -1.0), abs(value - p.neutral)
-        nodes = self._nodes(p, side)
-        self._curves.setdefault(number, {})
+        side = 1.0 if value > p.neutral else -1.0
+        known = self._curves.setdefault(number, {})
+        nodes = sorted({*self._planned(p, side), *known}, key=lambda at: side * (at - p.neutral))
+        nodes = [at for at in nodes if side * (at - p.neutral) > 0]
         if not nodes:
             return np.zeros_like(self._sound)
-        at = int(np.searchsorted(nodes, step, side="left"))
-        outer = min(at, len(nodes) - 1)
-        upper = self._node(number, effect, p, p.neutral + side * nodes[outer])
+        within = sum(side * (at - value) < 0 for at in nodes)
+        outer = min(within, len(nodes) - 1)
+        upper = self._node(number, effect, p, nodes[outer])
         if outer == 0:
-            return upper * (step / nodes[0])
-        lower = self._node(number, effect, p, p.neutral + side * nodes[outer - 1])
-        share = (step - nodes[outer - 1]) / (nodes[outer] - nodes[outer - 1])
+            return upper * ((value - p.neutral) / (nodes[0] - p.neutral))
+        lower = self._node(number, effect, p, nodes[outer - 1])
+        share = (value - nodes[outer - 1]) / (nodes[outer] - nodes[outer - 1])
         return lower + share * (upper - lower)
 
-    def _nodes(self, p: Parameter, side: float) -> list[float]:
-        """How far the nodes on one side are from neutral."""
+    def _planned(self, p: Parameter, side: float) -> list[float]:
+        """Nodes on one side of neutral that are simulated when they are first needed."""
         end, bound = (p.plausible[1], p.high) if side > 0 else (p.plausible[0], p.low)
         room, width = abs(bound - p.neutral), abs(end - p.neutral) or (p.plausible[1] - p.plausible[0]) / 4
-        return sorted({min(share * width, room) for share in self._shares if room > 0})
+        return [p.neutral + side * min(share * width, room) for share in self._shares if room > 0]
 
     def _node(self, number: Number, effect: Effect, p: Parameter, value: float) -> Array:
         known = self._curves[number]

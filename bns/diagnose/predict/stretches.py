@@ -11,7 +11,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.physics.jointed.drives import Drive
 from bns.physics.jointed.mechanism import Mechanism, machine
 from bns.physics.jointed.model import JointedModel
-from bns.physics.jointed.plant import Sighting
+from bns.physics.jointed.plant import Plant, Sighting
 from bns.physics.jointed.simulate import Rest, Simulator
 from bns.physics.model import Model
 from bns.sweep.jobs.cores import cores
@@ -67,7 +67,16 @@ class Simulations:
     def seen(self, model: Model) -> Array:
         """What is seen of a model, simulated coarsely; (looks, 3, sites, 2)."""
         assert isinstance(model, JointedModel)
-        return _stacked(self._coarse.sightings(model.plant, self._rests[1]))
+        return self.seen_of(model.plant)
+
+    def seen_of(self, plant: Plant) -> Array:
+        """The same of a plant."""
+        return _stacked(self._coarse.sightings(plant, self._rests[1]))
+
+    @property
+    def plant(self) -> Plant:
+        """The plant with nothing wrong."""
+        return self._coarse.machine.plant
 
     def at(self, points_m: Array, since_s: Array) -> Array:
         """Points (frames, sites, 2) that were looked at (looks, sites, 2), at times since_s (frames,) of their stretches."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array, Tracks, slimmed
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import HORIZONS, windows
+from bns.diagnose.predict.luck import Luck
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
 from bns.physics.effect import Effect
@@ -43,6 +44,7 @@ class WheelPredictor:
     near = "1s"
     tracking: tuple[float, float] | None = None
     counted: Array | None = None
+    luck: Luck | None = None
     screening = None
 
     def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
@@ -82,8 +84,9 @@ class WheelPredictor:
         body = displacements(view.poses, self.tracks.is_first)
         return Steps(self._pictured(body, placed) if placed else body, self._drift(model, poses, sums))
 
-    def anchor(self, model: Model) -> None:
+    def anchor(self, model: Model) -> bool:
         """Every answer is exact."""
+        return False
 
     def _pictured(self, body: Array, placed: Sequence[ActiveEffect]) -> Array:
         """Displacements (frames, 3) as they look where the robot was seen: the picture is undone there, and made again."""

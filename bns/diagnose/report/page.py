@@ -18,6 +18,7 @@ from markupsafe import Markup
 from bns.diagnose.adding import ExtendedModel, add_effects
 from bns.diagnose.comparison import Comparison, compare
 from bns.diagnose.data.load import Measured
+from bns.diagnose.data.stretches import StretchTracks
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.base import Predictor
@@ -46,6 +47,8 @@ class Material:
     proposal: Proposal | None
     why_none: str
     paths: list[dict[str, Any]]
+    near: str = "1s"
+    """The horizon of curves and worst moments."""
 
 
 def gathered(
@@ -74,7 +77,7 @@ def gathered(
     except DataError as none:
         why = str(none)
     tick("paths")
-    return Material(measured, model, d, comparison, extended, proposal, why, shown_paths(predictor, model, d))
+    return Material(measured, model, d, comparison, extended, proposal, why, shown_paths(predictor, model, d), predictor.near)
 
 
 def report_html(m: Material, command: Mapping[str, str]) -> str:
@@ -93,6 +96,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "model_name": m.model.name,
         "trials": len(m.measured.tracks),
         "verdict": d.verdict,
+        "near": "one second" if m.near == "1s" else f"one {m.near}",
         "headline": headline(d),
         "certainty": certainty(d),
         "numbers": numbers_in_words(d.selection.fit, d.effects, d.numbers) if d.selection is not None else [],
@@ -160,6 +164,9 @@ def _paths_text(m: Material, has_after: bool) -> str:
     order = "those first in which mending the model changes most" if has_after else "the worst predicted first"
     some = f"{shown} of {trials} trials, {order}" if shown < trials else f"All {trials} trials, {order}"
     after = " The extended model's numbers come from other trials than those it predicts here." if has_after else ""
+    if isinstance(m.measured.tracks, StretchTracks):
+        begun = f"Predictions start again from the measured pose where each {m.near} begins"
+        return f"{some}. {begun}; those that luck decides are left out.{after}"
     return (
         f"{some}. Predictions start from the first measured pose and know only the commands; even a perfect model's path parts "
         f"from the measured one in time, since motors vary and the first heading is known only so well.{after}"

@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
 from bns.diagnose.design.proposal import Proposal
+from bns.diagnose.design.repeats import Repeats
+from bns.diagnose.estimate.stretch_noise import predicted_since_begin
 from bns.diagnose.settings import DEFAULTS
+from bns.errors import DataError
 from bns.plotting.style import GREY, OKABE_ITO, lettered, panels, save, style
 
 _FRAME_S = DEFAULTS.report.frame_s
@@ -23,6 +26,8 @@ _SHOWN = DEFAULTS.report.planned_trials
 @style()
 def plan_figure(p: Proposal, path: Path) -> Path:
     """One panel a trial: the arena, the start, and where each explanation says that the robot goes."""
+    if isinstance(p.plan, Repeats):
+        return _repeats_figure(p, p.plan, path)
     shown = min(_SHOWN, len(p.plan))
     seen = foreseen(p, np.arange(shown))
     figure, axes = panels(shown, 2.6, wide=True)
@@ -34,8 +39,41 @@ def plan_figure(p: Proposal, path: Path) -> Path:
     return save(figure, path)[0]
 
 
+def _repeats_figure(p: Proposal, plan: Repeats, path: Path) -> Path:
+    """One panel a repeated cycle: where each explanation says that it ends, from its begin."""
+    shown = min(_SHOWN, len(plan))
+    figure, axes = panels(shown, 2.6, wide=True)
+    for trial, (axis,) in enumerate(axes):
+        _draw_repeat(axis, p, plan, trial)
+        axis.set_ylabel("to its left (cm)" if trial == 0 else "")
+        axis.set_title(lettered(trial, shown, f"trial {trial}, {plan.lasting_s[trial]:.0f} s"))
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return save(figure, path)[0]
+
+
+def _draw_repeat(axis: Axes, p: Proposal, plan: Repeats, trial: int) -> None:
+    tracks, chosen = plan.tracks, plan.chosen[trial]
+    frames = np.flatnonzero(tracks.stretch == chosen)
+    for number, competitor in enumerate(p.competing_models):
+        predictor = p.predictor
+        assert predictor is not None
+        assert predictor.luck is not None
+        pose = 100 * predicted_since_begin(predictor.luck, tracks.pose, predictor.steps(competitor.fit.model))[frames, :2]
+        color = OKABE_ITO[number % len(OKABE_ITO)]
+        axis.plot(*pose.T, label=competitor.title, color=color, linestyle=("-", "--", "-.", ":")[number % 4])
+        axis.plot(*pose[-1], "o", color=color)
+    axis.plot(0, 0, "k^")
+    axis.set(aspect="equal", xlabel="ahead (cm)")
+
+
 def trial_axes(axis: Axes, p: Proposal, trial: int) -> None:
     """One trial of the plan on axes that are there."""
+    if isinstance(p.plan, Repeats):
+        _draw_repeat(axis, p, p.plan, trial)
+        axis.set_ylabel("to its left (cm)")
+        axis.set_title(f"trial {trial}, {p.plan.lasting_s[trial]:.0f} s")
+        axis.legend()
+        return
     _draw_trial(axis, p, foreseen(p, np.array([trial])), 0)
     axis.set_title(f"trial {trial}, {p.plan.lasting_s[trial]:.0f} s")
     axis.legend()
@@ -44,12 +82,15 @@ def trial_axes(axis: Axes, p: Proposal, trial: int) -> None:
 def foreseen(p: Proposal, trials: NDArray[np.int64]) -> list[Tracks]:
     """What each explanation says of these trials (numbers from 0): tracks with a frame every so many milliseconds."""
     plan = p.plan.only(trials)
+    if p.arena is None or isinstance(plan, Repeats):
+        raise DataError("Paths of repeated cycles have no place in an arena; the report draws each from its own begin.")
     tracks = planned_tracks(plan, p.arena.start, _FRAME_S, np.zeros(len(plan)))
     return [noise_free_predictor(competitor.fit.model, tracks).tracks for competitor in p.competing_models]
 
 
 def _draw_trial(axis: Axes, p: Proposal, seen: list[Tracks], trial: int) -> None:
     a = p.arena
+    assert a is not None
     size = (100 * (a.x_high_m - a.x_low_m), 100 * (a.y_high_m - a.y_low_m))
     axis.add_patch(Rectangle((100 * a.x_low_m, 100 * a.y_low_m), *size, fill=False, edgecolor=GREY, linestyle=":"))
     for number, (competitor, each) in enumerate(zip(p.competing_models, seen, strict=True)):

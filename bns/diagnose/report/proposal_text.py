@@ -36,6 +36,12 @@ def proposal_lines(p: Proposal) -> list[str]:
     if not len(p.plan):
         return [*lines, "No trial is proposed: no commands would decide anything."]
     a = p.arena
+    if a is None or p.bounds is None:
+        return [
+            *lines,
+            f"{len(p.plan)} trials are proposed, {p.plan.lasting_s.sum() / 60:.1f} min of driving: what was driven before and "
+            "tells most, each driven once more by itself.",
+        ]
     return [
         *lines,
         f"{len(p.plan)} trials of about {p.plan.lasting_s.mean():.0f} s are proposed, {p.plan.lasting_s.sum() / 60:.1f} min of "
@@ -46,7 +52,9 @@ def proposal_lines(p: Proposal) -> list[str]:
 
 
 def _next(p: Proposal, written: str) -> Iterator[str]:
-    if written:
+    if written and p.arena is None:
+        yield f"written to {written}; drive its trials, log them as before, and then: bns diagnose DATA --more NEW.csv --model M"
+    elif written and p.arena is not None:
         if not np.allclose(p.arena.start, START, atol=0.02):
             yield "note: bns trial starts every trial at x = 0, y = 0, heading 90°; --start=0,0,90 plans for that."
         yield f"written to {written}; drive it with: bns trial --robot khepera --rig RIG.yaml --commands {written}"

@@ -79,11 +79,11 @@ def improvement_text(d: Diagnosis) -> str:
     """What adding the effects does to the error, in a sentence; "" where nothing was added."""
     if d.errors is None or not d.effects:
         return ""
-    shown = [e for h in ("1s", "command", "cycle") for e in [d.errors.horizons.get(h)] if e is not None and e.windows]
+    shown = [e for h in ("1s", "command", "cycle", "stretch") for e in [d.errors.horizons.get(h)] if e is not None and e.windows]
     if not shown:
         return ""
     e = shown[0]
-    ahead = {"1s": "a second", "command": "a command", "cycle": "a cycle"}[e.horizon]
+    ahead = {"1s": "a second", "command": "a command", "cycle": "a cycle", "stretch": "a stretch"}[e.horizon]
     known = "With it" if d.verdict != "unlisted" else "With the known effects alone"
     noise = f" (tracking noise alone: {_mm(e.noise_floor_m)} mm)" if np.isfinite(e.noise_floor_m) else ""
     before, after = _mm(e.models[0].rms_m), _mm(e.models[-1].rms_m)
@@ -148,7 +148,11 @@ def _shown(number: Mapping[str, Any]) -> tuple[str, str]:
 
 def commands_table(p: Proposal) -> Table:
     """The proposed trial file."""
-    table = p.commands().iloc[:, :4]
+    table = p.commands()
+    if p.arena is None:
+        rows = [[int(row[0]), *(f"{value:.4f}" for value in row[1:])] for row in table.itertuples(index=False)]
+        return _table(list(table.columns), rows)
+    table = table.iloc[:, :4]
     rows = [[int(row[0]), f"{row[1]:.4f}", f"{row[2]:.4f}", f"{row[3]:.2f}"] for row in table.itertuples(index=False)]
     return _table(["trial", "left (m/s)", "right (m/s)", "for (s)"], rows)
 
@@ -189,7 +193,8 @@ def next_commands(d: Diagnosis, p: Proposal | None, command: Mapping[str, str]) 
         out.append(f"bns add {data} {term.name} --term '{term.term}' --on {term.on} {base} -o extended.yaml")
     if p is not None and len(p.plan):
         out.append(f"bns propose {data} {model} -o next.csv")
-        out.append("bns trial --robot khepera --rig RIG.yaml --commands next.csv")
+        if p.arena is not None:
+            out.append("bns trial --robot khepera --rig RIG.yaml --commands next.csv")
         out.append(f"bns diagnose {data} {model} --more NEW-MEASUREMENTS.csv")
     return out
 

@@ -164,7 +164,8 @@ def _comparison(c: Comparison) -> Iterator[str]:
 
 def ahead(horizon: str) -> str:
     """A horizon in words."""
-    words = {"command": "one command", "1s": "1 s", "5s": "5 s", "trial": "whole trial", "cycle": "one cycle"}
+    words = {"command": "one command", "1s": "1 s", "5s": "5 s", "trial": "whole trial"}
+    words |= {"cycle": "one cycle", "stretch": "one stretch"}
     return words.get(horizon, horizon)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem, chance
-from bns.diagnose.estimate.noise import filter_for
+from bns.diagnose.estimate.problem import problem_with_noise
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 
@@ -35,7 +35,8 @@ def screened(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> list[Scre
     """Every effect on the predictor's few tracks, the one that could lower the loss most first."""
     light = problem.predictor.screening
     assert light is not None
-    few = Problem(light, filter_for(light, light.steps(fit.model), problem.pose_filter.noise))
+    light.anchor(fit.model)
+    few = problem_with_noise(light, light.steps(fit.model), problem.pose_filter.noise)
     base = few.fit(fit.model, rounds=0)
     return sorted((_scored(few, base, effect) for effect in effects), key=lambda s: -s.gain)
 

@@ -14,7 +14,7 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.plausibility import at_bound, implausible
-from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.problem import problem_for, settled_problem
 from bns.diagnose.estimate.significance import MIN_Z
 from bns.diagnose.estimate.starts import best_start, fit_with, listed
 from bns.diagnose.estimate.trial_clock_test import TrialClocks, compare_clocks, fit_trial_clocks, with_shared_clock
@@ -28,6 +28,7 @@ from bns.physics.effect import Effect
 from bns.physics.model import Model
 
 FALSE_ALARM = DEFAULTS.select.false_alarm
+MIN_Z_STRETCHES = DEFAULTS.estimate.min_z_stretches
 MIN_GAIN = DEFAULTS.select.min_gain
 SCREEN = DEFAULTS.select.screen
 BEHIND = DEFAULTS.select.behind
@@ -54,6 +55,7 @@ class StepwiseSelection:
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
         self._all_believed = False
+        self._least_z = MIN_Z if predictor.luck is None else MIN_Z_STRETCHES
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 
     def run(self) -> SelectionResult:
@@ -143,8 +145,7 @@ class StepwiseSelection:
 
     def _refit_with_noise(self, model: Model, start: Array | None = None) -> tuple[Problem, Fit]:
         """Noise and numbers that belong together."""
-        problem = problem_for(self.predictor, model, start)
-        return problem, problem.fit(model)
+        return settled_problem(self.predictor, model, start)
 
     def _forward_step(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
@@ -195,7 +196,7 @@ class StepwiseSelection:
     def _earned(self, candidate: Candidate, before: Fit, decoy_threshold: float) -> bool:
         e = candidate.paired_comparison
         least = MIN_GAIN * float(before.held_out.mean())
-        return e.p_value < self.level and e.z > MIN_Z and e.elpd_diff > max(decoy_threshold, least)
+        return e.p_value < self.level and e.z > self._least_z and e.elpd_diff > max(decoy_threshold, least)
 
     def _exchange_step(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]

@@ -54,6 +54,9 @@ class Design:
         "A trial is driven this often at most: a world that is like neither model shows in many different trials, not in one; "
         f"{BY_HAND}.",
     )
+    repeat_step_s: float = setting(
+        0.02, "s", f"Step in which the length of a repeated cycle of a robot on joints is worked out; {BY_HAND}."
+    )
     placing_s: float = setting(
         10.0, "s", f"What placing the robot is reckoned at when trials of different lengths are weighed; {BY_HAND}."
     )

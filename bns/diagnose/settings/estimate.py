@@ -56,6 +56,29 @@ class Estimate:
     noise_high: tuple[float, ...] = setting(
         (0.3, 0.5, 0.5, 0.5, 3.0), _NOISE_UNITS, f"Noise is sought below this; {BY_HAND}."
     )
+    stretch_guess: tuple[float, ...] = setting(
+        (2e-3, 8e-3, 2e-3, 6e-3),
+        "m, rad, m, rad",
+        f"Robots on joints: where the search for position and heading noise of a tracked pose, and for the drift of both over a "
+        f"stretch, begins; {BY_HAND}.",
+    )
+    stretch_low: tuple[float, ...] = setting((2e-5, 1e-4, 1e-4, 3e-4), "m, rad, m, rad", f"They are above this; {BY_HAND}.")
+    stretch_high: tuple[float, ...] = setting((0.3, 0.5, 0.3, 0.5), "m, rad, m, rad", f"They are below this; {BY_HAND}.")
+    stretch_luck_factor: float = setting(
+        2.718281828459045,
+        "1",
+        "Luck is expected to be as strong as usual within this factor (one standard deviation of its logarithm): few stretches "
+        "hardly tell one kind from another.",
+    )
+    stretch_luck_range: tuple[float, float] = setting(
+        (0.1, 3.0),
+        "1",
+        "And never weaker or stronger than this: no floor changes by more than 30 % (standard deviation) from cycle to cycle. "
+        "Unbounded, the luck of a body with a joint at 0.4 of its strength was 9 times as strong as usual, and hid the joint.",
+    )
+    stretch_noise_of: int = setting(
+        160, "stretches", "The noise is estimated from so many stretches at most, evenly chosen: eight numbers need no more."
+    )
     flips: int = setting(
         20_000,
         "samples",
@@ -66,6 +89,13 @@ class Estimate:
         2.5,
         "standard errors",
         f"Least gain that counts: it must be earned in many trials, not in a few; the number is {BY_HAND}.",
+    )
+    min_z_stretches: float = setting(
+        0.5,
+        "standard errors",
+        "The same for cycles of robots on joints: few cycles need one joint much, and a trial that has one earns many times what "
+        "others do (a joint at 0.4 of its strength: p = 0.0008 and 0.9 standard errors). That it is earned in many trials is in "
+        "the chance by sign flips: of ten trials it is no rarer than 0.001, however much one of them earns.",
     )
     start_shares: tuple[float, ...] = setting(
         (0.01, 0.05, 0.2),

@@ -65,7 +65,25 @@ class Predict:
         "1",
         f"A model this near to a simulated one (sum over its numbers, in plausible ranges) is not simulated again; {BY_HAND}.",
     )
-    screening_cycles: int = setting(80, "cycles", f"So many cycles, evenly chosen, screen the effects of a body; {BY_HAND}.")
+    node_long: float = setting(
+        0.15,
+        "1",
+        "Where numbers are settled, stretches between nodes that are longer than this share of what is plausible are halved: an "
+        "arm's servo at half its strength was read as 0.40 between nodes at 0.4 and 0.8, and a second effect made up for it.",
+    )
+    node_beside: float = setting(
+        0.3,
+        "1",
+        "Those too that a number lies next to, by this share of `node_long`: fits stop at the bends of a curve; "
+        f"{BY_HAND}.",
+    )
+    screening_cycles: int = setting(64, "cycles", f"So many cycles, evenly chosen, screen the effects of a body; {BY_HAND}.")
+    most_stretches: int = setting(
+        200,
+        "stretches",
+        "Of more cycles or stretches of a body so many are simulated, evenly chosen: each costs 26 ms of a core a model, and a "
+        "diagnosis asks for some 60 models.",
+    )
     look_s: float = setting(
         0.04, "s", f"A simulated body is looked at this often; what a camera sees in between lies on the chord; {BY_HAND}."
     )
@@ -76,6 +94,21 @@ class Predict:
         "foreseen and are left out: with 0.06 a friction that was plain by likelihood was withdrawn, for few wild cycles decide "
         "a root mean square.",
     )
+    luck_friction: float = setting(
+        0.1,
+        "1",
+        "A floor is usually rougher or smoother by this share from stretch to stretch, and under one link than under another: "
+        "dust and wear. How much it really is, is estimated; this is where that begins.",
+    )
+    luck_slope_rad: float = setting(
+        8e-3, "rad", "And falls by this, along x and along y: laboratory floors are level to within some centimetres a metre."
+    )
+    luck_draws: int = setting(
+        3,
+        "draws",
+        f"Uneven links are drawn so often, each a direction of its own; each costs a simulation of all stretches; {BY_HAND}.",
+    )
+    luck_seed: int = setting(20_270_101, "1", "A fixed key: the same tracks have the same luck. Any number would do.")
     still_m: float = setting(
         5e-3, "m", f"Cycles that a little luck moves less far than this scatter alike; {BY_HAND}."
     )

@@ -26,10 +26,12 @@ class Drive:
     begin: Array
 
 
-def through_postures(mechanism: Mechanism, postures: Array, dt_s: float, begin: Array, looks: int = 2) -> Drive:
+def through_postures(
+    mechanism: Mechanism, postures: Array, dt_s: float, begin: Array, looks: int = 2, before: int = 1
+) -> Drive:
     """From posture (postures, joints) to posture: every servo at the same speed, all wait for the last.
 
-    Looked at so many times, evenly spaced, from the second posture to the last.
+    Looked at so many times, evenly spaced, from the posture that comes after the first ``before`` to the last.
     """
     q = mechanism.resolution_rad
     targets = np.round(postures / q) * q if q else postures
@@ -40,7 +42,7 @@ def through_postures(mechanism: Mechanism, postures: Array, dt_s: float, begin: 
         reach = furthest * np.arange(1, steps + 1)[:, None]
         parts.append(start + np.clip(way, -reach, reach))
     ends = np.cumsum([len(part) for part in parts])
-    return Drive(np.concatenate(parts), _looks(int(ends[1]), int(ends[-1]), looks), begin)
+    return Drive(np.concatenate(parts), _looks(int(ends[before]), int(ends[-1]), looks), begin)
 
 
 def at_times(

@@ -70,14 +70,16 @@ class Machine:
 
     def changed(self, plant: Plant) -> Any:
         """The MuJoCo model with the masses and the friction of a plant."""
-        same = plant.friction_along == plant.friction_across == 1.0 and (plant.mass == 1.0).all()
-        if same:
+        same = plant.friction_along == plant.friction_across == 1.0
+        if same and (plant.mass == 1.0).all() and (plant.grip == 1.0).all():
             return self.model
         model = _copy(self.model)
         model.body_mass[1:] *= plant.mass
         model.body_inertia[1:] *= plant.mass[:, None]
-        model.pair_friction[:, 0] *= plant.friction_along
-        model.pair_friction[:, 1] *= plant.friction_across
+        links = np.maximum(model.geom_bodyid[model.pair_geom1], model.geom_bodyid[model.pair_geom2])
+        grip = np.concatenate([[1.0], plant.grip])[links]
+        model.pair_friction[:, 0] *= plant.friction_along * grip
+        model.pair_friction[:, 1] *= plant.friction_across * grip
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
 

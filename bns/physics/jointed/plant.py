@@ -20,11 +20,11 @@ class Plant:
 
     Of each joint with a servo, (joints,): ``stiffness`` and ``torque`` (its limit) as factors, ``zero_rad`` (where it is when it
     believes to be at 0), ``speed`` (its limit as a share of the fastest that it is told to move; from 1 on none). Of
-    each link, (links,): ``mass`` as a factor. ``friction_along``, ``friction_across``: of links on the floor, factors along and
-    across their own axes. ``dead_band_rad`` and ``delay_s`` come on top of the model's own. ``sag``: share of stiffness and
-    torque limit that is lost when all servos pull with all they have. ``slope``: fall of the floor towards east and north, rad.
-    ``pull_n``: force of the tether east and north; ``return_n_m``: the same a metre of way from the origin, back to it;
-    ``drag_n``: of the tether against its motion, beyond the model's own.
+    each link, (links,): ``mass`` and ``grip`` (on the floor, all ways) as factors. ``friction_along``, ``friction_across``: of
+    links on the floor, factors along and across their own axes. ``dead_band_rad`` and ``delay_s`` come on top of the model's own.
+    ``sag``: share of stiffness and torque limit that is lost when all servos pull with all they have. ``slope``: fall of the
+    floor towards east and north, rad. ``pull_n``: force of the tether east and north; ``return_n_m``: the same a metre of way
+    from the origin, back to it; ``drag_n``: of the tether against its motion, beyond the model's own.
     """
 
     joints: tuple[str, ...]
@@ -33,6 +33,7 @@ class Plant:
     zero_rad: Array
     speed: Array
     mass: Array
+    grip: Array
     friction_along: float = 1.0
     friction_across: float = 1.0
     dead_band_rad: float = 0.0
@@ -54,7 +55,7 @@ class Plant:
 def sound(joints: tuple[str, ...], links: int) -> Plant:
     """The plant with nothing wrong."""
     n = len(joints)
-    return Plant(joints, np.ones(n), np.ones(n), np.zeros(n), np.full(n, np.inf), np.ones(links))
+    return Plant(joints, np.ones(n), np.ones(n), np.zeros(n), np.full(n, np.inf), np.ones(links), np.ones(links))
 
 
 @dataclass(frozen=True)

@@ -24,5 +24,6 @@ EFFECT = Effect(
     lookalikes=("torque-limit", "supply-sag", "dead-band"),
     sentence="the joints are not as stiff as assumed",
     measurement="hang a known weight on an arm that a servo holds level, and measure by how much it sinks",
+    starts=((0.86,), (0.58,), (1.4,), (2.2,)),
     apply=apply,
 )

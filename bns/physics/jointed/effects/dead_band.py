@@ -24,5 +24,6 @@ EFFECT = Effect(
     lookalikes=("compliance",),
     sentence="the servos have more play than assumed",
     measurement="turn a servo's arm by hand to and fro while it holds a position, and measure the play",
+    starts=((0.03,), (0.09,)),
     apply=apply,
 )

@@ -22,5 +22,6 @@ EFFECT = Effect(
     lookalikes=("servo-speed-limit", "clock-offset"),
     sentence="the servos follow later than assumed",
     measurement="film a servo and the lamp of its bus together",
+    starts=((-0.01,), (0.08,), (0.24,)),
     apply=apply,
 )

@@ -26,5 +26,6 @@ EFFECT = Effect(
     lookalikes=("torque-limit", "servo-delay", "compliance"),
     sentence="the servos turn more slowly than they are told to",
     measurement="let one servo turn freely from end to end and take the time",
+    starts=((0.86,), (0.58,), (0.3,)),
     apply=apply,
 )

@@ -24,5 +24,6 @@ EFFECT = Effect(
     lookalikes=("compliance", "torque-limit"),
     sentence="the supply's voltage drops when the servos work hard",
     measurement="log the servos' own voltage while the robot moves",
+    starts=((0.19,), (0.57,), (0.95,)),
     apply=apply,
 )

@@ -26,5 +26,6 @@ EFFECT = Effect(
     lookalikes=("compliance", "supply-sag", "servo-speed-limit"),
     sentence="the servos are weaker than assumed",
     measurement="hang a weight on a servo's arm until it gives way",
+    starts=((0.82,), (0.46,), (0.1,)),
     apply=apply,
 )

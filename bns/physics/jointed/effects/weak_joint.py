@@ -17,13 +17,16 @@ EFFECT = PerJoint(
         name="weak-joint",
         stage="mechanics",
         parameters=(
-            Parameter("strength", "1", 0.0, 1.0, (0.0, 1.0), 1.0, "strength of the joint's servo; 0 is silent"),
+            Parameter(
+                "strength", "1", 0.0, 1.0, (0.0, 1.0), 1.0, "strength of the joint's servo; 0 is silent", reached=(0.0,)
+            ),
         ),
         equation="torque' = strength * torque of one joint",
         residuals="The markers' distance and the direction of motion differ in the cycles that need this joint.",
         lookalikes=("joint-zero", "compliance"),
         sentence="the servo of {joint} is weak or silent",
         measurement="switch the robot on, hold it up and press against {joint} by hand",
+        starts=((0.8,), (0.4,), (0.0,)),
         apply=apply,
     )
 )
