@@ -7,13 +7,14 @@ BUDGET  ?=
 JOBS    ?=
 ONLY    ?=
 DATA    ?=
+FROM    ?=
 STAMP   := $(VENV)/.installed
 # The CPU build: a tagged wheel where one is at hand, else from PyTorch's own index. Never the CUDA packages.
 TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint dist docs sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants
+.PHONY: help setup test lint dist docs sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants replication
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -57,8 +58,11 @@ sweep-snake: setup ## the snake study: trials in physics, small slice, all 30,00
 sweep-budget: setup ## how much evolution and training an evaluation should get
 	$(SWEEP) sweeps/budget.yaml
 
-figures: setup ## page and figures of whatever results there are, into results/figures; ONLY=success-by-mutation for one
-	$(BIN)/bns figures --results "$(RESULTS)" $(if $(ONLY),--only "$(ONLY)")
+figures: setup ## page and figures of whatever results there are, into results/figures; ONLY=success-by-mutation for one; FROM=published: of the published study
+	$(BIN)/bns figures --results "$(RESULTS)" $(if $(FROM),--from "$(FROM)") $(if $(ONLY),--only "$(ONLY)")
+
+replication: setup ## docs/replication.md, what of the dissertation replicates, from the published archive; FRESH=1: from results
+	$(BIN)/python -m analysis.replication --results "$(RESULTS)" $(if $(FRESH),--fresh)
 
 bench: setup ## speed, as ratios against named peers measured in the same run
 	$(BIN)/python -m tests.bench --json "$(RESULTS)/bench.json"

@@ -10,7 +10,7 @@ import pandas as pd
 from analysis import checks
 from analysis.coverage import coverage
 from analysis.figure_result import FigureResult
-from analysis.labels import task_number, task_title
+from analysis.labels import TITLES, task_number, task_title, valued
 from analysis.outcomes import fewest
 from analysis.results import NoDataError, Results
 from analysis.scatter import combinations
@@ -76,9 +76,17 @@ def _check(store: Results, chosen: Selection, name: str, task: str, arguments: d
     try:
         result: Checked = getattr(checks, name)(store, chosen, task, **arguments)
     except NoDataError as reason:
-        said = ", ".join(f"{key} {value}" for key, value in arguments.items())
-        return Checked(f"{name.replace('_', ' ')} {said}".strip(), str(reason).partition(";")[0], UNDECIDED)
+        return Checked(_in_words(name, arguments), str(reason).partition(";")[0], UNDECIDED)
     return result
+
+
+def _in_words(name: str, arguments: dict[str, Any]) -> str:
+    """What the dissertation says, where nothing can be measured that says it."""
+    parameter = arguments.get("parameter", "")
+    given = arguments | {"parameter": TITLES.get(parameter, "")}
+    given |= {key: valued(parameter, arguments[key]) for key in ("value",) if key in arguments}
+    given |= {"range": " to ".join(f"{end:g}" for end in arguments.get("range", ()))}
+    return str(source()["in_words"][name]).format(**given)
 
 
 def _drawn(store: Results, chosen: Selection, table: pd.DataFrame) -> FigureResult:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -24,6 +24,7 @@ from bns.diagnose.report.figures import ranking_axes
 from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.settings import DEFAULTS, Settings
 from bns.diagnose.settings.chosen import Chosen, changes_text, in_force, settings_of
+from bns.diagnose.values import ranked_values
 from bns.errors import DataError
 from bns.physics.effect import Effect
 from bns.physics.effects import effect_in_file
@@ -166,6 +167,7 @@ def diagnose(
     settings: Chosen | None = None,
     fresh: bool = False,
     progress: Progress | None = None,
+    alone: Callable[[Mapping[str, Any]], None] | None = None,
 ) -> DiagnoseResult:
     """Find what a model lacks.
 
@@ -178,6 +180,8 @@ def diagnose(
             one, or `bns.diagnose.settings.Settings`. What differs is in the summary and the provenance.
         fresh: work it out again even where the same was asked before (`bns.api.common.cache`).
         progress: told the share that is done (0 to 1, an estimate that never falls) and what is being looked at.
+        alone: told what an effect earns by itself as soon as it is known, as an entry of ``ranking`` in the JSON. It is called
+            from several threads; a later search (without trials that stand out) may correct it.
 
     Raises:
         DataError: measurements that cannot be used, or of another robot.
@@ -185,7 +189,7 @@ def diagnose(
     """
     chosen = settings_of(settings)
     with in_force(chosen):
-        return _found(_checked_again(log, chosen), model, also, without_effects, chosen, fresh, progress)
+        return _found(_checked_again(log, chosen), model, also, without_effects, chosen, fresh, progress, alone)
 
 
 def _checked_again(log: Log, settings: Settings) -> Log:
@@ -203,6 +207,7 @@ def _found(
     settings: Settings,
     fresh: bool,
     progress: Progress | None,
+    alone: Callable[[Mapping[str, Any]], None] | None,
 ) -> DiagnoseResult:
     own = [each if isinstance(each, Effect) else effect_in_file(Path(each)) for each in also]
     robot = with_effects(model)
@@ -212,7 +217,8 @@ def _found(
     meter = Meter(progress, PHASES, pace=STEPS * (len(ready.model.catalogue()) + len(extra)))
 
     def work() -> Diagnosis:
-        return find(ready.predictor, ready.model, extra=extra, tick=meter, barred=barred).slim()
+        told = (lambda candidate: None) if alone is None else (lambda candidate: alone(ranked_values(candidate)))
+        return find(ready.predictor, ready.model, extra=extra, tick=meter, barred=barred, alone=told).slim()
 
     found = work() if own else remembered("diagnose", ready, sorted(barred), work, Diagnosis, fresh, settings)
     meter.done()

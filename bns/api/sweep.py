@@ -15,7 +15,7 @@ import yaml
 
 from bns.api.common.progress import Progress, silent
 from bns.api.common.shown import Shown, plain
-from bns.errors import SpecError
+from bns.errors import SpecError, unknown_name
 from bns.sweep.budget import Budget
 from bns.sweep.confirm import confirmation
 from bns.sweep.executors import load_executor
@@ -24,6 +24,7 @@ from bns.sweep.expand.grid import load_sweep, parse_sweep
 from bns.sweep.expand.shard import Shard
 from bns.sweep.forecast.plan import Plan
 from bns.sweep.forecast.plan import plan as forecast
+from bns.sweep.ranking.until import DECIDED, Ranking, run_until_ranked
 from bns.sweep.report import planned, summed_up
 from bns.sweep.request import Placement, Request
 from bns.sweep.runner import Summary
@@ -40,6 +41,8 @@ class SweepResult(Shown):
 
     counts: Summary
     results: Path
+    ranking: Ranking | None = None
+    """With ``until="ranking"``: the best of each task, each with its confidence; how many runs were saved."""
 
     @property
     def done(self) -> int:
@@ -48,8 +51,8 @@ class SweepResult(Shown):
 
     @property
     def finished(self) -> bool:
-        """Has every run a result, good or bad?"""
-        return self.counts.remaining == 0
+        """Has every run a result, good or bad, or can the others not change the ranking that was asked for?"""
+        return self.counts.remaining == 0 or self.counts.stopped_by == DECIDED
 
     def load(self, table: str = "evals") -> pd.DataFrame:
         """The rows of this sweep, as `bns.load` gives them."""
@@ -59,7 +62,8 @@ class SweepResult(Shown):
 
     def summary(self) -> str:
         """Where the sweep stands, and how to go on."""
-        return summed_up(self.counts, self.results)
+        ranking = "" if self.ranking is None else f"{self.ranking.in_words()}\n"
+        return ranking + summed_up(self.counts, self.results)
 
     def _line(self) -> str:
         c = self.counts
@@ -168,6 +172,7 @@ class Sweep(Shown):
         scheduler: str | None = None,
         shard: tuple[int, int] | None = None,
         budget_s: float | None = None,
+        until: str | None = None,
         retry_failed: bool = False,
         progress: Progress | None = None,
     ) -> SweepResult:
@@ -180,6 +185,7 @@ class Sweep(Shown):
             executor: joblib (default), dask or slurm; ``scheduler``: address of a Dask scheduler.
             shard: (k, n): only the k-th (from 1) of n shares.
             budget_s: stop in time, seconds.
+            until: "ranking": stop when the ten best combinations of each task are known; ``.ranking`` holds them.
             retry_failed: do failed and quarantined runs again.
             progress: told the share that is done.
 
@@ -199,6 +205,11 @@ class Sweep(Shown):
             scheduler=scheduler,
         )
         way = load_executor(_way(device, executor, jobs))
+        if until is not None:
+            if until != "ranking":
+                raise SpecError(unknown_name("end of a sweep", until, ["ranking"]))
+            counts, ranking = run_until_ranked(way, self._described, request)
+            return SweepResult(counts, Path(results), ranking)
         return SweepResult(way.carry_out(self._described, request), Path(results))
 
     def plan(self, results: _Path = "results", *, jobs: int | None = None) -> SweepPlan:

@@ -13,7 +13,7 @@ from bns.api.model import Given
 from bns.app.background import Background
 from bns.app.results.study import Study, is_store
 from bns.app.session import is_session, opened
-from bns.app.tab import FIRST_MODEL, Tab, Tabs
+from bns.app.tab import FIRST_MODEL, Tab, Tabs, files_of
 from bns.extras import require
 
 
@@ -92,7 +92,10 @@ def tabs_of(
     if isinstance(log, DiagnoseResult):
         kept, model, log = Background(log), log.ready.model, log.ready.log
     first.take(model, model_words or (_words(model),))
-    if log is not None:
+    files = files_of(log)
+    if files:
+        first.ask([Path(file) for file in files], data_words or " ".join(map(str, files)))
+    elif log is not None:
         first.open(log, data_words or _words(log))
     if kept is not None:
         first.diagnosis = kept

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from bns.diagnose.predict.paired_errors import Change, HorizonErrors
+from bns.diagnose.predict.paired_errors import Change, HorizonErrors, PairedErrors
 from bns.diagnose.report.plain_language import figures_in_words
-from bns.diagnose.report.tables import AHEAD
+from bns.diagnose.report.tables import ahead
 from bns.physics.effect import Effect
 
 BADGE = '<span class="bns-badge">{}</span>'
@@ -47,10 +47,23 @@ def error_list(e: HorizonErrors) -> str:
             ]
         )
     rows.append(["noise of the tracking", mm(e.noise_floor_m), "", "", ""])
-    caption = f"Position error {AHEAD[e.horizon]} ahead, on {e.windows} windows of trials held out, the same for all"
-    left_out = f" ({e.left_out} left out: the tracker jumps within them)" if e.left_out else ""
+    caption = f"Position error {ahead(e.horizon)} ahead, on {e.windows} windows of trials held out, the same for all"
+    left_out = f" ({e.left_out} left out: within them the tracker jumps, or poses were left out)" if e.left_out else ""
     columns = ["model", "error, mm", "95 %", "median, mm", "change, mm (95 %)"]
     return table(columns, rows, caption + left_out, "bns-errors")
+
+
+def found_errors(errors: PairedErrors | None) -> str:
+    """What a diagnosis says of the errors before and after, at every horizon, as its summary does."""
+    if errors is None:
+        return ""
+    rows = []
+    for horizon, e in errors.horizons.items():
+        for index, m in enumerate(e.models if e.windows else ()):
+            change = change_text(e.changes[index - 1]) if index else ""
+            rows.append([ahead(horizon) if index == 0 else "", m.name, mm(m.rms_m), mm(m.median_m), change])
+    columns = ["ahead", "model", "error, mm", "median, mm", "change, mm (95 %)"]
+    return table(columns, rows, "Position error on trials held out, all on the same windows", "bns-found")
 
 
 def change_text(c: Change) -> str:
@@ -85,6 +98,11 @@ def _in_words(n: Mapping[str, Any]) -> str:
     """A number with its 95 % interval, in units for people."""
     value, interval = figures_in_words(n["value"], n["low"], n["high"], n["unit"])
     return escape(f"{value}; 95 %: {interval}" if interval else value)
+
+
+def note(text: str) -> str:
+    """What should be known beside a table."""
+    return f"<p class='bns-note'>{escape(text)}.</p>" if text else ""
 
 
 def message(text: str) -> str:

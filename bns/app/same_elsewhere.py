@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+from bns.app.log.part import ALL, Part
 from bns.app.switches import Switches
 
 
-def commands(data: str, model: Sequence[str], switches: Switches) -> list[str]:
-    """What to type for the same: one `bns add` for listed effects, and one more for every formula."""
+def commands(data: str, model: Sequence[str], switches: Switches, networks: bool = False) -> list[str]:
+    """What to type for the same: one `bns add` for listed effects, and one more for every formula; networks are compared only."""
     data, base = shlex.quote(data), shlex.join(["--model", *model])
+    if networks:
+        return [f"bns compare {data} {base}"]
     given = base
     terms = {t.name: t for t in switches.terms}
     names = [n for n in switches.on if n not in terms]
@@ -25,13 +30,18 @@ def commands(data: str, model: Sequence[str], switches: Switches) -> list[str]:
     return [*out, f"bns report {data} {given} -o report.html"]
 
 
-def python(data: str, model: Sequence[str], switches: Switches, left_out: Sequence[str]) -> str:
-    """The same in Python."""
+def python(
+    data: str, model: Sequence[str], switches: Switches, part: Part = ALL, mapping: Mapping[str, Any] | None = None,
+    networks: bool = False,
+) -> str:
+    """The same in Python; ``mapping``: how the columns were read, where the user said that."""
     terms = {t.name: t for t in switches.terms}
     names = [n for n in switches.on if n not in terms]
     given = f"bns.Model({model[0]!r}" + (f", wheelbase_m={model[2]})" if len(model) > 2 else ")")
-    lines = ["import bns", "", f"log = bns.Measurements({data!r})"]
-    lines += [f"log = log.without({list(left_out)!r})"] if left_out else []
+    read = "" if mapping is None else f", mapping={_literal(mapping)}"
+    lines = ["import bns", "", f"log = bns.Measurements({data!r}{read})", *part.python()]
+    if networks:
+        return "\n".join([*lines, f"print(bns.compare(log, {model[0]!r}).summary())"])
     lines += [f"model = {given}", "print(bns.compare(log, model).summary())"]
     if names:
         lines += [f"added = bns.add(log, {names!r}, model)", "print(added.summary())", "model = added.model"]
@@ -42,3 +52,12 @@ def python(data: str, model: Sequence[str], switches: Switches, left_out: Sequen
         lines += [f"numbers = {{**model.values_of({effect!r}), {parameter!r}: {value!r}}}"]
         lines += [f"model = bns.Model(model.with_effect({effect!r}, **numbers))"]
     return "\n".join([*lines, 'bns.Model(model).save("extended.yaml")'])
+
+
+def _literal(tree: Any) -> str:
+    """As Python reads it: an endless time has no name of its own there."""
+    if isinstance(tree, Mapping):
+        return "{" + ", ".join(f"{key!r}: {_literal(value)}" for key, value in tree.items()) + "}"
+    if isinstance(tree, list | tuple):
+        return "[" + ", ".join(map(_literal, tree)) + "]"
+    return f'float("{tree}")' if isinstance(tree, float) and not math.isfinite(tree) else repr(tree)

@@ -11,6 +11,7 @@ import yaml
 
 from bns.api.measurements import Measurements
 from bns.api.model import Model
+from bns.app.log.part import KEYS, read_part
 from bns.app.switches import Switches, Term
 from bns.app.tab import Tab
 from bns.errors import DataError, ModelError
@@ -22,7 +23,7 @@ ENDING = ".session.yaml"
 _LINES = 20
 """Among the first so many the file says what it is."""
 _KEYS = {"bns_session", "log", "model", "switches", "snapshots"}
-_LOG_KEYS = {"files", "sha256", "mapping", "left_out"}
+_LOG_KEYS = {"files", "sha256", "mapping", *KEYS}
 
 
 def session_yaml(tab: Tab) -> str:
@@ -31,8 +32,11 @@ def session_yaml(tab: Tab) -> str:
         raise DataError("A session needs a log; open one first.")
     tree: dict[str, Any] = {
         "bns_session": FORMAT,
-        "log": {"files": list(tab.files), "sha256": tab.log.sha256, "left_out": list(tab.left_out)},
-        "model": {"words": list(tab.model_words), "yaml": tab.model.to_yaml()},
+        "log": {"files": list(tab.files), "sha256": tab.log.sha256, **tab.part.plain()},
+        "model": {
+            "words": list(tab.model_words),
+            **({"networks": tab.networks} if tab.networks else {"yaml": tab.model.to_yaml()}),
+        },
         "switches": _plain(tab.now),
         "snapshots": {name: _plain(state) for name, state in tab.snapshots.items()},
     }
@@ -60,16 +64,16 @@ def opened(path: Path) -> Tab:
     log, model, tab = tree["log"], tree["model"], Tab()
     files = [str(_found(str(name), path.parent)) for name in _list(log, "files", path)]
     mapping = log.get("mapping")
-    measured = Measurements(files, mapping=mapping)
+    measured = Measurements(files if mapping is None else files[:1], mapping=mapping)  # a mapping names the others itself
     if measured.sha256 != log.get("sha256"):
         raise DataError(
             f"{files[0]} is not the log that {path.name} was saved with: its numbers differ. "
             "Open the log by itself, or find the one that the session names."
         )
     given = _model(model, path, tab)
-    tab.take(given, tuple(str(word) for word in model.get("words") or (given.name,)))
+    tab.take(given, tuple(str(word) for word in model.get("words") or (_name(given),)))
     tab.open(measured, " ".join(files), mapping, files=files)
-    tab.leave_out(tuple(str(name) for name in log.get("left_out") or ()))
+    tab.take_part(read_part(log, str(path)))
     snapshots = tree.get("snapshots") or {}
     tab.history.to(_switches(tree["switches"], path))
     tab.snapshots.update({str(name): _switches(state, path) for name, state in snapshots.items()})
@@ -131,8 +135,14 @@ def _found(name: str, folder: Path) -> Path:
     raise DataError(f"The session's log {name} is not there. Put {Path(name).name} beside the session file.")
 
 
-def _model(tree: Mapping[str, Any], path: Path, tab: Tab) -> Model:
-    """Read as a model file would be: effects that are programs are refused as there."""
+def _name(model: Model | str) -> str:
+    return model if isinstance(model, str) else model.name
+
+
+def _model(tree: Mapping[str, Any], path: Path, tab: Tab) -> Model | str:
+    """Read as a model file would be: effects that are programs are refused as there; or the name of networks."""
+    if isinstance(tree.get("networks"), str):
+        return str(tree["networks"])
     text = tree.get("yaml")
     if not isinstance(text, str):
         raise DataError(f"{path}: model needs yaml, the text of a model file.")

@@ -7,13 +7,14 @@ import shutil
 import tempfile
 import weakref
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from os import PathLike
+from dataclasses import dataclass, field, fields, replace
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from bns.api.common.prepared import are_networks
 from bns.api.compare import CompareResult, compare
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log, Measurements
@@ -21,9 +22,9 @@ from bns.api.model import Given, Model, as_model
 from bns.api.propose import ProposeResult
 from bns.api.run import RunResult
 from bns.app.background import Background
+from bns.app.log.part import ALL, Part
 from bns.app.switches import History, Switches
 from bns.app.workbench import Workbench
-from bns.diagnose.data.guess.mapping import drafted
 from bns.diagnose.data.sources.read import read_table
 from bns.errors import DataError, ModelError
 
@@ -35,27 +36,34 @@ MOST_TABS = 16
 
 @dataclass
 class Tab:
-    """``log``: all trials as read; ``left_out``: names of trials that take no part; ``bench`` is None until a log is open.
+    """``log``: all trials as read; ``part``: what of it takes part; ``bench`` is None until a log is open.
 
     ``data_words``, ``model_words``: what to write for them on a command line; ``files``: where the log lies; ``mapping``: how its
-    columns were read, where the user wrote that; ``snapshots``: states of the switches that the user named.
+    columns were read, where the user wrote that; ``networks``: the name or file of those that are compared instead of the model;
+    ``snapshots``: states of the switches that the user named. ``asked``: the files that were asked for last; where they could not
+    be read, ``why_no_log`` says why. ``alone``: what each effect earns by itself, as far as the diagnosis under way has come.
     """
 
     log: Measurements | None = None
     data_words: str = ""
     files: tuple[str, ...] = ()
     mapping: Mapping[str, Any] | None = None
-    left_out: tuple[str, ...] = ()
+    part: Part = ALL
     model: Model = field(default_factory=lambda: Model(FIRST_MODEL))
+    networks: str = ""
     model_words: tuple[str, ...] = (FIRST_MODEL,)
     bench: Workbench | None = None
     history: History = field(default_factory=History)
     snapshots: dict[str, Switches] = field(default_factory=dict)
+    alone: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     diagnosis: Background[DiagnoseResult] = field(default_factory=Background)
     evolution: Background[RunResult] = field(default_factory=Background)
     experiment: Background[ProposeResult] = field(default_factory=Background)
     why_no_bench: str = ""
+    asked: tuple[Path, ...] = ()
+    why_no_log: str = ""
     _folder: Path | None = None
+    _used: Measurements | None = None
     _compared: dict[Any, CompareResult] = field(default_factory=dict)
 
     @property
@@ -68,10 +76,23 @@ class Tab:
 
     def open(self, log: Log, words: str, mapping: Mapping[str, Any] | None = None, files: Sequence[str] = ()) -> None:
         """Another log, which lies in ``files`` if it is read already. DataError: it cannot be used, and all stays as it was."""
-        self.log = log if isinstance(log, Measurements) else Measurements(log, mapping=mapping)
-        self.data_words, self.left_out, self.mapping = words, (), mapping
-        self.files = tuple(files) or _files_of(log)
+        self.log = self._used = log if isinstance(log, Measurements) else Measurements(log, mapping=mapping)
+        self.data_words, self.part, self.mapping = words, ALL, mapping
+        self.files = tuple(files) or tuple(str(path.absolute()) for path in files_of(log))
+        self.asked, self.why_no_log = tuple(map(Path, self.files)), ""
         self._lay_on()
+
+    def ask(self, paths: Sequence[Path], words: str) -> None:
+        """Open files; where their columns say nothing, keep the question for the page, which has menus for that.
+
+        DataError: they cannot be read at all.
+        """
+        try:
+            self.open([str(path) for path in paths], words)
+        except DataError as fault:
+            for path in paths:
+                read_table(path)
+            self.asked, self.why_no_log = tuple(paths), str(fault)
 
     def keep(self, files: Mapping[str, bytes]) -> list[Path]:
         """Files of the browser, by their names, written where the tab keeps them."""
@@ -94,22 +115,47 @@ class Tab:
             if each.name != "_folder":
                 setattr(self, each.name, getattr(other, each.name))
 
-    def leave_out(self, trials: tuple[str, ...]) -> None:
-        """Other trials take no part. DataError if none would be left."""
-        if self.log is not None and trials != self.left_out:
-            self.log.without(trials)
-            self.left_out = trials
+    def twin(self) -> Tab:
+        """A tab that begins as this one stands; what one does from then on, the other does not see."""
+        other = replace(
+            self,
+            history=History(),
+            snapshots=dict(self.snapshots),
+            diagnosis=self.diagnosis if self.diagnosis.result is not None else Background(),
+            evolution=Background(),
+            experiment=Background(),
+            alone={},
+            _folder=None,
+            _compared=dict(self._compared),
+        )
+        other.history.to(self.now)
+        return other
+
+    def take_part(self, part: Part) -> None:
+        """Something else of the log takes part. DataError if nothing is left of it, and all stays as it was."""
+        if self.log is not None and part != self.part:
+            self._used = part.of(self.log)
+            self.part = part
             self._lay_on()
 
     def take(self, model: Given, words: tuple[str, ...]) -> None:
-        """Another model. ModelError if there is none."""
-        self.model, self.model_words = as_model(model), words
+        """Another model, or networks. ModelError if there are none."""
+        if are_networks(model):
+            self.networks = fspath(model)  # type: ignore[arg-type]  # a model with effects is no networks
+        else:
+            self.model, self.networks = as_model(model), ""
+        self.model_words = words
         self._lay_on()
 
     @property
     def used(self) -> Measurements | None:
         """The measurements that take part."""
-        return None if self.log is None else self.log.without(self.left_out)
+        return self._used
+
+    @property
+    def as_it_lies(self) -> bool:
+        """Does a command read the log's own files as the page does?"""
+        return not self.part and self.mapping is None
 
     @property
     def now(self) -> Switches:
@@ -119,9 +165,9 @@ class Tab:
     def compared(self, model: Model) -> CompareResult:
         """`bns.compare` of the used measurements and a model; the model as given, or as it is now."""
         assert self.bench is not None
-        key = self.bench, model.canonical_json()
+        key = self.bench, self.networks or model.canonical_json()
         if key not in self._compared:
-            self._compared[key] = compare(self.bench.ready.log, model)
+            self._compared[key] = compare(self.bench.ready.log, self.networks or model)
         return self._compared[key]
 
     def report(self, path: Path) -> bytes:
@@ -136,25 +182,25 @@ class Tab:
         """Log and model on the bench, all switches off; why that cannot be is kept in words."""
         for work in (self.diagnosis, self.evolution, self.experiment):
             work.stop()
-        self.bench, self.history = None, History()
+        self.bench, self.history, self.alone = None, History(), {}
         self.diagnosis, self.evolution, self.experiment = Background(), Background(), Background()
         self.snapshots.clear()
         self._compared.clear()
         self.why_no_bench = ""
-        if self.used is None:
+        if self._used is None:
             return
         try:
-            self.bench = Workbench(self.used, self.model)
+            self.bench = Workbench(self._used, self.networks or self.model)
         except (DataError, ModelError) as fault:
             self.why_no_bench = str(fault)
 
 
-def _files_of(log: Log) -> tuple[str, ...]:
-    """Absolute paths of a log that is files; none where it is a table in memory."""
+def files_of(log: Log | Any) -> tuple[Path, ...]:
+    """Of a log that is files; none where it is a table in memory."""
     given = [log] if isinstance(log, str | PathLike) else log
     if not isinstance(given, list | tuple) or not all(isinstance(one, str | PathLike) for one in given):
         return ()
-    return tuple(str(Path(one).absolute()) for one in given)
+    return tuple(Path(one) for one in given)
 
 
 def mapping_of(text: str) -> dict[str, Any]:
@@ -166,14 +212,6 @@ def mapping_of(text: str) -> dict[str, Any]:
     if not isinstance(rules, dict):
         raise DataError("The mapping must have keys such as columns; docs/logs.md has all that may stand in it.")
     return rules
-
-
-def draft_for(path: Path) -> str:
-    """A mapping to begin with, guessed from a log's columns as `bns import` guesses; "" where the file does not read."""
-    try:
-        return drafted(read_table(path))
-    except DataError:
-        return ""
 
 
 @dataclass
@@ -188,16 +226,8 @@ class Tabs:
         if name in self.known:
             self.known[name] = tab = self.known.pop(name)
             return name, tab
-        name, tab = secrets.token_urlsafe(6), Tab()
-        if self.first is not None and self.first.log is not None:
-            tab.log, tab.data_words, tab.files = self.first.log, self.first.data_words, self.first.files
-            tab.model, tab.model_words, tab.mapping = self.first.model, self.first.model_words, self.first.mapping
-            tab.left_out = self.first.left_out
-            tab._lay_on()
-            if self.first.diagnosis.result is not None:
-                tab.diagnosis = self.first.diagnosis
-            tab.history.to(self.first.now)
-            tab.snapshots.update(self.first.snapshots)
+        name = secrets.token_urlsafe(6)
+        tab = Tab() if self.first is None else self.first.twin()
         self.known[name] = tab
         while len(self.known) > MOST_TABS:
             self.known.pop(next(iter(self.known))).diagnosis.stop()

@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 
 from bns.api.add import AddResult, added
-from bns.api.common.prepared import Prepared, prepared
+from bns.api.common.prepared import Prepared, PreparedNetworks, prepared, prepared_networks
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
-from bns.app.switches import Switches
+from bns.app.switches import Switches, Term
 from bns.diagnose.adding import Memory, does_nothing
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.cross_validation import AS_GIVEN
@@ -29,8 +29,10 @@ from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import laid_paths
 from bns.diagnose.predict.paired_errors import PairedErrors, judged_windows, paired_errors
 from bns.diagnose.values import numbers_of
+from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.formula import formula_effect
+from bns.physics.jointed.model import JointedModel
 
 BY_HAND = "by hand"
 """The name of a model whose numbers were moved, in the list of errors: it is judged as it is, nothing is fitted."""
@@ -60,14 +62,32 @@ class Shown:
 
 
 class Workbench:
-    """One log, one model as given. Errors are those of `bns.add`: DataError, ModelError."""
+    """One log, one model as given: with effects, or networks, which have none. As `bns.add`: DataError, ModelError."""
 
     def __init__(self, log: Log, model: Given) -> None:
-        self.ready: Prepared = prepared(log, model)
-        self.catalogue: dict[str, Effect] = listed(self.ready.model)
+        self.ready: Prepared | PreparedNetworks = prepared_networks(log, model) or prepared(log, model)
+        self.given = model
+        predictor = self.ready.predictor
+        timed = None if predictor.tracks.timed or self.of_networks else predictor.tracks  # no clock where nothing has a time
+        self.catalogue: dict[str, Effect] = {} if self.of_networks else listed(self.ready.model, None, timed)
         self._memory: Memory = {}
         self._fitted: dict[Any, Shown] = {}
         self._formulas: dict[Any, Effect] = {}
+
+    @property
+    def of_networks(self) -> bool:
+        """Are these networks, which can be compared and have no effects?"""
+        return isinstance(self.ready, PreparedNetworks)
+
+    @property
+    def on_wheels(self) -> bool:
+        """Is the model a drive?"""
+        return not self.of_networks and not isinstance(self.ready.model, JointedModel)
+
+    @property
+    def thinned(self) -> str:
+        """How many of the poses are used, in words; "" for all."""
+        return "" if isinstance(self.ready, PreparedNetworks) else self.ready.thinned
 
     @property
     def horizons(self) -> tuple[str, ...]:
@@ -105,6 +125,8 @@ class Workbench:
 
     def add(self, switches: Switches) -> AddResult:
         """What `bns.add` gives for the effects that are on."""
+        if isinstance(self.ready, PreparedNetworks):
+            raise ModelError(f"{self.ready.model.name} holds networks, which have no effects: they can be compared only.")
         chosen = [self.effect(switches, name) for name in switches.on]
         return added(self.ready, chosen, memory=self._memory)
 
@@ -122,16 +144,20 @@ class Workbench:
     @property
     def columns(self) -> tuple[str, ...]:
         """The log's further columns, which a formula may use."""
-        return tuple(self.ready.predictor.tracks.extra)
+        return tuple(getattr(self.ready.predictor.tracks, "extra", ()))
 
     def effect(self, switches: Switches, name: str) -> tuple[Effect, Mapping[str, str]]:
         """A listed effect or a formula, and how a model file writes it. The same object each time: fits are known by it."""
         for term in switches.terms:
             if term.name == name:
-                if term not in self._formulas:
-                    self._formulas[term] = formula_effect(term.name, term.term, term.on, self.columns)
-                return self._formulas[term], {"term": term.term, "on": term.on}
+                return self.term(term), {"term": term.term, "on": term.on}
         return self.catalogue[name], {}
+
+    def term(self, term: Term) -> Effect:
+        """A formula as an effect; the same object each time."""
+        if term not in self._formulas:
+            self._formulas[term] = formula_effect(term.name, term.term, term.on, self.columns)
+        return self._formulas[term]
 
     def path(self, steps: Steps, trial: int) -> Array:
         """Predicted poses (frames, 3) of a trial, from its first measured one."""

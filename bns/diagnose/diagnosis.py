@@ -189,19 +189,22 @@ def diagnose(
     extra: Mapping[str, Effect] | None = None,
     tick: Callable[[str], None] = lambda _: None,
     barred: Collection[str] = (),
+    alone: Callable[[Candidate], None] = lambda _: None,
 ) -> Diagnosis:
     """What the model lacks on these tracks, effects named in ``barred`` aside.
+
+    ``alone`` is told what an effect earns by itself as soon as that is known, by several threads; a later search may correct it.
 
     A set of effects with which the held-out error does not fall is withdrawn. A few trials that are unlike the rest count nothing
     in the fits of a second search, whose end is presented; errors are always those of all trials.
     """
-    found = _diagnosed(predictor, model, extra, tick, barred)
+    found = _diagnosed(predictor, model, extra, tick, barred, alone)
     if found.selection is None or not isinstance(predictor, WheelPredictor) or predictor.tracks.relative:
         return found
     wild = standing_out(found.selection.problem, found.selection.fit)
     if not len(wild):
         return found
-    without = _diagnosed(predictor.not_counting(wild.tolist()), model, extra, tick, barred)
+    without = _diagnosed(predictor.not_counting(wild.tolist()), model, extra, tick, barred, alone)
     names = tuple(predictor.tracks.names[i] for i in wild)
     both = WithoutWorst(names, (found.verdict, found.effects), (without.verdict, without.effects))
     return replace(without, without_worst=both, notes=(on_worst(both), *without.notes))
@@ -213,9 +216,10 @@ def _diagnosed(
     extra: Mapping[str, Effect] | None,
     tick: Callable[[str], None],
     barred: Collection[str],
+    alone: Callable[[Candidate], None],
 ) -> Diagnosis:
     """One search, and what it leaves."""
-    search = StepwiseSelection(predictor, model, extra, tick, barred)
+    search = StepwiseSelection(predictor, model, extra, tick, barred, alone)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))

@@ -42,6 +42,8 @@ def summed_up(summary: Summary, results: Path) -> str:
         )
     if summary.stopped_by == "submitted":
         text += "; the rest is queued: see squeue --me, and bns status for what is done"
+    elif summary.stopped_by == "ranking":
+        text += "; the rest cannot change the ranking"
     elif summary.stopped_by:
         text += f"; stopped: {_WHY[summary.stopped_by]}; the same command goes on from here"
     return text

@@ -34,7 +34,7 @@ class Summary:
     ``new_failed`` is how many of the new ones failed or were quarantined.
 
     ``stopped_by`` is None (nothing left to do), "budget", "limit", "interrupt" (Ctrl-C), "terminated"
-    (SIGTERM) or "submitted" (the rest is queued with a batch system).
+    (SIGTERM), "submitted" (the rest is queued with a batch system) or "ranking" (what was asked for is known).
     """
 
     sweep: str
@@ -89,7 +89,7 @@ def run_sweep(
     with Interrupts(grace_s) as sweep_run.interrupts:
         try:
             with Writer(
-                sweep_run.results, sweep.name, sweep_text=sweep.text, sweep_runs=sweep.total, shard=name
+                sweep_run.results, sweep.name, sweep_text=sweep.text, sweep_runs=sweep.described, shard=name
             ) as writer:
                 todo = sweep_run.plan(retry_failed, limit)
                 if todo and sweep_run.budget.allows_another():
@@ -137,7 +137,7 @@ class _SweepRun:
                 self._count(spec.run_id, status)
             if status not in skipped:
                 todo.append(spec)
-        if len(known) > len(self._statuses):
+        if len(known) > len(self._statuses) and self._sweep.chosen is None:
             self._warn_of_others(len(known.keys() - {spec.run_id for spec in everything}))
         self._wanted = len(todo)
         todo = todo if limit is None else todo[:limit]

@@ -139,6 +139,9 @@ def test_every_finding_of_the_source_has_a_check_and_every_robot_its_trials():
     assert len(source()["findings"]) > 20
     for finding in source()["findings"]:
         assert callable(getattr(checks, finding["check"])), finding
+        assert finding["check"] in source()["in_words"], finding
+        for _, arguments in findings._each_task(finding):
+            assert "{" not in findings._in_words(finding["check"], arguments)
     assert trials_of("khepera", 3) == [(55, 40), (60, 50), (45, 30)]
     assert trials_of("khepera", 9) == trials_of("unknown", 1) == []
 

@@ -1,12 +1,6 @@
 """The page in a browser, from a log with a hidden effect to the saved model. Skipped where there is no Chromium to drive."""
 
-import os
 import re
-import shutil
-import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -14,52 +8,9 @@ import bns
 from bns.app.switches import Switches
 from bns.app.workbench import Workbench
 from bns.examples import FOLDER
-
-pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+from tests.app.visits import Visit, error_of, go, shown
 
 LOG = FOLDER / "khepera-log.csv"
-CHROMIUM = next(
-    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
-)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
-SLOW_MS = 120_000
-
-
-class Visit:
-    """A server of its own, and pages on it; everything odd that a page did is kept."""
-
-    def __init__(self, browser, *arguments):
-        command = [sys.executable, "-m", "bns", "explore", "--no-browser", *map(str, arguments)]
-        self.server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.address = self.server.stdout.readline().strip()
-        self.browser, self.outside, self.odd = browser, [], []
-
-    def open(self, width=1280, address=None):
-        page = self.browser.new_page(viewport={"width": width, "height": 1400})
-        page.set_default_timeout(SLOW_MS)
-        page.on("request", self._requested)
-        page.on("console", lambda said: self.odd.append(said.text) if said.type in {"error", "warning"} else None)
-        page.on("pageerror", lambda error: self.odd.append(str(error)))
-        page.goto(address or self.address)
-        return page
-
-    def _requested(self, request):
-        if not request.url.startswith((self.address, "data:", "blob:", self.address.replace("http", "ws", 1))):
-            self.outside.append(request.url)
-
-    def end(self):
-        self.server.send_signal(signal.SIGTERM)
-        said = self.server.communicate(timeout=30)
-        return self.server.returncode, said[1]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
@@ -83,30 +34,11 @@ def bench():
     return Workbench(LOG, "khepera")
 
 
-def go(page, screen, sign):
-    page.get_by_role("button", name=screen, exact=True).click()
-    page.locator(sign).wait_for()
-
-
-def error_of(page, model):
-    row = page.locator("#bns-errors tbody tr").filter(has=page.get_by_role("rowheader", name=model, exact=True))
-    row.wait_for()
-    return float(row.locator("td").first.inner_text())
-
-
-def shown(page, name):
-    """A screenshot, kept where the environment says so: pictures are looked at, not compared."""
-    folder = os.environ.get("BNS_SCREENSHOTS")
-    if folder:
-        page.wait_for_timeout(800)
-        Path(folder).mkdir(parents=True, exist_ok=True)
-        page.screenshot(path=str(Path(folder) / f"{name}.png"))
-
-
 def test_what_is_odd_is_listed_beside_the_paths(page):
     shown(page, "data")
     assert "14 trials" in page.locator("#bns-log").inner_text()
-    assert page.locator("#bns-findings tbody tr").count() == len(bns.Measurements(LOG).findings)
+    page.locator("#bns-findings").wait_for()
+    assert page.get_by_role("checkbox", name="trial ").count() == len(bns.Measurements(LOG).findings)
 
 
 def test_the_error_falls_when_the_hidden_effect_is_switched_on(page, bench):

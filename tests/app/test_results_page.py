@@ -7,7 +7,7 @@ from bns.app.results.study import Study, is_store
 from bns.errors import StoreError
 
 pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
-from .test_page import CHROMIUM, Visit, browser, shown  # noqa: F401  # a fixture, too
+from tests.app.visits import Visit, shown
 
 QUICK = {"population_size": [8], "evaluations": [3], "training_iterations_per_evaluation": [2]}
 TASKS = ["circle", "infinity", "complex"]
@@ -50,8 +50,7 @@ def test_what_is_no_store_is_said(tmp_path, results):
         Study(results).curve("x' OR 1=1 --")
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
-def test_runs_are_filtered_compared_and_driven_again_in_the_browser(results, browser):  # noqa: F811
+def test_runs_are_filtered_compared_and_driven_again_in_the_browser(results, browser):
     visit = Visit(browser, results)
     page = visit.open()
     page.get_by_text("12 of 12 finished runs.").wait_for()

@@ -8,11 +8,14 @@ import pytest
 import bns
 from bns.api.compare import compare
 from bns.app.background import Background
+from bns.app.log.part import Part
 from bns.app.same_elsewhere import commands, python
+from bns.app.session import opened, session_yaml
 from bns.app.switches import History, Switches, Term
-from bns.app.tab import Tab, Tabs, draft_for, mapping_of
+from bns.app.tab import Tab, Tabs, mapping_of
 from bns.app.workbench import BY_HAND, Workbench
 from bns.cli.main import main
+from bns.diagnose.data.mapping import load_mapping
 from bns.errors import DataError
 from bns.examples import FOLDER
 from tests.app.numbers import rows_of
@@ -109,24 +112,23 @@ def test_trials_that_are_left_out_take_no_part():
     tab = Tab()
     tab.open(LOG, str(LOG))
     first = tab.log.trials["trial"].iloc[0]
-    tab.leave_out((str(first),))
+    tab.take_part(Part((str(first),)))
     assert len(tab.bench.ready.log) == len(tab.log) - 1
     assert tab.bench.ready.log.name == "khepera-log.csv"
     with pytest.raises(DataError, match="All trials are left out"):
-        tab.leave_out(tuple(map(str, tab.log.trials["trial"])))
+        tab.take_part(Part(tuple(map(str, tab.log.trials["trial"]))))
     with pytest.raises(DataError, match="There is no trial 99"):
         tab.log.without(["99"])
-    assert tab.left_out == (str(first),)
+    assert tab.part.trials == (str(first),)
 
 
-def test_a_log_without_a_mapping_is_answered_with_a_draft(tmp_path):
+def test_a_log_without_a_mapping_is_read_with_one_of_the_users(tmp_path):
     other = tmp_path / "other.csv"
     other.write_bytes(LOG.read_bytes())
     tab = Tab()
     with pytest.raises(DataError, match="lack"):
         tab.upload(tab.keep({"../other.csv": other.read_bytes()}))
     assert (tab.folder / "other.csv").is_file()
-    assert "columns:" in draft_for(other)
     tab.open(other, "other.csv", mapping_of((FOLDER / "khepera-log.csv.import.yaml").read_text()))
     assert len(tab.log) == 14
     for text in ("columns: [", "just words"):
@@ -160,7 +162,33 @@ def test_what_to_type_gives_the_same(tmp_path, monkeypatch, capsys, bench):
     typed = commands(str(LOG), ("khepera",), BOTH.with_term(Term("mine", "k * v", "v")))
     assert typed[2] == f"bns add {LOG} motor-lag turn-slip --model khepera -o extended.yaml"
     assert typed[3] == f"bns add {LOG} mine --term 'k * v' --on v --model extended.yaml -o extended.yaml"
-    exec(python(str(LOG), ("khepera",), BOTH.moved("motor-lag", "tau_s", 0.1), ()), {})
+    exec(python(str(LOG), ("khepera",), BOTH.moved("motor-lag", "tau_s", 0.1)), {})
     capsys.readouterr()
     saved = bns.Model("extended.yaml")
     assert rows_of(saved) == rows_of(bench.shown(BOTH.moved("motor-lag", "tau_s", 0.1)).model)
+
+
+def test_what_was_left_out_is_saved_and_read_again(tmp_path):
+    tab = Tab()
+    tab.open(LOG, str(LOG))
+    first, second = map(str, tab.log.trials["trial"].iloc[:2])
+    part = Part((first,), (int(tab.log.findings["row"].iloc[-1]),), ((second, 1.0, 5.5),))
+    tab.take_part(part)
+    saved = tmp_path / "a.session.yaml"
+    saved.write_text(session_yaml(tab))
+    again = opened(saved)
+    assert again.part == part
+    assert again.used.sha256 == tab.used.sha256 != tab.log.sha256
+    tab.take_part(Part())
+    assert tab.used.sha256 == tab.log.sha256
+    saved.write_text(saved.read_text().replace("from_s: 1.0", "from_s: soon"))
+    with pytest.raises(DataError, match="cuts lists"):
+        opened(saved)
+
+
+def test_python_reads_columns_as_the_menus_had_them(tmp_path):
+    mapping = {**load_mapping(LOG.with_name(LOG.name + ".import.yaml")), "hold_commands_s": float("inf")}
+    text = python(str(LOG), ("khepera",), Switches(), mapping=mapping)
+    names = {}
+    exec(text.split("model =")[0], names)
+    assert names["log"].sha256 == bns.Measurements(LOG, mapping=mapping).sha256

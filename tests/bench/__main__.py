@@ -23,6 +23,7 @@ PARTS = {
     "two_jobs": "two workers against one, and the sweep's overhead",
     "reading": "reading a study for a figure",
     "figures": "drawing a whole study",
+    "page": "bns explore in a browser",
 }
 
 

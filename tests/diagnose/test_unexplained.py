@@ -95,9 +95,10 @@ def test_motors_that_vary_have_no_rhythm(jitter):
     assert largest(measured(NOMINAL, trials=30, seed=2, jitter=jitter)) is None
 
 
-def test_a_heading_that_swings_with_a_period_has_a_rhythm():
+@pytest.mark.parametrize("period_s", [0.4, 1.5])
+def test_a_heading_that_swings_with_a_period_has_a_rhythm(period_s):
     table = measured(NOMINAL, trials=30, seed=2)
-    phase = 2 * np.pi * (table.t_s + 0.37 * table.trial) / 1.5
+    phase = 2 * np.pi * (table.t_s + 0.37 * table.trial) / period_s
     autocorrelation = largest(table.assign(heading_rad=table.heading_rad + 0.02 * np.sin(phase)))
     assert (autocorrelation.direction, autocorrelation.scale) == ("heading", "within")
 

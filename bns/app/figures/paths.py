@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool
 
 from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank, drawable
-from bns.diagnose.data.tracks import Array
+from bns.diagnose.data.cycles import CycleTracks
+from bns.diagnose.data.joints import JointTracks
+from bns.diagnose.data.tracks import Array, Tracks
 from bns.plotting.style import BLUE, OKABE_ITO, RED
+
+MARKERS = ("yellow", "green")
+"""Of a snake, in the order of `CycleTracks.markers_m`."""
 
 
 class PathFigure:
@@ -48,37 +54,67 @@ class PathFigure:
         self._dots.data = {"x": [p[0] for p in places], "y": [p[1] for p in places], "color": [BLUE, RED]}
 
 
+def paths_of(tracks: Tracks) -> list[tuple[str, str, Array]]:
+    """Trial, marker ("" for the robot itself) and places (n, 2 or 3), m; NaN where it goes on elsewhere."""
+    if isinstance(tracks, CycleTracks):
+        seen = [_cycles(tracks, trial) for trial in range(len(tracks))]
+        return [(name, site, seen[i][:, k]) for i, name in enumerate(tracks.names) for k, site in enumerate(MARKERS)]
+    if isinstance(tracks, JointTracks):
+        sites = [(site, tracks.points_m[:, k]) for k, site in enumerate(tracks.sites)]
+    else:
+        sites = [("", tracks.pose)]
+    breaks = np.zeros(len(tracks.t_s), dtype=bool) if tracks.jumped is None else tracks.jumped
+    return [
+        (name, site, np.insert(places[a:b], np.flatnonzero(breaks[a:b]), np.nan, axis=0))
+        for name, (a, b) in zip(tracks.names, pairwise(tracks.first), strict=True)
+        for site, places in sites
+    ]
+
+
+def _cycles(tracks: CycleTracks, trial: int) -> Array:
+    """Both markers (n, 2, 2) at the begin of each cycle, in it where a camera saw them, and at its end."""
+    parts = []
+    for frame in range(tracks.first[trial], tracks.first[trial + 1], 2):
+        inner = [tracks.between[frame // 2][1]] if tracks.between else []
+        parts += [tracks.markers_m[frame][None], *inner, tracks.markers_m[frame + 1][None]]
+    return np.concatenate([np.zeros((0, 2, 2)), *parts])
+
+
 class LogFigure:
     """All measured paths, what was found odd on them, and trials that can be selected."""
 
-    def __init__(self) -> None:
-        self.paths = ColumnDataSource({"x": [[0.0]], "y": [[0.0]], "trial": [""], "color": [BLUE]})
+    def __init__(self, title: str = "", height: int = 420) -> None:
+        self.paths = ColumnDataSource({"x": [[0.0]], "y": [[0.0]], "trial": [""], "marker": [""], "color": [BLUE]})
         self.findings = ColumnDataSource({"x": [], "y": [], "text": []})
         self.figure = blank(
-            "Measured paths; crosses: findings. Tap or brush paths to choose trials",
+            title or "Measured paths; crosses: findings. Tap or brush paths to choose trials",
             *EAST_NORTH,
             tools=SELECTING,
-            height=420,
+            height=height,
             **FLOOR,
         )
         lines = self.figure.multi_line(
             "x", "y", source=self.paths, color="color", line_width=1.5, nonselection_alpha=0.15
         )
-        self.figure.add_tools(HoverTool(renderers=[lines], tooltips=[("trial", "@trial")]))
+        self.figure.add_tools(HoverTool(renderers=[lines], tooltips=[("trial", "@trial"), ("of", "@marker")]))
         marks = self.figure.scatter(
             "x", "y", source=self.findings, marker="x", size=12, line_width=3, color="black", nonselection_alpha=1.0
         )
         self.figure.add_tools(HoverTool(renderers=[marks], tooltips=[("", "@text")]))
 
-    def fill(self, paths: Sequence[Array], names: Sequence[str], findings: dict[str, list[Any]]) -> None:
-        """Poses (frames, 3) of each trial; findings as x, y, text."""
+    def fill(self, paths: Sequence[tuple[str, str, Array]], findings: dict[str, list[Any]]) -> None:
+        """As `paths_of` gives them: a colour a trial, or a marker; findings as x, y, text."""
         most = max(50, 60_000 // max(len(paths), 1))
-        thin = [p[:: max(1, -(-len(p) // most))] for p in paths]
+        thin = [p[:: max(1, -(-len(p) // most))] for _, _, p in paths]
+        sites = list(dict.fromkeys(site for _, site, _ in paths))
+        trials = list(dict.fromkeys(name for name, _, _ in paths))
+        look = [sites.index(site) if len(sites) > 1 else trials.index(name) for name, site, _ in paths]
         self.paths.selected.indices = []
         self.paths.data = {
             "x": [p[:, 0] for p in thin],
             "y": [p[:, 1] for p in thin],
-            "trial": list(names),
-            "color": [OKABE_ITO[i % len(OKABE_ITO)] for i in range(len(thin))],
+            "trial": [name for name, _, _ in paths],
+            "marker": [site or "robot" for _, site, _ in paths],
+            "color": [OKABE_ITO[i % len(OKABE_ITO)] for i in look],
         }
         self.findings.data = findings

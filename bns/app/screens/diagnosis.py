@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from html import escape
+from typing import Any
 
+import pandas as pd
 import panel as pn
 
 from bns.api.diagnose import DiagnoseResult, diagnose
+from bns.app.html import found_errors
 from bns.app.parts import WIDE, button, heading
 from bns.app.screens.working import Working
 from bns.app.switches import Term
@@ -22,7 +25,8 @@ class DiagnosisPart:
         self, tab: Tab, found: Callable[[], None], switch_on: Callable[[tuple[str, ...], tuple[Term, ...]], None]
     ) -> None:
         self._tab, self._found, self._switch_to = tab, found, switch_on
-        self._work = Working("Diagnose in the background", self._start, lambda: tab.diagnosis, self._show)
+        self._work = Working("Diagnose in the background", self._start, lambda: tab.diagnosis, self._show, self._meanwhile)
+        self._told = 0
         self._switch_on = button("Switch on what it found", self._take)
         self.view = pn.Column(heading("What is missing?"), self._work.buttons, self._switch_on, self._work.said, **WIDE)
 
@@ -34,12 +38,23 @@ class DiagnosisPart:
     def alone(self, name: str) -> str:
         """What an effect earns when added alone, in words; "" while nobody knows."""
         result = self._tab.diagnosis.result
-        if result is None or name not in result.ranking.index:
+        if result is None:
+            return in_words(self._tab.alone[name], "alone, so far") if name in self._tab.alone else ""
+        return in_words(result.ranking.loc[name], "alone") if name in result.ranking.index else ""
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Terms that describe what no effect explains; none while nobody knows."""
+        result = self._tab.diagnosis.result
+        return tuple(Term(t.name, t.term, t.on) for t in result.diagnosis.terms) if result else ()
+
+    def term_in_words(self, name: str) -> str:
+        """What a term says, as the summary says it; "" for what is none."""
+        result = self._tab.diagnosis.result
+        if result is None:
             return ""
-        row = result.ranking.loc[name]
-        if row["elpd_diff"] is None or row["rejected_because"]:
-            return f"alone: not considered: {row['rejected_because']}" if row["rejected_because"] else ""
-        return f"alone: {row['elpd_diff']:+.3f} ± {row['dse']:.3f} log-likelihood a trial, p = {row['p_value']:.2g}"
+        said = zip(result.diagnosis.terms, result.diagnosis.terms_in_words, strict=True)
+        return next((words for term, words in said if term.name == name), "")
 
     def ties(self, name: str) -> list[str]:
         """Effects that these data cannot tell from one."""
@@ -49,19 +64,42 @@ class DiagnosisPart:
 
     def _start(self) -> None:
         bench, model = self._tab.bench, self._tab.model
-        if bench is not None:
+        if bench is not None and not bench.of_networks:
             self._switch_on.disabled = True
-            self._tab.diagnosis.start("diagnosing", lambda tell: diagnose(bench.ready.log, model, progress=tell))
+            found: dict[str, Mapping[str, Any]] = {}
+            self._tab.alone = found
+
+            def keep(entry: Mapping[str, Any]) -> None:
+                found[entry["name"]] = entry
+
+            self._tab.diagnosis.start(
+                "diagnosing", lambda tell: diagnose(bench.ready.log, model, progress=tell, alone=keep)
+            )
+
+    def _meanwhile(self) -> None:
+        """Beside each effect what it earns, as soon as that is known."""
+        if len(self._tab.alone) != self._told:
+            self._told = len(self._tab.alone)
+            self._found()
 
     def _take(self) -> None:
         result = self._tab.diagnosis.result
         if result is not None:
-            terms = tuple(Term(t.name, t.term, t.on) for t in result.diagnosis.terms)
-            self._switch_to(result.effects, terms)
+            self._switch_to(result.effects, self.terms)
 
     def _show(self, result: DiagnoseResult) -> None:
         self._switch_on.disabled = not (result.effects or result.diagnosis.terms)
         said, sure = escape(headline(result.diagnosis)), escape(certainty(result.diagnosis))
         words = "".join(f"<br>It looks like this: {escape(each)}." for each in result.diagnosis.terms_in_words)
-        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}{words}</p>"
+        errors = result.diagnosis.errors_with_terms or result.diagnosis.errors
+        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}{words}</p>{found_errors(errors)}"
         self._found()
+
+
+def in_words(entry: Any, when: str) -> str:
+    """What an effect earns by itself, of an entry of the ranking."""
+    if entry["rejected_because"]:
+        return f"{when}: not considered: {entry['rejected_because']}"
+    if pd.isna(entry["elpd_diff"]):
+        return ""
+    return f"{when}: {entry['elpd_diff']:+.3f} ± {entry['dse']:.3f} log-likelihood a trial, p = {entry['p_value']:.2g}"

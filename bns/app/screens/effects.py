@@ -9,7 +9,7 @@ import panel as pn
 
 from bns.app.figures.errors import LadderFigure
 from bns.app.figures.paths import PathFigure
-from bns.app.html import error_list, message
+from bns.app.html import error_list, message, note
 from bns.app.jobs import Jobs
 from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
 from bns.app.screens.diagnosis import DiagnosisPart
@@ -21,7 +21,15 @@ from bns.app.workbench import Shown
 from bns.errors import ModelError
 from bns.physics.formula import ON, VARIABLES, formula_effect
 
-GROUPS = {"wheel": "Wheels", "body": "Body", "world": "Floor", "clock": "Clock", "measure": "Camera"}
+GROUPS = {
+    "wheel": "Wheels",
+    "body": "Body",
+    "mechanics": "Servos, joints and floor",
+    "world": "Floor",
+    "clock": "Clock",
+    "measure": "Camera",
+    "sight": "Camera and markers",
+}
 """Stage of an effect -> what it is about, for people."""
 
 
@@ -41,7 +49,7 @@ class EffectsScreen:
         self._horizon = pn.widgets.Select(name="Error how far ahead", options=["1s"], width=160)
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
         self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
-        self._diagnosis = DiagnosisPart(tab, self._refresh_effects, self._switch_to)
+        self._diagnosis = DiagnosisPart(tab, self._learned, self._switch_to)
         self._snapshots = SnapshotsPart(tab, jobs, self._go_to, lambda: str(self._horizon.value))
         self._name = pn.widgets.TextInput(name="Name", value="mine", width=110)
         self._term = pn.widgets.TextInput(name="Formula", placeholder="k * v * abs(w)", width=220)
@@ -59,10 +67,17 @@ class EffectsScreen:
         if bench is None:
             self._problem.show(self._tab.why_no_bench or "Open a log first: the screen Data.")
             return
+        if bench.of_networks:
+            text = f"{self._tab.networks} holds networks, which have no effects: the screen Where it fails compares them."
+            self._problem.show(text)
+        self._body.visible = not bench.of_networks
+        if bench.of_networks:
+            return
         if bench is not self._bench:
             self._bench = bench
             self._effects.clear()
             self._list_effects()
+            self._formula.visible = bench.on_wheels
             names = list(bench.ready.predictor.tracks.names)
             self._trial.options = dict(zip(names, range(len(names)), strict=True))
             self._horizon.options = list(bench.horizons)
@@ -91,9 +106,12 @@ class EffectsScreen:
 
     def switch(self, name: str, on: bool) -> None:
         """An effect was switched on or off."""
-        if on != (name in self._tab.now.on):
-            self._tab.history.to(self._tab.now.switched(name, on))
-            self.update()
+        if on == (name in self._tab.now.on):
+            return
+        term = next((t for t in self._diagnosis.terms if t.name == name and on), None)
+        state = self._tab.now
+        self._tab.history.to(state.switched(name, on) if term is None else state.with_term(term))
+        self.update()
 
     def _switch_to(self, names: tuple[str, ...], terms: tuple[Term, ...]) -> None:
         state = self._tab.now
@@ -120,7 +138,7 @@ class EffectsScreen:
         self._shown = shown
         self._problem.show("")
         horizon = shown.errors.horizons[self._horizon.value]
-        self._errors.object = error_list(horizon)
+        self._errors.object = error_list(horizon) + note(self._tab.bench.thinned if self._tab.bench else "")
         self._warnings.object = "".join(message(w) for w in shown.warnings)
         self._ladder.fill(horizon)
         self._show_paths()
@@ -155,11 +173,18 @@ class EffectsScreen:
     def _list_effects(self) -> None:
         bench = self._tab.bench
         assert bench is not None
-        named = {**bench.catalogue, **{t.name: bench.effect(self._tab.now, t.name)[0] for t in self._tab.now.terms}}
-        for name, effect in named.items():
+        mine = {t.name: t for t in self._tab.now.terms}
+        found = {t.name: t for t in self._diagnosis.terms if t.name not in mine}
+        terms = {name: bench.term(t) for name, t in {**mine, **found}.items()}
+        named = {name: e for name, e in {**bench.catalogue, **terms}.items() if name not in found}
+        for name, effect in {**bench.catalogue, **terms}.items():
             if name not in self._effects or self._effects[name].effect is not effect:
-                self._effects[name] = OneEffect(effect, self.switch, self.move)
-        groups = []
+                words = self._diagnosis.term_in_words(name)
+                said = f"{name}: add this term: {words}" if words else ""
+                self._effects[name] = OneEffect(effect, self.switch, self.move, said)
+        groups: list[Any] = []
+        if found:
+            groups += [heading("What no effect explains"), *(self._effects[name].view for name in found)]
         for stage, title in GROUPS.items():
             inside = [self._effects[n].view for n, e in named.items() if e.stage == stage]
             if inside:
@@ -174,6 +199,12 @@ class EffectsScreen:
                 each.refresh(
                     self._shown, self._diagnosis.alone(each.effect.name), self._diagnosis.ties(each.effect.name)
                 )
+
+    def _learned(self) -> None:
+        """The diagnosis knows more: what effects earn, and terms of its own."""
+        if self._tab.bench is not None and self._diagnosis.terms:
+            self._list_effects()
+        self._refresh_effects()
 
     def _sync_switches(self, state: Switches) -> None:
         for name, each in self._effects.items():
@@ -191,7 +222,7 @@ class EffectsScreen:
         self._after_walk()
 
     def _after_walk(self) -> None:
-        if self._tab.now.terms:
+        if self._tab.now.terms or self._diagnosis.terms:
             self._list_effects()
         self.update()
 
@@ -234,14 +265,14 @@ class EffectsScreen:
 
     def _laid_out(self) -> Any:
         variables = "; ".join(f"{name}: {text}" for name, text in VARIABLES.items())
-        formula = pn.Column(
+        self._formula = pn.Column(
             heading("A formula of your own"),
             row(self._name, self._term, self._on, self._add_term, align_items="end"),
             self._formula_problem.view,
             html(f"<details><summary>what may stand in it</summary>{variables}</details>"),
             **WIDE,
         )
-        left = pn.Column(self._diagnosis.view, self._switches, formula, **WIDE)
+        left = pn.Column(self._diagnosis.view, self._switches, self._formula, **WIDE)
         right = pn.Column(
             row(self._undo, self._redo, self._fit),
             row(self._horizon, self._trial),
@@ -253,7 +284,8 @@ class EffectsScreen:
             self._snapshots.view,
             **WIDE,
         )
-        return pn.Column(self._problem.view, beside(left, right, least=330, first=right), **WIDE)
+        self._body = beside(left, right, least=330, first=right)
+        return pn.Column(self._problem.view, self._body, **WIDE)
 
 
 def _on_change(widget: Any, what: str, act: Callable[[], object]) -> None:

@@ -47,7 +47,9 @@ class EvolvePart:
 
     def enter(self) -> None:
         """As the run stands."""
-        if self._tab.bench is not None:
+        bench = self._tab.bench
+        self.view.visible = bench is not None and bench.on_wheels
+        if self.view.visible:
             self._work.enter()
 
     def _begin(self) -> None:

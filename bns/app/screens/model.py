@@ -13,7 +13,12 @@ from bns.api.model import Model
 from bns.app.jobs import Jobs
 from bns.app.parts import WIDE, Problem, beside, button, heading, html
 from bns.app.tab import Tab
+from bns.diagnose.predict.saved_networks import OF_ROBOT
+from bns.physics.jointed.model_files import SNAKE
 from bns.physics.model import BASES, model_names
+
+ROBOTS = [*model_names(), SNAKE, SNAKE + OF_ROBOT]
+"""Drives, the snake in MuJoCo, and the snake's static simulator."""
 
 
 class ModelScreen:
@@ -22,9 +27,9 @@ class ModelScreen:
     def __init__(self, tab: Tab, jobs: Jobs) -> None:
         self._tab, self._jobs = tab, jobs
         self._problem, self._bench_problem, self._said = Problem(), Problem(), html()
-        self._name = pn.widgets.Select(name="A robot of the catalogue", options=model_names(), **WIDE)
+        self._name = pn.widgets.Select(name="A robot of the catalogue", options=ROBOTS, **WIDE)
         self._path = pn.widgets.TextInput(name="Or a model file of this machine", placeholder="mine.yaml", **WIDE)
-        self._file = pn.widgets.FileInput(name="Or drop a model file", accept=".yaml,.yml")
+        self._file = pn.widgets.FileInput(name="Or drop a model file", accept=".yaml,.yml,.xml,.safetensors")
         self._wheelbase = pn.widgets.FloatInput(
             name="Or a differential drive: wheelbase (m)", value=0.1, start=0.001, end=10, step=0.001, **WIDE
         )
@@ -47,13 +52,17 @@ class ModelScreen:
 
     def enter(self) -> None:
         """The model as the tab has it."""
-        self._said.object = f"<pre id='bns-model'>{escape(self._tab.model.summary())}</pre>"
+        self._said.object = f"<pre id='bns-model'>{escape(self._in_words())}</pre>"
         self._bench_problem.show(self._tab.why_no_bench)
         used = self._tab.used
         suggested = None if used is None else used.suggested_wheelbase_m
         if suggested is not None:
             self._wheelbase.value = round(suggested, 5)
             self._suggestion.object = f"<p>The log's own turns suggest {suggested:.4g} m.</p>"
+
+    def _in_words(self) -> str:
+        tab = self._tab
+        return f"networks {tab.networks}: they are compared, nothing is fitted" if tab.networks else tab.model.summary()
 
     def _take_path(self) -> None:
         text = (self._path.value_input or self._path.value).strip()

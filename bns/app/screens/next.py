@@ -51,30 +51,36 @@ class NextScreen:
     def enter(self) -> None:
         """The words for what is on now."""
         tab, bench = self._tab, self._tab.bench
-        self._make.disabled = self._prepare.disabled = bench is None
+        self._prepare.disabled = bench is None
+        self._make.disabled = bench is None or bench.of_networks
         self._model.object = self._used.object = self._report.object = self._session.object = ""
         if bench is None:
             self._problem.show(tab.why_no_bench or "Open a log first: the screen Data.")
             return
         self._problem.show("")
-        self._experiment.enter()
+        self._experiment.view.visible = not bench.of_networks
+        if not bench.of_networks:
+            self._experiment.enter()
         self._evolve.enter()
         state = tab.now
         self._jobs.run("fitting", lambda: bench.shown(state), self._fitted, self._problem.show)
         self._commands.object = _to_copy("\n".join(self._typed()), "bns-commands")
-        text = python(tab.data_words, tab.model_words, state, tab.left_out)
+        text = python(tab.data_words, tab.model_words, state, tab.part, tab.mapping, bool(tab.networks))
         self._python.object = _to_copy(text, "bns-python")
 
     def _typed(self) -> list[str]:
         tab = self._tab
-        notes = [f"# {USED}: the measurements that took part, saved here"] if tab.left_out else []
+        notes = [f"# {USED}: the measurements that took part, saved here"] if not tab.as_it_lies else []
         notes += ["# numbers moved by hand are in the saved model alone"] if tab.now.by_hand else []
-        return [*notes, *commands(USED if tab.left_out else tab.data_words, tab.model_words, tab.now)]
+        return [*notes, *commands(tab.data_words if tab.as_it_lies else USED, tab.model_words, tab.now, bool(tab.networks))]
 
     def _fitted(self, shown: Shown) -> None:
-        self._summary.object = _to_copy(shown.model.summary(), "bns-saved")
-        text = shown.model.to_yaml().encode()
-        self._model.object = download("Save the model", "extended.yaml", text, "text/yaml")
+        if self._tab.networks:
+            self._summary.object = "<p>Networks are compared: there is no model to save.</p>"
+        else:
+            self._summary.object = _to_copy(shown.model.summary(), "bns-saved")
+            text = shown.model.to_yaml().encode()
+            self._model.object = download("Save the model", "extended.yaml", text, "text/yaml")
         if self._tab.files:
             session = session_yaml(self._tab).encode()
             link = download("Save the session", f"explore{ENDING}", session, "text/yaml")

@@ -18,13 +18,17 @@ _WRAPPED = "label { white-space: normal; overflow-wrap: anywhere; }"
 
 
 class OneEffect:
-    """``switch(name, on)`` and ``move(name, parameter, value)`` are told what the user does."""
+    """``switch(name, on)`` and ``move(name, parameter, value)`` are told what the user does; ``said``: its label."""
 
     def __init__(
-        self, effect: Effect, switch: Callable[[str, bool], None], move: Callable[[str, str, float], None]
+        self,
+        effect: Effect,
+        switch: Callable[[str, bool], None],
+        move: Callable[[str, str, float], None],
+        said: str = "",
     ) -> None:
         self.effect, self._move, self._quiet = effect, move, False
-        said = f"{effect.name}: {effect.in_words}"
+        said = said or f"{effect.name}: {effect.in_words}"
         # a group of one: Bokeh's single checkbox has no label that a screen reader or a click would find
         self._box = pn.widgets.CheckBoxGroup(
             options={said: effect.name}, margin=(6, 8, 0, 8), stylesheets=[_WRAPPED], **WIDE

@@ -13,7 +13,7 @@ from bns.app.parts import WIDE, Problem, button, heading, html, row
 from bns.app.switches import Switches
 from bns.app.tab import Tab
 from bns.app.workbench import Shown
-from bns.diagnose.report.tables import AHEAD
+from bns.diagnose.report.tables import ahead
 
 MOST = 12
 """More rows nobody compares at a glance."""
@@ -51,7 +51,7 @@ class SnapshotsPart:
         horizon = self._horizon()
         rows = [_row(name, each, horizon) for name, each in shown.items()]
         columns = ["snapshot", "effects", "error, mm", "95 %", "change from the model as given, mm (95 %)"]
-        caption = f"Position error {AHEAD[horizon]} ahead; all snapshots on the same windows of trials held out"
+        caption = f"Position error {ahead(horizon)} ahead; all snapshots on the same windows of trials held out"
         self._table.object = table(columns, rows, caption, "bns-snapshots")
 
     def _keep(self) -> None:

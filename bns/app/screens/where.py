@@ -11,12 +11,12 @@ import panel as pn
 from bns.api.compare import CompareResult
 from bns.app.figures.errors import WindowFigures
 from bns.app.figures.paths import PathFigure
-from bns.app.html import mm, table
+from bns.app.html import mm, note, table
 from bns.app.jobs import Jobs
 from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, row
 from bns.app.tab import Tab
 from bns.app.workbench import Shown, Workbench
-from bns.diagnose.report.tables import AHEAD
+from bns.diagnose.report.tables import ahead
 
 GIVEN, NOW = "as given", "as it is now"
 
@@ -81,14 +81,13 @@ class WhereScreen:
     def _compared(self, shown: Shown, result: CompareResult) -> None:
         self._shown, comparison = shown, result.comparison
         rows = [
-            [AHEAD[h], mm(e["position_m"]), mm(e["position_se_m"]), mm(comparison.noise_floor_m(h)), int(e["windows"])]
+            [ahead(h), mm(e["position_m"]), mm(e["position_se_m"]), mm(comparison.noise_floor_m(h)), int(e["windows"])]
             for h, e in comparison.errors.items()
             if e["windows"]
         ]
         columns = ["after", "error, mm", "± se", "noise, mm", "windows"]
-        self._errors.object = table(
-            columns, rows, f"Position error of the model {self._which.value}, nothing held out", "bns-compared"
-        )
+        caption = f"Position error of the model {self._which.value}, nothing held out"
+        self._errors.object = table(columns, rows, caption, "bns-compared") + note(self._bench.thinned if self._bench else "")
         explained = [
             [p.variable, p.channel, f"{p.share:.2%}", f"{p.paired_comparison.p_value:.2g}"]
             for p in comparison.residual_dependence[:8]

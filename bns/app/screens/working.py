@@ -17,12 +17,18 @@ EVERY_MS = 500
 
 
 class Working(Generic[T]):
-    """``begin`` starts the work on what `work` gives; ``done`` is called with every result, once it is shown."""
+    """``begin`` starts the work on what `work` gives; ``done`` is called with every result, once it is shown, ``meanwhile``
+    whenever it was looked at while it went on."""
 
     def __init__(
-        self, name: str, begin: Callable[[], None], work: Callable[[], Background[T]], done: Callable[[T], None]
+        self,
+        name: str,
+        begin: Callable[[], None],
+        work: Callable[[], Background[T]],
+        done: Callable[[T], None],
+        meanwhile: Callable[[], None] = lambda: None,
     ) -> None:
-        self._work, self._done = work, done
+        self._work, self._done, self._meanwhile = work, done, meanwhile
         self._clock: Any = None
         self.said = html()
         self._begin = button(name, lambda: self._start(begin), "primary")
@@ -48,6 +54,7 @@ class Working(Generic[T]):
         self._begin.disabled, self._stop.disabled = work.at_work, not work.at_work
         if work.at_work:
             self.said.object = f"<p>{escape(work.progress)}</p>"
+            self._meanwhile()
             return
         if self._clock is not None:
             self._clock.stop()

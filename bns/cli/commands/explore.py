@@ -22,7 +22,10 @@ def add_commands(command: Adder) -> None:
         help="measurements, a saved session, or a folder of results; without any: sample logs",
     )
     page.add_argument(
-        "--model", default="khepera", metavar="M", help="khepera (default), differential-drive, a YAML file"
+        "--model",
+        default="khepera",
+        metavar="M",
+        help="khepera (default), differential-drive, snake, a YAML file; snake-networks or a run's networks",
     )
     page.add_argument(
         "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"
@@ -33,6 +36,7 @@ def add_commands(command: Adder) -> None:
 
 def explore(options: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C or SIGTERM, which is how it is meant to end: exit code 0."""
+    from bns.api.common.prepared import are_networks
     from bns.api.model import Model
     from bns.app.explore import Explorer, shown_of
     from bns.extras import require
@@ -43,7 +47,8 @@ def explore(options: argparse.Namespace) -> int:
     words = (options.model, *(["--wheelbase", f"{options.wheelbase:g}"] if given else []))
     files = [str(file) for file in options.data]
     log = files[0] if len(files) == 1 else files or None
-    explorer = Explorer(shown_of(log, Model(options.model, **given), " ".join(files), words), options.port)
+    model = options.model if are_networks(options.model) else Model(options.model, **given)
+    explorer = Explorer(shown_of(log, model, " ".join(files), words), options.port)
     print(explorer.address, flush=True)
     print("open this address in a browser on this machine; Ctrl-C ends the page", flush=True)
     explorer.serve(browser=not options.no_browser)

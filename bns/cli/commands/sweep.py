@@ -11,6 +11,7 @@ from bns.cli.compiling import say_if_compiling
 from bns.cli.options.option_types import as_json, duration, positive
 from bns.cli.options.sweep_options import add_cluster_options, backend_name, request_of
 from bns.cli.parser import add_results, add_trust
+from bns.errors import SpecError
 from bns.spec import RunSpec
 
 INTERRUPTED, TERMINATED = 130, 143
@@ -34,6 +35,11 @@ def add_commands(command: Adder) -> None:
         help="when a sweep is done, run the K best combinations of each task again on fresh seeds, as sweep NAME-confirm",
     )
     many.add_argument(
+        "--until",
+        choices=("ranking",),
+        help="stop when the ten best combinations of each task are known: those that cannot be among them are not run on",
+    )
+    many.add_argument(
         "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
     )
     costs = command(
@@ -53,8 +59,12 @@ def sweep(options: argparse.Namespace) -> int:
     from bns.sweep.expand.grid import load_sweep
     from bns.sweep.forecast.plan import plan as forecast
     from bns.sweep.progress import SweepProgress
+    from bns.sweep.ranking.until import run_until_ranked
     from bns.sweep.report import planned, summed_up
 
+    if options.until and (options.confirm_top or options.dry_run):
+        other = "--confirm-top" if options.confirm_top else "--dry-run"
+        raise SpecError(f"--until {options.until} ends a sweep early, and {other} is about whole ones. Leave one of them out.")
     files = [load_sweep(file) for file in options.files]
     sweeps = in_turn(files, options.results, options.confirm_top)
     backend = load_executor(backend_name(options))
@@ -72,7 +82,11 @@ def sweep(options: argparse.Namespace) -> int:
             say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files))
         failed = 0
         for one in sweeps:
-            summary = backend.carry_out(one, request)
+            if options.until:
+                summary, ranking = run_until_ranked(backend, one, request)
+                print(ranking.in_words())
+            else:
+                summary = backend.carry_out(one, request)
             print(summed_up(summary, options.results), file=sys.stderr)
             failed += summary.new_failed
             if summary.stopped_by in {"interrupt", "terminated"}:

@@ -126,9 +126,10 @@ def to_numbers(table: pd.DataFrame, columns: Sequence[str]) -> None:
     """Make these columns floats, in place. DataError names the first row that holds something else, or no time."""
     for name in columns:
         values = pd.to_numeric(table[name], errors="coerce")
-        wrong = values.isna() & table[name].notna() & (table[name].astype(str).str.lower() != "nan")
-        if wrong.any():
-            row = int(np.flatnonzero(wrong)[0])
+        wrong = np.flatnonzero(values.isna() & table[name].notna())
+        wrong = wrong[(table[name].iloc[wrong].astype(str).str.lower() != "nan").to_numpy()] if len(wrong) else wrong
+        if len(wrong):
+            row = int(wrong[0])
             raise DataError(f"Row {row}: {name} is {table[name].iloc[row]!r}; it must be a number, or empty.")
         if np.isinf(values).any():
             row = int(np.flatnonzero(np.isinf(values))[0])
@@ -200,7 +201,8 @@ def _jumps(pose: np.ndarray, t: np.ndarray) -> np.ndarray:
     inner = values[1:-1] - values[:-2] - share * (values[2:] - values[:-2])
     off = np.vstack([_beyond(values, t, 0, 1, 2), inner, _beyond(values, t, -1, -2, -3)])
     size = np.column_stack([np.hypot(off[:, 0], off[:, 1]), np.abs(off[:, 2])])
-    near = np.pad(t[2:] - t[:-2], 1, mode="edge") < _NEAR_S
+    span = t[2:] - t[:-2]
+    near = np.concatenate([span[:1], span, span[-1:]]) < _NEAR_S
     if not near.any():
         return np.zeros(len(t), dtype=bool)
     limits = np.maximum([_JUMP_M, _JUMP_RAD], 12 * np.median(size[near], axis=0))
@@ -209,8 +211,8 @@ def _jumps(pose: np.ndarray, t: np.ndarray) -> np.ndarray:
     excess = times.max(axis=1)
     # there and back: a pose that is held and then catches up is no jump
     across = np.hypot(*(pose[2:, :2] - pose[:-2, :2]).T)
-    returns = np.pad(across < np.maximum(size[1:-1, 0], limits[0] / 2), 1, constant_values=True)
-    around = np.pad(excess, 1)
+    returns = np.concatenate([[True], across < np.maximum(size[1:-1, 0], limits[0] / 2), [True]])
+    around = np.concatenate([[0.0], excess, [0.0]])
     found: np.ndarray = near & returns & (excess > 1) & (excess >= around[:-2]) & (excess >= around[2:])
     return found
 

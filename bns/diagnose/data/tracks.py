@@ -208,8 +208,12 @@ def _commands(table: pd.DataFrame, rows: list[NDArray[np.int64]], t_s: Array) ->
 
 def _padded(rows: list[Array], mode: Literal["edge", "constant"]) -> Array:
     """Rows of one length: their last value goes on, or zeros follow."""
-    width = max(map(len, rows))
-    return np.stack([np.pad(row, (0, width - len(row)), mode=mode) for row in rows])
+    padded = np.zeros((len(rows), max(map(len, rows))))
+    for line, row in zip(padded, rows, strict=True):
+        line[: len(row)] = row
+        if mode == "edge":
+            line[len(row) :] = row[-1]
+    return padded
 
 
 def _session(

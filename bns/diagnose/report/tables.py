@@ -17,14 +17,20 @@ from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.values import numbers_of
 
 Table = dict[str, list[Any]]
-AHEAD = {
+_AHEAD = {
     "command": "one command",
     "1s": "1 second",
     "5s": "5 seconds",
     "trial": "the whole trial",
     "cycle": "one cycle",
+    "change": "one change of cycles",
     "stretch": "one stretch",
 }
+
+
+def ahead(horizon: str) -> str:
+    """A horizon in words; one that says it itself stays as it is."""
+    return _AHEAD.get(horizon, horizon)
 
 
 def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
@@ -36,7 +42,7 @@ def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
     if d.effects:
         rows = [
             [
-                AHEAD[e.horizon],
+                ahead(e.horizon),
                 _both(e.models[0]),
                 _both(e.models[-1]),
                 _interval(e),
@@ -54,7 +60,7 @@ def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
             "windows",
         ]
         return _table(columns, rows)
-    rows = [[AHEAD[e.horizon], _both(e.models[0]), _mm(e.noise_floor_m), str(e.windows)] for e in shown]
+    rows = [[ahead(e.horizon), _both(e.models[0]), _mm(e.noise_floor_m), str(e.windows)] for e in shown]
     return _table(["after", "as given (mm)", "tracking noise (mm)", "windows"], rows)
 
 
@@ -92,7 +98,7 @@ def error_by_step_table(m: ExtendedModel) -> Table:
         for index, name in enumerate(m.names)
     ]
     rows.append(["tracking noise", *(_mm(e.noise_floor_m) for e in shown)])
-    return _table(["model", *(f"{AHEAD[e.horizon]} (mm)" for e in shown)], rows)
+    return _table(["model", *(f"{ahead(e.horizon)} (mm)" for e in shown)], rows)
 
 
 def curves_table(c: Comparison) -> Table:

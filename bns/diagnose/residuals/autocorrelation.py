@@ -6,7 +6,8 @@ between commands each trial's.
 
 Errors of a tracker that share something with those of the frames before are no motion, and correlate as well where a filter
 takes them for independent. They add up to nothing: what they add to the way in some frames, they take away later. So a
-correlation counts only if ways that do not touch each other are alike too, by the track alone; opposed ones beside such a one.
+correlation counts only if the track alone shows it as well: what it moved in frames or longer ways is alike, or is opposed by
+more than stationary errors can make it.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ LEAST_BETWEEN = DEFAULTS.residuals.least_between
 LEAST_Z = DEFAULTS.residuals.correlation_z
 APART = DEFAULTS.residuals.ways_apart
 MOVES_Z = DEFAULTS.residuals.moves_z
+MEMORY = DEFAULTS.residuals.tracker_memory
 _CLIP = DEFAULTS.residuals.clip
 _DIRECTIONS = ("forward", "left", "heading")
 
@@ -59,9 +61,7 @@ def autocorrelations(problem: Problem, fit: Fit) -> list[Autocorrelation]:
     for index, direction in enumerate(_DIRECTIONS):
         trials = list(_by_command(problem, fit, index))
         within = [_pooled(direction, "within", lag, [_within(commands, lag) for commands in trials]) for lag in LAGS]
-        alike = [r for r in within if r.correlation > 0 and (not r.significant or _moves(moved, index, r.lag))]
-        swings = any(r.significant for r in alike)
-        found += [*alike, *(r for r in within if swings and r.correlation <= 0)]
+        found += [r for r in within if not r.significant or _moves(moved, index, r)]
         found.append(_pooled(direction, "between", 1, [_between(commands) for commands in trials]))
     return sorted(found, key=lambda r: (not r.significant, -abs(r.z)))
 
@@ -86,15 +86,19 @@ def _unforeseen_ways(problem: Problem, fit: Fit) -> list[Array]:
     return out
 
 
-def _moves(moved: list[Array], direction: int, frames: int) -> bool:
-    """Are ways of so many frames like those a little later? Errors that add up to nothing make them opposed."""
-    sums = []
-    for ways in moved:
-        way = np.concatenate([[0.0], np.cumsum(ways[:, direction])])
-        values = way[frames:] - way[:-frames]
-        if len(values) > frames + APART + 6:
-            sums.append((float(values[frames + APART :] @ values[: -frames - APART]), float(values @ values)))
-    return _pooled("", "", frames, sums).z > MOVES_Z
+def _moves(moved: list[Array], direction: int, found: Autocorrelation) -> bool:
+    """Does the track by itself move on, or back, so many frames later?"""
+    lag = found.lag
+    frames = _pooled("", "", lag, [_lagged(ways[:, direction], lag) for ways in moved if len(ways) > lag + 6])
+    if found.correlation < 0:
+        return frames.correlation < -MEMORY and frames.z < -MOVES_Z
+    longer = [np.concatenate([[0.0], np.cumsum(ways[:, direction])]) for ways in moved]
+    values = [way[lag:] - way[:-lag] for way in longer if len(way) > 2 * lag + APART + 6]
+    return frames.z > MOVES_Z or _pooled("", "", lag, [_lagged(v, lag + APART) for v in values]).z > MOVES_Z
+
+
+def _lagged(values: Array, lag: int) -> tuple[float, float]:
+    return float(values[lag:] @ values[:-lag]), float(values @ values)
 
 
 def _by_command(problem: Problem, fit: Fit, direction: int) -> Iterator[list[Array]]:

@@ -47,8 +47,9 @@ class StepwiseSelection:
         extra: Mapping[str, Effect] | None = None,
         tick: Callable[[str], None] = lambda _: None,
         barred: Collection[str] = (),
+        alone: Callable[[Candidate], None] = lambda _: None,
     ) -> None:
-        self.predictor, self.model, self.tick = predictor, model.arranged(), tick
+        self.predictor, self.model, self.tick, self.alone = predictor, model.arranged(), tick, alone
         self._extra, self._barred = extra, barred
         self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
@@ -187,7 +188,10 @@ class StepwiseSelection:
     def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
         self.tick(effect.name)
         added = fit_with(problem, fit, effect)
-        return Candidate(effect.name, added, problem.paired_comparison(fit, added), self._rejected(added, effect.name))
+        found = Candidate(effect.name, added, problem.paired_comparison(fit, added), self._rejected(added, effect.name))
+        if len(added.model.effects) == len(self.model.effects) + 1 and effect.name in self.catalogue:
+            self.alone(found)
+        return found
 
     def _earned(self, candidate: Candidate, before: Fit, decoy_threshold: float) -> bool:
         e = candidate.paired_comparison

@@ -55,7 +55,13 @@ class Residuals:
         2.0,
         "standard errors",
         "Ways are alike from here on. Tracking errors with a memory of 0.4 to 0.9 a frame (AR(1), up to 5 mm and 0.05 rad) stay "
-        "below 0; a heading that swings by 0.02 rad in 1.5 s reaches more than 10.",
+        "below 0, over ways of 3 to 18 frames; a heading that swings by 0.02 rad in 1.5 s reaches 24.",
+    )
+    tracker_memory: float = setting(
+        0.08,
+        "correlation",
+        "What the track moved in one frame is opposed by more than this three or more frames later: errors with a memory of r a "
+        "frame (AR(1)) reach (1 - r) r^2 / 2, at most 0.074.",
     )
     clip: float = setting(
         4.0,

@@ -51,6 +51,8 @@ class Sweep:
     text: str
     path: Path
     first_seed: int = 0
+    chosen: tuple[tuple[int, int], ...] | None = None
+    """Only these of its runs (number of the combination, seed), in this order; None: all."""
 
     @property
     def all_seeds(self) -> range:
@@ -60,6 +62,11 @@ class Sweep:
     @property
     def total(self) -> int:
         """Number of runs."""
+        return self.described if self.chosen is None else len(self.chosen)
+
+    @property
+    def described(self) -> int:
+        """Number of runs that the file describes."""
         return self.seeds * len(self.combos)
 
     def runs_by_task(self) -> dict[str, int]:

@@ -15,8 +15,11 @@ def ordered_specs(sweep: Sweep) -> list[RunSpec]:
     """All runs: the first seed of every combination, then the second, ...; shuffled within a seed, alike on all machines.
 
     The shuffle keeps neighbours in the grid (equally long runs, one task) apart, which evens out progress
-    and estimates. It sorts by a hash, so combinations added later leave the others in their order.
+    and estimates. It sorts by a hash, so combinations added later leave the others in their order. Of a sweep with chosen runs
+    these, as they are.
     """
+    if sweep.chosen is not None:
+        return [_spec(sweep, sweep.combos[number], seed) for number, seed in sweep.chosen]
     texts = [(json.dumps(combo, sort_keys=True), combo) for combo in sweep.combos]
     specs = []
     for seed in sweep.all_seeds:

@@ -37,7 +37,7 @@ def of_columns(table: pd.DataFrame) -> dict[str, Any]:
         if column == "heading_rad" and quaternion is not None:  # the last
             entries[column] = {"from": quaternion, "unit": "quaternion"}
         elif found is not None and not (column in {FORWARD, TURN} and "left_m_s" in entries):
-            entries[column] = {"from": found, **_unit(column, names[found], table[found])}
+            entries[column] = {"from": found, **unit_of_column(column, found, table[found])}
     return _whole(entries)
 
 
@@ -87,8 +87,9 @@ def _speed(said: str) -> dict[str, Any]:
     return {"scale": RADIUS} if turning else {}
 
 
-def _unit(column: str, said: str, values: pd.Series) -> dict[str, Any]:
-    """The unit that a name ends with, or that the numbers show."""
+def unit_of_column(column: str, name: str, values: pd.Series) -> dict[str, Any]:
+    """What an entry for ``column`` says of the unit: the one that the source's name ends with, or that its numbers show."""
+    said = words_of(name)
     if column == "trial":
         return {}
     if column in COMMANDS and (speed := _speed(said)):

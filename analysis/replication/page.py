@@ -1,0 +1,93 @@
+"""The page as Markdown, from a study's numbers and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from analysis.labels import source_position
+from analysis.replication.numbers import VERDICTS, Study
+
+WAITS = "no "
+"""How the reason begins where a finding cannot be measured yet: no combination, no run has enough."""
+TEMPLATE = Path(__file__).with_name("page.md")
+ROBOTS = {"khepera": "Khepera", "snake": "Snake"}
+
+
+def page(studies: Sequence[Study], readings: pd.DataFrame | None, pictures: Mapping[str, str], origin: Sequence[str]) -> str:
+    """The whole page.
+
+    Args:
+        studies: one a robot.
+        readings: table of the paired runs; None if there are none.
+        pictures: "figure 4.7" -> path of a picture, relative to the page.
+        origin: lines that say where the numbers come from.
+    """
+    parts = {
+        "LOOK": "\n\n".join(_look(one) for one in studies),
+        "FINDINGS": "\n\n".join(_findings(one, pictures) for one in studies),
+        "READINGS": "There are no runs of other readings yet." if readings is None else table(readings),
+        "ORIGIN": "\n".join(f"- {line}" for line in origin),
+    }
+    text = TEMPLATE.read_text(encoding="utf-8")
+    for name, part in parts.items():
+        text = text.replace(f"{{{name}}}", part)
+    return text
+
+
+def table(rows: pd.DataFrame) -> str:
+    """Rows as a table in Markdown."""
+    lines = [list(map(str, rows.columns)), ["---"] * rows.shape[1], *rows.astype(str).to_numpy().tolist()]
+    return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
+
+
+def _look(one: Study) -> str:
+    """How much there is and how it was decided."""
+    amount = one.tasks.merge(one.counts, on="task", how="left").fillna(0)
+    each = [str(row.most) if row.least == row.most else f"{row.least} to {row.most}" for row in amount.itertuples()]
+    shown = pd.DataFrame({
+        "task": amount.task, "runs": [f"{runs:,}" for runs in amount.runs],
+        "combinations of 500": amount.combinations, "runs of each": each,
+        **{word: amount[word].astype(int) for word in VERDICTS.values()},
+    })  # fmt: skip
+    return f"**{ROBOTS.get(one.chosen.robot, one.chosen.robot)}**\n\n{table(shown)}"
+
+
+def _findings(one: Study, pictures: Mapping[str, str]) -> str:
+    """A heading a figure or section of the dissertation, a row a finding and task."""
+    sections = [f"### {ROBOTS.get(one.chosen.robot, one.chosen.robot)}"]
+    places = sorted(set(one.findings["where"]) | _drawn_of(one, pictures), key=lambda where: (*source_position(where), where))
+    runs = one.tasks.set_index("task").runs
+    waits = one.findings["these results"].str.startswith(WAITS)
+    for where in places:
+        own = one.findings[(one.findings["where"] == where) & ~waits]
+        if own.empty and where not in pictures:
+            continue
+        rows = pd.DataFrame({
+            "task": own.task, "the dissertation": own["the dissertation"], "here (95 % interval)": own["these results"],
+            "n": [f"{runs.get(task, 0):,}" for task in own.task], "verdict": [f"**{word}**" for word in own.verdict],
+        })  # fmt: skip
+        sections.append(f"#### {where[:1].upper()}{where[1:]}")
+        sections += [table(rows)] if len(rows) else []
+        sections += [f"![{where}]({pictures[where]})"] if where in pictures else []
+    return "\n\n".join([*sections, *_waiting(one.findings[waits])])
+
+
+def _waiting(rows: pd.DataFrame) -> list[str]:
+    """Findings that nothing can be said of yet, a row each, with the reason."""
+    if rows.empty:
+        return []
+    keys = ["where", "the dissertation", "these results"]
+    numbers = rows.assign(task=rows.task.str.partition(",")[0])
+    each = numbers.groupby(keys, sort=False).task.agg(", ".join).reset_index()
+    each = each.sort_values("where", key=lambda places: places.map(source_position), kind="stable")
+    shown = each[["where", "task", *keys[1:]]].set_axis(["where", "tasks", "the dissertation", "why not yet"], axis=1)
+    return ["#### Not measured yet (undecided)", table(shown)]
+
+
+def _drawn_of(one: Study, pictures: Mapping[str, str]) -> set[str]:
+    """Figures without a finding of their own that belong to this robot's chapter."""
+    chapter = 4.0 if one.chosen.robot == "khepera" else 5.0
+    return {where for where in pictures if source_position(where)[0] == chapter}

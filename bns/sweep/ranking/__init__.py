@@ -1,0 +1,1 @@
+"""A sweep that stops when its best combinations are known."""

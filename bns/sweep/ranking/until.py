@@ -1,0 +1,124 @@
+"""`--until ranking`: rounds of runs on any executor until the best combinations of each task are known; and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from bns.errors import SpecError
+from bns.sweep.confirm import best
+from bns.sweep.executors import Backend
+from bns.sweep.expand.grid import Sweep
+from bns.sweep.ranking.confidence import confidences
+from bns.sweep.ranking.race import possible
+from bns.sweep.ranking.stored import BEST, Race, results_of
+from bns.sweep.request import Request
+from bns.sweep.runner import Summary
+
+DECIDED = "ranking"
+"""What stops a sweep whose best are known."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One of the best: place from 1, parameters, mean success over all seeds, confidence that it is one of them."""
+
+    task: str
+    place: int
+    combination: dict[str, Any]
+    success: float
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """The best of each task so far; ``open``: combinations that may still be among them; runs done, and of the whole sweep."""
+
+    best: tuple[Ranked, ...]
+    open: int
+    runs: int
+    total: int
+
+    @property
+    def saved(self) -> float:
+        """The part of the sweep that was not run."""
+        return 1.0 - self.runs / self.total
+
+    def in_words(self) -> str:
+        """A table and what was saved."""
+        lines = [f"{'task':12} {'place':>5} {'success':>8} {'confidence':>10}  combination"]
+        for one in self.best:
+            told = ", ".join(f"{name} {value}" for name, value in one.combination.items() if name != "task")
+            lines.append(f"{one.task:12} {one.place:5} {one.success:8.3f} {one.confidence:10.1%}  {told}")
+        state = "decided" if not self.open else f"not decided: {self.open} more combinations may be among them"
+        lines.append(f"the {BEST} best of each task are {state}; {self.runs} of {self.total} runs, {self.saved:.0%} saved")
+        return "\n".join(lines)
+
+
+def run_until_ranked(backend: Backend, sweep: Sweep, request: Request) -> tuple[Summary, Ranking]:
+    """Carry out rounds until the best combinations are known, or the budget or a signal ends it.
+
+    Raises:
+        SpecError: only one shard is to be done.
+    """
+    if request.shard is not None:
+        raise SpecError("--until ranking decides by the results of all runs; leave --shard out, or give --executor slurm.")
+    race, tried, new, new_failed = Race(sweep), set[str](), 0, 0
+    while True:
+        stored, success = results_of(request.results, sweep.name)
+        failed = {run for run, status in stored.items() if status != "ok"} if request.retry_failed else set()
+        missing = race.todo(stored, success, failed - tried)
+        now = _counted(sweep, race, stored, new, new_failed)
+        if not missing:
+            return replace(now, stopped_by=DECIDED if now.remaining else None), ranking(race, request.results)
+        tried |= {race.run_id(number, seed) for number, seed in missing}
+        part = replace(sweep, chosen=tuple(missing))
+        summary = backend.carry_out(part, replace(request, wait=True, on_progress=_whole(request, now)))
+        new, new_failed = new + summary.new, new_failed + summary.new_failed
+        if summary.stopped_by is not None:
+            stored, _ = results_of(request.results, sweep.name)
+            stopped = replace(_counted(sweep, race, stored, new, new_failed), stopped_by=summary.stopped_by)
+            return stopped, ranking(race, request.results)
+
+
+def ranking(race: Race, folder: Path) -> Ranking:
+    """The best of the combinations that have all of their runs, by the rules of a whole sweep's ranking."""
+    found: list[Ranked] = []
+    whole = race.whole()
+    chosen = best(race.sweep, folder, BEST, whole) if whole else []
+    for task, numbers in race.tasks.items():
+        results = race.results[task]
+        own = [race.sweep.combos.index(combo) for combo in chosen]
+        places = [numbers.index(number) for number in own if number in numbers]
+        sure, (mean, _) = confidences(results, places, BEST), results.bounds()
+        for at, (place, confidence) in enumerate(zip(places, sure, strict=True), 1):
+            found.append(Ranked(task, at, race.sweep.combos[numbers[place]], float(mean[place]), confidence))
+    left = sum(int((possible(results, BEST) & ~results.whole).sum()) for results in race.results.values())
+    done = sum(int(results.seen.sum()) for results in race.results.values())
+    return Ranking(tuple(found), left, done, race.sweep.described)
+
+
+def _counted(sweep: Sweep, race: Race, stored: dict[str, str], new: int, new_failed: int) -> Summary:
+    known = [stored[run] for run in race.asked() if run in stored]
+    done, failed, quarantined = (known.count(status) for status in ("ok", "failed", "quarantined"))
+    return Summary(sweep.name, sweep.described, done, failed, quarantined, new, new_failed)
+
+
+def _whole(request: Request, before: Summary) -> Callable[[Summary], None]:
+    """Progress of a round, told as that of the whole sweep."""
+
+    def told(part: Summary) -> None:
+        request.on_progress(
+            replace(
+                before,
+                done=before.done + part.done,
+                failed=before.failed + part.failed,
+                quarantined=before.quarantined + part.quarantined,
+                new=before.new + part.new,
+                new_failed=before.new_failed + part.new_failed,
+            )
+        )
+
+    return told

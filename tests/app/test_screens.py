@@ -1,0 +1,162 @@
+"""Screens without a browser: what they show of terms, of effects while a diagnosis works, of the snake and of networks."""
+
+import json
+
+import pytest
+
+import bns
+from bns.cli.main import main
+from tests.diagnose.test_established import warming
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+from tests.hidden_snake.worlds import Hidden, World, driven
+
+pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
+
+from bns.app.explore import tabs_of
+from bns.app.html import found_errors
+from bns.app.log.part import Part
+from bns.app.screens.data import DataScreen
+from bns.app.screens.effects import EffectsScreen
+from bns.app.screens.model import ModelScreen
+from bns.app.screens.next import NextScreen
+from bns.app.screens.where import WhereScreen
+from bns.app.session import opened, session_yaml
+from bns.app.tab import Tab
+
+pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+
+
+class AtOnce:
+    """Does every job at once; a failure is one of the test."""
+
+    def run(self, _text, work, done, failed):
+        done(work())
+
+
+def entered(screen, tab):
+    made = screen(tab, AtOnce())
+    made.enter()
+    return made
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Something that no listed effect explains."""
+    return bns.diagnose(measured(warming(), trials=24, seed=3), bns.Model(NOMINAL), without_effects=["warm-up"])
+
+
+def test_a_term_is_a_switch_and_its_errors_are_those_of_the_summary(found):
+    [term] = found.diagnosis.terms[:1]
+    said = found_errors(found.diagnosis.errors_with_terms)
+    errors = found.to_json()["error_with_terms"]["1s"]
+    for key in ("before", "after"):
+        assert f"<td>{1e3 * errors[key]:.2f}</td>" in said
+    tab = tabs_of(found, "khepera").get("")[1]
+    screen = entered(EffectsScreen, tab)
+    label = f"{term.name}: add this term: {found.diagnosis.terms_in_words[0]}"
+    assert label in screen._effects[term.name]._box.options
+    assert "bns-found" in screen._diagnosis._work.said.object
+    screen._effects[term.name]._box.value = [term.name]
+    assert tab.now.on == (term.name,)
+    assert [t.term for t in tab.now.terms] == [term.term]
+    shown = tab.bench.shown(tab.now)  # test_workbench holds these numbers against those of `bns add`
+    assert shown.names == ["as given", term.name]
+    assert f"{1e3 * shown.errors.horizons['1s'].models[-1].rms_m:.2f}" in screen._errors.object
+    screen._effects[term.name]._box.value = []
+    assert tab.now.on == ()
+
+
+def test_what_effects_earn_alone_stands_beside_them_while_the_diagnosis_works():
+    log = bns.Measurements(measured(hidden(turn_slip={"slip_s": 0.12}), trials=12, commands=3))
+    tab = Tab()
+    tab.take(bns.Model(NOMINAL), ("khepera",))
+    tab.open(log, "log.csv")
+    screen = entered(EffectsScreen, tab)
+    told = {}
+    result = bns.diagnose(log, bns.Model(NOMINAL), fresh=True, alone=lambda entry: told.setdefault(entry["name"], entry))
+    ranking = {entry["name"]: entry for entry in result.to_json()["ranking"]}
+    assert set(told) == set(ranking)
+    for key in ("elpd_diff", "dse", "p_value"):
+        assert {name: entry[key] for name, entry in told.items()} == {name: entry[key] for name, entry in ranking.items()}
+    tab.alone = {"turn-slip": told["turn-slip"]}
+    screen._diagnosis._meanwhile()
+    gain = f"{told['turn-slip']['elpd_diff']:+.3f}"
+    assert f"alone, so far: {gain}" in screen._effects["turn-slip"]._text.object
+    assert "alone" not in screen._effects["motor-lag"]._text.object
+
+
+@pytest.fixture(scope="module")
+def snake(tmp_path_factory):
+    path = tmp_path_factory.mktemp("snake") / "snake.parquet"
+    driven(World("friction", "single", Hidden(friction=1.6), ("floor-friction",)), 1, 4, 4, True).to_parquet(path, index=False)
+    return path
+
+
+@pytest.fixture(scope="module")
+def body(snake):
+    tab = Tab()
+    tab.take("snake", ("snake",))
+    tab.open(str(snake), str(snake))
+    return tab
+
+
+def test_the_paths_of_a_snakes_markers_are_drawn(body):
+    screen = entered(DataScreen, body)
+    data = screen._picture.paths.data
+    assert set(data["marker"]) == {"yellow", "green"}
+    assert len(set(data["color"])) == 2
+    tracks = body.log.measured.tracks
+    assert len(data["trial"]) == 2 * len(tracks)
+    assert len(data["x"][0]) > tracks.first[1]  # what the camera saw within the cycles, too
+    assert data["x"][0][0] == tracks.markers_m[0, 0, 0]
+
+
+def test_a_body_is_compared_and_switched_like_a_drive(body, capsys, snake):
+    where = entered(WhereScreen, body)
+    assert main(["compare", str(snake), "--model", "snake", "--json"]) == 0
+    error = json.loads(capsys.readouterr().out)["error"]["cycle"]
+    assert f"<td>{1e3 * error['position_m']:.2f}</td>" in where._errors.object
+    assert "one cycle" in where._errors.object
+    assert "floor-friction" in entered(EffectsScreen, body)._effects
+    assert "12 joints" in entered(ModelScreen, body)._said.object
+    screen = entered(EffectsScreen, body)
+    screen.switch("floor-friction", True)
+    shown = body.bench.shown(body.now)
+    assert shown.names == ["as given", "floor-friction"]
+    assert shown.numbers["floor-friction"]["factor"]["value"] > 1.2
+    assert f"{1e3 * shown.errors.horizons['cycle'].models[-1].rms_m:.2f}" in screen._errors.object
+    assert not screen._formula.visible
+    following = entered(NextScreen, body)
+    assert "floor-friction --model snake" in following._commands.object
+    assert "extended.yaml" in following._model.object
+    screen.switch("floor-friction", False)
+
+
+def test_cycles_are_left_out_like_poses(body):
+    row = int(body.log.frame.index[5])
+    cycles = len(body.log.measured.tracks.gait)
+    used = Part((), (row,), ()).of(body.log)
+    assert len(used.measured.tracks.gait) == cycles - 1
+    cut = Part((), (), (("0", 0.0, 4.0),)).of(body.log)
+    tracks = cut.measured.tracks
+    assert 0 < tracks.first[1] < body.log.measured.tracks.first[1]
+    assert tracks.t_s[: tracks.first[1]].max() <= 4.0
+
+
+def test_networks_are_compared_and_have_no_effects(snake, capsys, tmp_path):
+    tab = tabs_of(str(snake), "snake-networks").get("")[1]
+    assert tab.why_no_bench == ""
+    where = entered(WhereScreen, tab)
+    assert main(["compare", str(snake), "--model", "snake-networks", "--json"]) == 0
+    error = json.loads(capsys.readouterr().out)["error"]["cycle"]
+    assert f"<td>{1e3 * error['position_m']:.2f}</td>" in where._errors.object
+    assert "no effects" in entered(EffectsScreen, tab)._problem.view.object
+    assert "snake-networks" in entered(ModelScreen, tab)._said.object
+    following = entered(NextScreen, tab)
+    assert "bns compare" in following._commands.object
+    assert "bns add" not in following._commands.object
+    saved = tmp_path / "a.session.yaml"
+    saved.write_text(session_yaml(tab))
+    again = opened(saved)
+    assert again.networks == "snake-networks"
+    assert again.bench.of_networks
