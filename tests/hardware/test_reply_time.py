@@ -57,6 +57,13 @@ def test_time_outs_stay_within_their_limits(trip_s, timeout_s):
     assert time.timeout_s == timeout_s
 
 
+def test_the_first_answer_of_a_slow_link_is_waited_for():
+    """Nothing is known of the link yet: a round trip of 0.3 s with a tail as long must not be asked for twice."""
+    assert ReplyTime().timeout_s > 0.3 + 2 * 0.3
+    assert ReplyTime(khepera_settings({}).reply).timeout_s == ReplyTime().timeout_s
+    assert ReplyTime().patience_s >= 4 * ReplyTime().timeout_s
+
+
 class BodysEye:
     """A tracker that always knows."""
 

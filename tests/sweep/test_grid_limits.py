@@ -1,5 +1,6 @@
 """Sweep files that are too large, too odd or not to be run as a whole: an explanation, not a traceback."""
 
+import itertools
 import re
 from pathlib import Path
 
@@ -82,3 +83,11 @@ def test_names_are_short_and_not_that_of_the_single_runs(tmp_path):
     }.items():
         refused(tmp_path, 2, text, "", f"robot: khepera\nname: {name}\n")
     assert sweep_of(tmp_path, "", f"robot: khepera\nname: {'n' * 80}\n").name == "n" * 80
+
+
+def test_aliases_that_stand_for_millions_are_refused(tmp_path):
+    names = "abcdefghi"
+    lines = [f"{after}: &{after} [{','.join([f'*{before}'] * 9)}]" for before, after in itertools.pairwise(names)]
+    bomb = "\n".join(["a: &a [1,1,1,1,1,1,1,1,1]", *lines])
+    with pytest.raises(SpecError, match="keys and values with all aliases; 50000 are allowed"):
+        sweep_of(tmp_path, f"{bomb}\n")
