@@ -158,14 +158,15 @@ def _without_needless_terms(
     predictor: Predictor, state: _State, accepted: Mapping[str, Effect], level: float
 ) -> _State:
     """Without the terms that several accepted effects together do as well: a curve came in before it could be known."""
-    for term in state.terms:
+    others = [effect for name, effect in accepted.items() if name not in state.names]
+    for term in state.terms if others else ():
         model = state.fit.model.without(term.name)
-        for effect in (effect for name, effect in accepted.items() if name not in state.names):
+        for effect in others:
             loose = problem_for(predictor, model)
             model = fit_with(loose, loose.fit(model), effect).model
         problem = problem_for(predictor, model, state.problem.pose_filter.noise)
         without = problem.fit(model)
-        again = fitted(problem, without, term.on, term.term, term.name, term.signal)
+        again = fitted(problem, without, term.on, term.term, term.name, term.signal, term.values)
         kept = again.paired_comparison.elpd_diff if again is not None else 0.0
         if kept < KEPT_TERM * term.paired_comparison.elpd_diff:
             terms = tuple(one for one in state.terms if one.name != term.name)

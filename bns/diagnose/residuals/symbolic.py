@@ -7,7 +7,7 @@ like any other, and offered with its held-out gain as a term that `bns add` take
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
@@ -148,10 +148,20 @@ def _disc(x: str, y: str, radius: str) -> str:
     return f"(1 / (1 + (({x}**2 + {y}**2) / {radius}**2)**8))"
 
 
-def fitted(problem: Problem, fit: Fit, on: str, term: str, name: str = NAME, signal: str = "") -> Formula | None:
-    """The model with a term whose numbers begin at 0, all numbers fitted; None where it cannot be calculated."""
-    effect = formula_effect(name, term, on)
-    model = _written(fit.model.with_active(effect, (0.0,) * len(effect.parameters)), term, on, name)
+def fitted(
+    problem: Problem,
+    fit: Fit,
+    on: str,
+    term: str,
+    name: str = NAME,
+    signal: str = "",
+    start: Mapping[str, float] | None = None,
+) -> Formula | None:
+    """The model with a term whose numbers begin at ``start`` (0), all numbers fitted; None where it cannot be calculated."""
+    effect, start = formula_effect(name, term, on), start or {}
+    model = _written(
+        fit.model.with_active(effect, tuple(start.get(p.name, 0.0) for p in effect.parameters)), term, on, name
+    )
     try:
         added = problem.fit(model)
     except ModelError:
