@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.data.cycles import CycleTracks
+from bns.diagnose.data.bodies.cycles import CycleTracks
 from bns.diagnose.data.load import load_measured
 from bns.diagnose.predict.cycle_networks import CyclePredictor
 from bns.diagnose.predict.horizons import errors_of

@@ -73,7 +73,7 @@ def upward(module: str, rooms: list[tuple[str, int]]) -> list[str]:
 
 
 DIAGNOSE_FLOORS = (
-    {"settings"},
+    {"settings", "parallel"},
     {"data"},
     {"predict"},
     {"estimate"},

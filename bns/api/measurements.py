@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from bns.api.common.shown import Shown, drawn
 from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.bodies.cycles import CycleTracks
 from bns.diagnose.data.checks import left_out_rows, own_rows, rows_by_trial, rows_of_losses
-from bns.diagnose.data.cycles import CycleTracks
 from bns.diagnose.data.load import Measured, load_measured, measured_table, table_sha256
 from bns.diagnose.data.mapping import checked_mapping, load_mapping
 from bns.diagnose.data.sources.read import read_table

@@ -20,11 +20,11 @@ from bns.api.model import Given, Model
 from bns.app.switches import Switches, Term
 from bns.diagnose.adding import Memory, does_nothing
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.clocks.trial_clock_test import steps_of
 from bns.diagnose.estimate.cross_validation import AS_GIVEN
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
-from bns.diagnose.estimate.trial_clock_test import steps_of
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import laid_paths
 from bns.diagnose.predict.paired_errors import PairedErrors, judged_windows, paired_errors

@@ -13,14 +13,14 @@ import numpy as np
 import yaml
 
 from bns.diagnose.data.load import Measured
+from bns.diagnose.estimate.clocks.trial_clock_test import steps_of, with_trial_clocks
 from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.fit_set import Tried, fit_set
-from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fitting
-from bns.diagnose.estimate.trial_clock_test import steps_of, with_trial_clocks
+from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
 from bns.errors import ModelError

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.clocks.trial_clock_test import steps_of
 from bns.diagnose.estimate.fit import Fit
-from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.trial_clock_test import steps_of
+from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import Errors
 from bns.diagnose.predict.paired_errors import PairedErrors, judged_windows, noise_json, paired_errors, plain

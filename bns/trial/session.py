@@ -29,6 +29,7 @@ from bns.robots.base import on_floor
 from bns.spec import RunSpec
 from bns.sweep.single_run import keep_run
 from bns.tasks import load_task
+from bns.trial.again.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
 from bns.trial.background import BackgroundDriver
 from bns.trial.driver import TrialDriver
 from bns.trial.evaluation import Evaluation
@@ -43,7 +44,6 @@ from bns.trial.folder import (
     stuck_before,
 )
 from bns.trial.operator import EmulatedHands, Operator, TerminalOperator, UnattendedOperator
-from bns.trial.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
 from bns.trial.report import TrialResult, report
 from bns.worlds.robot import RobotWorld
 

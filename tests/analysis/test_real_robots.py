@@ -12,9 +12,9 @@ from analysis.real_robots.cases import cases, diagnosed, measured, table_of, wit
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.clocks.trial_clock_test import fit_trial_clocks, steps_of
 from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.trial_clock_test import fit_trial_clocks, steps_of
 from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError

@@ -7,10 +7,10 @@ import pytest
 from bns.cli.main import main
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.clocks.trial_clock_test import every_other_block, fit_trial_clocks, with_trial_clocks
+from bns.diagnose.estimate.clocks.trial_clocks import eliminate_clocks, with_fitted_clocks
 from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.trial_clock_test import every_other_block, fit_trial_clocks, with_trial_clocks
-from bns.diagnose.estimate.trial_clocks import eliminate_clocks, with_fitted_clocks
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import ModelError
 from bns.measurements import write_measurements

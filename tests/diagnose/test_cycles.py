@@ -9,7 +9,7 @@ import pytest
 
 from bns.cli.main import main
 from bns.diagnose.comparison import compare
-from bns.diagnose.data.cycles import checked_cycles, cycle_tracks
+from bns.diagnose.data.bodies.cycles import checked_cycles, cycle_tracks
 from bns.diagnose.predict.cycle_networks import CyclePredictor
 from bns.diagnose.predict.horizons import errors_of
 from bns.engine.philox import Key

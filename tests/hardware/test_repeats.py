@@ -9,8 +9,8 @@ from bns.cli.main import main
 from bns.errors import TrialPausedError
 from bns.hardware.link.hardware_log import events
 from bns.robots import load_robot
+from bns.trial.again.repeats import drive_repeats, final_evaluation
 from bns.trial.folder import past_evaluations, past_repeats
-from bns.trial.repeats import drive_repeats, final_evaluation
 
 from . import soak
 

@@ -11,8 +11,8 @@ import pytest
 import bns
 from bns.api.common.prepared import prepared
 from bns.cli.main import main
-from bns.diagnose.data.cycles import checked_cycles, cycle_tracks
-from bns.diagnose.data.stretches import apart, poses_of, stretches_of_cycles
+from bns.diagnose.data.bodies.cycles import checked_cycles, cycle_tracks
+from bns.diagnose.data.bodies.stretches import apart, poses_of, stretches_of_cycles
 from bns.diagnose.design.competing_models import competing_models_of
 from bns.diagnose.design.power import PastTrials
 from bns.diagnose.design.repeats import RepeatPlanner

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
-from bns.diagnose.data.cycles import CycleTracks, marker_noise_m
-from bns.diagnose.data.joints import JointTracks, check_names
+from bns.diagnose.data.bodies.cycles import CycleTracks, marker_noise_m
+from bns.diagnose.data.bodies.joints import JointTracks, check_names
+from bns.diagnose.data.bodies.stretches import stretches_of_cycles, stretches_of_joints
 from bns.diagnose.data.load import Measured
-from bns.diagnose.data.stretches import stretches_of_cycles, stretches_of_joints
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.check_robot import check_named_robot, check_same_robot

@@ -10,8 +10,8 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool
 
 from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank, drawable
-from bns.diagnose.data.cycles import CycleTracks
-from bns.diagnose.data.joints import JointTracks
+from bns.diagnose.data.bodies.cycles import CycleTracks
+from bns.diagnose.data.bodies.joints import JointTracks
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.plotting.style import BLUE, OKABE_ITO, RED
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from bns.api.trial import driven, trial_setup, trial_spec
+from bns.trial.again.replay import replayed
 from bns.trial.experiment import drive_commands
-from bns.trial.replay import replayed
 from bns.trial.session import TrialSetup
 
 

@@ -13,9 +13,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.bodies.cycles import are_cycles, checked_cycles, cycle_tracks
+from bns.diagnose.data.bodies.joints import are_joints, joint_tracks
 from bns.diagnose.data.checks import Finding, checked
-from bns.diagnose.data.cycles import are_cycles, checked_cycles, cycle_tracks
-from bns.diagnose.data.joints import are_joints, joint_tracks
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.tracker_faults import jumps, without_faults

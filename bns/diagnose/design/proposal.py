@@ -27,8 +27,8 @@ from bns.diagnose.design.search import Pool
 from bns.diagnose.design.sequences import Arena, Bounds, Sequences
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.noise import huber
-from bns.diagnose.estimate.parallel import one_thread_each
 from bns.diagnose.estimate.significance import fewest_trials
+from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.stepwise import FALSE_ALARM
 from bns.diagnose.settings import DEFAULTS

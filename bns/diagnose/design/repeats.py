@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from bns.diagnose.data.stretches import StretchTracks
+from bns.diagnose.data.bodies.stretches import StretchTracks
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.design.competing_models import CompetingModel
 from bns.diagnose.design.discrimination import Discrimination, Pair, curvature_of, whitened_errors

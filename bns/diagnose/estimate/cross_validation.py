@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bns.diagnose.estimate.clocks.trial_clock_test import steps_of
 from bns.diagnose.estimate.fit import Problem
 from bns.diagnose.estimate.noise import Whitening
-from bns.diagnose.estimate.parallel import each
-from bns.diagnose.estimate.trial_clock_test import steps_of
+from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
 from bns.diagnose.settings import DEFAULTS

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.clocks.trial_clocks import ReducedJacobian, eliminate_clocks, with_initial_clocks
 from bns.diagnose.estimate.noise import Whitening, huber
 from bns.diagnose.estimate.normal_equations import (
     NormalEquations,
@@ -27,7 +28,6 @@ from bns.diagnose.estimate.normal_equations import (
 )
 from bns.diagnose.estimate.parameters import FreeParameter, active_mask, increment, moved_by
 from bns.diagnose.estimate.significance import PairedComparison, paired_elpd_diff, sign_flip_p
-from bns.diagnose.estimate.trial_clocks import ReducedJacobian, eliminate_clocks, with_initial_clocks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model

@@ -11,9 +11,9 @@ from functools import partial
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
-from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
+from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect

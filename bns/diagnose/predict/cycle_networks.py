@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.cycles import CycleTracks, marker_noise_m
+from bns.diagnose.data.bodies.cycles import CycleTracks, marker_noise_m
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.settings import DEFAULTS

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.stretches import StretchTracks, apart, poses_of
+from bns.diagnose.data.bodies.stretches import StretchTracks, apart, poses_of
 from bns.diagnose.data.tracks import Array
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from bns.diagnose.data.cycles import CycleTracks
+from bns.diagnose.data.bodies.cycles import CycleTracks
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.cycle_networks import CyclePredictor

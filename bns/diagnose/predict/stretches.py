@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.stretches import StretchTracks
+from bns.diagnose.data.bodies.stretches import StretchTracks
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.jointed.drives import Drive

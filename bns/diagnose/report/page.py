@@ -17,8 +17,8 @@ from markupsafe import Markup
 
 from bns.diagnose.adding import ExtendedModel, add_effects
 from bns.diagnose.comparison import Comparison, compare
+from bns.diagnose.data.bodies.stretches import StretchTracks
 from bns.diagnose.data.load import Measured
-from bns.diagnose.data.stretches import StretchTracks
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.base import Predictor

@@ -15,8 +15,8 @@ import numpy as np
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import weights
-from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison
+from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.along_variables import earned_by_columns, losses_with_columns
 from bns.diagnose.settings import DEFAULTS

@@ -17,8 +17,8 @@ from sklearn.linear_model import orthogonal_mp
 
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import weights
-from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.significance import PairedComparison
+from bns.diagnose.parallel import each
 from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import ModelError

@@ -15,8 +15,8 @@ import numpy as np
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import weights
-from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.plausibility import implausible
+from bns.diagnose.parallel import each
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect

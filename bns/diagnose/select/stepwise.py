@@ -11,13 +11,18 @@ from dataclasses import replace
 from functools import cache, partial
 
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.clocks.trial_clock_test import (
+    TrialClocks,
+    compare_clocks,
+    fit_trial_clocks,
+    with_shared_clock,
+)
 from bns.diagnose.estimate.fit import Fit, Problem
-from bns.diagnose.estimate.parallel import each
 from bns.diagnose.estimate.plausibility import at_bound, implausible
 from bns.diagnose.estimate.problem import problem_for, settled_problem
 from bns.diagnose.estimate.significance import MIN_Z
 from bns.diagnose.estimate.starts import best_start, fit_with, listed
-from bns.diagnose.estimate.trial_clock_test import TrialClocks, compare_clocks, fit_trial_clocks, with_shared_clock
+from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.estimate.clocks.trial_clocks import with_fitted_clocks
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import Whitening, huber
 from bns.diagnose.estimate.significance import PairedComparison, paired_elpd_diff, sign_flip_p
 from bns.diagnose.estimate.starts import fit_with
-from bns.diagnose.estimate.trial_clocks import with_fitted_clocks
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model

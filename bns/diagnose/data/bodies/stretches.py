@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.cycles import CycleTracks
-from bns.diagnose.data.joints import SET, JointTracks
+from bns.diagnose.data.bodies.cycles import CycleTracks
+from bns.diagnose.data.bodies.joints import SET, JointTracks
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError

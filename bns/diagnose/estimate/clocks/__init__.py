@@ -1,0 +1,1 @@
+"""Clocks of single trials: fitted beside the numbers that all trials share, and whether they are needed."""

@@ -1,0 +1,1 @@
+"""Drives once more: a journal replayed, a final controller repeated."""
