@@ -5,6 +5,7 @@ import json
 import pandas as pd
 import pytest
 
+import bns
 from bns.cli.main import main
 from bns.measurements import write_measurements
 from bns.physics.model import load_model
@@ -25,6 +26,15 @@ def test_compare_says_how_far_and_where(data, tmp_path, capsys):
     assert answer["error"]["command"]["position_m"] > answer["error"]["command"]["noise_floor_m"]
     assert len(answer["worst"]) == 5
     assert (tmp_path / "comparison.png").stat().st_size > 10_000
+
+
+def test_a_trial_takes_no_part(data, capsys):
+    left_out = ["--without", "3", "--without", "5"]
+    assert main(["compare", str(data), "--model", "khepera", "--json", *left_out]) == 0
+    fewer = bns.compare(bns.Measurements(data).without(["3", "5"]), "khepera").to_json()
+    assert json.loads(capsys.readouterr().out)["error"] == json.loads(json.dumps(fewer["error"]))
+    assert main(["compare", str(data), "--model", "khepera", "--without", "nobody"]) == 2
+    assert "There is no trial nobody; there are 0, 1," in capsys.readouterr().err
 
 
 def test_added_effects_lower_the_error_and_the_model_comes_back(data, tmp_path, capsys):

@@ -54,7 +54,10 @@ def add_commands(command: Adder) -> None:
     )
     more.add_argument("--term", metavar="FORMULA", help="a formula instead of a listed effect: 'k * v * abs(w)'")
     more.add_argument(
-        "--on", default="v", metavar="VELOCITY", help="what the formula is added to: v, w, s, east, north"
+        "--on",
+        default="v",
+        metavar="VELOCITY",
+        help="what the formula is added to: v, w, s, east, north, share, wheels, left, right (docs/formulas.md)",
     )
     more.add_argument(
         "--per-trial",
@@ -96,6 +99,13 @@ def add_model_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="further measurements, taken together with these",
+    )
+    parser.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="TRIAL",
+        help="a trial that takes no part, by its name in the data; may be repeated",
     )
 
 
@@ -235,7 +245,7 @@ def log_of(options: argparse.Namespace) -> Measurements:
     from bns.api.measurements import Measurements
     from bns.diagnose.report.text import findings_text
 
-    log = Measurements(options.data, *options.more, robot=options.robot)
+    log = Measurements(options.data, *options.more, robot=options.robot).without(options.without)
     findings = log.measured.findings
     if findings:
         most = len(findings) if getattr(options, "findings", False) else 5
