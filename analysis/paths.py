@@ -74,7 +74,7 @@ def _draw_task(store: Results, robot: str, task: str, runs: pd.DataFrame) -> Fig
             numbers.append(repeats.assign(run_id=run.run_id)[["run_id", "repeat", "step", *WORLD]])
         origin = f"{run.sweep},\n" if len(sweeps) > 1 else ""
         driven = len(path) - 1
-        cut = f",\nended in cycle {driven} of {run.commands}" if driven < run.commands else ""
+        cut = f",\nended in cycle {driven} of {int(run.commands)}" if driven < run.commands else ""
         reached = repeats.groupby("repeat").success.first().sum()
         again = f",\nall goals in {reached} of {len(drives)} drives" if drives else ""
         ax.set_title(f"{origin}seed {run.seed}, evaluation {run.evaluation}:\n{outcome(run.success)}{cut}{again}")

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 _SMALLEST_SLEEP_S = 0.002  # shorter ones cost more than they last, so they are saved up
-_LONGEST_ANSWER_S = 20.0  # an emulator that takes longer by the computer's clock is broken, however busy the computer is
+_LONGEST_ANSWER_S = 3.0  # an emulator that takes longer by the computer's clock will not answer
 
 
 class Clock(Protocol):

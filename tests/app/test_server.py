@@ -1,5 +1,6 @@
 """Who gets in: nobody but a browser on this machine that was given the address."""
 
+import asyncio
 import subprocess
 import sys
 import urllib.error
@@ -34,6 +35,28 @@ def test_the_page_is_served_on_loopback_under_a_token(page):
     assert page.address.startswith("http://127.0.0.1:")
     assert len(page.address.rstrip("/").rpartition("/")[2]) >= 20
     assert answer(page.address) == 200
+
+
+def test_a_notebook_whose_own_loop_runs_gets_a_page_of_its_own():
+    async def cell():
+        served = explore(browser=False)
+        try:
+            return await asyncio.to_thread(answer, served.address)
+        finally:
+            served.stop()
+
+    assert asyncio.run(cell()) == 200
+
+
+def test_a_notebook_that_is_busy_does_not_hold_up_the_page():
+    async def cell():
+        served = explore(browser=False)
+        try:
+            return answer(served.address)  # the notebook's loop waits for this line
+        finally:
+            served.stop()
+
+    assert asyncio.run(cell()) == 200
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import socket
 import threading
 import webbrowser
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any
 
@@ -32,9 +33,18 @@ class PageServer:
     def __init__(self, page: Callable[[], Any], port: int = 0) -> None:
         _check_free(port)
         self._loop = asyncio.new_event_loop()
-        asyncio.set_event_loop(self._loop)
         self.token = secrets.token_urlsafe(16)
-        self._server = get_server(
+        with ThreadPoolExecutor(1) as elsewhere:  # else a loop that runs already, a notebook's, is listened on
+            self._server = elsewhere.submit(self._made, page, port).result()
+        self.port = int(self._server.port)
+        http = self._server._http  # Bokeh has no public way to stand before its handlers
+        application: Any = http.request_callback
+        application.websocket_origins.update(f"{name}:{self.port}" for name in (LOOPBACK, "localhost"))
+        http.request_callback = Guard(application, self.port, self.token)
+
+    def _made(self, page: Callable[[], Any], port: int) -> Any:
+        asyncio.set_event_loop(self._loop)
+        return get_server(
             {"/": page},
             port=port,
             address=LOOPBACK,
@@ -44,11 +54,6 @@ class PageServer:
             websocket_max_message_size=LARGEST_UPLOAD,
             loop=IOLoop.current(),
         )
-        self.port = int(self._server.port)
-        http = self._server._http  # Bokeh has no public way to stand before its handlers
-        application: Any = http.request_callback
-        application.websocket_origins.update(f"{name}:{self.port}" for name in (LOOPBACK, "localhost"))
-        http.request_callback = Guard(application, self.port, self.token)
 
     @property
     def address(self) -> str:
