@@ -19,7 +19,7 @@ with extra("robot"):
 _BOUNDARY = b"frame"
 _QUALITY = 92
 _AGAIN_S = 0.1  # by the computer's clock
-_LONGEST_WAY_S = 20.0  # somebody who has not taken a frame by then has gone
+_LONGEST_WAY_S = 10.0  # somebody who has not taken a frame by then has gone
 
 
 class CameraEmulator:
@@ -34,6 +34,7 @@ class CameraEmulator:
         self._viewers = self._sent = self._taken = 0
         self._new, self._filming = threading.Condition(), threading.Lock()
         self._open = True
+        self._gone_at: int | None = None
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
         self._server.daemon_threads = True
         self.address = f"http://127.0.0.1:{self._server.server_address[1]}/stream.mjpg"
@@ -82,7 +83,9 @@ class CameraEmulator:
             self._jpeg, self._number = coded.tobytes(), self._number + 1
             self._new.notify_all()
         with self._clock.arrivals:
-            self._clock.arrivals.wait_for(self._seen, timeout=_LONGEST_WAY_S)
+            if self._gone_at != self._clock.arrived_count:  # whoever took none of the last frame is not waited for again
+                seen = self._clock.arrivals.wait_for(self._seen, timeout=_LONGEST_WAY_S)
+                self._gone_at = None if seen else self._clock.arrived_count
 
     def _seen(self) -> bool:
         return not self._viewers or (self._taken == self._number and self._clock.arrived_count >= self._sent)
