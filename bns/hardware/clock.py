@@ -15,7 +15,12 @@ _LONGEST_ANSWER_S = 3.0  # an emulator that takes longer by the computer's clock
 
 
 class Clock(Protocol):
-    """What drivers and trackers ask for the time."""
+    """What drivers and trackers ask for the time.
+
+    ``longest_write_s``: a port that takes no bytes for so long, by the computer's clock, is hung.
+    """
+
+    longest_write_s: float
 
     def now_s(self) -> float:
         """Seconds since some fixed instant."""
@@ -35,6 +40,8 @@ class Clock(Protocol):
 
 class RealClock:
     """The computer's steady clock."""
+
+    longest_write_s = 1.0
 
     def now_s(self) -> float:
         """Seconds of the steady clock."""
@@ -58,6 +65,8 @@ class RealClock:
 
 class EmulatedClock:
     """Time that passes only when somebody waits; `speed` seconds of it pass in one of the computer's (inf: at once)."""
+
+    longest_write_s = 20.0  # a busy computer is no lost link
 
     def __init__(self, speed: float = 1.0) -> None:
         self.speed = speed

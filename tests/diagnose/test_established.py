@@ -124,3 +124,13 @@ def test_beside_a_curve_no_effect_has_numbers_that_no_robot_has():
     found = stands(predictor, "understeer")
     assert found.names == ()
     assert (found.terms[0].signal, found.terms[0].on) == ("speed with turn", "w")
+
+
+def test_a_patch_of_floor_keeps_its_numbers_where_it_is_weighed_against_effects():
+    """Its formula cannot be calculated at 0, where other terms begin."""
+    patch = {"x_m": 0.1, "y_m": -0.05, "radius_m": 0.25, "loss": 0.5}
+    predictor = predictor_of(hidden(floor_patch=patch), trials=40, commands=8)
+    found = stands(predictor, "speed-gain")
+    assert found.names == ()
+    said = r"slower by (4|5)\d\.\d+% within 0\.2[3-7]\d* m of \(0\.[01]\d*, -0\.0\d*\) m"
+    assert re.match(said, in_words(found.terms[0], predictor))

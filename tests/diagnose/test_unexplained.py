@@ -10,6 +10,7 @@ from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.predict.wheels import RECENT_S, WheelPredictor
 from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence, probe_effect, significant_dependence
+from bns.diagnose.residuals.autocorrelation import Autocorrelation, _moves
 from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, outliers
 from bns.diagnose.residuals.unexplained import unexplained
 from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
@@ -113,6 +114,18 @@ def test_a_tracker_whose_errors_have_a_memory_has_no_rhythm(memory):
         off[k] = memory * off[k - 1] + fresh[k]
     x_m, y_m, heading_rad = (np.array([0.005, 0.005, 0.05]) * off).T
     assert largest(table.assign(x_m=table.x_m + x_m, y_m=table.y_m + y_m, heading_rad=table.heading_rad + heading_rad)) is None
+
+
+def test_opposed_ways_are_a_motion_where_no_errors_of_a_tracker_could_be_so_opposed():
+    rng, trials = np.random.default_rng(0), 40
+    opposed = Autocorrelation("heading", "within", 3, -0.2, -9.0)
+    swing = [np.cos(2 * np.pi * np.arange(200) / 6 + phase) for phase in rng.uniform(0, 6, trials)]
+    moves = [np.repeat((s + rng.standard_normal(200))[:, None], 3, axis=1) for s in swing]
+    assert _moves(moves, 2, opposed)
+    errors = np.zeros((trials, 201))  # the memory with which they are opposed most, three frames later
+    for k in range(1, 201):
+        errors[:, k] = 2 / 3 * errors[:, k - 1] + rng.standard_normal(trials)
+    assert not _moves([np.repeat(np.diff(e)[:, None], 3, axis=1) for e in errors], 2, opposed)
 
 
 def variables_of(left_m_s, command_s=0.4):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.errors import HardwareError, StopNotConfirmedError, TrialPausedError
-from bns.hardware.clock import RealClock
+from bns.hardware.clock import EmulatedClock, RealClock
 from bns.hardware.emulators.devices.khepera import KheperaEmulator
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Fault, Faults
@@ -179,3 +179,19 @@ def test_a_link_that_cannot_be_had_back_is_said_to_be_so(tmp_path):
         pass
     link.close()
     robot.close()
+
+
+class _Silent:
+    def receive(self, _data):
+        return b""
+
+    def written(self):
+        pass
+
+
+@pytest.mark.parametrize(("clock", "longest_s"), [(RealClock(), 1.0), (EmulatedClock(np.inf), 20.0)])
+def test_a_robot_s_port_that_takes_nothing_is_given_up_soon_and_a_busy_computer_s_is_not(tmp_path, clock, longest_s):
+    with PseudoTerminal(_Silent(), tmp_path, "port") as line:
+        link = SerialLink(str(line.path), 115200, clock, HardwareLog(None, None))
+        assert link._serial.write_timeout == longest_s
+        link.close()

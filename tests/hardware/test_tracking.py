@@ -249,3 +249,19 @@ def test_a_camera_that_is_not_there(tmp_path, clock):
     settings = {"kind": "aruco", "camera": str(tmp_path / "none"), "calibration": str(tmp_path / "c.json")}
     with pytest.raises(HardwareError, match=r"camera .*none cannot be opened"):
         open_tracker(settings | {"side_m": 0.09, "height_m": 0.06}, clock)
+
+
+def test_a_viewer_that_takes_no_frames_is_waited_for_once(scene, monkeypatch):
+    monkeypatch.setattr("bns.hardware.emulators.camera._LONGEST_WAY_S", 0.05)
+    clock, waits = EmulatedClock(np.inf), []
+    with CameraEmulator(lambda: scene.frame([]), clock, rate_hz=10) as camera:
+        camera._watched(1)  # it looks on and takes nothing
+        wait_for = clock.arrivals.wait_for
+        monkeypatch.setattr(clock.arrivals, "wait_for", lambda *a, **k: waits.append(wait_for(*a, **k)))
+        for _ in range(3):
+            camera.film()
+        assert len(waits) == 1
+        clock.arrived()  # somebody took one: frames are waited for again
+        camera.film()
+        assert len(waits) == 2
+        camera._watched(-1)

@@ -23,7 +23,7 @@ class Planner(Protocol):
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
-        """Which models are held against each other."""
+        """Which models are compared with each other."""
 
     def best(
         self, rng: np.random.Generator, models: Sequence[CompetingModel], seconds: float, past: Mapping[Pair, PastTrials]

@@ -14,12 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bns.diagnose.data.tracking_noise import robust_sd
-from bns.diagnose.data.tracks import Array
+from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements
@@ -57,11 +59,11 @@ class Autocorrelation:
 
 def autocorrelations(problem: Problem, fit: Fit) -> list[Autocorrelation]:
     """Every direction and time scale, the largest in proportion to its threshold first."""
-    found, moved = [], _unforeseen_ways(problem, fit)
+    found, moved = [], cache(lambda: _unforeseen_ways(problem, fit))
     for index, direction in enumerate(_DIRECTIONS):
         trials = list(_by_command(problem, fit, index))
         within = [_pooled(direction, "within", lag, [_within(commands, lag) for commands in trials]) for lag in LAGS]
-        found += [r for r in within if not r.significant or _moves(moved, index, r)]
+        found += [r for r in within if not r.significant or _moves(moved(), index, r)]
         found.append(_pooled(direction, "between", 1, [_between(commands) for commands in trials]))
     return sorted(found, key=lambda r: (not r.significant, -abs(r.z)))
 
@@ -79,8 +81,7 @@ def _unforeseen_ways(problem: Problem, fit: Fit) -> list[Array]:
     out = []
     for trial, (a, b) in enumerate(pairwise(tracks.first)):
         ways = np.clip(off[a + 1 : b] / usual, -_CLIP, _CLIP)
-        command = np.searchsorted(np.cumsum(tracks.duration_s[trial]), tracks.t_s[a + 1 : b] - 1e-9)
-        _, of, count = np.unique(command, return_inverse=True, return_counts=True)
+        _, of, count = np.unique(_command(tracks, trial), return_inverse=True, return_counts=True)
         means = np.stack([np.bincount(of, ways[:, i]) / count for i in range(3)], axis=1) if len(ways) else ways
         out.append(ways - means[of])
     return out
@@ -106,8 +107,14 @@ def _by_command(problem: Problem, fit: Fit, direction: int) -> Iterator[list[Arr
     tracks = problem.predictor.tracks
     for trial, (a, b) in enumerate(pairwise(tracks.first)):
         whitened = np.clip(fit.whitened[a + 1 : b, direction], -_CLIP, _CLIP)
-        command = np.searchsorted(np.cumsum(tracks.duration_s[trial]), tracks.t_s[a + 1 : b] - 1e-9)
+        command = _command(tracks, trial)
         yield [whitened[command == c] for c in np.unique(command)]
+
+
+def _command(tracks: Tracks, trial: int) -> NDArray[np.int64]:
+    """Number of the command in force in each frame of a trial but its first."""
+    frames = slice(tracks.first[trial] + 1, tracks.first[trial + 1])
+    return np.searchsorted(np.cumsum(tracks.duration_s[trial]), tracks.t_s[frames] - 1e-9)
 
 
 def _within(commands: list[Array], lag: int) -> tuple[float, float]:

@@ -19,7 +19,7 @@ with extra("robot"):
 _BOUNDARY = b"frame"
 _QUALITY = 92
 _AGAIN_S = 0.1  # by the computer's clock
-_LONGEST_WAY_S = 10.0  # somebody who has not taken a frame by then has gone
+_LONGEST_WAY_S = 10.0  # a viewer that has not taken a frame by then is gone
 
 
 class CameraEmulator:
@@ -83,7 +83,7 @@ class CameraEmulator:
             self._jpeg, self._number = coded.tobytes(), self._number + 1
             self._new.notify_all()
         with self._clock.arrivals:
-            if self._gone_at != self._clock.arrived_count:  # whoever took none of the last frame is not waited for again
+            if self._gone_at != self._clock.arrived_count:  # a viewer that is gone is not waited for again
                 seen = self._clock.arrivals.wait_for(self._seen, timeout=_LONGEST_WAY_S)
                 self._gone_at = None if seen else self._clock.arrived_count
 

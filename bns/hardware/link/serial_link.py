@@ -20,8 +20,6 @@ with extra("robot"):
     from serial.tools.list_ports import comports
 
 _LONGEST_LINE = 256
-_WRITE_S = 20.0
-"""For hangs alone: a frame fits into the port's buffer, and the waits for its answer say sooner that nobody hears it."""
 _OWED_S = 3.0
 """An answer that has not come after so long was lost."""
 
@@ -44,7 +42,7 @@ class SerialLink:
         self._owed: list[tuple[float, bytes]] = []
         """When questions were asked whose answers have not come and may still do so."""
         self._serial: serial.Serial | None = None
-        self._serial = open_port(port, baud)
+        self._serial = open_port(port, baud, clock)
 
     def exchange(self, request: bytes, timeout_s: float, again: bool = False) -> bytes:
         """Send `request`, return the line that answers without its end; NoReplyError if none does within `timeout_s`.
@@ -56,7 +54,7 @@ class SerialLink:
         self._owed = [(asked_s, what) for asked_s, what in self._owed if began_s - asked_s < _OWED_S]
         try:
             if self._serial is None:
-                self._serial, self._owed = open_port(self.port, self._baud), []
+                self._serial, self._owed = open_port(self.port, self._baud, self._clock), []
             if not again:
                 self.forget()
             self._journal.note("sent", data=request.decode("latin-1"))
@@ -118,12 +116,12 @@ class SerialLink:
             port.close()
 
 
-def open_port(port: str, baud: int) -> serial.Serial:
+def open_port(port: str, baud: int, clock: Clock) -> serial.Serial:
     """An open port; HardwareError says why there is none and what to try."""
     if not Path(port).exists():
         raise HardwareError(no_port(port))
     try:
-        return serial.Serial(port, baud, timeout=GRANULARITY_S, write_timeout=_WRITE_S, exclusive=True)
+        return serial.Serial(port, baud, timeout=GRANULARITY_S, write_timeout=clock.longest_write_s, exclusive=True)
     except serial.SerialException as error:
         raise HardwareError(why_not_opened(port, error)) from error
 

@@ -70,7 +70,7 @@ class BridgeChain:
 
     def _open(self) -> None:
         """Open the port, and say nothing until the board has said hello or cannot be starting any more (see `STARTED_S`)."""
-        self._serial = open_port(self._port, BAUD)
+        self._serial = open_port(self._port, BAUD, self._clock)
         data, answer, began_s = b"", None, self._clock.now_s()
         while (answer is None or answer.kind != HELLO | ANSWER) and self._clock.now_s() - began_s < STARTED_S:
             self._clock.sleep(_LISTEN_S)

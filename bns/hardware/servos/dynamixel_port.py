@@ -34,7 +34,7 @@ class ClockedPort(PortHandler):
         """
         if self.is_open:
             self.closePort()
-        self.ser = open_port(self.port_name, cflag_baud)
+        self.ser = open_port(self.port_name, cflag_baud, self._clock)
         self.ser.timeout = _SLICE_S
         self.is_open = True
         self.tx_time_per_byte = 1000.0 * _BITS_A_BYTE / cflag_baud
