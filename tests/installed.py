@@ -8,6 +8,9 @@ import zipfile
 from pathlib import Path
 
 from filelock import FileLock
+from numba.core.caching import _CacheLocator
+
+from bns.engine.jit import cache_folder
 
 ROOT = Path(__file__).resolve().parent.parent
 PARTS = ("bns", "analysis", "sweeps", "docs", "site_pages", "tests")
@@ -36,7 +39,29 @@ def installed(temporary: Path) -> Path:
             with zipfile.ZipFile(wheel) as file:
                 file.extractall(part)
             part.rename(folder)
+            _take_over_kernels(folder)
     return folder
+
+
+def _take_over_kernels(folder: Path) -> None:
+    """Kernels that the checkout has compiled, of the same text, serve the installed package: compiling them is tested elsewhere.
+
+    Numba keeps them in a folder named after that of the source, and takes those of a file with the same date and size.
+    """
+    old, new = ROOT / "bns", folder / "bns"
+    theirs = new / "__pycache__" / cache_folder().name
+    for source in new.rglob("*.py"):
+        original = old / source.relative_to(new)
+        if not original.exists():  # what is shipped beside the package has no kernels
+            continue
+        date = original.stat()
+        os.utime(source, ns=(date.st_atime_ns, date.st_mtime_ns))
+        compiled, subpath = (cache_folder() / _CacheLocator.get_suitable_cache_subpath(str(f)) for f in (original, source))
+        if compiled.is_dir() and not (theirs / subpath.name).is_dir():
+            for kind in ("nbc", "nbi"):  # the index last: it names the others
+                for file in compiled.glob(f"*.{kind}"):
+                    (theirs / subpath.name).mkdir(parents=True, exist_ok=True)
+                    shutil.copy(file, theirs / subpath.name)
 
 
 def wheel_in(folder: Path) -> Path:

@@ -14,6 +14,7 @@ import yaml
 from bns.cli.main import _parser, main
 from tests.conftest import remembering
 from tests.installed import ROOT, installed, shared_by_workers, without_us
+from tests.typist import Typist
 
 pytestmark = pytest.mark.timeout(1200)  # a page is many commands, and the first of each kind compiles
 DOCS = ROOT / "docs"
@@ -26,8 +27,8 @@ FILES = {"python", "yaml"}
 class Walk:
     """A person in an empty folder with an installed bns, who types what pages say."""
 
-    def __init__(self, folder, package):
-        self.folder, self.package, self.said = folder, package, {}
+    def __init__(self, folder, package, typist):
+        self.folder, self.package, self.typist, self.said = folder, package, typist, {}
 
     def follow(self, page):
         """Write the files and type the commands of a page of docs/, in its order; a command that was typed before is skipped."""
@@ -54,19 +55,17 @@ class Walk:
 
     def output(self, words):
         """What a command prints; it must end with 0."""
-        start = {"bns": [sys.executable, "-m", "bns"], "python": [sys.executable]}[words[0]]
-        done = subprocess.run(
-            [*start, *words[1:]],
-            cwd=self.folder,
-            env=without_us(self.package) | remembering(),
-            capture_output=True,
-            text=True,
-            timeout=600,
-            check=False,
-        )
-        assert done.returncode == 0, f"{shlex.join(words)}\n{done.stdout}\n{done.stderr}"
-        assert "Traceback" not in done.stderr
-        return done.stdout
+        if words[0] == "bns":
+            code, out, err = self.typist.type(words[1:], self.folder)
+        else:
+            done = subprocess.run(
+                [{"python": sys.executable}[words[0]], *words[1:]],
+                cwd=self.folder, env=without_us(self.package), capture_output=True, text=True, timeout=600, check=False,
+            )  # fmt: skip
+            code, out, err = done.returncode, done.stdout, done.stderr
+        assert code == 0, f"{shlex.join(words)}\n{out}\n{err}"
+        assert "Traceback" not in err
+        return out
 
 
 @pytest.fixture(scope="module")
@@ -74,9 +73,16 @@ def package(tmp_path_factory):
     return installed(shared_by_workers(tmp_path_factory))
 
 
+@pytest.fixture(scope="module")
+def typist(package):
+    one = Typist(without_us(package) | remembering())
+    yield one
+    one.close()
+
+
 @pytest.fixture
-def walk(tmp_path, package):
-    return Walk(tmp_path, package)
+def walk(tmp_path, package, typist):
+    return Walk(tmp_path, package, typist)
 
 
 @pytest.fixture
@@ -92,6 +98,10 @@ def small_walk(walk):
 def shown(page):
     """What a page shows of an answer: its blocks of text."""
     return [text for _, kind, text in BLOCK.findall((DOCS / page).read_text()) if kind == "text"]
+
+
+def test_commands_are_those_of_the_installed_package(typist, package):
+    assert typist.package == package / "bns"
 
 
 def test_a_newcomer_names_the_effect(walk):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -94,9 +94,9 @@ def formula_effect(
     """
     if on not in ON:
         raise ModelError(f"formula {name}: " + unknown_name("velocity to add to (on)", on, ON))
-    names, code = _parsed(name, term)
+    code = _parsed(name, term)
     known = set(VARIABLES) | (set(OF_A_WHEEL) if on in WHICH_WHEELS else set())
-    logged, unknown = _sorted(name, names - known, set(columns), None if numbers is None else set(numbers))
+    logged, unknown = _sorted(name, code.names - known, set(columns), None if numbers is None else set(numbers))
     if not unknown:
         raise ModelError(f"formula {name}: {term!r} has no number to fit; multiply it by one, as in k * ({term}).")
     return Effect(
@@ -111,13 +111,13 @@ def formula_effect(
         lookalikes=(),
         apply=partial(_apply, name, code, on, logged),
         after=FORMULAS,
-        needs_place=bool(names & _PLACE) or on in {"east", "north"},
+        needs_place=bool(code.names & _PLACE) or on in {"east", "north"},
     )
 
 
 def value_of(term: str, names: Mapping[str, Any]) -> Array:
     """The value of a term for given numbers and arrays, one for each of its names; ModelError if it is no formula."""
-    _, code = _parsed("term", term)
+    code = _parsed("term", term)
     with np.errstate(all="ignore"):
         value = eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **names})  # checked by _parsed
     return np.asarray(value, dtype=np.float64)
@@ -142,21 +142,24 @@ def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | N
 
 
 class Compiled:
-    """A checked term, ready to be calculated; pickled as its text."""
+    """A checked term, ready to be calculated, and the names in it; pickled as its text."""
 
     def __init__(self, name: str, term: str) -> None:
         self._made_of = name, term
-        self.code = compile(checked_formula(f"formula {name}", term, FUNCTIONS), name, "eval")
+        tree = checked_formula(f"formula {name}", term, FUNCTIONS)
+        called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+        self.names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - called
+        self.code = compile(tree, name, "eval")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Compiled, self._made_of
 
 
-def _parsed(name: str, term: str) -> tuple[set[str], Compiled]:
-    tree = checked_formula(f"formula {name}", term, FUNCTIONS)
-    called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
-    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - called
-    return names, Compiled(name, term)
+def _parsed(name: str, term: str) -> Compiled:
+    return _remembered(name, term) if isinstance(term, str) else Compiled(name, term)  # a model file may hold anything
+
+
+_remembered = lru_cache(maxsize=4096)(Compiled)  # a search asks for the same few hundred terms again and again
 
 
 def _apply(name: str, code: Compiled, on: str, logged: list[str], body: Body, **numbers: float) -> Body:

@@ -131,6 +131,8 @@ class Board:
 class BoardClock:
     """The board's time, for the driver; the board runs while the driver waits."""
 
+    longest_write_s = 20.0
+
     def __init__(self, board):
         self._board = board
 

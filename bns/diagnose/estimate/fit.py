@@ -255,10 +255,27 @@ class Problem:
         new = [j for j in new if np.abs(added.jacobian[..., j]).max() > 0]
         if not new or elpd_diff <= 0:
             return PairedComparison(elpd_diff, dse, 1.0)
-        joint = np.concatenate([base.jacobian, added.jacobian[..., new]], axis=2)
+        columns = added.jacobian[..., new] if self.predictor.luck is None else self._chords(base, added, new)
+        joint = np.concatenate([base.jacobian, columns], axis=2)
         return PairedComparison(
             elpd_diff, dse, chance(self.normal_equations(joint, base.whitened), base.jacobian.shape[2])
         )
+
+    def _chords(self, base: Fit, added: Fit, new: Sequence[int]) -> Array:
+        """Change of the whitened innovations for each new number on its whole way from neutral, (frames, 3, numbers).
+
+        A body's response may be far from straight: where a silent joint bends no further its slope is 0, and its way is long.
+        """
+        out = []
+        for j in new:
+            number = added.free[j]
+            changed = added.values[j] - number.parameter.neutral
+            if abs(changed) < increment(number, added.values[j]) or not np.isfinite(changed):
+                out.append(added.jacobian[..., j])
+                continue
+            lacking = self.whitened(moved_by(added.model, added.free, -changed * np.eye(len(added.free))[j]))
+            out.append((added.whitened - lacking) / changed)
+        return np.stack(out, axis=2)
 
     def _jacobian(
         self, at: _Point, free: Sequence[FreeParameter], nearby: Mapping[FreeParameter, Array] | None = None
