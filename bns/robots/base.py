@@ -159,6 +159,8 @@ class Fitness(Protocol):
     """How well a controller does at a task."""
 
     radii_m: tuple[float, ...]
+    """At which success is recorded, the one that fitness counts first. A robot that heeds ``Task.radius_m`` and any
+    ``region_m`` when it scores says so by ``narrows_goals = True`` (`bns.approaches.bns` asks)."""
 
     def score(
         self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from types import ModuleType
@@ -33,6 +33,18 @@ class Task:
     goals_m: np.ndarray
     region_m: float = 0.0
     surface_m: tuple[float, float] = UNBOUNDED
+    radius_m: float | None = None
+    """How near a point must be passed in evolution; None: as near as the robot says. Success on the robot is not judged by it."""
+
+    def narrower(self, margin_m: float, radius_m: float) -> Task:
+        """The task with goals that are smaller all around; ``radius_m`` is that of its points. SpecError if nothing is left."""
+        left = (self.region_m / 2 if self.region_m else radius_m) - margin_m
+        if left <= 0:
+            raise SpecError(
+                f"task {self.name}: a margin of {margin_m:g} m leaves nothing of goals that reach {left + margin_m:g} m; "
+                f"take less than {left + margin_m:g}."
+            )
+        return replace(self, region_m=2 * left) if self.region_m else replace(self, radius_m=left)
 
 
 class _Tasks(Registry):

@@ -10,6 +10,7 @@ from bns.approaches.parts.base import Setting
 from bns.approaches.parts.evolving import Evolving
 from bns.bootstrap.simulators import NetworkSimulator
 from bns.bootstrap.trainer import Trainer
+from bns.tasks import Task
 
 
 class NeuroSimulation(Evolving):
@@ -41,7 +42,11 @@ class NeuroSimulation(Evolving):
         """The training networks over the evolution networks."""
         with self.timed("evolution_cpu_s"):
             self.weights = self.trainer.evolution_weights()
-            self.simulator = NetworkSimulator(self.setting.robot, self.setting.task, self.weights)
+            self.simulator = NetworkSimulator(self.setting.robot, self.goals(), self.weights)
+
+    def goals(self) -> Task:
+        """The task that evolution is asked to do."""
+        return self.setting.task
 
     def measures(self) -> dict[str, Any]:
         """With the errors of the networks, and how much they learn from."""

@@ -58,6 +58,7 @@ class Khepera:
     simulators = "bns.robots"
     two_wheeled = True
     marks_unstable = False
+    narrows_goals = True
 
     def __init__(self, switched_on: tuple[str, ...] = ()) -> None:
         self.switched_on, self._options = switched_on, Options(switched_on)
@@ -164,14 +165,17 @@ class Khepera:
     ) -> Scores:
         """Fitness on simulator networks (algorithm 2), without noise."""
         known = None if parents is None else parents.outputs
-        fitness, reached, failures, outputs = roll_out(population, weights, task.goals_m, known, self._penalty_m)
+        fitness, reached, failures, outputs = roll_out(
+            population, weights, task.goals_m, known, self._penalty_m, task.radius_m or GOAL_RADIUS_M
+        )
         return Scores(fitness, reached, failures, outputs=outputs)
 
     def walk(
         self, population: Population, displacements: np.ndarray, task: Task, stream: RandomStream | None = None
     ) -> Scores:
         """As `score`, from displacements (commands, 3)."""
-        return Scores(*walked(population, self.targets(displacements), task.goals_m, self._penalty_m))
+        radius_m = task.radius_m or GOAL_RADIUS_M
+        return Scores(*walked(population, self.targets(displacements), task.goals_m, self._penalty_m, radius_m))
 
     def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
         """Fitness per metre, and goals reached, of one path; 0 where `score` would call the arithmetic failed."""

@@ -12,16 +12,17 @@ from bns.engine.jit import copy_items, exact, fast
 from bns.engine.snn import INPUTS, predict_into
 from bns.robots.khepera.rules import (
     CENTRE,
+    GOAL_RADIUS_M,
     LARGEST_HEADING_RAD,
     MISSED_GOAL_M,
     PER_UNIT,
     SCALE,
-    SQUARED_REACH_M2,
     START,
     aim_of,
     at_rest,
     fitness_of,
     squared_distance,
+    squared_reach_m2,
     step_of,
     unbranched_sine,
 )
@@ -121,7 +122,7 @@ def _steps(outputs, scale, sine, cosine):  # type: ignore[no-untyped-def]  # com
 
 
 @exact
-def _distances(step_x, step_y, starts, lengths, goals, reached, distance):  # type: ignore[no-untyped-def]  # compiled
+def _distances(step_x, step_y, starts, lengths, goals, squared_reach, reached, distance):  # type: ignore[no-untyped-def]  # compiled
     """Distance to the goal after every command, and how many goals each controller reaches: `aimed` along many paths.
 
     The goal's place is kept and a goal reached is a branch, hardly ever taken: one place chosen out of several after every
@@ -134,7 +135,7 @@ def _distances(step_x, step_y, starts, lengths, goals, reached, distance):  # ty
             x += step_x[c]
             y += step_y[c]
             squared = squared_distance(x, y, aim_x, aim_y)
-            if squared <= SQUARED_REACH_M2 and goal < goals.shape[0]:
+            if squared <= squared_reach and goal < goals.shape[0]:
                 goal += 1
                 aim_x, aim_y = aim_of(goal, goals)
                 squared = squared_distance(x, y, aim_x, aim_y)
@@ -145,7 +146,7 @@ def _distances(step_x, step_y, starts, lengths, goals, reached, distance):  # ty
 
 
 @exact
-def _walk(outputs, lengths, scale, goals, extra_m, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+def _walk(outputs, lengths, scale, goals, squared_reach, extra_m, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
     """Algorithm 2 for every controller; how many could not be computed. extra_m: by how much the penalty is another one."""
     count, starts = outputs.shape[1], np.cumsum(lengths) - lengths
     heading, step_y, step_x = np.empty(count), np.empty(count), np.empty(count)
@@ -153,7 +154,7 @@ def _walk(outputs, lengths, scale, goals, extra_m, fitness, reached):  # type: i
     _headings(outputs[2], starts, lengths, scale[2], heading, astray)
     _directions(heading, step_y, step_x)
     _steps(outputs, scale, step_y, step_x)
-    _distances(step_x, step_y, starts, lengths, goals, reached, heading)
+    _distances(step_x, step_y, starts, lengths, goals, squared_reach, reached, heading)
     failures = 0
     for i in range(lengths.size):
         total = astray[i]
@@ -185,9 +186,11 @@ def _outputs(commands, lengths, origin, known, weights, centre, per_unit):  # ty
 
 
 @exact
-def _rolled_out(commands, lengths, origin, known, weights, centre, per_unit, scale, goals, extra_m, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+def _rolled_out(  # type: ignore[no-untyped-def]  # compiled
+    commands, lengths, origin, known, weights, centre, per_unit, scale, goals, squared_reach, extra_m, fitness, reached
+):
     outputs = _outputs(commands, lengths, origin, known, weights, centre, per_unit)
-    return outputs, _walk(outputs, lengths, scale, goals, extra_m, fitness, reached)
+    return outputs, _walk(outputs, lengths, scale, goals, squared_reach, extra_m, fitness, reached)
 
 
 class Rollout(NamedTuple):
@@ -206,8 +209,9 @@ def roll_out(
     goals_m: np.ndarray,
     known: np.ndarray | None,
     penalty_m: float = MISSED_GOAL_M,
+    radius_m: float = GOAL_RADIUS_M,
 ) -> Rollout:
-    """Algorithm 2 on networks (3, W), with ``penalty_m`` for every goal missed.
+    """Algorithm 2 on networks (3, W), with ``penalty_m`` for every goal missed, passed within ``radius_m``.
 
     known (3, commands): what the same networks said of all commands of the generation that this one was bred from. An output
     does not depend on where in a batch its command stands, so taking it over and computing it anew give the same number.
@@ -223,6 +227,7 @@ def roll_out(
         PER_UNIT,
         SCALE,
         goals_m,
+        squared_reach_m2(radius_m),
         penalty_m - MISSED_GOAL_M,
         fitness,
         reached,
@@ -231,12 +236,13 @@ def roll_out(
 
 
 def walked(
-    population: Population, outputs: np.ndarray, goals_m: np.ndarray, penalty_m: float = MISSED_GOAL_M
+    population: Population, outputs: np.ndarray, goals_m: np.ndarray, penalty_m: float = MISSED_GOAL_M,
+    radius_m: float = GOAL_RADIUS_M,
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Algorithm 2 on outputs (3, commands) that are known: fitness (n,), goals reached (n,), how many failed."""
     fitness, reached = np.empty(len(population)), np.empty(len(population), np.int32)
-    extra_m = penalty_m - MISSED_GOAL_M
-    failures = _walk(np.ascontiguousarray(outputs), population.lengths, SCALE, goals_m, extra_m, fitness, reached)
+    reach, extra_m = squared_reach_m2(radius_m), penalty_m - MISSED_GOAL_M
+    failures = _walk(np.ascontiguousarray(outputs), population.lengths, SCALE, goals_m, reach, extra_m, fitness, reached)
     return fitness, reached, int(failures)
 
 

@@ -9,10 +9,17 @@ import numpy as np
 from bns.engine.jit import inline
 
 GOAL_RADIUS_M = 0.07
-SQUARED_REACH_M2 = math.nextafter(GOAL_RADIUS_M**2, 0.0)
-while math.sqrt(math.nextafter(SQUARED_REACH_M2, 1.0)) <= GOAL_RADIUS_M:
-    SQUARED_REACH_M2 = math.nextafter(SQUARED_REACH_M2, 1.0)
-"""The largest number whose root is not above GOAL_RADIUS_M: to compare squares with it is to compare distances, bit for bit."""
+
+
+def squared_reach_m2(radius_m: float) -> float:
+    """The largest number whose root is not above a radius: to compare squares with it is to compare distances, bit for bit."""
+    square = math.nextafter(radius_m**2, 0.0)
+    while math.sqrt(math.nextafter(square, 1.0)) <= radius_m:
+        square = math.nextafter(square, 1.0)
+    return square
+
+
+SQUARED_REACH_M2 = squared_reach_m2(GOAL_RADIUS_M)
 MISSED_GOAL_M = 10.0
 """Penalty for a goal not reached, in metres of distance: more than any path on the surface adds up to, so that one goal
 more always outweighs a shorter path. The dissertation says "a large constant"."""

@@ -45,6 +45,7 @@ class Snake:
     simulators = "bns.robots"
     two_wheeled = False
     marks_unstable = True
+    narrows_goals = True
     networks = ("dx_yellow", "dy_yellow", "dx_green", "dy_green", "stable")
     hidden = 100
     input_count = 4
