@@ -14,7 +14,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test lint dist docs sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants replication
+.PHONY: help setup test test-slow lint dist docs sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants replication
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -30,8 +30,11 @@ $(STAMP): pyproject.toml setup.py constraints.txt
 	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[all,docs,test,lint,bench]'
 	@touch $@
 
-test: setup ## all tests
-	$(BIN)/python -m pytest -n 2 --dist worksteal -q
+test: setup ## the tests, all but the slow ones
+	$(BIN)/python -m pytest -n 2 --dist worksteal -q -m "not slow"
+
+test-slow: setup ## the tests that go end to end or over many cases; with make test these are all
+	$(BIN)/python -m pytest -n 2 --dist worksteal -q -m slow
 
 lint: setup ## style and types
 	$(BIN)/ruff check .

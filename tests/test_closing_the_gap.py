@@ -11,6 +11,8 @@ import yaml
 from analysis.transfer.__main__ import main as transfer
 from bns.cli.main import main as bns
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "closing-the-gap.md").read_text()
 COMMANDS = re.findall(r"^.+$", "\n".join(re.findall(r"```sh\n(.*?)```", PAGE, flags=re.S)), flags=re.M)

@@ -198,6 +198,7 @@ def test_the_commands_of_the_example_are_understood(tmp_path):
         assert isinstance(_parser().parse_args(words[1:]), Namespace)
 
 
+@pytest.mark.slow
 def test_the_script_of_the_example_finds_what_is_hidden(tmp_path):
     assert main(["example", str(tmp_path)]) == 0
     done = subprocess.run(

@@ -12,7 +12,7 @@ from tests.digests_kept import QUICK, kept
 
 FILE = Path(__file__).with_name("digests-quick.json")
 EVALS = "sweep quick-khepera: evals"
-pytestmark = pytest.mark.timeout(900)  # where the kernels must be compiled and the machine has much to do
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # where the kernels must be compiled and the machine has much to do
 
 
 @pytest.fixture(scope="module")

@@ -46,6 +46,7 @@ def carried_out(code):
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=200, check=False)
 
 
+@pytest.mark.slow
 def test_every_module_is_imported_where_nothing_of_posix_is_there():
     done = carried_out(IMPORT_ALL.format(blocked=POSIX))
     assert done.returncode == 0, done.stderr

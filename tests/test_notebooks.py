@@ -6,6 +6,8 @@ import pytest
 
 from bns.examples import FILES, FOLDER, copy_example
 
+pytestmark = pytest.mark.slow
+
 NOTEBOOKS = [name for name in FILES if name.endswith(".ipynb")]
 
 

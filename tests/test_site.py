@@ -59,6 +59,7 @@ def site(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_no_page_asks_another_host_for_anything(site):
     pages = list(site.rglob("*.html"))
     assert len(pages) > 60
@@ -71,6 +72,7 @@ def test_no_page_asks_another_host_for_anything(site):
         assert not re.findall(r"(?:url\(|@import )[\"']?(?:https?:)?//", sheet.read_text()), sheet
 
 
+@pytest.mark.slow
 def test_every_effect_has_a_page_with_its_picture(site):
     overview = (site / "gallery" / "effects.html").read_text()
     for name, effect in all_effects().items():
@@ -91,6 +93,7 @@ def test_effects_of_joints_are_listed_with_no_blank_left():
     assert "{" not in text
 
 
+@pytest.mark.slow
 def test_every_public_name_has_its_docstring_on_the_page(site):
     page = (site / "reference" / "python.html").read_text()
     for name in bns.__all__:

@@ -16,7 +16,7 @@ from tests.conftest import remembering
 from tests.installed import ROOT, installed, shared_by_workers, without_us
 from tests.typist import Typist
 
-pytestmark = pytest.mark.timeout(1200)  # a page is many commands, and the first of each kind compiles
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]  # a page is many commands, and the first of each kind compiles
 DOCS = ROOT / "docs"
 BLOCK = re.compile(r"^([ ]*)```(\w+)\n(.*?)^\1```$", flags=re.S | re.M)
 SET_UP = ("pip ", "python -m venv", ". ")

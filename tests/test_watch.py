@@ -16,6 +16,8 @@ from bns.errors import BnsError
 from bns.spec import RunSpec
 from bns.store import Writer
 
+pytestmark = pytest.mark.slow
+
 
 def add_runs(results: Path, seed: int) -> None:
     with Writer(results, "grid") as writer:

@@ -44,6 +44,7 @@ STORES = {
 
 
 @pytest.mark.parametrize("kind", STORES)
+@pytest.mark.slow
 def test_the_command_draws_or_explains_every_figure(tmp_path, kind, capsys):
     STORES[kind](tmp_path / "results")
     assert main(["--results", str(tmp_path / "results"), "--out", str(tmp_path / "out")]) == 0

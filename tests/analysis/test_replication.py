@@ -71,6 +71,7 @@ def test_a_drive_without_noise_is_the_static_simulators_and_under_noise_fails_mo
     assert (table.first_goals_cm[0], table.last_goal_cm[0], table.simulated[0], table.runs[0]) == (6.5, 1.0, 100, 5)
 
 
+@pytest.mark.slow
 def test_the_page_has_every_finding_with_its_verdict_and_the_same_from_archive_and_runs(study, tmp_path):
     archive(study, tmp_path / "results" / "published" / "study.parquet")
     out = tmp_path / "docs" / "page.md"

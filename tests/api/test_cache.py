@@ -59,6 +59,7 @@ def test_the_environment_names_another_folder(table, asked, tmp_path, monkeypatc
     assert not entries(tmp_path)
 
 
+@pytest.mark.slow
 def test_whatever_changes_is_asked_again(table, asked, monkeypatch):
     def ask(log=table, model=NOMINAL, **more):
         bns.diagnose(log, model, **more)

@@ -9,6 +9,8 @@ from bns.cli.main import main
 from bns.examples import FOLDER
 from tests.app.visits import SLOW_MS, Visit, go, shown
 
+pytestmark = pytest.mark.slow
+
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
 LOG = FOLDER / "khepera-log.csv"

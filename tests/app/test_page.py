@@ -10,6 +10,8 @@ from bns.app.workbench import Workbench
 from bns.examples import FOLDER
 from tests.app.visits import Visit, error_of, go, shown
 
+pytestmark = pytest.mark.slow
+
 LOG = FOLDER / "khepera-log.csv"
 
 

@@ -9,6 +9,8 @@ from bns.errors import StoreError
 pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
 from tests.app.visits import Visit, shown
 
+pytestmark = pytest.mark.slow
+
 QUICK = {"population_size": [8], "evaluations": [3], "training_iterations_per_evaluation": [2]}
 TASKS = ["circle", "infinity", "complex"]
 

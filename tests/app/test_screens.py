@@ -45,6 +45,7 @@ def found():
     return bns.diagnose(measured(warming(), trials=24, seed=3), bns.Model(NOMINAL), without_effects=["warm-up"])
 
 
+@pytest.mark.slow
 def test_a_term_is_a_switch_and_its_errors_are_those_of_the_summary(found):
     [term] = found.diagnosis.terms[:1]
     said = found_errors(found.diagnosis.errors_with_terms)
@@ -111,6 +112,7 @@ def test_the_paths_of_a_snakes_markers_are_drawn(body):
     assert data["x"][0][0] == tracks.markers_m[0, 0, 0]
 
 
+@pytest.mark.slow
 def test_a_body_is_compared_and_switched_like_a_drive(body, capsys, snake):
     where = entered(WhereScreen, body)
     assert main(["compare", str(snake), "--model", "snake", "--json"]) == 0

@@ -122,6 +122,7 @@ def test_names_and_options_that_there_are_none_of(name, message):
         RunSpec(approach=name)
 
 
+@pytest.mark.slow
 def test_the_command_line_a_sweep_and_its_resumption(bns, tmp_path):
     small = [f"--{key.replace('_', '-')}={value}" for key, value in SMALL.items()]
     done = bns("run", "--approach", "on-robot+population=3", *small, "--results", tmp_path)

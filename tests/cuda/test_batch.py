@@ -62,6 +62,7 @@ def together(request):
     return carried_out({"khepera": [TINY, OTHER, SHORT], "snake": [SNAKE, OTHER_SNAKE]}[request.param])
 
 
+@pytest.mark.slow
 def test_runs_side_by_side_are_those_of_the_cpu_engine(together):
     for spec, columns in zip(together.specs, together.evals(), strict=True):
         assert_same(columns, run(spec).tables["evals"])

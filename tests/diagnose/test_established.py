@@ -116,6 +116,7 @@ def test_what_one_wheel_or_a_place_does_is_described(on, term, value, signal, sa
     assert re.fullmatch(says, in_words(found.terms[0], predictor))
 
 
+@pytest.mark.slow
 def test_beside_a_curve_no_effect_has_numbers_that_no_robot_has():
     """A robot that slides beyond a sideways acceleration: understeer is far beyond its range, and only bends the curve."""
     slides = formula_effect("grip", "w * (min(1, k / max(abs(v * w), 0.02)) - 1)", "w")
@@ -126,6 +127,7 @@ def test_beside_a_curve_no_effect_has_numbers_that_no_robot_has():
     assert (found.terms[0].signal, found.terms[0].on) == ("speed with turn", "w")
 
 
+@pytest.mark.slow
 def test_a_patch_of_floor_keeps_its_numbers_where_it_is_weighed_against_effects():
     """Its formula cannot be calculated at 0, where other terms begin."""
     patch = {"x_m": 0.1, "y_m": -0.05, "radius_m": 0.25, "loss": 0.5}

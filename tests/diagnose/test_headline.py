@@ -47,6 +47,7 @@ def test_a_set_with_which_it_falls_stays(monkeypatch):
 
 
 @pytest.mark.parametrize(("factor", "plausible"), [(1.6, True), (2.6, False), (0.55, False)])
+@pytest.mark.slow
 def test_a_skid_steer_that_turns_as_if_it_were_wider_is_shown_so(factor, plausible):
     """1.6 times the drawing is usual for skid-steered robots; 2.6 times is not, and is the headline nevertheless."""
     true = SKID_STEER.with_effect("wheelbase", factor=factor).with_effect("marker-offset", forward_m=-0.05, left_m=0.0)

@@ -79,6 +79,7 @@ def asked(world, networks, trials=40):
         ("slope", slow_only, ("thin-data", "inputs-cannot-know"), "heading_rad"),
     ],
 )
+@pytest.mark.slow
 def test_the_planted_reason_is_named(world, kept, verdict, variable):
     why = asked(world, trained(world, kept))
     assert why.verdict == verdict
@@ -87,6 +88,7 @@ def test_the_planted_reason_is_named(world, kept, verdict, variable):
     assert (why.share["thin data"] > 0.8) == (kept is not None)
 
 
+@pytest.mark.slow
 def test_in_words_numbers_and_a_figure(tmp_path, capsys):
     networks = tmp_path / "n.safetensors"
     save_simulator(trained("slope"), networks)

@@ -161,6 +161,7 @@ def test_an_experiment_decides_in_half_the_time_of_random_commands(narrow):
     assert "times as long" in proposal_text(proposal)
 
 
+@pytest.mark.slow
 def test_what_is_the_same_from_outside_is_said_to_be_so():
     d, predictor = found_in(DELAYED, trials=12)
     assert d.verdict == "tie"
@@ -220,6 +221,7 @@ def test_a_pair_without_numbers_separates_by_its_error_alone():
     assert one.each().tolist() == [1.0, 2.0]
 
 
+@pytest.mark.slow
 def test_a_trial_file_is_written_that_a_trial_reads(tmp_path, capsys):
     data, out = tmp_path / "d.csv", tmp_path / "next.csv"
     write_measurements(measured(DEAD, trials=12, ends_only=True, speeds=(0.085, 0.115), seed=4), data)

@@ -99,6 +99,7 @@ def test_motions_have_no_place_and_nothing_that_needs_one_is_tried(log):
     assert "floor-slope" in listed(model, None, moved)
 
 
+@pytest.mark.slow
 def test_a_turned_sensor_is_named_and_everything_calibrated_together(log, capsys):
     assert main(["diagnose", str(log), "--model", "differential-drive", "--wheelbase", "0.09", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
@@ -118,6 +119,7 @@ def test_a_turned_sensor_is_named_and_everything_calibrated_together(log, capsys
         assert numbers[which]["se"] < 0.05
 
 
+@pytest.mark.slow
 def test_an_effect_can_be_taken_out(log, capsys):
     arguments = ["diagnose", str(log), "--model", "differential-drive", "--wheelbase", "0.09", "--json"]
     assert main([*arguments, "--without-effect", "sensor-rotation"]) == 0
@@ -129,6 +131,7 @@ def test_an_effect_can_be_taken_out(log, capsys):
 
 @pytest.mark.skipif(not LASER.is_dir(), reason="the laser Khepera's logs are not beside this checkout")
 @pytest.mark.parametrize("subset", ["lstraight_0", "lstraight_1", "l90_0"])
+@pytest.mark.slow
 def test_the_laser_khepera_is_calibrated_as_its_authors_did(subset, tmp_path):
     path = tmp_path / "log.csv"
     applied(read_table(LASER / f"{subset}.tuple"), MAPPING).to_csv(path, index=False)

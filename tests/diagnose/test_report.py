@@ -79,6 +79,7 @@ def browse(page, width, profile):
 
 
 @pytest.mark.parametrize("verdict", WORLDS)
+@pytest.mark.slow
 def test_every_verdict_has_a_page_that_needs_nothing_else(page_of, verdict):
     text = page_of(verdict).read_text()
     assert f"verdict: {verdict}" in text

@@ -63,10 +63,12 @@ def test_times_are_those_of_the_piece(pieces, log):
     assert begun + worst["t_s"] == pytest.approx(310.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_long_log_with_an_acceleration_limit_is_none_against_the_model_that_has_it(pieces):
     assert bns.diagnose(pieces, LIMITED).verdict == "none"
 
 
+@pytest.mark.slow
 def test_against_the_drawing_it_is_the_limit_and_nothing_else(pieces):
     found = bns.diagnose(pieces, NOMINAL)
     assert found.verdict == "effects"

@@ -99,6 +99,7 @@ def test_sound_files_are_read(folder, kind):
 
 
 @pytest.mark.parametrize("kind", READERS)
+@pytest.mark.slow
 def test_spoilt_files_are_read_or_explained(folder, kind):
     text, name, read = READERS[kind]
 

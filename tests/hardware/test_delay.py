@@ -24,6 +24,7 @@ def setup(tracker, late_s, **more):
 
 
 @pytest.mark.parametrize(("tracker", "late_s"), [(None, 0.0), (None, 0.15), (ARUCO, 0.0), (ARUCO, 0.07), (ARUCO, 0.15)])
+@pytest.mark.slow
 def test_a_late_tracker_is_found_out(tracker, late_s):
     """A camera's fifteen pictures a second are taken when they are stamped, or so much before.
 
@@ -35,6 +36,7 @@ def test_a_late_tracker_is_found_out(tracker, late_s):
     assert found.error_s < 0.003
 
 
+@pytest.mark.slow
 def test_what_is_known_already_is_part_of_the_delay():
     assert measured_delay(setup(ARUCO, 0.1, delay_s=0.04)).delay_s == pytest.approx(0.1, abs=0.003)
 

@@ -35,6 +35,7 @@ def with_files_of_at_most(size, *arguments):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_full_disk_stops_the_robot_and_the_trial_is_gone_on_with(tmp_path, capsys):
     # First of all the kernels: a process that may write nothing long cannot keep what it compiles.
     assert main([*TRIAL[:-1], "1", "--results", str(tmp_path / "other")]) == 0

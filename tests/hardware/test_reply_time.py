@@ -80,6 +80,7 @@ class BodysEye:
 @pytest.mark.parametrize(
     ("delay_s", "jitter", "loss"), [(0.02, 1.0, 0.02), (0.11, 0.2, 0.0), (0.15, 0.3, 0.02), (0.3, 0.3, 0.02)]
 )
+@pytest.mark.slow
 def test_a_slow_link_is_driven_over(tmp_path, monkeypatch, delay_s, jitter, loss):
     """On a real line in real time, guard and all: done or paused, and standing."""
     robot = DistantRobot(tmp_path, delay_s, jitter, loss, seed=1)

@@ -140,6 +140,7 @@ def examined(rigged, clock, tmp_path, **driver):
 
 
 @pytest.mark.parametrize("wiring", ["bus", "bridge"])
+@pytest.mark.slow
 def test_the_doctor_asks_the_servos(rigged, clock, tmp_path, wiring):
     on, said = examined(rigged, clock, tmp_path, wiring=wiring)
     assert f"ok   12 servos answer ({wiring}), 12.0 V or more, 30 °C or less" in said()
@@ -167,6 +168,7 @@ def call(*arguments):
     return main([str(a) for a in arguments])
 
 
+@pytest.mark.slow
 def test_from_command_to_table_and_replay(tmp_path, capsys):
     assert TRIAL[-2:] == ["--repeats", "1"]
     asked = [option for option in TRIAL[:-2] if option != "--no-figures"]  # as often as a snake is driven
@@ -258,6 +260,7 @@ def test_a_robot_that_is_lost_while_it_straightens_has_driven_nothing(rigged, cl
     assert measured(tmp_path / "snake1.jsonl").empty
 
 
+@pytest.mark.slow
 def test_ten_trials_with_faults_at_random(tmp_path):
     ends = [soak.judged(seed, tmp_path, "snake") for seed in range(10)]
     assert set(ends) <= {"done", "paused, resumed", "stop not confirmed, and shouted", "refused before it moved"}

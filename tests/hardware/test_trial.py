@@ -294,6 +294,7 @@ def test_a_torn_last_line_is_passed_over(tmp_path):
     assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path, "--resume") == 0
 
 
+@pytest.mark.slow
 def test_ten_trials_with_faults_at_random(tmp_path):
     ends = [soak.judged(seed, tmp_path) for seed in range(10)]
     assert set(ends) <= {"done", "paused, resumed", "stop not confirmed, and shouted", "refused before it moved"}

@@ -192,6 +192,7 @@ def test_limits_of_wheels_are_refused_for_a_body(bent_arm):
         bent_arm.propose(arena=(2.0, 2.0))
 
 
+@pytest.mark.slow
 def test_a_body_has_a_report_with_an_experiment(bent_arm, tmp_path):
     page = bent_arm.report(tmp_path / "report.html", minutes=1).path.read_text()
     for said in ("joint-zero-elbow", "shoulder_set_rad", "what was driven before", "bns propose"):

@@ -17,6 +17,8 @@ from bns.store.read.reader import load
 from tests.plugins.package import announce
 from tests.plugins.test_stranger import SCRIPT
 
+pytestmark = pytest.mark.slow
+
 ROBOT = ["--robot", "my-robot"]
 SMALL = [
     *("--population-size", "30", "--training-iterations-per-evaluation", "20", "--generations-per-evaluation", "2"),

@@ -14,6 +14,8 @@ from bns.store.read.reader import load
 from bns.tasks import TASKS
 from tests.plugins.package import blocks, entry_points, install
 
+pytestmark = pytest.mark.slow
+
 SMALL = [
     *("--population-size", "20", "--training-iterations-per-evaluation", "10", "--generations-per-evaluation", "1"),
     *("--real-world-selection-size", "0.1"),

@@ -54,6 +54,7 @@ def check(results, reference):
         ("fold", "after", 2),  # all published, journal still there
     ],
 )
+@pytest.mark.slow
 def test_killed_writer(tmp_path, reference, action, moment, number):
     assert "appended" in kill(tmp_path, action, moment, number)
     check(tmp_path, reference)
@@ -76,6 +77,7 @@ def test_killed_writer(tmp_path, reference, action, moment, number):
         ("unlink", 4),  # one of the old evals files removed
     ],
 )
+@pytest.mark.slow
 def test_killed_compaction(tmp_path, reference, moment, number):
     runs = sample()
     for chunk in (runs[:5], runs[5:10], runs[10:]):

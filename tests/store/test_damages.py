@@ -31,6 +31,7 @@ def full(count):
     return [record(spec, ("evals", "paths", "generations", "probes")) for spec in specs(count, 2, record="full")]
 
 
+@pytest.mark.slow
 def test_no_damage_goes_unnoticed_and_a_sweep_makes_up_for_each():
     outcomes = survey(14, 7)
     assert [one for one in outcomes if one.verdict not in {"named", "harmless", "again"}] == []

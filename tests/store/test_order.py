@@ -109,6 +109,7 @@ class KilledError(Exception):
 
 
 @pytest.mark.parametrize("step", [0, 2, 4, 5, 6, 8, 14])
+@pytest.mark.slow
 def test_a_cut_at_any_step_of_a_compaction_loses_nothing(tmp_path, monkeypatch, step):
     for first in (0, 2):
         store(tmp_path, full(2, first))

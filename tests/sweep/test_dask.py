@@ -120,6 +120,7 @@ def test_scheduler_without_workers_is_explained():
         DaskExecutor(empty.address, patience_s=10).__enter__()
 
 
+@pytest.mark.slow
 def test_killed_scheduler_is_waited_for_and_the_sweep_goes_on(tmp_path, marks):
     stored = []
 
@@ -136,6 +137,7 @@ def test_killed_scheduler_is_waited_for_and_the_sweep_goes_on(tmp_path, marks):
     assert len(load(tmp_path)) == 8 * 3
 
 
+@pytest.mark.slow
 def test_own_cluster_quarantines_the_run_that_kills_its_workers(tmp_path, marks, monkeypatch):
     path = [str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))

@@ -9,6 +9,8 @@ pytest.importorskip("distributed")
 from dask_cluster import Cluster
 from soak_dask import soak
 
+pytestmark = pytest.mark.slow
+
 
 def test_workers_that_are_killed_again_and_again_cost_little_and_no_run(tmp_path):
     with Cluster(2) as cluster:

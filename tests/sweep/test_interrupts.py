@@ -75,6 +75,7 @@ def expected(folder) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize(("number", "name"), [(signal.SIGINT, "interrupt"), (signal.SIGTERM, "terminated")])
+@pytest.mark.slow
 def test_first_signal_finishes_what_is_in_flight_and_the_rest_can_be_resumed(tmp_path, start, number, name):
     process = start(tmp_path / "a", 2, "slow")
     wait_for(lambda: len(begun(tmp_path)) >= 2, "two runs to begin")

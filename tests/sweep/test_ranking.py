@@ -146,6 +146,7 @@ def test_a_race_killed_anywhere_goes_the_same_way():
     assert len(whole) < 19 * 12
 
 
+@pytest.mark.slow
 def test_from_the_command_line(tmp_path, capsys):
     """Eleven combinations of tiny runs: what is run has the numbers of the complete sweep, and the ranking is its."""
     file = tmp_path / "race.yaml"

@@ -58,6 +58,7 @@ def slurm_commands(tmp_path, monkeypatch):
     return folder
 
 
+@pytest.mark.slow
 def test_shards_of_the_local_executor_give_what_one_process_gives(tmp_path):
     request = Request(tmp_path / "a", jobs=1, shards=2, cluster="local", wait=True)
     summary = slurm.carry_out(small(), request)

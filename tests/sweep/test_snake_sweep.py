@@ -19,6 +19,8 @@ from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.jobs.job import run_job
 from bns.sweep.runner import run_sweep
 
+pytestmark = pytest.mark.slow
+
 TEXT = """
 name: {robot}-tiny
 robot: {robot}
