@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import i0e, i1e
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
@@ -95,7 +96,8 @@ def _pairs(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> Arr
     variance = np.einsum("nii->ni", inverse)[:, :4] * ((left**2).sum(axis=1) / spare)[:, None] / scale[:, :4] ** 2
     pair = (fitted / scale)[:, :4]
     length2, unsure = (np.repeat(v[:, ::2] + v[:, 1::2], 2, axis=1) for v in (pair**2, variance))
-    out: Array = pair / np.sqrt(length2 + 1e-30) * (length2 / (length2 + unsure + 1e-30))
+    known = 2.0 * np.maximum(length2 - unsure, 0.0) / (unsure + 1e-30)  # concentration of the phase's distribution
+    out: Array = pair / np.sqrt(length2 + 1e-30) * (i1e(known) / i0e(known))  # the expected cosine of its error
     return out
 
 
