@@ -17,11 +17,15 @@ ROOMS: dict[str, tuple[str, str]] = {
         "bns/diagnose/select/*.py",
         "tests/diagnose/test_alike.py tests/diagnose/test_equivalents.py tests/diagnose/test_search.py",
     ),
-    "safety": ("bns/hardware/safety.py", "tests/hardware/test_safety.py tests/hardware/test_safety_edges.py tests/hardware/test_confirmed_stop.py"),
+    "safety": (
+        "bns/hardware/safety.py",
+        "tests/hardware/test_safety.py tests/hardware/test_safety_edges.py tests/hardware/test_confirmed_stop.py",
+    ),
     "drivers": (
         "bns/hardware/wheels/khepera.py bns/hardware/servos/dynamixel.py bns/hardware/servos/servo_chain.py "
         "bns/hardware/servos/bridge.py",
-        "tests/hardware/test_confirmed_stop.py tests/hardware/test_khepera.py tests/hardware/test_khepera_asks.py tests/hardware/test_ax12.py "
+        "tests/hardware/test_confirmed_stop.py tests/hardware/test_khepera.py tests/hardware/test_khepera_asks.py "
+        "tests/hardware/test_ax12.py "
         "tests/hardware/test_bridge.py",
     ),
 }
