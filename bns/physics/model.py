@@ -55,6 +55,12 @@ class ActiveEffect:
     trial_values: tuple[float, ...] = ()
     """Each trial's value, in the order of the trials at hand; empty while none is known. A matter of data: never written down."""
 
+    def check(self) -> None:
+        """ModelError for a value that is not allowed. Looked at once: a search makes ten thousand models of the same few."""
+        if "_checked" not in self.__dict__:
+            self.effect.checked(self.by_name)
+            object.__setattr__(self, "_checked", True)
+
     @property
     def by_name(self) -> dict[str, float]:
         """Parameter name -> value."""
@@ -88,14 +94,16 @@ class Model:
         if self.base not in self.bases:
             raise ModelError(unknown_name("base", self.base, self.bases))
         for name, (low, high) in LIMITS.items():
-            value = number(f"model {self.name}: {name}", getattr(self, name), low, high)
+            if type(held := getattr(self, name)) is float and low <= held <= high:
+                continue
+            value = number(f"model {self.name}: {name}", held, low, high)
             object.__setattr__(self, name, value)
         names = [active.effect.name for active in self.effects]
         for name in names:
             if names.count(name) > 1:
                 raise ModelError(f"model {self.name} has the effect {name!r} twice; keep one of them.")
         for active in self.effects:
-            active.effect.checked(active.by_name)
+            active.check()
             if active.per_trial and not active.effect.per_trial_allowed:
                 raise ModelError(
                     f"model {self.name}: {active.effect.name} has one value for all trials; per_trial goes with "
