@@ -28,7 +28,7 @@ from bns.diagnose.residuals.words import in_words
 from bns.diagnose.residuals.worst_trials import WithoutWorst, standing_out
 from bns.diagnose.select.equivalents import equivalent_pairs
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.result import Candidate, SelectionResult
+from bns.diagnose.select.result import Candidate, SelectionResult, certainly_lower
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import before_and_after, dependence_values, numbers_of, ranked_values, ties_of
@@ -286,7 +286,12 @@ def _established(selection: SelectionResult, predictor: Predictor, rest: Unexpla
     if not rest.any and not left_over(selection.problem, selection.fit):
         return None
     known = known_effects(selection)
-    return established(predictor, selection.nominal.model, {name: known[name] for name in selection.accepted})
+    found = established(predictor, selection.nominal.model, {name: known[name] for name in selection.accepted})
+    lost = set(selection.accepted) - set(found.names)
+    if lost and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):
+        # the effects predict better than what they are said to imitate: it is the terms that imitate
+        return replace(established(predictor, selection.fit.model, {}), names=selection.accepted)
+    return found
 
 
 def _errors_with_terms(selection: SelectionResult, given: Model, found: Established) -> PairedErrors:

@@ -68,10 +68,16 @@ class SelectionResult:
 
 
 def predicts_better(one: SelectionResult, other: SelectionResult) -> bool:
-    """Does the held-out error fall for certain from one result to the other, at one horizon at least, and rise at none?"""
-    predictor = one.problem.predictor
+    """As `certainly_lower`, from one result to the other."""
+    return certainly_lower((one.problem, one.fit), (other.problem, other.fit))
+
+
+def certainly_lower(before: tuple[Problem, Fit], after: tuple[Problem, Fit]) -> bool:
+    """Does the held-out error fall for certain from one fit to the other, at one horizon at least, and rise at none?"""
+    predictor = before[0].predictor
     steps = [
-        (name, held_out_steps(predictor, r.problem.pose_filter, r.fit.model)) for name, r in (("a", one), ("b", other))
+        (name, held_out_steps(predictor, problem.pose_filter, fit.model))
+        for name, (problem, fit) in (("before", before), ("after", after))
     ]
     errors = paired_errors(predictor, steps)
     return errors.falls and any(e.total is not None and e.total.fell for e in errors.horizons.values())
