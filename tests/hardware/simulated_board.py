@@ -12,7 +12,7 @@ import tty
 from pathlib import Path
 
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.terminal import put_through
 
 HERE = Path(__file__).parent / "arduino"
@@ -130,6 +130,8 @@ class Board:
 
 class BoardClock:
     """The board's time, for the driver; the board runs while the driver waits."""
+
+    longest_write_s = 20.0
 
     def __init__(self, board):
         self._board = board

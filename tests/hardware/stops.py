@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import yaml
 
 from bns.errors import BnsError
 from bns.hardware.clock import EmulatedClock
@@ -146,5 +147,6 @@ def _spread(seconds):
 
 
 if __name__ == "__main__":
-    robot, count, *wiring = sys.argv[1:]
-    print(*report_lines(measured(robot, int(count), **({"wiring": wiring[0]} if wiring else {}))), sep="\n")
+    robot, count, *driver = sys.argv[1:]
+    settings = {name: yaml.safe_load(value) for name, _, value in (each.partition("=") for each in driver)}
+    print(*report_lines(measured(robot, int(count), **settings)), sep="\n")

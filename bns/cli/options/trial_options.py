@@ -102,6 +102,9 @@ def add_servo_options(parser: argparse.ArgumentParser) -> None:
     def part(name: str, text: str) -> argparse.ArgumentParser:
         added = parts.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
         added.add_argument("--port", required=True, metavar="DEVICE", help="the bus adapter, as /dev/ttyUSB0")
+        added.add_argument(
+            "--protocol", type=int, choices=(1, 2), help="1: AX-12, 2: XL430 and XM430 (default: both, which takes longer)"
+        )
         added.set_defaults(part=name)
         return added
 
@@ -112,5 +115,5 @@ def add_servo_options(parser: argparse.ArgumentParser) -> None:
     new.add_argument("id", type=int, metavar="ID", help="its new number, 0 to 252")
     new.add_argument("--from", type=int, dest="old", metavar="ID", help="its present number, where several are connected")
     part("check", "say what of the servos' settings is not as a drive needs it").add_argument(
-        "--fix", "--mend", dest="mend", action="store_true", help="write return delay, status return level and angle limits first"
+        "--fix", "--mend", dest="mend", action="store_true", help="write the settings that a drive needs first"
     )

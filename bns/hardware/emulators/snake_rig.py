@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.devices.ax12 import Bus
 from bns.hardware.emulators.devices.bridge import BridgeEmulator
+from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import HangUp, PseudoTerminal
 from bns.hardware.emulators.faults import FaultPlan
@@ -19,6 +19,7 @@ from bns.hardware.emulators.scene import Patch, disc
 from bns.hardware.emulators.snake_body import SnakeBody
 from bns.hardware.emulators.watchers import GREEN_BGR, YELLOW_BGR, emulated_camera, emulated_lens
 from bns.hardware.rig import Rig
+from bns.hardware.servos.servo_table import BAUD
 from bns.hardware.servos.snake_settings import snake_settings
 from bns.hardware.tracking.lens import Lens
 from bns.physics.snake.parameters import shipped_parameters
@@ -26,7 +27,6 @@ from bns.physics.snake_drive import START_HEADING_RAD, START_M
 
 _RATE_HZ = 5.0
 """Enough for a robot that moves some centimetres in that time."""
-
 
 def lens() -> Lens:
     """High enough to see both ends of a robot whose middle is anywhere on the surface; 768 by 432 pixels."""
@@ -41,7 +41,11 @@ class EmulatedSnakeRig:
         self._clock, self._tracker_faults, self._worn_last = clock, plan.of("tracker"), list[Patch]()
         self.body = SnakeBody(shipped_parameters(), seed)
         self.body.lay(START_M, START_HEADING_RAD, 0.0)
-        self.servos = [Servo(n, clock, faults, self.body.joint(place)) for place, n in enumerate(settings.ids)]
+        kind = settings.table
+        self.servos = [
+            Servo(number, clock, faults, self.body.joint(place), kind, baud_rate=kind.bauds[BAUD])
+            for place, number in enumerate(settings.ids)
+        ]
         self.body.servos = self.servos
         device = BridgeEmulator(self.servos, clock, faults) if settings.wiring == "bridge" else Bus(self.servos, clock, faults)
         self._line = PseudoTerminal(device, folder, "snake")

@@ -11,15 +11,14 @@ from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.clock import Clock, EmulatedClock
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
-from bns.hardware.guard.recipe import StopRecipe, ax12_recipe, bridge_recipe
+from bns.hardware.guard.recipe import StopRecipe, bridge_recipe, bus_recipe
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
 from bns.hardware.servos.bridge import BAUD as BRIDGE_BAUD
 from bns.hardware.servos.bridge import BridgeChain
-from bns.hardware.servos.dynamixel import BAUD as BUS_BAUD
-from bns.hardware.servos.dynamixel import Ax12Chain
+from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.servos.servo_chain import ServoChain, ServoError, StuckServoError
 from bns.hardware.servos.snake_drive import SnakeDrive
 from bns.hardware.servos.snake_settings import SnakeSettings, snake_settings
@@ -103,7 +102,7 @@ def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: Hardwa
     """The servos as a rig's settings say that they are wired; HardwareError names who is missing."""
     if settings.wiring == "bridge":
         return BridgeChain(port, len(settings.ids), clock, journal, settings.limits)
-    return Ax12Chain(port, settings.ids, clock, journal, settings.limits)
+    return DynamixelChain(port, settings.ids, clock, journal, settings.limits, settings.table)
 
 
 def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stopping) -> SnakePlatform:
@@ -129,7 +128,7 @@ def stop_recipe(rig: Rig) -> StopRecipe:
     settings = snake_settings(rig.driver)
     if settings.wiring == "bridge":
         return bridge_recipe(BRIDGE_BAUD, len(settings.ids))
-    return ax12_recipe(BUS_BAUD, settings.ids)
+    return bus_recipe(settings.ids, settings.table)
 
 
 def emulate(rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> EmulatedSnakeRig:

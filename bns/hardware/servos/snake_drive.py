@@ -11,7 +11,6 @@ from bns.hardware.agreement import SameScene
 from bns.hardware.clock import Clock
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.safety import OutOfSight, Watch
-from bns.hardware.servos.ax12_table import RAD_PER_STEP
 from bns.hardware.servos.servo_chain import ServoChain, StrainWatch, StuckServoError
 from bns.hardware.servos.snake_settings import SnakeSettings
 from bns.hardware.tracking.eye import Eye
@@ -126,7 +125,7 @@ class SnakeDrive:
         asked_s = self._clock.now_s()
         sent = np.array(self._chain.move(target.tolist(), [speed_rad_s] * len(target)))
         short = int(np.argmax(np.abs(sent - target)))
-        if abs(sent[short] - target[short]) > 1.5 * RAD_PER_STEP:
+        if abs(sent[short] - target[short]) > 1.5 * self._chain.step_rad:
             raise TrialPausedError(
                 f"joint {short + 1} was to go to {math.degrees(target[short]):.0f}° and was only told "
                 f"{math.degrees(sent[short]):.0f}°: widen the angle limits in its servo"
