@@ -382,7 +382,8 @@ def main(count, causes=()):
             ends = ", ".join(sorted({str(s.ended) for s in seen}))
             took = f"{np.median(took_ms):.0f}, {took_ms.max():.0f} | {(took_ms <= 500).sum()}"
             alone_ms = 1000 * np.array([s.alone_s for s in seen])
-            alone = f" (by itself {np.median(alone_ms):.0f}, {alone_ms.max():.0f} after the cause)" if np.isfinite(alone_ms).all() else ""
+            alone = f" by itself {np.median(alone_ms):.0f}, {alone_ms.max():.0f} after the cause"
+            alone = alone if np.isfinite(alone_ms).all() else ""
             print(f"| {cause} | {link} | {count} | {took} | {ends} |{alone}", flush=True)
     nursery.close()
 

@@ -28,7 +28,7 @@ def test_given_commands_are_driven_as_by_the_command(tmp_path, commands):
     assert found.summary().startswith("2 trials driven")
     assert repr(found) == f"<ExperimentResult: 2 trials driven, in {found.folder}>"
     assert len(found.measurements.trials) == 2
-    with pytest.raises(bns.HardwareError, match="there is an experiment in .* already"):
+    with pytest.raises(bns.HardwareError, match=r"there is an experiment in .* already"):
         bns.trial(commands=commands, emulated=True, results=tmp_path / "a")
 
 

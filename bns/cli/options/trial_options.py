@@ -61,7 +61,7 @@ def add_looking_options(
         "--wii", action="store_true", help="find how the Wii remote of --rig hangs: mirror, orientation, place, view"
     )
     source.add_argument(
-        "--delay", action="store_true", help="have the robot of --rig turn about, and find how late its tracker is"
+        "--delay", action="store_true", help="have the robot of --rig move to and fro, and find how late its tracker is"
     )
     calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii and --delay")
     calibrating.add_argument("--robot", default="khepera", help="for --delay (default: khepera)")

@@ -27,6 +27,9 @@ from bns.physics.snake_drive import START_HEADING_RAD, START_M
 
 _RATE_HZ = 5.0
 """Enough for a robot that moves some centimetres in that time."""
+_KEPT = 400
+"""Moments that a late tracker's rig remembers; some seconds."""
+
 
 def lens() -> Lens:
     """High enough to see both ends of a robot whose middle is anywhere on the surface; 768 by 432 pixels."""
@@ -41,6 +44,9 @@ class EmulatedSnakeRig:
         self._clock, self._tracker_faults, self._worn_last = clock, plan.of("tracker"), list[Patch]()
         self.body = SnakeBody(shipped_parameters(), seed)
         self.body.lay(START_M, START_HEADING_RAD, 0.0)
+        self._places: list[tuple[float, np.ndarray]] = []
+        if any(fault.kind == "late-tracker" for fault in plan.faults):
+            clock.listeners.append(self._remember)
         kind = settings.table
         self.servos = [
             Servo(number, clock, faults, self.body.joint(place), kind, baud_rate=kind.bauds[BAUD])
@@ -71,19 +77,32 @@ class EmulatedSnakeRig:
     def close(self) -> None:
         """Take it away."""
         self._hang_up.close()
+        if self._remember in self._clock.listeners:
+            self._clock.listeners.remove(self._remember)
         if self._bridge is not None:
             self._bridge.close()
         self._line.close()
         self._camera.close()
+
+    def _remember(self, now_s: float) -> None:
+        """Where the markers are, for a tracker that is late."""
+        places, up = self.body.markers(now_s)
+        self._places = [*self._places[-_KEPT:], (now_s, np.column_stack([places, up]))]
+
+    def _remembered(self, then_s: float) -> tuple[np.ndarray, np.ndarray]:
+        times, places = np.array([t_s for t_s, _ in self._places]), np.array([place for _, place in self._places])
+        found = np.array([[np.interp(then_s, times, column) for column in each.T] for each in np.moveaxis(places, 1, 0)])
+        return found[:, :3], found[:, 3]
 
     def _worn(self, settings: Mapping[str, Any], now_s: float) -> list[Patch]:
         """The markers are balls, alike from everywhere, on the tops of their links: a link that lies on its side hides them.
 
         Of a frozen scene they are where they were; the body cannot be asked where it was at any other time.
         """
-        if self._tracker_faults.filmed_s(now_s) < now_s and self._worn_last:
+        filmed_s = self._tracker_faults.filmed_s(now_s)
+        if filmed_s < now_s and self._worn_last and not self._places:
             return self._worn_last
-        places, up = self.body.markers(now_s)
+        places, up = self.body.markers(now_s) if not self._places else self._remembered(filmed_s)
         diameter_m = float(settings["diameter_m"])
         self._worn_last = [
             disc(colour, diameter_m, x, y, z)

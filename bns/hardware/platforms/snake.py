@@ -9,6 +9,7 @@ import numpy as np
 
 from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.clock import Clock, EmulatedClock
+from bns.hardware.delay import Motion
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
 from bns.hardware.guard.recipe import StopRecipe, bridge_recipe, bus_recipe
@@ -16,6 +17,7 @@ from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
+from bns.hardware.servos.bending import bent
 from bns.hardware.servos.bridge import BAUD as BRIDGE_BAUD
 from bns.hardware.servos.bridge import BridgeChain
 from bns.hardware.servos.dynamixel import DynamixelChain
@@ -74,6 +76,17 @@ class SnakePlatform:
         """Give port and tracker free."""
         self._chain.close()
         self._eye.close()
+
+    def move_about(self, seconds: float) -> Motion:
+        """Bend to one side and back, for the tracker's delay; stopped at the end. TrialPausedError, StopNotConfirmedError."""
+        drive = SnakeDrive(self._chain, self._eye, self._watch, self._settings, self._clock, self._journal)
+        self._watch.begin()
+        with StopsAtTheEnd(self.stop):
+            try:
+                drive.straighten()
+                return bent(self._chain, self._eye, self._watch, self._settings, self._clock, seconds)
+            except (ServoError, DriveEnded) as error:
+                raise TrialPausedError(f"the robot could not be bent about: {error}") from error
 
     def drive(self, commands: np.ndarray) -> Driven:
         """Straighten the robot, then drive the cycles one after the other."""
