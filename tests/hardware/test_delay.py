@@ -69,7 +69,7 @@ def test_the_markers_are_as_far_apart_as_mujoco_has_them():
 def test_a_guarded_platform_moves_about_only_if_its_own_can(tmp_path):
     told = []
     guard = SimpleNamespace(tripped=lambda: None, stop_now=None, arm=lambda: told.append("a"), still=lambda: told.append("s"))
-    able = SimpleNamespace(move_about=lambda seconds: told.append(seconds))
+    able = SimpleNamespace(move_about=told.append)
     GuardedPlatform(able, guard, Stopping()).move_about(3.0)
     assert told == ["a", 3.0, "s"]
     assert not hasattr(GuardedPlatform(SimpleNamespace(), guard, Stopping()), "move_about")

@@ -63,9 +63,19 @@ def add_looking_options(
     source.add_argument(
         "--delay", action="store_true", help="have the robot of --rig move to and fro, and find how late its tracker is"
     )
-    calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii and --delay")
-    calibrating.add_argument("--robot", default="khepera", help="for --delay (default: khepera)")
-    calibrating.add_argument("--emulated", action="store_true", help="with --delay: the emulated rig")
+    source.add_argument(
+        "--colours",
+        type=Path,
+        metavar="FILE.png",
+        help="write a picture of what the colour tracker of --rig sees, and find hues that fit its markers",
+    )
+    for name in ("yellow", "green"):
+        calibrating.add_argument(
+            f"--{name}", type=int, nargs=2, metavar=("LOW", "HIGH"), help="hues to try with --colours, 0 to 179"
+        )
+    calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii, --delay and --colours")
+    calibrating.add_argument("--robot", default="khepera", help="for --delay and --colours (default: khepera)")
+    calibrating.add_argument("--emulated", action="store_true", help="with --delay or --colours: the emulated rig")
     calibrating.add_argument(
         "--floor",
         type=Path,
