@@ -77,9 +77,10 @@ class Glances:
 
     def _seen(self, now_s):
         if self._wheels is None:
-            wiggle = 0.05 * np.sin(5.0 * self._filmed_s)
-            points = {"yellow": np.array([wiggle, -0.3]), "green": np.array([wiggle, 0.3])}
-            return Sight(now_s, np.array([wiggle, 0.0, np.pi / 2]), 0.0, points)
+            middle = 0.05 * np.array([np.sin(5.0 * self._filmed_s), np.cos(5.0 * self._filmed_s)])  # never at rest
+            half = np.array([0.0, 0.3])
+            points = {"yellow": middle - half, "green": middle + half}
+            return Sight(now_s, np.array([*middle, np.pi / 2]), 0.0, points)
         left, right = self._wheels
         turned = (right - left) / 0.0884 * (0.0 if Glances.sent_s is None else self._filmed_s - Glances.sent_s)
         radius_m = 0.0884 / 2 * (right + left) / (right - left)

@@ -22,11 +22,11 @@ from bns.hardware.servos.bridge import BAUD as BRIDGE_BAUD
 from bns.hardware.servos.bridge import BridgeChain
 from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.servos.servo_chain import ServoChain, ServoError, StuckServoError
-from bns.hardware.servos.snake_drive import SnakeDrive
+from bns.hardware.servos.snake_drive import KNOWN_S, UNKNOWN_S, SnakeDrive
 from bns.hardware.servos.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
-from bns.hardware.tracking.kinds import checked, delay_of, open_tracker
+from bns.hardware.tracking.kinds import DELAY, checked, delay_of, open_tracker
 
 REPEATS = 3
 """How often a trial drives its final controller by default: the dissertation drove it three times (section 5.7)."""
@@ -49,6 +49,7 @@ class SnakePlatform:
         self._chain, self._eye, self._settings = chain, eye, settings
         self._clock, self._journal = clock, journal
         self._watch = Watch(rig.limits, clock, stopping)
+        self._unknown_s = KNOWN_S if DELAY in rig.tracker else UNKNOWN_S
 
     @property
     def retries(self) -> int:
@@ -77,9 +78,14 @@ class SnakePlatform:
         self._chain.close()
         self._eye.close()
 
+    def _new_drive(self) -> SnakeDrive:
+        return SnakeDrive(
+            self._chain, self._eye, self._watch, self._settings, self._clock, self._journal, self._unknown_s
+        )
+
     def move_about(self, seconds: float) -> Motion:
         """Bend to one side and back, for the tracker's delay; stopped at the end. TrialPausedError, StopNotConfirmedError."""
-        drive = SnakeDrive(self._chain, self._eye, self._watch, self._settings, self._clock, self._journal)
+        drive = self._new_drive()
         self._watch.begin()
         with StopsAtTheEnd(self.stop):
             try:
@@ -90,7 +96,7 @@ class SnakePlatform:
 
     def drive(self, commands: np.ndarray) -> Driven:
         """Straighten the robot, then drive the cycles one after the other."""
-        drive, ended = SnakeDrive(self._chain, self._eye, self._watch, self._settings, self._clock, self._journal), ""
+        drive, ended = self._new_drive(), ""
         guard, stuck = StopsAtTheEnd(self.stop), ""
         began_s = self._clock.now_s()
         self._watch.begin()

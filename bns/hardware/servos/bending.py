@@ -12,9 +12,10 @@ from bns.hardware.clock import Clock
 from bns.hardware.delay import Motion, signed_steps
 from bns.hardware.safety import Watch
 from bns.hardware.servos.servo_chain import ServoChain, StrainWatch
+from bns.hardware.servos.shape import apart_m
 from bns.hardware.servos.snake_settings import SnakeSettings
 from bns.hardware.tracking.eye import Eye
-from bns.physics.snake.parameters import SnakeParameters, shipped_parameters
+from bns.physics.snake.parameters import shipped_parameters
 
 _LEAST_RAD, _MOST_RAD = 0.15, 0.6
 """Of one joint. Straighter than that, the markers hardly come nearer; four joints at the other end bend by 137 degrees."""
@@ -48,13 +49,3 @@ def bent(chain: ServoChain, eye: Eye, watch: Watch, settings: SnakeSettings, clo
         clock.sleep(_LOOK_S)
     return Motion(*np.array(robot).T, *np.array(seen).reshape(-1, 2).T)
 
-
-def apart_m(joints_rad: list[float], parameters: SnakeParameters) -> float:
-    """Distance of the markers by the angles of the joints; those that bend up and down are taken for straight."""
-    between = parameters.joints_between_markers
-    gap_m, pitch_m, length_m = parameters.marker_gap_m, parameters.pitch_m, parameters.length_m
-    joints_m = pitch_m * (1.0 + np.arange(between.start, between.stop))
-    along_m = np.array([(length_m - gap_m) / 2.0, *joints_m, (length_m + gap_m) / 2.0])
-    sideways = [angle if joint % 2 == 0 else 0.0 for joint, angle in enumerate(joints_rad)][between]
-    headings = np.concatenate([[0.0], np.cumsum(sideways)])
-    return float(abs(np.sum(np.diff(along_m) * np.exp(1j * headings))))
