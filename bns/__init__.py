@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from bns.api.report import ReportResult, report
     from bns.api.run import RunResult, run
     from bns.api.sweep import Sweep, SweepResult
-    from bns.api.trial import TrialResult, trial
+    from bns.api.trial import ExperimentResult, TrialResult, trial
     from bns.app.explore import Explorer, explore
     from bns.errors import (
         BnsError,
@@ -58,6 +58,7 @@ __all__ = [
     "DeviceError",
     "DiagnoseResult",
     "Effect",
+    "ExperimentResult",
     "Explorer",
     "HardwareError",
     "Measurements",
@@ -101,7 +102,7 @@ _HOMES = {
     "api.report": ("ReportResult", "report"),
     "api.run": ("RunResult", "run"),
     "api.sweep": ("Sweep", "SweepResult"),
-    "api.trial": ("TrialResult", "trial"),
+    "api.trial": ("ExperimentResult", "TrialResult", "trial"),
     "app.explore": ("Explorer", "explore"),
     "errors": (
         *("BnsError", "ClusterError", "DataError", "DeviceError", "HardwareError", "ModelError", "SpecError"),

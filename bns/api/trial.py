@@ -1,4 +1,4 @@
-"""`bns.trial`: a run whose world is a robot, or its emulator."""
+"""`bns.trial`: a run whose world is a robot, or its emulator; given commands driven; a trial run again from its journal."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, Unpack, overload
 
 from matplotlib.axes import Axes
 
@@ -22,6 +22,8 @@ from bns.hardware.rig import load_rig, shipped_rig
 from bns.robots import load_robot
 from bns.spec import RunSpec, robot_and_options
 from bns.tasks import default_task
+from bns.trial.again.replay import replayed
+from bns.trial.experiment import drive_commands
 from bns.trial.folder import MEASUREMENTS
 from bns.trial.report import TrialResult as Driven
 from bns.trial.session import MOST_ROUNDS, TrialSetup, carry_out
@@ -56,10 +58,67 @@ class TrialResult(Shown):
         return f"{spec.robot}, {spec.task}, seed {spec.seed}, {len(evals)} evaluations driven, in {self.folder}"
 
 
+@dataclass(frozen=True, repr=False)
+class ExperimentResult(Shown):
+    """Given commands that were driven. ``folder`` holds their journal and measurements."""
+
+    folder: Path
+    text: str
+
+    @cached_property
+    def measurements(self) -> Measurements:
+        """What was commanded and where the robot was, of every drive."""
+        return Measurements(self.folder / MEASUREMENTS)
+
+    def summary(self) -> str:
+        """How many trials were driven, and where the measurements are."""
+        return self.text
+
+    def _line(self) -> str:
+        return f"{self.text.partition(';')[0]}, in {self.folder}"
+
+
+class Settings(Parameters, total=False):
+    """How a trial is carried out, for type checkers; `trial` says what each is."""
+
+    rig: _Path | None
+    emulated: bool
+    results: _Path
+    seed: int
+    speed: float | None
+    faults: _Path | FaultPlan | None
+    unattended: bool
+    resume: bool
+    most_rounds: int
+    until_success: int | None
+    repeats: int | None
+    figures: bool
+    progress: Progress | None
+    on_evaluation: Callable[[Row], None] | None
+
+
+@overload
+def trial(
+    robot: str = ..., task: str | None = ..., *, commands: None = ..., replay: None = ..., **settings: Unpack[Settings]
+) -> TrialResult: ...
+
+
+@overload
+def trial(
+    robot: str = ..., task: str | None = ..., *, commands: _Path, replay: None = ..., **settings: Unpack[Settings]
+) -> ExperimentResult: ...
+
+
+@overload
+def trial(*, replay: _Path, results: _Path = ...) -> RunResult: ...
+
+
 def trial(
     robot: str = "khepera",
     task: str | None = None,
     *,
+    commands: _Path | None = None,
+    replay: _Path | None = None,
     rig: _Path | None = None,
     emulated: bool = False,
     results: _Path = "results",
@@ -75,12 +134,14 @@ def trial(
     progress: Progress | None = None,
     on_evaluation: Callable[[Row], None] | None = None,
     **parameters: Unpack[Parameters],
-) -> TrialResult:
+) -> TrialResult | ExperimentResult | RunResult:
     """Carry out a run on a robot: training and evolution go on while it drives.
 
     Args:
         robot: khepera or snake.
         task: a goal task of that robot; by default the first of its study.
+        commands: a file of commands (CSV, as `bns.propose` writes it) to be driven instead of evolving; an ExperimentResult.
+        replay: the journal of a trial, to run that again without a robot; a RunResult with the same rows.
         rig: the file of your set-up (docs/trials.md): port, tracker, surface.
         emulated: drive the emulator of the robot, by the same drivers; needs no rig.
         results: folder of all results; the trial has a folder of its own in its ``trials``.
@@ -104,6 +165,8 @@ def trial(
         StopNotConfirmedError: the robot may still be moving.
         SpecError: a parameter that there is none of, or whose value is not allowed.
     """
+    if replay is not None:
+        return _replayed(replay, results, commands, rig, emulated)
     setup = trial_setup(
         robot,
         rig,
@@ -118,7 +181,19 @@ def trial(
         repeats=repeats,
     )
     spec = trial_spec(robot, task, seed=seed, **parameters)
+    if commands is not None:
+        return ExperimentResult(*drive_commands(Path(commands), setup, Path(results), spec.seed))
     return driven(spec, setup, results, progress=progress, on_evaluation=on_evaluation)
+
+
+def _replayed(
+    journal: _Path, results: _Path, commands: _Path | None, rig: _Path | None, emulated: bool
+) -> RunResult:
+    """A trial again from its journal, which knows its robot and spec: nothing else is driven."""
+    if commands is not None or rig is not None or emulated:
+        raise HardwareError("replay is a trial from its journal, without a robot; give no commands, rig or emulated with it.")
+    kept = replayed(Path(journal), Path(results))
+    return RunResult(kept.spec, kept.result, kept.wall_s, {})
 
 
 def trial_spec(robot: str, task: str | None = None, *, record: str = "paths", **parameters: Any) -> RunSpec:

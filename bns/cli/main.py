@@ -141,7 +141,7 @@ def _add_single_runs(command: measuring.Adder) -> None:
     ill.add_argument(
         "--rig", type=Path, metavar="FILE", help="your set-up (YAML): its robot and tracker are asked, too"
     )
-    add_servo_options(command("servos", servos, "set up AX-12 servos: who answers, their ids, their settings"))
+    add_servo_options(command("servos", servos, "set up Dynamixel servos: who answers, their ids, their settings"))
 
 
 def run(options: argparse.Namespace) -> int:

@@ -39,10 +39,16 @@ class SameScene:
         self._points: np.ndarray | None = None
         self._made = 0.0
 
+    def is_another(self, points: np.ndarray) -> bool:
+        """Whether `points` (n, 2), m, are seen elsewhere than in the scene so far, or are the first; then this is the scene."""
+        other = self._points is None or bool(np.hypot(*(points - self._points).T).max() > self._still_m)
+        self._points = points if other else self._points
+        return other
+
     def since_it_moved(self, points: np.ndarray, made: float) -> float:
         """The part of the motion `made` so far, by the robot's account, of which nothing is seen at `points` (n, 2), m."""
-        if self._points is None or np.hypot(*(points - self._points).T).max() > self._still_m:
-            self._points, self._made = points, made
+        if self.is_another(points):
+            self._made = made
         return made - self._made
 
 

@@ -12,8 +12,10 @@ from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.rig import Rig
 from bns.hardware.tracking.calibration import Board, Calibration, calibrate, corners, load_calibration
-from bns.hardware.tracking.camera import FrameTracker, StreamCamera, annotated
-from bns.hardware.tracking.kinds import open_tracker
+from bns.hardware.tracking.camera import FrameTracker, StreamCamera, annotated, open_camera
+from bns.hardware.tracking.colour import detector, markers_of
+from bns.hardware.tracking.colour_preview import drawn, report
+from bns.hardware.tracking.kinds import checked, open_tracker
 from bns.hardware.tracking.sight import Sight
 
 with extra("robot"):
@@ -44,6 +46,25 @@ def watch(rig: Rig, clock: Clock, seconds: float, folder: Path | None, say: Call
     finally:
         tracker.close()
     return looks, seen
+
+
+def coloured(rig: Rig, clock: Clock) -> tuple[str, bytes]:
+    """What the rig's colour tracker makes of a picture: in words, and drawn (PNG). HardwareError if it is of another kind."""
+    if rig.tracker["kind"] != "colour":
+        raise HardwareError(f"the tracker of the rig is {rig.tracker['kind']}; colours are looked at by kind: colour.")
+    settings = checked(rig.tracker)
+    camera = open_camera(settings, clock)
+    try:
+        clock.sleep(_LOOK_S)
+        frame = camera.newest()
+    finally:
+        camera.close()
+    if frame is None:
+        raise HardwareError("the camera is gone; plug it in again.")
+    find = detector(settings)
+    good, coded = cv2.imencode(".png", drawn(frame.picture, find))
+    assert good
+    return report(frame.picture, find, markers_of(settings)), coded.tobytes()
 
 
 def in_words(sight: Sight | None) -> str:

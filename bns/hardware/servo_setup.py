@@ -1,7 +1,7 @@
-"""New AX-12 servos made ready for a chain: who is on the bus, an id each, and settings that a drive needs.
+"""New Dynamixel servos made ready for a chain: who is on the bus, an id each, and settings that a drive needs.
 
 New servos are all number 1 and answer at once, over each other; so one at a time is given its number. Registers and what they
-mean: the AX-12's manual, control table. The makers' highest voltage is 12 V.
+mean, and the makers' voltages: the tables of the models.
 """
 
 from __future__ import annotations
@@ -16,25 +16,37 @@ from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.doctor import Finding, latency_of
 from bns.hardware.link.terminal_error import TerminalError
-from bns.hardware.servos.ax12_table import REGISTERS
-from bns.hardware.servos.dynamixel import BAUD
+from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.dynamixel_port import ClockedPort
-from bns.hardware.servos.servo_chain import ServoLimits
+from bns.hardware.servos.servo_models import TABLES, name_of, table_of
+from bns.hardware.servos.servo_table import BAUD, ServoTable
+from bns.hardware.servos.snake_settings import limits_of
 
 with extra("robot"):
     from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
 
-BAUDS = (1_000_000, 57_600, 115_200, 500_000, 400_000, 250_000, 200_000, 19_200, 9_600)
-"""That a servo can be set to; the first is how it comes, the second how newer kinds come."""
-MODELS = {12: "AX-12", 18: "AX-18", 300: "AX-12W"}
-_AX12, _LAST_ID = 12, 252
+PROTOCOLS = (1, 2)
+_LAST_ID = 252
 _MOST_DELAY = 25
 """A return delay of 50 µs: above it, a round of twelve servos takes milliseconds longer for nothing."""
-_ANSWERS_ALL = 2
 _EEPROM_S = 0.02
-_REACH = 512 - 307
-"""Angle limits of this and its mirror leave 90 degrees to both sides of the middle."""
-_WANTED = {"return_delay": 0, "status_return": _ANSWERS_ALL, "cw_angle_limit": 0, "ccw_angle_limit": 1023}
+_QUARTER_RAD = 1.5707963267948966
+_NAMES = {"return_delay": "return delay", "status_return": "status return level"}
+
+
+class Rate(NamedTuple):
+    """Bits a second, and the protocol spoken at it."""
+
+    baud: int
+    protocol: int
+
+
+def rates(protocols: Sequence[int] = PROTOCOLS, every: bool = False) -> list[Rate]:
+    """Where servos are looked for: at the rate of a chain, and at that of new ones; or at every rate that they can be set to."""
+    tables = [table for table in TABLES.values() if table.protocol in protocols]
+    usual = [Rate(BAUD, table.protocol) for table in tables] + [Rate(table.new_baud, table.protocol) for table in tables]
+    others = [Rate(baud, table.protocol) for table in tables for baud in table.bauds] if every else []
+    return list(dict.fromkeys(usual + others))
 
 
 class OnTheBus(NamedTuple):
@@ -43,105 +55,145 @@ class OnTheBus(NamedTuple):
     number: int
     baud: int
     model: int
+    protocol: int = 1
+
+    @property
+    def table(self) -> ServoTable | None:
+        """Of its model, if there is one."""
+        return table_of(self.protocol, self.model)
 
     def __str__(self) -> str:
         if not self.model:
             return f"id {self.number} at {self.baud} baud: garbled; more than one servo has this id. Connect them one at a time"
-        return f"id {self.number} at {self.baud} baud: {MODELS.get(self.model, f'model {self.model}')}"
+        return f"id {self.number} at {self.baud} baud: {name_of(self.protocol, self.model)}"
 
 
 class ServoBus:
     """A bus opened to set servos up; no other process can have it meanwhile."""
 
     def __init__(self, port: str, clock: Clock) -> None:
-        self.port, self._clock, self._packets = port, clock, PacketHandler(1.0)
-        self._line = ClockedPort(port, clock)
+        self.port, self._clock = port, clock
+        self._packets = {protocol: PacketHandler(float(protocol)) for protocol in PROTOCOLS}
+        self._line, self._baud = ClockedPort(port, clock), 0
         self.at(BAUD)
 
     def at(self, baud: int) -> None:
         """Go on at this rate; HardwareError if the port cannot be opened or set to it."""
-        if not self._line.setBaudRate(baud):
+        if baud != self._baud and not self._line.setBaudRate(baud):
             raise HardwareError(f"{self.port} cannot be set to {baud} baud; another adapter may be needed.")
+        self._baud = baud
 
-    def scan(self, bauds: Sequence[int] = (BAUD,), numbers: Sequence[int] | None = None) -> Iterator[OnTheBus]:
+    def scan(self, looked: Sequence[Rate] | None = None, numbers: Sequence[int] | None = None) -> Iterator[OnTheBus]:
         """All that answers, number by number."""
-        for baud in bauds:
+        for baud, protocol in rates() if looked is None else looked:
             self.at(baud)
+            packets = self._packets[protocol]
             for number in range(_LAST_ID + 1) if numbers is None else numbers:
-                model, result, _ = self._packets_of(lambda n=number: self._packets.ping(self._line, n))  # type: ignore[misc]
+                model, result, _ = self._asked(lambda p=packets, n=number: p.ping(self._line, n))  # type: ignore[misc]
                 if result != COMM_RX_TIMEOUT:
-                    yield OnTheBus(number, baud, int(model) if result == COMM_SUCCESS else 0)
+                    yield OnTheBus(number, baud, int(model) if result == COMM_SUCCESS else 0, protocol)
 
-    def set_id(self, new: int, old: int | None = None) -> OnTheBus:
-        """Give the servo on the bus a number; HardwareError unless it is alone there (or alone has the number `old`)."""
+    def set_id(self, new: int, old: int | None = None, looked: Sequence[Rate] | None = None) -> OnTheBus:
+        """Give the servo on the bus a number, and the rate of a chain; HardwareError unless it is alone there (or alone has the
+        number `old`)."""
         if not 0 <= new <= _LAST_ID:
             raise HardwareError(f"the id {new} is none; ids go from 0 to {_LAST_ID}.")
-        there = list(self.scan())
+        there = list(self.scan(looked))
         meant = [servo for servo in there if old is None or servo.number == old]
         if len(meant) != 1 or not meant[0].model:
             listed = "; ".join(str(servo) for servo in there) or "no servo answers"
             which = "Connect one servo alone" if old is None else f"No single servo has the id {old}"
             raise HardwareError(f"{which}: {listed}. Name one of several with --from ID.")
-        if any(servo.number == new for servo in there if servo is not meant[0]):
+        (servo,) = meant
+        if any(other.number == new for other in there if other is not servo):
             raise HardwareError(f"another servo on this bus has the id {new}; take a free one, or connect one servo alone.")
-        if new != meant[0].number:
-            self.write(meant[0].number, "id", new)
-        found = list(self.scan(numbers=[new]))
+        if new != servo.number:
+            self.write(servo, "id", new)
+            servo = servo._replace(number=new)
+        if servo.baud != BAUD and servo.table is not None:
+            self.write(servo, "baud_rate", servo.table.bauds[BAUD])
+        found = list(self.scan([Rate(BAUD, servo.protocol)], [new]))
         if len(found) != 1 or not found[0].model:
             raise HardwareError(f"the servo does not answer as {new}; switch it off and on, then: bns servos scan")
         return found[0]
 
-    def check(self, number: int, limits: ServoLimits) -> Iterator[Finding]:
+    def check(self, servo: OnTheBus) -> Iterator[Finding]:
         """What of a servo's settings is not as a drive needs it."""
-        values = {name: self.read(number, name) for name in (*_WANTED, "model_number", "present_voltage", "alarm_shutdown")}
-        model = MODELS.get(values["model_number"], str(values["model_number"]))
-        yield Finding(values["model_number"] == _AX12, f"servo {number} is a {model}", "" if model == "AX-12" else "replace it")
+        number, table, name = servo.number, servo.table, name_of(servo.protocol, servo.model)
+        usable = table is not None and servo.baud == BAUD
+        replace_it = f"replace it; of use are {', '.join(TABLES)}"
+        at_rate = f"bns servos set-id {number} --from {number} --port {self.port}"
+        try_next = "" if usable else at_rate if table else replace_it
+        yield Finding(usable, f"servo {number} is a {name} at {servo.baud} baud", try_next)
+        if table is None:
+            return
         mend = f"bns servos check --fix --port {self.port}"
-        yield _fit(number, "return delay", 2 * values["return_delay"], "µs", values["return_delay"] <= _MOST_DELAY, mend)
-        yield _fit(number, "status return level", values["status_return"], "", values["status_return"] == _ANSWERS_ALL, mend)
-        low, high = values["cw_angle_limit"], values["ccw_angle_limit"]
-        wide = low <= _REACH and high >= 1023 - _REACH
+        for what, wanted in table.wanted.items():
+            if not what.endswith("angle_limit"):
+                value = self.read(servo, what)
+                good = value <= _MOST_DELAY if what == "return_delay" else value == wanted
+                shown = f"{2 * value} µs" if what == "return_delay" else str(value)
+                yield Finding(good, f"servo {number}: {_NAMES.get(what, what.replace('_', ' '))} {shown}", "" if good else mend)
+        low, high = self.read(servo, "cw_angle_limit"), self.read(servo, "ccw_angle_limit")
+        reach = _QUARTER_RAD / table.rad_per_step
+        wide = low <= table.centre - reach and high >= table.centre + reach - 1
         yield Finding(wide, f"servo {number}: angle limits {low} to {high}", "" if wide else f"90° to both sides: {mend}")
-        volts = values["present_voltage"] / 10
+        volts, limits = self.read(servo, "present_voltage") / 10, limits_of(table)
         fed = limits.low_v <= volts <= limits.high_v
-        supply = f"a supply of {limits.low_v:g} to {limits.high_v:g} V; the makers allow 12 V"
+        supply = f"a supply of {limits.low_v:g} to {limits.high_v:g} V; the makers allow {table.volts[1]:g} V"
         yield Finding(fed, f"servo {number}: {volts:.1f} V", "" if fed else supply)
 
-    def mend(self, number: int) -> list[str]:
+    def mend(self, servo: OnTheBus) -> list[str]:
         """Write the settings that a drive needs, read them back; names of those that were changed."""
         changed = []
+        wanted = {} if servo.table is None else servo.table.wanted
         # What it confirms goes first, so that the others are confirmed.
-        for name in ("status_return", *(n for n in _WANTED if n != "status_return")):
-            if self.read(number, name) != _WANTED[name]:
-                self.write(number, name, _WANTED[name])
+        for name in sorted(wanted, key=lambda name: name != "status_return"):
+            if self.read(servo, name) != wanted[name]:
+                self.write(servo, name, wanted[name])
                 changed.append(name)
         return changed
 
-    def read(self, number: int, name: str) -> int:
+    def read(self, servo: OnTheBus, name: str) -> int:
         """A register of one servo; HardwareError if it does not answer."""
-        register = REGISTERS[name]
-        call = self._packets.read1ByteTxRx if register.size == 1 else self._packets.read2ByteTxRx
-        value, result, _ = self._packets_of(lambda: call(self._line, number, register.address))
-        if result != COMM_SUCCESS:
-            raise HardwareError(f"servo {number} does not answer ({self._packets.getTxRxResult(result)}); check its cable.")
-        return int(value)
+        table = servo.table or AX12
+        address, size = table.span(name, name)
+        packets, found = self._packets[servo.protocol], list[int]()
 
-    def write(self, number: int, name: str, value: int) -> None:
+        def call() -> tuple[int, int, int]:
+            data, result, bits = packets.readTxRx(self._line, servo.number, address, size)
+            found[:] = data
+            return 0, result, bits
+
+        self.at(servo.baud)
+        _, result, _ = self._asked(call)
+        if result != COMM_SUCCESS or len(found) != size:
+            raise HardwareError(f"servo {servo.number} does not answer ({packets.getTxRxResult(result)}); check its cable.")
+        return table.value(name, int.from_bytes(bytes(found), "little"))
+
+    def write(self, servo: OnTheBus, name: str, value: int) -> None:
         """Write a register and read it back: whether a servo confirms a write depends on what is being set."""
-        register = REGISTERS[name]
-        call = self._packets.write1ByteTxRx if register.size == 1 else self._packets.write2ByteTxRx
-        self._packets_of(lambda: (0, *call(self._line, number, register.address, value)), attempts=1)
+        table = servo.table or AX12
+        address, size = table.span(name, name)
+        if address < table.locked_below and self.read(servo, "torque_enable"):
+            self.write(servo, "torque_enable", 0)
+        data = list(value.to_bytes(size, "little"))
+        self.at(servo.baud)
+        packets = self._packets[servo.protocol]
+        self._asked(lambda: (0, *packets.writeTxRx(self._line, servo.number, address, size, data)), attempts=1)
         self._clock.sleep(_EEPROM_S)
-        now = value if name == "id" else number
+        now = servo._replace(number=value) if name == "id" else servo
+        if name == "baud_rate":
+            now = servo._replace(baud=next(baud for baud, code in table.bauds.items() if code == value))
         if (found := self.read(now, name)) != value:
-            raise HardwareError(f"servo {number}: {name} is {found} after {value} was written; switch it off and on.")
+            raise HardwareError(f"servo {servo.number}: {name} is {found} after {value} was written; switch it off and on.")
 
     def close(self) -> None:
         """Give the port free."""
         if self._line.is_open:
             self._line.closePort()
 
-    def _packets_of(self, call: Callable[[], tuple[int, int, int]], attempts: int = 2) -> tuple[int, int, int]:
+    def _asked(self, call: Callable[[], tuple[int, int, int]], attempts: int = 2) -> tuple[int, int, int]:
         answer = (0, COMM_RX_TIMEOUT, 0)
         for _ in range(attempts):
             try:
@@ -163,6 +215,3 @@ def adapter(port: str, root: Path = Path("/sys/class/tty")) -> Iterator[Finding]
     if timer.exists():
         yield latency_of(port, int(timer.read_text()))
 
-
-def _fit(number: int, what: str, value: int, unit: str, good: bool, mend: str) -> Finding:
-    return Finding(good, f"servo {number}: {what} {value}{f' {unit}' if unit else ''}", "" if good else mend)

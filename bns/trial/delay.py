@@ -1,4 +1,4 @@
-"""`bns calibrate --delay`: the robot turns about on its rig, and how late its tracker is comes out."""
+"""`bns calibrate --delay`: the robot moves to and fro on its rig, and how late its tracker is comes out."""
 
 from __future__ import annotations
 
@@ -9,19 +9,22 @@ from bns.hardware.tracking.kinds import delay_of
 from bns.trial.session import TrialSetup, open_rig
 
 SECONDS = 15.0
+_WHEELS = "turn on the spot, a third of a turn each way,"
+_SNAKE = "straighten, then bend to one side and back"
 
 
 def measured_delay(how: TrialSetup, seconds: float = SECONDS, seed: int = 0) -> Delay:
-    """Turn for so long, guarded like a trial; HardwareError, TrialPausedError, StopNotConfirmedError."""
+    """Move for so long, guarded like a trial; HardwareError, TrialPausedError, StopNotConfirmedError."""
     with Stopping() as stopping, open_rig(how, seed, None, stopping) as opened:
-        turn_about = getattr(opened.platform, "turn_about", None)
-        if turn_about is None:
+        move_about = getattr(opened.platform, "move_about", None)
+        if move_about is None:
             raise HardwareError(
-                f"the robot {how.rig.robot} has no motion to measure a delay with; its platform needs turn_about(seconds)."
+                f"the robot {how.rig.robot} has no motion to measure a delay with; its platform needs move_about(seconds)."
             )
         if not (how.yes or how.emulated):
-            stopping.ask(f"The robot will turn on the spot for {seconds:g} s, a third of a turn each way; Enter: ")
-        return delay_between(turn_about(seconds), delay_of(how.rig.tracker))
+            what = _SNAKE if how.rig.robot == "snake" else _WHEELS
+            stopping.ask(f"The robot will {what} for {seconds:g} s; Enter: ")
+        return delay_between(move_about(seconds), delay_of(how.rig.tracker))
 
 
 def in_words(found: Delay) -> str:
@@ -29,5 +32,5 @@ def in_words(found: Delay) -> str:
     return (
         f"the tracker's poses are {1000 * found.delay_s:.1f} ms old when they are stamped (standard error "
         f"{1000 * found.error_s:.1f} ms, correlation {found.correlation:.4f}, {found.sights} sights, {found.readings} readings "
-        f"of the encoders)\nwrite this into the rig's tracker:\n  delay_s: {found.delay_s:.4f}"
+        f"of its joints or encoders)\nwrite this into the rig's tracker:\n  delay_s: {found.delay_s:.4f}"
     )

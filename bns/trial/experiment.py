@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -76,8 +77,15 @@ def _starts(path: Path, table: pd.DataFrame, robot: Robot) -> np.ndarray:
     return starts
 
 
-def drive_commands(path: Path, how: TrialSetup, results: Path, seed: int) -> str:
-    """Drive every trial of a file, or those that are left of them; measurements beside the journal; the report in words."""
+class Experiment(NamedTuple):
+    """Commands that were driven: the folder of journal and measurements, and a report in words."""
+
+    folder: Path
+    text: str
+
+
+def drive_commands(path: Path, how: TrialSetup, results: Path, seed: int) -> Experiment:
+    """Drive every trial of a file, or those that are left of them; measurements beside the journal."""
     trials = read_commands(path, load_robot(how.rig.robot))
     for _, (x_m, y_m, _heading) in trials:
         if not how.rig.limits.surface.holds(x_m, y_m):
@@ -87,7 +95,7 @@ def drive_commands(path: Path, how: TrialSetup, results: Path, seed: int) -> str
             )
     folder = results / "trials" / f"experiment-{path.stem}{'-emulated' if how.emulated else ''}"
     with locked(folder):
-        return _driven(trials, how, folder / JOURNAL, seed)
+        return Experiment(folder, _driven(trials, how, folder / JOURNAL, seed))
 
 
 def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journal: Path, seed: int) -> str:

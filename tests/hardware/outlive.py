@@ -39,12 +39,16 @@ HANGS_S = 60.0
 
 
 class Seen(NamedTuple):
-    """Seconds from the cause until the robot stood; how the trial's process ended, and what it said; the guard's log."""
+    """Seconds from the cause until the robot stood; how the trial's process ended, and what it said; the guard's log.
+
+    Where the link was away, `still_s` counts from its return; `alone_s` from the cause, of a robot that stood before that.
+    """
 
     still_s: float
     ended: int
     said: str
     events: list
+    alone_s: float = float("nan")
 
 
 class Glances:
@@ -73,9 +77,10 @@ class Glances:
 
     def _seen(self, now_s):
         if self._wheels is None:
-            wiggle = 0.05 * np.sin(5.0 * self._filmed_s)
-            points = {"yellow": np.array([wiggle, -0.3]), "green": np.array([wiggle, 0.3])}
-            return Sight(now_s, np.array([wiggle, 0.0, np.pi / 2]), 0.0, points)
+            middle = 0.05 * np.array([np.sin(5.0 * self._filmed_s), np.cos(5.0 * self._filmed_s)])  # never at rest
+            half = np.array([0.0, 0.3])
+            points = {"yellow": middle - half, "green": middle + half}
+            return Sight(now_s, np.array([*middle, np.pi / 2]), 0.0, points)
         left, right = self._wheels
         turned = (right - left) / 0.0884 * (0.0 if Glances.sent_s is None else self._filmed_s - Glances.sent_s)
         radius_m = 0.0884 / 2 * (right + left) / (right - left)
@@ -258,7 +263,7 @@ def outlived(nursery, link, cause, folder, gone_s=0.0):
     """One trial that this befell while its robot moved; AssertionError if the robot went on, or anything is left over."""
     robot = Robot(link, folder)
     try:
-        still_s, ended = _befell(nursery, robot, cause, folder, gone_s)
+        still_s, alone_s, ended = _befell(nursery, robot, cause, folder, gone_s)
         _guard_ends(robot, folder)
     except BaseException:
         for event in _events(folder):  # it would try for ever, at a port that another one may have by then
@@ -270,7 +275,7 @@ def outlived(nursery, link, cause, folder, gone_s=0.0):
         robot.close()
     assert not moves
     said = folder / "said"
-    return Seen(still_s, ended, said.read_text() if said.exists() else "", _events(folder))
+    return Seen(still_s, ended, said.read_text() if said.exists() else "", _events(folder), alone_s)
 
 
 def _befell(nursery, robot, cause, folder, gone_s):
@@ -280,12 +285,17 @@ def _befell(nursery, robot, cause, folder, gone_s):
         time.sleep(_ARMED_S if cause.startswith("camera") and robot.link != "serial" else 0.25)
         began_s = time.monotonic()
         CAUSES[cause](robot, process, terminal)
+        alone_s = float("nan")
         if cause in GONE_S:
-            time.sleep(gone_s or GONE_S[cause])
+            end_s = began_s + (gone_s or GONE_S[cause])
+            while (now_s := time.monotonic()) < end_s and robot.moves():
+                time.sleep(0.002)
+            alone_s = now_s - began_s if now_s < end_s else alone_s
+            time.sleep(max(0.0, end_s - time.monotonic()))
             robot.plug_in()
             began_s = time.monotonic()
         still_s = robot.until(False, HANGS_S) - began_s
-        return still_s, _end(nursery, cause, process, None if cause == "terminal closed" else terminal)
+        return still_s, alone_s, _end(nursery, cause, process, None if cause == "terminal closed" else terminal)
     finally:
         if cause != "terminal closed":
             os.close(terminal)
@@ -372,7 +382,10 @@ def main(count, causes=()):
             took_ms = 1000 * np.array([s.still_s for s in seen])
             ends = ", ".join(sorted({str(s.ended) for s in seen}))
             took = f"{np.median(took_ms):.0f}, {took_ms.max():.0f} | {(took_ms <= 500).sum()}"
-            print(f"| {cause} | {link} | {count} | {took} | {ends} |", flush=True)
+            alone_ms = 1000 * np.array([s.alone_s for s in seen])
+            alone = f" by itself {np.median(alone_ms):.0f}, {alone_ms.max():.0f} after the cause"
+            alone = alone if np.isfinite(alone_ms).all() else ""
+            print(f"| {cause} | {link} | {count} | {took} | {ends} |{alone}", flush=True)
     nursery.close()
 
 

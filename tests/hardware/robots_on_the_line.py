@@ -11,8 +11,8 @@ import numpy as np
 from bns.engine.philox import Key
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.body import DifferentialBody
-from bns.hardware.emulators.devices.ax12 import Bus
 from bns.hardware.emulators.devices.bridge import BridgeEmulator
+from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.khepera import KheperaEmulator
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal

@@ -12,7 +12,7 @@ import tty
 from pathlib import Path
 
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.terminal import put_through
 
 HERE = Path(__file__).parent / "arduino"

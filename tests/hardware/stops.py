@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import yaml
 
 from bns.errors import BnsError
 from bns.hardware.clock import EmulatedClock
@@ -31,6 +32,7 @@ ONCE = {
 UNREACHABLE = {"bus-fault", "hang-up", "brown-out", "silent-servo"}
 """While these last nobody can hear an order to stop."""
 OF_A_SERVO = {"overload", "overheat", "silent-servo"}
+FROZEN_S = 60.0
 CAUSES = {robot: ["end of the commands", "stop asked for", "off the surface", *ONCE[robot], *RATES[robot]] for robot in ONCE}
 
 
@@ -64,7 +66,8 @@ def stopped(robot, cause, seed, folder, **driver):
     if cause == "off the surface":
         rig = replace(rig, limits=replace(rig.limits, surface=_small(robot, draw)))
     module = platform_module(robot)
-    rig = replace(rig, driver={**rig.driver, **driver})
+    tracker = {**rig.tracker, **{name: driver.pop(name) for name in ("delay_s",) if name in driver}}
+    rig = replace(rig, driver={**rig.driver, **driver}, tracker=tracker)
     plan = Kept(_faults(robot, cause, at_s, draw), seed)
     emulation = module.emulate(rig, Path(tempfile.mkdtemp(dir=folder)), clock, plan, seed)
     if cause == "stop asked for":
@@ -82,7 +85,7 @@ def stopped(robot, cause, seed, folder, **driver):
     finally:
         emulation.close()
     begun = [t_s for faults in plan.kept for t_s in faults._begun.values() if cause in ONCE[robot]]
-    began_s = at_s if cause == "stop asked for" else min(begun, default=np.nan)
+    began_s = at_s if cause in {"stop asked for", "frozen-scene"} else min(begun, default=np.nan)
     gone_s = ONCE[robot][cause] if cause in UNREACHABLE else 0.0
     return _judged(path, began_s, gone_s)
 
@@ -100,6 +103,8 @@ def _judged(path, began_s, gone_s):
 
 def _faults(robot, cause, at_s, draw):
     servo = int(draw.integers(1, 13)) if cause in OF_A_SERVO else 0
+    if cause == "frozen-scene":
+        return (Fault(cause, at_s=at_s, for_s=FROZEN_S),)
     if cause in ONCE[robot]:
         return (Fault(cause, at_s=at_s, for_s=ONCE[robot][cause], servo=servo),)
     return (Fault(cause, rate=RATES[robot][cause]),) if cause in RATES[robot] else ()
@@ -146,5 +151,7 @@ def _spread(seconds):
 
 
 if __name__ == "__main__":
-    robot, count, *wiring = sys.argv[1:]
-    print(*report_lines(measured(robot, int(count), **({"wiring": wiring[0]} if wiring else {}))), sep="\n")
+    robot, count, *driver = sys.argv[1:]
+    causes = [each for each in driver if "=" not in each] or None
+    settings = {name: yaml.safe_load(value) for name, _, value in (each.partition("=") for each in driver if "=" in each)}
+    print(*report_lines(measured(robot, int(count), causes, **settings)), sep="\n")

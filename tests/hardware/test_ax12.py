@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 
 from bns.errors import HardwareError
-from bns.hardware.emulators.devices.ax12 import Bus, packet
+from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.servos.ax12_table import RAD_PER_STEP, REGISTERS
-from bns.hardware.servos.dynamixel import Ax12Chain
+from bns.hardware.servos.dynamixel import DynamixelChain
+from bns.hardware.servos.packets import WIRES
 from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits, StrainWatch
 
 IDS = (1, 2, 3)
+packet = WIRES[1].instruction
 
 
 @pytest.fixture
@@ -26,7 +28,7 @@ def chain(tmp_path, clock):
         bus = Bus([Servo(n, clock, struck, **registers) for n in numbers], clock, struck)
         line = PseudoTerminal(bus, tmp_path, f"bus{len(opened)}")
         opened.append(line)
-        driver = Ax12Chain(str(line.path), asked, clock, HardwareLog(None, clock))
+        driver = DynamixelChain(str(line.path), asked, clock, HardwareLog(None, clock))
         opened.append(driver)
         return driver, bus, line
 
@@ -93,7 +95,7 @@ def test_opening_finds_every_servo(chain):
     [
         ({"asked": (1, 2, 3, 4)}, r"servo 4 is missing .*bns doctor"),
         ({"numbers": (1, 2, 2, 3)}, r"servo 2: answers are garbled; two servos may have this id|servo 2 is missing"),
-        ({"model_number": 18}, r"servo 1 is a model 18, not an AX-12"),
+        ({"model_number": 18}, r"servo 1 is of the model AX-18, not AX-12"),
     ],
 )
 def test_chains_that_cannot_be_used(chain, build, message):
@@ -103,7 +105,7 @@ def test_chains_that_cannot_be_used(chain, build, message):
 
 def test_no_such_port(clock):
     with pytest.raises(HardwareError, match=r"there is no port /dev/nowhere.*bns doctor"):
-        Ax12Chain("/dev/nowhere", IDS, clock, HardwareLog(None, clock))
+        DynamixelChain("/dev/nowhere", IDS, clock, HardwareLog(None, clock))
 
 
 def test_arming_does_not_jerk(chain):

@@ -1,15 +1,21 @@
 """Poses are stamped when they were filmed: the tracker's delay, measured by the robot's own motion, and what a trial does."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 
 from bns.errors import HardwareError
-from bns.hardware.delay import Turns, delay_between
+from bns.hardware.delay import Motion, delay_between
 from bns.hardware.emulators.faults import Fault, FaultPlan
+from bns.hardware.guard.client import GuardedPlatform
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
+from bns.hardware.servos.shape import apart_m
+from bns.physics.snake.body import Body
+from bns.physics.snake.parameters import shipped_parameters
 from bns.trial.delay import measured_delay
 from bns.trial.session import TrialSetup, open_rig
 
@@ -34,6 +40,40 @@ def test_a_late_tracker_is_found_out(tracker, late_s):
     low_s, high_s = (-0.003, 0.003) if tracker else (-0.003, 0.015)
     assert low_s < found.delay_s - late_s < high_s
     assert found.error_s < 0.003
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("driver", "most_s"), [({}, 0.005), ({"wiring": "bridge"}, 0.009)])
+def test_a_snake_finds_out_by_bending(driver, most_s):
+    """An emulated bridge reads its servos when it is asked, half of the 17 ms of its answer before the middle."""
+    rig = shipped_rig("snake")
+    rig = replace(rig, driver={**rig.driver, **driver})
+    plan = FaultPlan((Fault("late-tracker", at_s=0.0, for_s=0.1),))
+    found = measured_delay(TrialSetup(rig, emulated=True, speed=np.inf, plan=plan), seconds=7.5)
+    assert found.delay_s == pytest.approx(0.1, abs=most_s)
+    assert found.error_s < 0.003
+
+
+def test_the_markers_are_as_far_apart_as_mujoco_has_them():
+    parameters = shipped_parameters()
+    body, draw = Body(parameters), np.random.default_rng(0)
+    assert apart_m([0.0] * 12, parameters) == pytest.approx(parameters.marker_gap_m)
+    for _ in range(5):
+        joints = draw.uniform(-0.9, 0.9, 12)
+        body.lay_straight((0.0, 0.0))
+        body.data.qpos[7:] = joints
+        mujoco.mj_forward(body.model, body.data)
+        yellow, green = body.data.site_xpos[body.sites]
+        assert apart_m(joints.tolist(), parameters) == pytest.approx(np.linalg.norm(green - yellow), abs=1e-9)
+
+
+def test_a_guarded_platform_moves_about_only_if_its_own_can(tmp_path):
+    told = []
+    guard = SimpleNamespace(tripped=lambda: None, stop_now=None, arm=lambda: told.append("a"), still=lambda: told.append("s"))
+    able = SimpleNamespace(move_about=told.append)
+    GuardedPlatform(able, guard, Stopping()).move_about(3.0)
+    assert told == ["a", 3.0, "s"]
+    assert not hasattr(GuardedPlatform(SimpleNamespace(), guard, Stopping()), "move_about")
 
 
 @pytest.mark.slow
@@ -78,7 +118,7 @@ def turns(late_s, slope=1.0, noise=0.0, seed=0):
     heading = lambda t: np.sin(2.1 * t) + 0.6 * np.sin(5.3 * t + 1.0)  # noqa: E731
     seen_s = np.arange(0.0, 12.0, 0.033)
     seen = slope * heading(seen_s - late_s) + 0.02 * seen_s + 0.3 + noise * draw.standard_normal(len(seen_s))
-    return Turns(robot_s, 0.04 * heading(robot_s), seen_s, seen)
+    return Motion(robot_s, 0.04 * heading(robot_s), seen_s, seen)
 
 
 @pytest.mark.parametrize("late_s", [-0.05, 0.0, 0.08, 0.3])
@@ -96,9 +136,9 @@ def test_the_standard_error_is_the_scatter():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (turns(0.1)._replace(seen_s=np.arange(3.0), seen_rad=np.zeros(3)), "was seen 3 times"),
-        (turns(0.1, slope=0.0, noise=0.1), "does not follow the robot's own turns"),
-        (turns(0.9), "does not follow the robot's own turns"),
+        (turns(0.1)._replace(seen_s=np.arange(3.0), seen=np.zeros(3)), "was seen 3 times"),
+        (turns(0.1, slope=0.0, noise=0.1), "does not follow the robot's own motion"),
+        (turns(0.9), "does not follow the robot's own motion"),
     ],
 )
 def test_what_tells_no_delay_is_refused(given, message):

@@ -19,11 +19,11 @@ from bns.hardware.guard import client as guard_client
 from bns.hardware.guard import process as guard_process
 from bns.hardware.guard.client import Guard, GuardedClock
 from bns.hardware.guard.line import identity
-from bns.hardware.guard.recipe import ax12_recipe, bridge_recipe, khepera_recipe
+from bns.hardware.guard.recipe import bridge_recipe, bus_recipe, khepera_recipe
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.link.serial_link import NoReplyError, SerialLink
 from bns.hardware.servos.bridge import BridgeChain
-from bns.hardware.servos.dynamixel import Ax12Chain
+from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.wheels.khepera import BAUD, KheperaIII
 
 from . import outlive
@@ -32,7 +32,7 @@ from .robots_on_the_line import LINKS, Robot
 HANGS_S = 30.0
 RECIPES = {
     "serial": khepera_recipe(BAUD, 720),
-    "bus": ax12_recipe(1_000_000, range(1, 13)),
+    "bus": bus_recipe(range(1, 13)),
     "bridge": bridge_recipe(115200, 12),
 }
 
@@ -67,7 +67,7 @@ def driver_of(link, guard, clock):
     if link == "serial":
         return KheperaIII(SerialLink(guard.path, BAUD, clock, journal), clock, journal)
     if link == "bus":
-        return Ax12Chain(guard.path, range(1, 13), clock, journal)
+        return DynamixelChain(guard.path, range(1, 13), clock, journal)
     return BridgeChain(guard.path, 12, clock, journal)
 
 

@@ -7,14 +7,14 @@ from filelock import FileLock
 from bns.cli.main import main
 from bns.errors import HardwareError
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.servo_setup import ServoBus
 from bns.hardware.servos.bridge import BridgeChain
-from bns.hardware.servos.dynamixel import Ax12Chain
+from bns.hardware.servos.dynamixel import DynamixelChain
 
 IDS = (1, 2, 3)
 EMULATED = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf"]
@@ -34,7 +34,7 @@ def first(tmp_path):
     clock = EmulatedClock(np.inf)
     bus = CountedBus([Servo(n, clock, Faults()) for n in IDS], clock)
     line = PseudoTerminal(bus, tmp_path, "bus")
-    driver = Ax12Chain(str(line.path), IDS, clock, HardwareLog(None, clock))
+    driver = DynamixelChain(str(line.path), IDS, clock, HardwareLog(None, clock))
     driver.arm()
     yield driver, bus, line
     driver.close()
@@ -44,7 +44,7 @@ def first(tmp_path):
 @pytest.mark.parametrize(
     "second",
     [
-        lambda port, clock: Ax12Chain(port, IDS, clock, HardwareLog(None, clock)),
+        lambda port, clock: DynamixelChain(port, IDS, clock, HardwareLog(None, clock)),
         lambda port, clock: BridgeChain(port, 3, clock, HardwareLog(None, clock)),
         ServoBus,
     ],
@@ -57,7 +57,7 @@ def test_a_second_driver_is_refused_and_says_nothing_to_the_servos(first, second
     assert bus.received == heard
     assert all(driver.read(n, "torque_enable") == 1 for n in IDS)
     driver.close()
-    second_driver = Ax12Chain(str(line.path), IDS, EmulatedClock(np.inf), HardwareLog(None, EmulatedClock(np.inf)))
+    second_driver = DynamixelChain(str(line.path), IDS, EmulatedClock(np.inf), HardwareLog(None, EmulatedClock(np.inf)))
     second_driver.close()
 
 

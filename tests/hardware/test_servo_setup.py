@@ -8,7 +8,7 @@ import pytest
 from bns.cli.main import main
 from bns.errors import HardwareError
 from bns.hardware.clock import EmulatedClock
-from bns.hardware.emulators.devices.ax12 import Bus
+from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
@@ -44,7 +44,7 @@ def test_scan_lists_who_answers(bus, capsys):
     code, said = call(capsys, "scan", "--port", port)
     assert code == 0
     listed = [f"id {n} at 1000000 baud: AX-12" for n in (1, 3, 7)]
-    assert said.out.splitlines() == [*listed, "3 ids answer (1 Mbaud; --all-bauds tries others)"]
+    assert said.out.splitlines() == [*listed, "3 ids answer (1 Mbaud and new ones; --all-bauds tries others)"]
 
 
 def test_two_servos_of_one_id_are_noticed(bus, capsys):

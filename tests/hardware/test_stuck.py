@@ -130,7 +130,7 @@ class Drive:
 
 def driven(monkeypatch, error, straightening=False):
     chain = SimpleNamespace(stop=lambda: Stop(True, 0.1, 0.1, ""))
-    rig = SimpleNamespace(limits=shipped_rig("snake").limits)
+    rig = SimpleNamespace(limits=shipped_rig("snake").limits, tracker={})
     monkeypatch.setattr(snake, "SnakeDrive", Drive(error, straightening))
     stopping = SimpleNamespace(check=lambda: None)
     return snake.SnakePlatform(chain, None, rig, None, EmulatedClock(np.inf), None, stopping).drive(CYCLES)

@@ -23,10 +23,9 @@ ROOMS: dict[str, tuple[str, str]] = {
     ),
     "drivers": (
         "bns/hardware/wheels/khepera.py bns/hardware/servos/dynamixel.py bns/hardware/servos/servo_chain.py "
-        "bns/hardware/servos/bridge.py",
+        "bns/hardware/servos/bridge.py bns/hardware/servos/packets.py bns/hardware/servos/servo_table.py",
         "tests/hardware/test_confirmed_stop.py tests/hardware/test_khepera.py tests/hardware/test_khepera_asks.py "
-        "tests/hardware/test_ax12.py "
-        "tests/hardware/test_bridge.py",
+        "tests/hardware/test_ax12.py tests/hardware/test_bridge.py tests/hardware/test_x430.py",
     ),
 }
 """Name -> files that are changed, tests that must notice; patterns with spaces between."""

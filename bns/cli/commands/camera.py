@@ -7,6 +7,7 @@ import math
 import sys
 import tempfile
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock, EmulatedClock, RealClock
 from bns.hardware.emulators.faults import FaultPlan
-from bns.hardware.looking import from_folder, views, watch
+from bns.hardware.looking import coloured, from_folder, views, watch
 from bns.hardware.platform import platform_module
 from bns.hardware.rig import Rig, load_rig, shipped_rig
 from bns.hardware.tracking.calibration import Board, Calibration, calibrate, check_scale
@@ -41,6 +42,8 @@ def calibrated(options: argparse.Namespace) -> str:
     """Carry out `bns calibrate`; a report in words."""
     if options.wii:
         return _hung(options)
+    if options.colours is not None:
+        return _coloured(options)
     if options.delay:
         how = trial_setup(options.robot, options.rig, emulated=options.emulated, speed=math.inf if options.emulated else None)
         return in_words(measured_delay(how))
@@ -130,19 +133,36 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def tracked(options: argparse.Namespace) -> str:
-    """Carry out `bns track`; a report in words."""
+def _coloured(options: argparse.Namespace) -> str:
+    """What the colour tracker of a rig sees, drawn; hues that would fit."""
+    if options.colours.suffix != ".png":
+        raise HardwareError(f"the preview is written as PNG; let {options.colours} end in .png.")
+    asked = {name: value for name in ("yellow", "green") if (value := getattr(options, name)) is not None}
+    with ExitStack() as stack:
+        rig, clock = _looked_at(options, stack)
+        text, picture = coloured(replace(rig, tracker={**rig.tracker, **asked}), clock)
+    options.colours.write_bytes(picture)
+    return f"{text}\nwritten to {options.colours}; try others with --yellow LOW HIGH, --green LOW HIGH"
+
+
+def _looked_at(options: argparse.Namespace, stack: ExitStack) -> tuple[Rig, Clock]:
+    """The rig, or its emulation, for as long as the stack is open."""
     if options.rig is None and not options.emulated:
         raise HardwareError("name your set-up with --rig FILE, or look at the emulated one with --emulated.")
     rig: Rig = shipped_rig(options.robot) if options.rig is None else load_rig(options.rig, options.robot)
-    clock: Clock = RealClock()
+    if not options.emulated:
+        return rig, RealClock()
+    clock = EmulatedClock()
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bns-rig-")))
+    emulation = platform_module(rig.robot).emulate(rig, folder, clock, FaultPlan(), 0)
+    stack.callback(emulation.close)
+    return emulation.rig, clock
+
+
+def tracked(options: argparse.Namespace) -> str:
+    """Carry out `bns track`; a report in words."""
     with ExitStack() as stack:
-        if options.emulated:
-            clock = EmulatedClock()
-            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bns-rig-")))
-            emulation = platform_module(rig.robot).emulate(rig, folder, clock, FaultPlan(), 0)
-            stack.callback(emulation.close)
-            rig = emulation.rig
+        rig, clock = _looked_at(options, stack)
         looks, seen = watch(rig, clock, options.seconds, options.frames, print)
     return f"seen in {seen} of {looks} looks" + (f"; frames in {options.frames}" if options.frames else "")
 

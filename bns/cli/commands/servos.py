@@ -7,8 +7,7 @@ import sys
 from collections.abc import Callable, Mapping
 
 from bns.hardware.clock import RealClock
-from bns.hardware.servo_setup import BAUDS, ServoBus, adapter
-from bns.hardware.servos.servo_chain import ServoLimits
+from bns.hardware.servo_setup import PROTOCOLS, Rate, ServoBus, adapter, rates
 
 
 def served(options: argparse.Namespace) -> int:
@@ -23,31 +22,31 @@ def served(options: argparse.Namespace) -> int:
 def scan(bus: ServoBus, options: argparse.Namespace) -> int:
     """Print who answers."""
     found = []
-    for servo in bus.scan(BAUDS if options.all_bauds else BAUDS[:1]):
+    for servo in bus.scan(_rates(options, options.all_bauds)):
         found.append(servo)
         print(servo, flush=True)
-    more = "" if options.all_bauds else " (1 Mbaud; --all-bauds tries others)"
+    more = "" if options.all_bauds else " (1 Mbaud and new ones; --all-bauds tries others)"
     print(f"{len(found)} ids answer{more}" if found else f"no servo answers{more}; is the supply on, the cable right?")
     return 0 if found and all(servo.model for servo in found) else 2
 
 
 def set_id(bus: ServoBus, options: argparse.Namespace) -> int:
     """Number a servo."""
-    print(bus.set_id(options.id, options.old))
+    print(bus.set_id(options.id, options.old, _rates(options)))
     return 0
 
 
 def check(bus: ServoBus, options: argparse.Namespace) -> int:
     """Print the findings of the adapter and of each servo."""
-    there = list(bus.scan())
+    there = list(bus.scan(_rates(options)))
     bad = sum(not servo.model for servo in there) + (not there)
     for servo in there:
         if not servo.model:
             print(f"BAD  {servo}")
             continue
-        if options.mend and (changed := bus.mend(servo.number)):
+        if options.mend and (changed := bus.mend(servo)):
             print(f"bns: servo {servo.number}: {', '.join(changed)} written", file=sys.stderr)
-        for finding in bus.check(servo.number, ServoLimits()):
+        for finding in bus.check(servo):
             bad += not finding.fine
             print(finding)
     for finding in adapter(options.port):
@@ -55,6 +54,10 @@ def check(bus: ServoBus, options: argparse.Namespace) -> int:
         print(finding)
     print("no servo answers" if not there else f"{bad} to be fixed" if bad else "all fine")
     return 2 if bad else 0
+
+
+def _rates(options: argparse.Namespace, every: bool = False) -> list[Rate]:
+    return rates(PROTOCOLS if options.protocol is None else (options.protocol,), every)
 
 
 _PARTS: Mapping[str, Callable[[ServoBus, argparse.Namespace], int]] = {"scan": scan, "set-id": set_id, "check": check}

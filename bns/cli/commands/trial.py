@@ -15,10 +15,10 @@ from bns.trial.session import TrialSetup
 def carried_out(options: argparse.Namespace, parameters: Mapping[str, Any]) -> str:
     """Carry out what the options say; a report as text."""
     if options.replay is not None:
-        return replayed(options.replay, options.results)
+        return replayed(options.replay, options.results).text
     spec, setup = trial_spec(**parameters), setup_of(options)
     if options.commands is not None:
-        return drive_commands(options.commands, setup, options.results, spec.seed)
+        return drive_commands(options.commands, setup, options.results, spec.seed).text
     return driven(spec, setup, options.results).summary()
 
 

@@ -61,11 +61,21 @@ def add_looking_options(
         "--wii", action="store_true", help="find how the Wii remote of --rig hangs: mirror, orientation, place, view"
     )
     source.add_argument(
-        "--delay", action="store_true", help="have the robot of --rig turn about, and find how late its tracker is"
+        "--delay", action="store_true", help="have the robot of --rig move to and fro, and find how late its tracker is"
     )
-    calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii and --delay")
-    calibrating.add_argument("--robot", default="khepera", help="for --delay (default: khepera)")
-    calibrating.add_argument("--emulated", action="store_true", help="with --delay: the emulated rig")
+    source.add_argument(
+        "--colours",
+        type=Path,
+        metavar="FILE.png",
+        help="write a picture of what the colour tracker of --rig sees, and find hues that fit its markers",
+    )
+    for name in ("yellow", "green"):
+        calibrating.add_argument(
+            f"--{name}", type=int, nargs=2, metavar=("LOW", "HIGH"), help="hues to try with --colours, 0 to 179"
+        )
+    calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii, --delay and --colours")
+    calibrating.add_argument("--robot", default="khepera", help="for --delay and --colours (default: khepera)")
+    calibrating.add_argument("--emulated", action="store_true", help="with --delay or --colours: the emulated rig")
     calibrating.add_argument(
         "--floor",
         type=Path,
@@ -102,6 +112,9 @@ def add_servo_options(parser: argparse.ArgumentParser) -> None:
     def part(name: str, text: str) -> argparse.ArgumentParser:
         added = parts.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
         added.add_argument("--port", required=True, metavar="DEVICE", help="the bus adapter, as /dev/ttyUSB0")
+        added.add_argument(
+            "--protocol", type=int, choices=(1, 2), help="1: AX-12, 2: XL430 and XM430 (default: both, which takes longer)"
+        )
         added.set_defaults(part=name)
         return added
 
@@ -112,5 +125,5 @@ def add_servo_options(parser: argparse.ArgumentParser) -> None:
     new.add_argument("id", type=int, metavar="ID", help="its new number, 0 to 252")
     new.add_argument("--from", type=int, dest="old", metavar="ID", help="its present number, where several are connected")
     part("check", "say what of the servos' settings is not as a drive needs it").add_argument(
-        "--fix", "--mend", dest="mend", action="store_true", help="write return delay, status return level and angle limits first"
+        "--fix", "--mend", dest="mend", action="store_true", help="write the settings that a drive needs first"
     )

@@ -1,4 +1,8 @@
-"""The body of an emulated snake: the MuJoCo model of the physics world, its joints turned by emulated servos."""
+"""The body of an emulated snake: the MuJoCo model of the physics world, its joints turned by emulated servos.
+
+They are as strong as that model's, whichever they are. An XL430 stalls at 1.5 N m, as an AX-12 does (their manuals, at 12 V); an
+XM430 is stronger than its emulation.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.hardware.emulators.devices.servo import Motion, Servo
-from bns.hardware.servos.ax12_table import CENTRE, RAD_PER_STEP
+from bns.hardware.servos.servo_table import ServoTable
 from bns.physics.snake.body import LOOK_EVERY, Body
 from bns.physics.snake.parameters import SnakeParameters
 from bns.physics.snake.stability import Watch
@@ -58,11 +62,12 @@ class SnakeBody:
         """What a joint does."""
         with self._lock:
             self._advance(now_s)
-            data, order = self._body.data, self.servos[number].order()
+            data, order, kind = self._body.data, self.servos[number].order(), self.servos[number].kind
             angle, speed = data.qpos[7 + number], data.qvel[6 + number]
             load = data.actuator_force[number] / self.parameters.torque_limit_n_m
-            under_way = order.torque > 0 and abs(_angle(order.goal) - self._aims[number]) > RAD_PER_STEP
-            return Motion(CENTRE + angle / RAD_PER_STEP, speed / RAD_PER_STEP, float(load), under_way)
+            under_way = order.torque > 0 and abs(_angle(order.goal, kind) - self._aims[number]) > kind.rad_per_step
+            steps, steps_s = kind.centre + angle / kind.rad_per_step, speed / kind.rad_per_step
+            return Motion(steps, steps_s, float(load), under_way)
 
     def _advance(self, now_s: float) -> None:
         steps = int((now_s - self._now_s) / self.parameters.dt_s)
@@ -71,8 +76,10 @@ class SnakeBody:
         orders = [servo.order() for servo in self.servos]
         torques = np.array([order.torque for order in orders])
         self._powered(torques)
-        goals = np.array([_angle(order.goal) for order in orders])
-        furthest = np.array([order.speed for order in orders]) * RAD_PER_STEP * self.parameters.dt_s
+        kinds = [servo.kind for servo in self.servos]
+        goals = np.array([_angle(order.goal, kind) for order, kind in zip(orders, kinds, strict=True)])
+        speeds_rad_s = np.array([order.speed * kind.rad_per_step for order, kind in zip(orders, kinds, strict=True)])
+        furthest = speeds_rad_s * self.parameters.dt_s
         for _ in range(steps):
             there = self._body.data.qpos[7:]
             self._aims = np.where(torques > 0, self._aims + np.clip(goals - self._aims, -furthest, furthest), there)
@@ -113,5 +120,5 @@ class Joint:
         return self._body.motion(self._number, now_s)
 
 
-def _angle(steps: float) -> float:
-    return (steps - CENTRE) * RAD_PER_STEP
+def _angle(steps: float, kind: ServoTable) -> float:
+    return (steps - kind.centre) * kind.rad_per_step

@@ -238,9 +238,11 @@ class GuardedPlatform:
         """
         return self._guarded(lambda: self._platform.drive(commands))
 
-    def turn_about(self, seconds: float) -> Any:
-        """Turn to and fro, guarded likewise, where the robot's platform can."""
-        return self._guarded(lambda: self._platform.turn_about(seconds))  # type: ignore[attr-defined]
+    @property
+    def move_about(self) -> Callable[[float], Any]:
+        """Move to and fro, guarded likewise; there is none where the robot's platform has none."""
+        move = self._platform.move_about  # type: ignore[attr-defined]
+        return lambda seconds: self._guarded(lambda: move(seconds))
 
     def _guarded(self, move: Callable[[], Any]) -> Any:
         self._stopping.check()

@@ -6,18 +6,19 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bns.hardware.servos.ax12_table import BROADCAST, READ, REGISTERS, WRITE
+from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.bridge_frames import ANSWER, POSITION, START, STARTED_S, STOP, STOPPED, Frame, encoded
-from bns.hardware.servos.servo_chain import STILL_STEPS
+from bns.hardware.servos.packets import BROADCAST, READ, WIRES, WRITE
+from bns.hardware.servos.servo_table import BAUD, ServoTable
 
 
 @dataclass(frozen=True)
 class StopRecipe:
     """A stop: `steps` are written one after the other, each with a pattern of its answer (None: nobody answers).
 
-    The groups of the patterns are numbers: with `text` in digits, speeds of at most `within`; without, places in two bytes, low
-    one first, that change by at most `within` from one round to the next. An answer is waited for `wait_s`, twice as long
-    after every round without one, up to `longest_s`. `own_stop` finds the order to stop in what the robot's driver writes.
+    The groups of the patterns are numbers: with `text` in digits, speeds of at most `within`; without, places in two bytes or
+    more, low one first, that change by at most `within` from one round to the next. An answer is waited for `wait_s`, twice as
+    long after every round without one, up to `longest_s`. `own_stop` finds the order to stop in what the robot's driver writes.
     Nothing is written for `quiet_s` after the port was opened, unless something comes from there.
     """
 
@@ -50,13 +51,34 @@ def khepera_recipe(baud: int, still_units: int) -> StopRecipe:
     return StopRecipe(baud, steps, rb"D,l0,l0\n", still_units, True, 0.12, 1.0)
 
 
-def ax12_recipe(baud: int, ids: Sequence[int]) -> StopRecipe:
+def bus_recipe(ids: Sequence[int], table: ServoTable = AX12) -> StopRecipe:
     """Torque off all servos at once; each read back without torque, no joint moved."""
-    torque, place = REGISTERS["torque_enable"], REGISTERS["present_position"]
-    size = place.address + place.size - torque.address
-    order = _packet(BROADCAST, WRITE, bytes([torque.address, 0]))
-    asks = [(_packet(n, READ, bytes([torque.address, size])), _status(n, size)) for n in ids]
-    return StopRecipe(baud, ((order, None), *asks), re.escape(order), STILL_STEPS, False, 0.04, 0.2)
+    wire, torque = WIRES[table.protocol], table.registers["torque_enable"]
+    order = wire.instruction(BROADCAST, WRITE, torque.address.to_bytes(wire.word, "little") + b"\0")
+    asks = [ask for number in ids for ask in (_together(number, table) if table.gapless else _apart(number, table))]
+    return StopRecipe(BAUD, ((order, None), *asks), re.escape(order), table.still_steps, False, 0.04, 0.2)
+
+
+def _together(number: int, table: ServoTable) -> list[tuple[bytes, bytes]]:
+    """Torque and place in one answer: error byte, torque (which must be 0), what stands between, the place, checksum."""
+    address, size = table.span("torque_enable", "present_position")
+    answer = b"\xff\xff" + re.escape(bytes([number, size + 2])) + b"." + b"\x00" + b".{%d}(..)." % (size - 3)
+    return [(_read(number, table, address, size), answer)]
+
+
+def _apart(number: int, table: ServoTable) -> list[tuple[bytes, bytes]]:
+    """The torque, which must be 0, then the place. Neither answer is long enough to hold a header that would be stuffed."""
+    found = []
+    for name, wanted in (("torque_enable", b"\x00"), ("present_position", b"(....)")):
+        address, size = table.span(name, name)
+        head = b"\xff\xff\xfd\x00" + bytes([number]) + (size + 4).to_bytes(2, "little") + b"\x55"
+        found.append((_read(number, table, address, size), re.escape(head) + b"." + wanted + b".."))
+    return found
+
+
+def _read(number: int, table: ServoTable, address: int, size: int) -> bytes:
+    wire = WIRES[table.protocol]
+    return wire.instruction(number, READ, b"".join(value.to_bytes(wire.word, "little") for value in (address, size)))
 
 
 def bridge_recipe(baud: int, count: int) -> StopRecipe:
@@ -65,14 +87,5 @@ def bridge_recipe(baud: int, count: int) -> StopRecipe:
     head = re.escape(bytes([START, size, STOP | ANSWER])) + b"."
     answer = head + b"\x00" * STOPPED + b"(..)" * count + b".."
     own = re.escape(bytes([START, 0, STOP]))
-    return StopRecipe(baud, ((encoded(Frame(STOP, 0, b"")), answer),), own, STILL_STEPS, False, 0.08, 0.5, STARTED_S)
+    return StopRecipe(baud, ((encoded(Frame(STOP, 0, b"")), answer),), own, AX12.still_steps, False, 0.08, 0.5, STARTED_S)
 
-
-def _packet(number: int, kind: int, parameters: bytes) -> bytes:
-    body = bytes([number, len(parameters) + 2, kind]) + parameters
-    return b"\xff\xff" + body + bytes([~sum(body) & 0xFF])
-
-
-def _status(number: int, size: int) -> bytes:
-    """Error byte, torque (which must be 0), what stands between, the place, checksum."""
-    return b"\xff\xff" + re.escape(bytes([number, size + 2])) + b"." + b"\x00" + b".{%d}(..)." % (size - 3)

@@ -9,23 +9,24 @@ import numpy as np
 
 from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.clock import Clock, EmulatedClock
+from bns.hardware.delay import Motion
 from bns.hardware.emulators.faults import FaultPlan
 from bns.hardware.emulators.snake_rig import EmulatedSnakeRig
-from bns.hardware.guard.recipe import StopRecipe, ax12_recipe, bridge_recipe
+from bns.hardware.guard.recipe import StopRecipe, bridge_recipe, bus_recipe
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
 from bns.hardware.safety import DriveEnded, Stopping, StopsAtTheEnd, Watch
+from bns.hardware.servos.bending import bent
 from bns.hardware.servos.bridge import BAUD as BRIDGE_BAUD
 from bns.hardware.servos.bridge import BridgeChain
-from bns.hardware.servos.dynamixel import BAUD as BUS_BAUD
-from bns.hardware.servos.dynamixel import Ax12Chain
+from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.servos.servo_chain import ServoChain, ServoError, StuckServoError
-from bns.hardware.servos.snake_drive import SnakeDrive
+from bns.hardware.servos.snake_drive import KNOWN_S, UNKNOWN_S, SnakeDrive
 from bns.hardware.servos.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
-from bns.hardware.tracking.kinds import checked, delay_of, open_tracker
+from bns.hardware.tracking.kinds import DELAY, checked, delay_of, open_tracker
 
 REPEATS = 3
 """How often a trial drives its final controller by default: the dissertation drove it three times (section 5.7)."""
@@ -48,6 +49,7 @@ class SnakePlatform:
         self._chain, self._eye, self._settings = chain, eye, settings
         self._clock, self._journal = clock, journal
         self._watch = Watch(rig.limits, clock, stopping)
+        self._unknown_s = KNOWN_S if DELAY in rig.tracker else UNKNOWN_S
 
     @property
     def retries(self) -> int:
@@ -76,9 +78,25 @@ class SnakePlatform:
         self._chain.close()
         self._eye.close()
 
+    def _new_drive(self) -> SnakeDrive:
+        return SnakeDrive(
+            self._chain, self._eye, self._watch, self._settings, self._clock, self._journal, self._unknown_s
+        )
+
+    def move_about(self, seconds: float) -> Motion:
+        """Bend to one side and back, for the tracker's delay; stopped at the end. TrialPausedError, StopNotConfirmedError."""
+        drive = self._new_drive()
+        self._watch.begin()
+        with StopsAtTheEnd(self.stop):
+            try:
+                drive.straighten()
+                return bent(self._chain, self._eye, self._watch, self._settings, self._clock, seconds)
+            except (ServoError, DriveEnded) as error:
+                raise TrialPausedError(f"the robot could not be bent about: {error}") from error
+
     def drive(self, commands: np.ndarray) -> Driven:
         """Straighten the robot, then drive the cycles one after the other."""
-        drive, ended = SnakeDrive(self._chain, self._eye, self._watch, self._settings, self._clock, self._journal), ""
+        drive, ended = self._new_drive(), ""
         guard, stuck = StopsAtTheEnd(self.stop), ""
         began_s = self._clock.now_s()
         self._watch.begin()
@@ -103,7 +121,7 @@ def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: Hardwa
     """The servos as a rig's settings say that they are wired; HardwareError names who is missing."""
     if settings.wiring == "bridge":
         return BridgeChain(port, len(settings.ids), clock, journal, settings.limits)
-    return Ax12Chain(port, settings.ids, clock, journal, settings.limits)
+    return DynamixelChain(port, settings.ids, clock, journal, settings.limits, settings.table)
 
 
 def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stopping) -> SnakePlatform:
@@ -129,7 +147,7 @@ def stop_recipe(rig: Rig) -> StopRecipe:
     settings = snake_settings(rig.driver)
     if settings.wiring == "bridge":
         return bridge_recipe(BRIDGE_BAUD, len(settings.ids))
-    return ax12_recipe(BUS_BAUD, settings.ids)
+    return bus_recipe(settings.ids, settings.table)
 
 
 def emulate(rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed: int) -> EmulatedSnakeRig:

@@ -1,20 +1,11 @@
-"""The control table of the AX-12: data alone. Addresses, sizes and defaults as in its manual."""
+"""The AX-12: addresses, sizes, defaults and units as in its manual."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import NamedTuple
 
-
-class Register(NamedTuple):
-    """Address, bytes, value after a reset, highest value, and whether it may be written."""
-
-    address: int
-    size: int
-    default: int
-    highest: int
-    writable: bool = True
-
+from bns.hardware.servos.servo_table import Register, ServoTable
 
 REGISTERS: Mapping[str, Register] = {
     "model_number": Register(0, 2, 12, 0xFFFF, False),
@@ -41,8 +32,8 @@ REGISTERS: Mapping[str, Register] = {
     "moving_speed": Register(32, 2, 0, 1023),
     "torque_limit": Register(34, 2, 1023, 1023),
     "present_position": Register(36, 2, 512, 1023, False),
-    "present_speed": Register(38, 2, 0, 2047, False),
-    "present_load": Register(40, 2, 0, 2047, False),
+    "present_speed": Register(38, 2, 0, 2047, False, True),
+    "present_load": Register(40, 2, 0, 2047, False, True),
     "present_voltage": Register(42, 1, 120, 255, False),
     "present_temperature": Register(43, 1, 30, 255, False),
     "registered": Register(44, 1, 0, 1, False),
@@ -50,7 +41,6 @@ REGISTERS: Mapping[str, Register] = {
     "lock": Register(47, 1, 0, 1),
     "punch": Register(48, 2, 32, 1023),
 }
-TABLE_SIZE = 50
 
 ERRORS: Mapping[int, str] = {
     0: "voltage out of its limits",
@@ -64,14 +54,40 @@ ERRORS: Mapping[int, str] = {
 """Bit of a status packet's error byte -> what it says."""
 VOLTAGE, ANGLE, OVERHEAT, RANGE, CHECKSUM, OVERLOAD, INSTRUCTION = (1 << bit for bit in range(7))
 
-PING, READ, WRITE, REG_WRITE, ACTION, RESET, SYNC_WRITE = 1, 2, 3, 4, 5, 6, 0x83
-BROADCAST = 254
-
 RAD_PER_STEP = 5.235987755982989 / 1023
 """300 degrees over 1023 steps."""
 CENTRE = 512
-RAD_S_PER_STEP = 0.111 * 2 * 3.141592653589793 / 60
+RAD_S_PER_STEP = 0.111 * 2 * math.pi / 60
 """A unit of moving_speed is 0.111 turns a minute; 0 stands for no limit at all."""
+
+AX12 = ServoTable(
+    model="AX-12",
+    number=12,
+    protocol=1,
+    registers=REGISTERS,
+    centre=CENTRE,
+    rad_per_step=RAD_PER_STEP,
+    rad_s_per_step=RAD_S_PER_STEP,
+    full_torque=1023,
+    no_load_rad_s=59 * 2 * math.pi / 60,
+    volts=(9.0, 12.0),
+    new_baud=1_000_000,
+    bauds={
+        1_000_000: 1,
+        500_000: 3,
+        400_000: 4,
+        250_000: 7,
+        200_000: 9,
+        115_200: 16,
+        57_600: 34,
+        19_200: 103,
+        9_600: 207,
+    },
+    wanted={"return_delay": 0, "status_return": 2, "cw_angle_limit": 0, "ccw_angle_limit": 1023},
+    alarms=ERRORS,
+    minus_bit=1024,
+)
+"""No load: 59 turns a minute at 12 V."""
 
 
 def errors_in(byte: int) -> list[str]:

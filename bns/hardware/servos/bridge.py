@@ -1,4 +1,4 @@
-"""A servo chain behind an Arduino: the same calls as `Ax12Chain`, over framed and checksummed packets of our own."""
+"""A servo chain behind an Arduino: the same calls as `DynamixelChain`, over framed and checksummed packets of our own."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bns.hardware.clock import Clock
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.link.serial_link import open_port
 from bns.hardware.link.terminal_error import TerminalError
-from bns.hardware.servos.ax12_table import CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
+from bns.hardware.servos.ax12_table import AX12, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
 from bns.hardware.servos.bridge_frames import (
     ANSWER,
     ARM,
@@ -31,7 +31,7 @@ from bns.hardware.servos.bridge_frames import (
     encoded,
     searched,
 )
-from bns.hardware.servos.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
 from bns.hardware.stop import Stop
 
 with extra("robot"):
@@ -48,6 +48,8 @@ _LISTEN_S = 0.02
 
 class BridgeChain:
     """Driver of `count` servos behind a bridge. Opening checks the bridge's version and how many servos it has found."""
+
+    step_rad = RAD_PER_STEP
 
     def __init__(self, port: str, count: int, clock: Clock, journal: HardwareLog, limits: ServoLimits | None = None) -> None:
         self._clock, self._journal, self.count = clock, journal, count
@@ -130,7 +132,7 @@ class BridgeChain:
             if places and acknowledged_s is None:
                 acknowledged_s = now_s - began_s
             still = places is not before and len(before) == len(places) > 0
-            if still and all(abs(a - b) <= STILL_STEPS for a, b in zip(places, before, strict=True)):
+            if still and all(abs(a - b) <= AX12.still_steps for a, b in zip(places, before, strict=True)):
                 return self._stopped(Stop(True, now_s - began_s, acknowledged_s))
             if now_s - began_s > patience_s:
                 return self._stopped(Stop(False, now_s - began_s, acknowledged_s, problem))

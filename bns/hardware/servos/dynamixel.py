@@ -1,9 +1,11 @@
-"""A chain of AX-12 servos over the Dynamixel SDK: every answer's result and error byte is looked at, every write is confirmed."""
+"""A chain of Dynamixel servos over the makers' SDK: every answer's result and error byte is looked at, every write is confirmed.
+
+Which model, and so which protocol, registers and units, is said by a table.
+"""
 
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
@@ -13,33 +15,41 @@ from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.link.terminal_error import TerminalError
-from bns.hardware.servos.ax12_table import BROADCAST, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, REGISTERS, errors_in
+from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.dynamixel_port import ClockedPort
-from bns.hardware.servos.servo_chain import STILL_STEPS, Health, ServoError, ServoLimits
+from bns.hardware.servos.packets import BROADCAST
+from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
+from bns.hardware.servos.servo_models import name_of
+from bns.hardware.servos.servo_table import BAUD, ServoTable
 from bns.hardware.stop import Stop
 
 with extra("robot"):
     from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, GroupSyncWrite, PacketHandler
 
-BAUD = 1_000_000
 ATTEMPTS = 6
-_AX12 = 12
 _BETWEEN_S = 0.02
-_GOAL = REGISTERS["goal_position"]
-_PRESENT = struct.Struct("<HHHBB")
+_REBOOTS_S = 0.5
+"""A guess: the manual does not say how long a servo takes."""
 
 
-class Ax12Chain:
-    """Driver of servos `ids` in the order of the joints. Opening checks that each is there, once, and an AX-12."""
+class DynamixelChain:
+    """Driver of servos `ids` in the order of the joints. Opening checks that each is there, once, and of the table's model."""
 
     def __init__(
-        self, port: str, ids: Sequence[int], clock: Clock, journal: HardwareLog, limits: ServoLimits | None = None
+        self,
+        port: str,
+        ids: Sequence[int],
+        clock: Clock,
+        journal: HardwareLog,
+        limits: ServoLimits | None = None,
+        table: ServoTable = AX12,
     ) -> None:
         self.ids, self._clock, self._journal = tuple(ids), clock, journal
-        self.limits = limits or ServoLimits()
+        self.limits, self.table = limits or ServoLimits(), table
+        self.step_rad = table.rad_per_step
         self.retries = 0
         self._limits_of: dict[int, tuple[int, int]] = {}
-        self._port, self._packets = ClockedPort(port, clock), PacketHandler(1.0)
+        self._port, self._packets = ClockedPort(port, clock), PacketHandler(float(table.protocol))
         if not self._port.setBaudRate(BAUD):
             raise HardwareError(f"{port} cannot be set to {BAUD} baud; another adapter may be needed.")
         self._check()
@@ -57,20 +67,26 @@ class Ax12Chain:
             if "corrupt" in str(error):
                 return f"servo {number}: answers are garbled; two servos may have this id ({error})"
             return f"servo {number} is missing ({error})"
-        return "" if model == _AX12 else f"servo {number} is a model {model}, not an AX-12 ({_AX12})"
+        if model != self.table.number:
+            return f"servo {number} is of the model {name_of(self.table.protocol, model)}, not {self.table.model}"
+        for name in self.table.needed:
+            if (value := self.read(number, name)) != self.table.wanted[name]:
+                return f"servo {number} has {name} {value}, not {self.table.wanted[name]} (bns servos check --fix sets it)"
+        return ""
 
     def read(self, number: int, name: str, alarms: bool = False) -> int:
         """A register; ServoError if the servo does not answer or reports an alarm (which `alarms` lets pass)."""
-        register = REGISTERS[name]
-        call = self._packets.read1ByteTxRx if register.size == 1 else self._packets.read2ByteTxRx
-        return int(self._checked(number, f"read {name}", lambda: call(self._port, number, register.address), alarms))
+        return self.table.in_block(name, self._block(number, name, name, alarms), self.table.registers[name].address)
 
     def write(self, number: int, name: str, value: int, alarms: bool = False) -> None:
         """Write a register and take the servo's confirmation."""
-        register = REGISTERS[name]
-        call = self._packets.write1ByteTxRx if register.size == 1 else self._packets.write2ByteTxRx
+        address, size = self.table.span(name, name)
+        data = list(value.to_bytes(size, "little"))
         self._checked(
-            number, f"write {name} {value}", lambda: (0, *call(self._port, number, register.address, value)), alarms
+            number,
+            f"write {name} {value}",
+            lambda: (0, *self._packets.writeTxRx(self._port, number, address, size, data)),
+            alarms,
         )
 
     def _checked(
@@ -93,11 +109,17 @@ class Ax12Chain:
                 self._port.is_using = False  # an exchange broken off leaves it set, and every later call fails
             self._journal.note("servo", id=number, what=what, result=result, error=bits, value=value)
             if result == COMM_SUCCESS:
-                if bits and not alarms:
-                    raise ServoError(f"servo {number}: {', '.join(errors_in(bits))}")
+                if bits & ~self.table.alarm_bits or (bits and not alarms):
+                    raise ServoError(f"servo {number}: {self.table.in_words(bits, self._hardware_error(number, bits))}")
                 return value
             problem = problem or str(self._packets.getTxRxResult(result))
         raise ServoError(f"servo {number}: {what}: {problem}; asked {attempts} times")
+
+    def _hardware_error(self, number: int, bits: int) -> int:
+        """The register that says which alarm, where the packets only say that there is one."""
+        if not bits & self.table.alarm_bits or "hardware_error" not in self.table.registers:
+            return 0
+        return self.read(number, "hardware_error", alarms=True)
 
     def close(self) -> None:
         """Give the port free."""
@@ -130,9 +152,13 @@ class Ax12Chain:
         for share in (0.25, 0.5, 0.75, 1.0):
             for number in self.ids:
                 meanwhile()
-                self.write(number, "torque_limit", round(1023 * self.limits.torque * share))
+                self.write(number, "torque_limit", self._torque(share))
                 self.write(number, "torque_enable", 1)
             self._clock.sleep(0.05)
+
+    def _torque(self, share: float = 1.0) -> int:
+        """So much of what the limits allow, as the register has it."""
+        return round(self.table.full_torque * self.limits.torque * share)
 
     def move(self, angles_rad: Sequence[float], speeds_rad_s: Sequence[float]) -> list[float]:
         """Set goals and speeds of all joints at once; the angles really sent, after clipping, once all confirmed them.
@@ -140,23 +166,27 @@ class Ax12Chain:
         A speed of 0 would be as fast as the servo can: the slowest speed is sent instead.
         """
         sent = [self._goal(number, angle) for number, angle in zip(self.ids, angles_rad, strict=True)]
-        together = GroupSyncWrite(self._port, self._packets, _GOAL.address, 4)
+        first, last = sorted(("goal_position", "moving_speed"), key=lambda name: self.table.registers[name].address)
+        together = GroupSyncWrite(self._port, self._packets, *self.table.span(first, last))
         for number, goal, speed in zip(self.ids, sent, speeds_rad_s, strict=True):
-            steps = max(1, min(1023, round(abs(speed) / RAD_S_PER_STEP)))
-            together.addParam(number, [*goal.to_bytes(2, "little"), *steps.to_bytes(2, "little")])
+            steps = round(abs(speed) / self.table.rad_s_per_step)
+            fastest = self.table.registers["moving_speed"].highest
+            values = {"goal_position": goal, "moving_speed": max(1, min(fastest, steps))}
+            data = [values[name].to_bytes(self.table.registers[name].size, "little") for name in (first, last)]
+            together.addParam(number, [*b"".join(data)])
         for _ in range(ATTEMPTS):
             self._port.is_using = False
             together.txPacket()
             heard = [self.read(number, "goal_position") for number in self.ids]  # nobody answers a sync write
             if heard == sent:
-                return [(goal - CENTRE) * RAD_PER_STEP for goal in sent]
+                return [(goal - self.table.centre) * self.table.rad_per_step for goal in sent]
         raise ServoError(f"goals {sent} were sent and {heard} read back, {ATTEMPTS} times")
 
     def _goal(self, number: int, angle_rad: float) -> int:
         if not math.isfinite(angle_rad):
             raise ServoError(f"servo {number}: the angle is {angle_rad}")
         low, high = self._angle_limits(number)
-        return max(low, min(high, CENTRE + round(angle_rad / RAD_PER_STEP)))
+        return max(low, min(high, self.table.centre + round(angle_rad / self.table.rad_per_step)))
 
     def _angle_limits(self, number: int) -> tuple[int, int]:
         if number not in self._limits_of:
@@ -169,26 +199,47 @@ class Ax12Chain:
         self.limits.check(found)
         return found
 
-    def _health(self, number: int, alarms: bool = False) -> Health:
+    def _health(self, number: int) -> Health:
         """One exchange for all of it: the registers stand side by side."""
-        return decoded(self._block(number, "present_position", "present_temperature", alarms))
+        return self.decoded(self._block(number, *self._present()))
+
+    def _present(self) -> tuple[str, str]:
+        """First and last of the registers that say how a servo is."""
+        names = ("present_position", "present_load", "present_voltage", "present_temperature")
+        ordered = sorted(names, key=lambda name: self.table.registers[name].address)
+        return ordered[0], ordered[-1]
+
+    def decoded(self, block: bytes) -> Health:
+        """What those registers say."""
+        address = self.table.registers[self._present()[0]].address
+        position, load, decivolts, celsius = (
+            self.table.in_block(name, block, address)
+            for name in ("present_position", "present_load", "present_voltage", "present_temperature")
+        )
+        angle_rad = (position - self.table.centre) * self.table.rad_per_step
+        return Health(angle_rad, load / self.table.full_torque, decivolts / 10, float(celsius))
 
     def _block(self, number: int, first: str, last: str, alarms: bool = False, attempts: int = ATTEMPTS) -> bytes:
         """The registers from `first` to `last`."""
-        start, end = REGISTERS[first].address, REGISTERS[last].address + REGISTERS[last].size
+        start, size = self.table.span(first, last)
         found: list[bytes] = []
 
         def call() -> tuple[int, int, int]:
-            data, result, bits = self._packets.readTxRx(self._port, number, start, end - start)
+            data, result, bits = self._packets.readTxRx(self._port, number, start, size)
             found[:] = [bytes(data)]
-            return 0, result if result != COMM_SUCCESS or len(data) == end - start else COMM_RX_CORRUPT, bits
+            refused = bits & ~self.table.alarm_bits
+            return 0, result if result != COMM_SUCCESS or refused or len(data) == size else COMM_RX_CORRUPT, bits
 
-        self._checked(number, f"read {first} to {last}", call, alarms, attempts)
+        self._checked(number, f"read {first}" + f" to {last}" * (last != first), call, alarms, attempts)
         return found[0]
 
     def recover(self, number: int) -> None:
-        """After an overload shutdown, when its cause is gone: the torque limit is written again, and no alarm may be left."""
-        self.write(number, "torque_limit", round(1023 * self.limits.torque), alarms=True)
+        """After an overload shutdown, when its cause is gone: the torque limit is written again, or the servo rebooted where it
+        takes that; and no alarm may be left."""
+        if "hardware_error" in self.table.registers:
+            self._checked(number, "reboot", lambda: (0, *self._packets.reboot(self._port, number)), True)
+            self._clock.sleep(_REBOOTS_S)
+        self.write(number, "torque_limit", self._torque(), alarms=True)
         self.read(number, "present_position")
 
     def stop(self, patience_s: float = 5.0) -> Stop:
@@ -217,26 +268,30 @@ class Ax12Chain:
         self._port.is_using = False
         with suppress(OSError, TerminalError, HardwareError):
             self._reopen()
-            self._packets.write1ByteTxOnly(self._port, BROADCAST, REGISTERS["torque_enable"].address, 0)
+            self._packets.write1ByteTxOnly(self._port, BROADCAST, self.table.registers["torque_enable"].address, 0)
             self._port.is_using = False
 
     def _not_still(self, number: int, places: dict[int, int]) -> str:
         """Why a servo does not stand still yet, or nothing. `places`: where those whose torque is off were at the last look."""
         try:
-            block = self._block(number, "torque_enable", "present_position", alarms=True, attempts=1)
+            powered, place = self._torque_and_place(number)
         except ServoError as error:
             return str(error)
-        if block[0]:
+        if powered:
             places.pop(number, None)
             return f"servo {number} still has its torque on"
-        before, places[number] = places.get(number), int.from_bytes(block[-2:], "little")
-        still = before is not None and abs(places[number] - before) <= STILL_STEPS
+        before, places[number] = places.get(number), place
+        still = before is not None and abs(place - before) <= self.table.still_steps
         return "" if still else f"servo {number} still moves"
 
+    def _torque_and_place(self, number: int) -> tuple[int, int]:
+        """Together, where no register is missing in between: reading one that is not there is refused."""
+        if self.table.gapless:
+            block = self._block(number, "torque_enable", "present_position", alarms=True, attempts=1)
+            address = self.table.registers["torque_enable"].address
+            return block[0], self.table.in_block("present_position", block, address)
+        torque = self._block(number, "torque_enable", "torque_enable", alarms=True, attempts=1)
+        place = self._block(number, "present_position", "present_position", alarms=True, attempts=1)
+        address = self.table.registers["present_position"].address
+        return torque[0], self.table.in_block("present_position", place, address)
 
-def decoded(block: bytes) -> Health:
-    """What the registers from `present_position` to `present_temperature` say."""
-    position, _speed, load, decivolts, celsius = _PRESENT.unpack(block)
-    return Health(
-        (position - CENTRE) * RAD_PER_STEP, (load & 1023) / 1023 * (-1 if load & 1024 else 1), decivolts / 10, float(celsius)
-    )

@@ -8,9 +8,6 @@ from typing import Protocol
 
 from bns.hardware.stop import Stop
 
-STILL_STEPS = 1
-"""A joint within so many steps of where it was at the last look stands still; the reading of a still one jumps by one."""
-
 
 class ServoError(Exception):
     """A servo that does not answer, or answers with an alarm."""
@@ -32,10 +29,6 @@ class Health:
     load: float
     voltage_v: float
     temperature_c: float
-
-
-REFUSED_V = 13.0
-"""No rig may allow so much."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +62,8 @@ class ServoChain(Protocol):
 
     retries: int
     limits: ServoLimits
+    step_rad: float
+    """The smallest change of an angle."""
 
     def arm(self, meanwhile: Callable[[], object] = lambda: None) -> None:
         """Torque on without a jerk: goals are where the joints are, and the torque grows in steps to its limit.

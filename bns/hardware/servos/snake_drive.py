@@ -11,8 +11,8 @@ from bns.hardware.agreement import SameScene
 from bns.hardware.clock import Clock
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.safety import OutOfSight, Watch
-from bns.hardware.servos.ax12_table import RAD_PER_STEP
 from bns.hardware.servos.servo_chain import ServoChain, StrainWatch, StuckServoError
+from bns.hardware.servos.shape import apart_m
 from bns.hardware.servos.snake_settings import SnakeSettings
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight
@@ -21,9 +21,17 @@ from bns.physics.snake.parameters import shipped_parameters
 
 _TICK_S = 0.15
 _STRAIGHTENING_RAD_S = 0.5
-_FROZEN_RAD = 0.8
-"""Joints between the markers that turn so far move a marker: by 3 mm after 0.55 rad at most in 130 drives of the model, seen by
+_STILL_M = 0.002
+_FROZEN_RAD = 0.65
+"""Joints between the markers that turn so far move a marker by that: after 0.35 rad at most in 182 drives of the model, seen by
 five pictures a second. Joints beyond them do not count: an end of the body that swings by 1 rad moves neither."""
+_FROZEN_M = 0.012
+"""Markers that the joints bring so much nearer, or further apart, are seen to move: after 2 mm at most in the same drives."""
+_SPRUNG_RAD = 0.2
+"""A joint that turned by so much more than its servo can had been held by the body and was let go."""
+_READINGS = 32
+UNKNOWN_S, KNOWN_S = 0.2, 0.02
+"""So late a camera may be whose delay was not measured (slow ones are 0.16 s), and one whose delay was."""
 _MARKERS = ("yellow", "green")
 _PLACES = ("yellow_x_m", "yellow_y_m", "green_x_m", "green_y_m")
 _NOTHING = dict.fromkeys(("cycle", *PARAMETERS, "stable"), math.nan)
@@ -31,18 +39,34 @@ _NOTHING = dict.fromkeys(("cycle", *PARAMETERS, "stable"), math.nan)
 
 class SnakeDrive:
     """Rows and observations are gathered as it goes on. A cycle that ends out of sight counts as unstable: a robot on its back
-    hides its markers. So does one that ends with a servo stuck: links that press against each other hold it."""
+    hides its markers. So does one that ends with a servo stuck: links that press against each other hold it.
+
+    `unknown_s`: so much before its stamp a picture may have been taken.
+    """
 
     def __init__(
-        self, chain: ServoChain, eye: Eye, watch: Watch, settings: SnakeSettings, clock: Clock, journal: HardwareLog
+        self,
+        chain: ServoChain,
+        eye: Eye,
+        watch: Watch,
+        settings: SnakeSettings,
+        clock: Clock,
+        journal: HardwareLog,
+        unknown_s: float = UNKNOWN_S,
     ) -> None:
+        self._unknown_s = unknown_s
         self._chain, self._eye, self._watch, self._settings = chain, eye, watch, settings
         self._clock, self._journal = clock, journal
         self._strain = StrainWatch(settings.limits)
-        self._scene, self._turned_rad = SameScene(), 0.0
-        self._between = shipped_parameters().joints_between_markers
+        self._scene, self._turned_rad = SameScene(_STILL_M), 0.0
+        self._parameters = shipped_parameters()
+        self._between = self._parameters.joints_between_markers
+        self._shape, self._apart = SameScene(_STILL_M), list[tuple[float, float]]()
+        """When the joints were read, and how far apart the markers are by them, m; since the last one that sprang."""
+        self._shown: tuple[float, float] | None = None
+        """Least and greatest distance, by the joints, of the markers in the scene that the picture shows."""
         self._joints_rad: np.ndarray | None = None
-        self._followed_s = 0.0
+        self._read_s = 0.0
         self._angles = np.zeros(len(settings.ids))
         self._markers = np.full(4, math.nan)
         self._began_s = 0.0
@@ -126,7 +150,7 @@ class SnakeDrive:
         asked_s = self._clock.now_s()
         sent = np.array(self._chain.move(target.tolist(), [speed_rad_s] * len(target)))
         short = int(np.argmax(np.abs(sent - target)))
-        if abs(sent[short] - target[short]) > 1.5 * RAD_PER_STEP:
+        if abs(sent[short] - target[short]) > 1.5 * self._chain.step_rad:
             raise TrialPausedError(
                 f"joint {short + 1} was to go to {math.degrees(target[short]):.0f}° and was only told "
                 f"{math.degrees(sent[short]):.0f}°: widen the angle limits in its servo"
@@ -138,12 +162,14 @@ class SnakeDrive:
 
     def _look(self) -> Sight | None:
         """Look at servos and markers; a row if there is something new to see."""
+        asked_s = self._clock.now_s()
         healths = self._chain.health()
         self._strain.look(healths, self._clock.now_s())
+        self._read((asked_s + self._clock.now_s()) / 2.0, np.array([health.position_rad for health in healths.values()]))
         sight = self._eye.look()
         if sight is not None:
             self._markers = np.concatenate([sight.points[name] for name in _MARKERS])
-            self._follow(np.array([health.position_rad for health in healths.values()]))
+            self._follow(sight.t_s)
             if self._seen and sight.t_s > self._seen[-1][0]:
                 self._seen.append((sight.t_s, self._markers))
             if self.rows and sight.t_s - self._began_s > self.rows[-1]["t_s"]:
@@ -160,19 +186,38 @@ class SnakeDrive:
     def _still_filmed(self) -> None:
         self._watch.still_filmed(self._eye.picture_s)
 
-    def _follow(self, joints_rad: np.ndarray) -> None:
-        """TrialPausedError if joints between the markers turn on and on and the markers stay where they were."""
-        now_s, joints_rad = self._clock.now_s(), joints_rad[self._between]
-        if self._joints_rad is not None:  # one that jumps further had been held by the body and was let go
-            furthest_rad = self._settings.joint_speed_rad_s * (now_s - self._followed_s)
-            self._turned_rad += min(float(np.abs(joints_rad - self._joints_rad).max()), furthest_rad)
-        self._joints_rad, self._followed_s = joints_rad, now_s
-        unseen_rad = self._scene.since_it_moved(self._markers.reshape(2, 2), self._turned_rad)
-        if unseen_rad > _FROZEN_RAD:
+    def _read(self, read_s: float, joints_rad: np.ndarray) -> None:
+        """Take in where the joints are: how far they have turned, and what that makes of the distance of the markers."""
+        if self._joints_rad is not None:
+            furthest_rad = self._settings.joint_speed_rad_s * (read_s - self._read_s)
+            turned_rad = float(np.abs(joints_rad - self._joints_rad)[self._between].max())
+            self._turned_rad += min(turned_rad, furthest_rad)
+            if turned_rad > furthest_rad + _SPRUNG_RAD:
+                self._apart, self._shown = [], None
+        self._joints_rad, self._read_s = joints_rad, read_s
+        self._apart = [*self._apart[1 - _READINGS :], (read_s, apart_m(joints_rad, self._parameters))]
+
+    def _follow(self, filmed_s: float) -> None:
+        """TrialPausedError if joints between the markers turn on and on and the markers stay where they were, or if the markers
+        must have come nearer, or gone apart, by the time of the picture."""
+        markers, span = self._markers.reshape(2, 2), self._apart_m(filmed_s)
+        unseen_rad = self._scene.since_it_moved(markers, self._turned_rad)
+        if self._shape.is_another(markers) or self._shown is None:
+            self._shown = span
+        unseen_m = max(span[0] - self._shown[1], self._shown[0] - span[1])
+        if unseen_rad > _FROZEN_RAD or unseen_m > _FROZEN_M:
             raise TrialPausedError(
-                f"joints have turned by {math.degrees(unseen_rad):.0f}° and the picture shows both markers where they were: the "
-                "camera hangs or shows another scene. Look at it: bns track"
+                f"joints have turned by {math.degrees(unseen_rad):.0f}°, {100 * max(unseen_m, 0.0):.1f} cm of the markers' "
+                "distance, and the picture shows both markers where they were: the camera hangs or shows another scene. Look at "
+                "it: bns track"
             )
+
+    def _apart_m(self, filmed_s: float) -> tuple[float, float]:
+        """Least and greatest distance of the markers, by the joints, at the times at which the picture can have been taken."""
+        times, apart = (np.array(column) for column in zip(*self._apart, strict=True))
+        ends = np.interp([filmed_s - self._unknown_s, filmed_s], times, apart)
+        between = apart[(times > filmed_s - self._unknown_s) & (times < filmed_s)]
+        return float(min(*ends, *between)), float(max(*ends, *between))
 
     def _in_sight(self) -> float:
         """Now; if the markers are not seen just then, the posture is held until they are, or the drive ends."""

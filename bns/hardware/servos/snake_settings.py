@@ -5,15 +5,22 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from bns.errors import HardwareError, unknown_name
-from bns.hardware.servos.servo_chain import REFUSED_V, ServoLimits
+from bns.hardware.servos.ax12_table import AX12
+from bns.hardware.servos.servo_chain import ServoLimits
+from bns.hardware.servos.servo_models import TABLES
+from bns.hardware.servos.servo_table import ServoTable
 from bns.physics.snake.parameters import shipped_parameters
 
 WIRINGS = ("bus", "bridge")
 """A bus adapter that the servos hang on, or an Arduino in between (docs/bridge.md)."""
+_CHARGED_V = 0.5
+"""Above what the makers allow: for the servo's own reading, and for a battery that has just been charged."""
+_REFUSED_V = 1.0
+"""So much above it, no rig may allow."""
 _LIMITS = tuple(limit.name for limit in dataclasses.fields(ServoLimits))
 
 
@@ -26,29 +33,53 @@ class SnakeSettings:
     joint_speed_rad_s: float
     settle_s: float
     limits: ServoLimits = field(default_factory=ServoLimits)
+    table: ServoTable = AX12
 
 
 def snake_settings(driver: Mapping[str, Any]) -> SnakeSettings:
     """The settings in a rig's `driver`; HardwareError names one that is wrong. What is not given is as in the physics model."""
     model = shipped_parameters()
-    known = ("wiring", "ids", "joint_speed_rad_s", "settle_s", *_LIMITS)
+    known = ("wiring", "protocol", "model", "ids", "joint_speed_rad_s", "settle_s", *_LIMITS)
     if unknown := [name for name in driver if name not in known]:
         raise HardwareError(f"the snake's driver: {unknown_name('setting', unknown[0], known)}")
     wiring = driver.get("wiring", "bus")
     if wiring not in WIRINGS:
         raise HardwareError(unknown_name("wiring of the snake", wiring, WIRINGS))
-    limits = ServoLimits(**{name: _number(name, driver[name]) for name in _LIMITS if name in driver})
+    table = _table(driver)
+    if wiring == "bridge" and table is not AX12:
+        raise HardwareError(f"the bridge's sketch drives AX-12 servos only, and the rig says {table.model}; use wiring: bus.")
+    limits = replace(limits_of(table), **{name: _number(name, driver[name]) for name in _LIMITS if name in driver})
     if not 0.0 < limits.torque <= 1.0:
         raise HardwareError(f"the snake's torque is {limits.torque:g}; it is a share of the servos' highest, above 0 up to 1.")
-    if limits.high_v >= REFUSED_V:
-        raise HardwareError(f"the snake's high_v is {limits.high_v:g}; the servos' makers allow 12 V.")
+    if limits.high_v >= table.volts[1] + _REFUSED_V:
+        raise HardwareError(f"the snake's high_v is {limits.high_v:g}; the servos' makers allow {table.volts[1]:g} V.")
     return SnakeSettings(
         wiring,
         _ids(driver.get("ids", list(range(1, model.joints + 1))), model.joints),
         _number("joint_speed_rad_s", driver.get("joint_speed_rad_s", model.joint_speed_rad_s)),
         _number("settle_s", driver.get("settle_s", model.settle_s)),
         limits,
+        table,
     )
+
+
+def limits_of(table: ServoTable) -> ServoLimits:
+    """What servos of this model must keep, unless a rig says otherwise."""
+    return ServoLimits(low_v=max(ServoLimits.low_v, table.volts[0]), high_v=table.volts[1] + _CHARGED_V)
+
+
+def _table(driver: Mapping[str, Any]) -> ServoTable:
+    """By protocol and model; an AX-12 unless the rig says otherwise."""
+    protocol = driver.get("protocol", 1)
+    models = [name for name, table in TABLES.items() if table.protocol == protocol]
+    if isinstance(protocol, bool) or not models:
+        raise HardwareError(f"the snake's protocol is {protocol!r}; its servos speak 1 (AX-12) or 2 (XL430, XM430).")
+    if protocol == 2 and "model" not in driver:
+        raise HardwareError(f"the snake's driver has protocol 2 and no model; give one of {', '.join(models)}.")
+    model = driver.get("model", models[0])
+    if model not in models:
+        raise HardwareError(unknown_name("model of the snake's servos", str(model), models))
+    return TABLES[model]
 
 
 def _ids(given: Any, joints: int) -> tuple[int, ...]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -32,8 +32,8 @@ SETTINGS = Settings(
 )
 YELLOW, GREEN = (20, 38), (50, 85)
 """Hues as OpenCV counts them, 0 to 179."""
-_HUE_GAP = 5
-_SATURATION, _VALUE = 110, 60
+HUE_GAP = 5
+SATURATION, VALUE = 110, 60
 _ROUND = 0.75
 _AREA_SHARE = (0.4, 2.0)
 _DISTANCE_SHARE = 0.2
@@ -51,11 +51,25 @@ class Markers:
 
     def __post_init__(self) -> None:
         low, high = sorted([self.yellow, self.green])
-        if high[0] - low[1] < _HUE_GAP:
+        if high[0] - low[1] < HUE_GAP:
             raise HardwareError(
                 f"the marker colours are too close: hues {low} and {high} leave {high[0] - low[1]} between them; at least "
-                f"{_HUE_GAP} of 180 are needed. Take markers of other colours, or narrow the ranges in the rig."
+                f"{HUE_GAP} of 180 are needed. Take markers of other colours, or narrow the ranges in the rig."
             )
+
+
+class Shape(NamedTuple):
+    """A blob's area as a share of a marker's, its roundness (1: a circle), and whether it can be a marker."""
+
+    area_share: float
+    roundness: float
+    good: bool
+
+
+def in_hsv(picture: np.ndarray) -> np.ndarray:
+    """Hue (0 to 179), saturation and value of a BGR picture, a little smoothed."""
+    found: np.ndarray = cv2.cvtColor(cv2.GaussianBlur(picture, (0, 0), 1.0), cv2.COLOR_BGR2HSV)
+    return found
 
 
 class ColourDetector:
@@ -64,9 +78,14 @@ class ColourDetector:
     def __init__(self, lens: Lens, markers: Markers) -> None:
         self._lens, self._markers = lens, markers
 
+    @property
+    def hues(self) -> dict[str, tuple[int, int]]:
+        """Name of a marker -> its range of hues."""
+        return {"yellow": self._markers.yellow, "green": self._markers.green}
+
     def find(self, frame: Frame) -> Sight | None:
         """Pose: the middle between the markers, heading from yellow to green; `points` has both. None if one is not seen."""
-        hsv = cv2.cvtColor(cv2.GaussianBlur(frame.picture, (0, 0), 1.0), cv2.COLOR_BGR2HSV)
+        hsv = in_hsv(frame.picture)
         yellow, green = (self._marker(frame.picture, hsv, hue) for hue in (self._markers.yellow, self._markers.green))
         if yellow is None or green is None:
             return None
@@ -80,24 +99,33 @@ class ColourDetector:
 
     def _marker(self, picture: np.ndarray, hsv: np.ndarray, hue: tuple[int, int]) -> np.ndarray | None:
         """Where the one marker of this colour is (2,), m; None if there is none, or more than one."""
-        mask = cv2.inRange(hsv, np.array([hue[0], _SATURATION, _VALUE]), np.array([hue[1], 255, 255]))
-        outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        good = [outline for outline in outlines if self._is_marker(outline)]
+        good = [outline for outline in self.outlines(hsv, hue) if self.shape(outline).good]
         if len(good) != 1:
             return None
         middle = _centroid(good[0], picture, hsv)
         found: np.ndarray = self._lens.on_plane(middle[None], self._markers.height_m)[0]
         return found if np.isfinite(found).all() else None
 
-    def _is_marker(self, outline: np.ndarray) -> bool:
+    def mask(self, hsv: np.ndarray, hue: tuple[int, int]) -> np.ndarray:
+        """Where a picture is of these hues, and coloured enough (255; else 0)."""
+        found: np.ndarray = cv2.inRange(hsv, np.array([hue[0], SATURATION, VALUE]), np.array([hue[1], 255, 255]))
+        return found
+
+    def outlines(self, hsv: np.ndarray, hue: tuple[int, int]) -> Sequence[np.ndarray]:
+        """Of all blobs there."""
+        found: Sequence[np.ndarray] = cv2.findContours(self.mask(hsv, hue), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
+        return found
+
+    def shape(self, outline: np.ndarray) -> Shape:
+        """What a blob looks like on the plane of the markers."""
         area, around = cv2.contourArea(outline), cv2.arcLength(outline, True)
         if area < 12 or len(outline) < 5:
-            return False
+            return Shape(0.0, 0.0, False)
         edge_m = self._lens.on_plane(outline.reshape(-1, 2).astype(np.float64), self._markers.height_m)
         area_m2 = float(cv2.contourArea(edge_m.astype(np.float32)))
         wanted_m2 = np.pi / 4 * self._markers.diameter_m**2
-        low, high = (share * wanted_m2 for share in _AREA_SHARE)
-        return bool(low <= area_m2 <= high and 4 * np.pi * area / around**2 >= _ROUND)
+        share, roundness = float(area_m2 / wanted_m2), float(4 * np.pi * area / around**2)
+        return Shape(share, roundness, _AREA_SHARE[0] <= share <= _AREA_SHARE[1] and roundness >= _ROUND)
 
 
 def _centroid(outline: np.ndarray, picture: np.ndarray, hsv: np.ndarray) -> np.ndarray:
@@ -119,10 +147,14 @@ def _hues(name: str, given: Any) -> tuple[int, ...]:
 
 def detector(settings: Mapping[str, Any]) -> ColourDetector:
     """The detector that a rig describes."""
-    lens = load_calibration(Path(str(settings["calibration"]))).lens
+    return ColourDetector(load_calibration(Path(str(settings["calibration"]))).lens, markers_of(settings))
+
+
+def markers_of(settings: Mapping[str, Any]) -> Markers:
+    """The markers that a rig describes."""
     hues = {name: _hues(name, settings[name]) for name in ("yellow", "green") if name in settings}
     sizes = {name: float(settings[name]) for name in SETTINGS.sizes if name in settings}
-    return ColourDetector(lens, Markers(**sizes, **hues))  # type: ignore[arg-type]  # two hues each
+    return Markers(**sizes, **hues)  # type: ignore[arg-type]  # two hues each
 
 
 def open_tracker(settings: Mapping[str, Any], clock: Clock) -> FrameTracker:

@@ -11,7 +11,7 @@ import numpy as np
 from bns.errors import TrialPausedError
 from bns.hardware.agreement import Agreement
 from bns.hardware.clock import Clock
-from bns.hardware.delay import Turns, turned
+from bns.hardware.delay import Motion, turned
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.platform import Driven
 from bns.hardware.rig import Rig
@@ -107,7 +107,7 @@ class WheeledPlatform:
         self._driver.close()
         self._eye.close()
 
-    def turn_about(self, seconds: float) -> Turns:
+    def move_about(self, seconds: float) -> Motion:
         """Turn to and fro on the spot, for the tracker's delay; stopped at the end. TrialPausedError, StopNotConfirmedError."""
         if self.pose() is None:
             raise TrialPausedError(_NOT_SEEN)

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bns.bootstrap.loop import run
+from bns.bootstrap.loop import RunResult, run
 from bns.console import live_view
 from bns.errors import HardwareError
 from bns.hardware.link.hardware_log import events
 from bns.robots import load_robot
+from bns.spec import RunSpec
 from bns.sweep.single_run import keep_run
 from bns.trial.background import BackgroundDriver
 from bns.trial.evaluation import Evaluation
@@ -38,8 +39,18 @@ class _NoRobot:
         pass
 
 
-def replayed(journal: Path, results: Path) -> str:
-    """Run the evaluations of a journal again and store them; the report in words."""
+@dataclass(frozen=True)
+class Replayed:
+    """A trial that was run again: its spec, its tables, how long that took, and a report in words."""
+
+    spec: RunSpec
+    result: RunResult
+    wall_s: float
+    text: str
+
+
+def replayed(journal: Path, results: Path) -> Replayed:
+    """Run the evaluations of a journal again and store them."""
     past = past_evaluations(journal)
     if not past:
         raise HardwareError(f"{journal} holds no evaluation that was driven; there is nothing to replay.")
@@ -47,11 +58,13 @@ def replayed(journal: Path, results: Path) -> str:
     began, started = time.perf_counter(), datetime.now(UTC)
     with live_view(spec) as show, BackgroundDriver(load_robot(spec.robot), _NoRobot(), past, most_rounds=1) as driver:
         result = run(spec, show, RobotWorld("robot-replayed"), driver)
-    keep_run(spec, result, results, SWEEP, started, time.perf_counter() - began)
+    wall_s = time.perf_counter() - began
+    keep_run(spec, result, results, SWEEP, started, wall_s)
     evals = result.tables["evals"]
     cut = "" if any(events(journal, "complete")) else "; the journal has no line `complete`: the trial did not come to its end"
-    return (
+    text = (
         f"replayed {len(past)} evaluations of {journal}, run {spec.run_id}: fitness of the last in the world "
         f"{evals['evaluated_fitness_world'][-1]:.4f}, goals reached {evals['evaluated_goals_reached'][-1]}; "
         f"stored in sweep {SWEEP}{cut}"
     )
+    return Replayed(spec, result, wall_s, text)

@@ -1,4 +1,4 @@
-"""An AX-12 servo: its control table, its alarms and shutdown, and a shaft that turns in time."""
+"""A Dynamixel servo of any model that has a table: its registers, its alarms and shutdown, and a shaft that turns in time."""
 
 from __future__ import annotations
 
@@ -7,11 +7,16 @@ from typing import NamedTuple, Protocol
 
 from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.faults import Faults
-from bns.hardware.servos.ax12_table import ANGLE, OVERHEAT, OVERLOAD, RANGE, REGISTERS, TABLE_SIZE, VOLTAGE
+from bns.hardware.servos.ax12_table import ANGLE, AX12, OVERHEAT, OVERLOAD, RANGE, VOLTAGE
+from bns.hardware.servos.servo_table import ServoTable
 
-_NO_LOAD_STEPS_S = 59 * 360 / 60 * 1023 / 300  # 59 turns a minute
-_SPEED_STEPS_S = 0.111 * 360 / 60 * 1023 / 300
 _COOL_C = 30
+_SLOPE_RAD = 32 * 3.41 * AX12.rad_per_step
+"""So far from its goal a joint uses all of its torque: the AX-12's compliance slope of 32 steps, times 3.41."""
+_TORQUE_WITH_GOAL = 0x08
+"""Bit of `drive_mode`."""
+_OUT_OF_RANGE, _TOO_SHORT, _BEYOND_A_LIMIT, _NO_ACCESS = 4, 5, 6, 7
+"""Refusals of protocol 2."""
 
 
 class Order(NamedTuple):
@@ -52,53 +57,64 @@ class FreeShaft:
         self._position += math.copysign(min(abs(aim - self._position), order.speed * passed_s), aim - self._position)
         left = aim - self._position
         moving = abs(left) >= 1.0
-        load = math.copysign(min(abs(left) / (32 * 3.41), order.torque), left)
+        load = math.copysign(min(abs(left) * servo.kind.rad_per_step / _SLOPE_RAD, order.torque), left)
         return Motion(self._position, math.copysign(order.speed, left) if moving else 0.0, load, moving)
 
 
 class Servo:
-    """One servo: its table, and its shaft (one that turns freely unless another is given)."""
+    """One servo of a `kind`: its table, and its shaft (one that turns freely unless another is given)."""
 
-    def __init__(self, number: int, clock: EmulatedClock, faults: Faults, shaft: Shaft | None = None, **values: int) -> None:
-        self._clock, self._faults = clock, faults
-        self.table = bytearray(TABLE_SIZE)
-        for name, register in REGISTERS.items():
+    def __init__(
+        self,
+        number: int,
+        clock: EmulatedClock,
+        faults: Faults,
+        shaft: Shaft | None = None,
+        kind: ServoTable = AX12,
+        **values: int,
+    ) -> None:
+        self._clock, self._faults, self.kind = clock, faults, kind
+        self.table = bytearray(max(r.address + r.size for r in kind.registers.values()))
+        for name, register in kind.registers.items():
             self.put(name, values.get(name, register.default))
         self.put("id", number)
+        self._steps_s = kind.rad_s_per_step / kind.rad_per_step
         self.shaft: Shaft = shaft or FreeShaft(float(self.get("present_position")), clock.now_s())
         self.alarm = self.latched = 0
         self.pending: tuple[int, bytes] | None = None
 
     def get(self, name: str) -> int:
-        """Value of a register."""
-        register = REGISTERS[name]
+        """What is in a register."""
+        register = self.kind.registers[name]
         return int.from_bytes(self.table[register.address : register.address + register.size], "little")
 
     def put(self, name: str, value: int) -> None:
         """Set a register, whether hosts may or not."""
-        register = REGISTERS[name]
-        self.table[register.address : register.address + register.size] = value.to_bytes(register.size, "little")
+        register, raw = self.kind.registers[name], self.kind.raw(name, value)
+        self.table[register.address : register.address + register.size] = raw.to_bytes(register.size, "little")
 
     def order(self) -> Order:
         """What the motor is to do; a speed of 0 is as fast as it can."""
-        asked = self.get("moving_speed") * _SPEED_STEPS_S
-        torque = self.get("torque_limit") / 1023 if self.get("torque_enable") else 0.0
-        return Order(torque, float(self.get("goal_position")), min(asked, _NO_LOAD_STEPS_S) if asked > 0 else _NO_LOAD_STEPS_S)
+        asked, most = self.get("moving_speed") * self._steps_s, self.kind.no_load_rad_s / self.kind.rad_per_step
+        limit = self.kind.value("torque_limit", self.get("torque_limit"))
+        torque = abs(limit) / self.kind.full_torque if self.get("torque_enable") else 0.0
+        return Order(torque, float(self.get("goal_position")), min(asked, most) if asked > 0 else most)
 
     def update(self) -> None:
         """Turn the shaft up to now, and see whether an alarm shuts the servo down."""
         now_s = self._clock.now_s()
         now = self.shaft.motion(self, now_s)
-        self.put("present_position", min(max(round(now.position), 0), 1023))
-        self.put("present_speed", _signed(now.speed / _SPEED_STEPS_S))
-        self.put("present_load", _signed(now.load * 1023))
+        highest = self.kind.registers["goal_position"].highest
+        self.put("present_position", min(max(round(now.position), 0), highest))
+        self.put("present_speed", _within(now.speed / self._steps_s))
+        self.put("present_load", _within(now.load * self.kind.full_torque))
         self.put("moving", int(now.moving))
         self._alarms(now_s)
 
     def _alarms(self, now_s: float) -> None:
         number = self.get("id")
         if self._faults.strikes("overheat", now_s, number):
-            self.put("present_temperature", 75)
+            self.put("present_temperature", self.get("temperature_limit") + 5)
         elif self.get("present_temperature") > _COOL_C:
             self.put("present_temperature", _COOL_C)
         found = 0
@@ -108,38 +124,79 @@ class Servo:
             found |= OVERHEAT
         if self._faults.strikes("overload", now_s, number):
             found |= OVERLOAD
-        if found & self.get("alarm_shutdown"):
-            self.put("torque_limit", 0)
+        if shut_down := found & self.get("alarm_shutdown"):
             self.put("torque_enable", 0)
-            self.latched |= found & OVERLOAD
+            if self.kind.protocol == 1:
+                self.put("torque_limit", 0)
+            self.latched |= found & OVERLOAD if self.kind.protocol == 1 else shut_down
         self.alarm = found
+        if "hardware_error" in self.kind.registers:
+            self.put("hardware_error", self.alarm | self.latched)
 
     def errors(self) -> int:
-        """Error byte: alarms there are, and an overload that was not acknowledged by writing the torque limit again."""
-        return self.alarm | self.latched
+        """For the error byte: alarms there are, and those that were not acknowledged (by writing the torque limit of an AX-12
+        again, by rebooting another)."""
+        found = self.alarm | self.latched
+        return found if self.kind.protocol == 1 else self.kind.alarm_bits * bool(found)
+
+    def reboot(self) -> None:
+        """As if it were switched off and on: what is not kept is as after a reset."""
+        for name, register in self.kind.registers.items():
+            if register.address >= self.kind.locked_below and not name.startswith("present"):
+                self.put(name, register.default)
+        self.latched = 0
+
+    def read(self, address: int, size: int) -> bytes | None:
+        """What is there; None where there is nothing to be read."""
+        if self.kind.protocol == 1:
+            return bytes(self.table[address : address + size]) if address + size <= len(self.table) else None
+        held = {r.address + i for r in self.kind.registers.values() for i in range(r.size)}
+        return bytes(self.table[address : address + size]) if held >= set(range(address, address + size)) else None
 
     def write(self, address: int, data: bytes) -> int:
-        """Write into the table; the error bits of it."""
+        """Write into the table; what is wrong with it, as the error byte says it."""
         last = address + len(data)
-        touched = {n: r for n, r in REGISTERS.items() if r.address < last and address < r.address + r.size}
-        if last > TABLE_SIZE or not touched:
-            return RANGE
+        touched = {n: r for n, r in self.kind.registers.items() if r.address < last and address < r.address + r.size}
+        refused = RANGE if self.kind.protocol == 1 else _NO_ACCESS
+        if last > len(self.table) or not touched:
+            return refused
         trial = bytearray(self.table)
         trial[address:last] = data
         for name, register in touched.items():
             value = int.from_bytes(trial[register.address : register.address + register.size], "little")
-            if not register.writable or value > register.highest:
-                return RANGE
-            if name == "goal_position" and not self.get("cw_angle_limit") <= value <= self.get("ccw_angle_limit"):
-                return ANGLE
+            if bits := self._refusal(name, value, (address, last)):
+                return bits
         self.table[:] = trial
-        if "torque_limit" in touched and not self.alarm & OVERLOAD:
+        if "torque_limit" in touched and self.kind.protocol == 1 and not self.alarm & OVERLOAD:
             self.latched &= ~OVERLOAD
-        if "goal_position" in touched and self.get("torque_limit") > 0:
-            self.put("torque_enable", 1)  # a goal switches the torque on by itself
+        if "goal_position" in touched and self._torque_comes_with_goals():
+            self.put("torque_enable", 1)
+        if self.latched and self.kind.protocol != 1:
+            self.put("torque_enable", 0)
         return 0
 
+    def _refusal(self, name: str, value: int, written: tuple[int, int]) -> int:
+        """Why a register cannot be set to this: a bit in protocol 1, a number in protocol 2; 0 if it can."""
+        register, second = self.kind.registers[name], self.kind.protocol != 1
+        if second and (written[0] > register.address or written[1] < register.address + register.size):
+            return _TOO_SHORT
+        locked = register.address < self.kind.locked_below and self.get("torque_enable")
+        if not register.writable or locked:
+            return _NO_ACCESS if second else RANGE
+        if name == "goal_position" and not self.get("cw_angle_limit") <= value <= self.get("ccw_angle_limit"):
+            beyond = value > register.highest
+            return (_OUT_OF_RANGE if beyond else _BEYOND_A_LIMIT) if second else (RANGE if beyond else ANGLE)
+        if abs(self.kind.value(name, value)) > register.highest:
+            return _OUT_OF_RANGE if second else RANGE
+        return 0
 
-def _signed(value: float) -> int:
-    """As loads and speeds stand in the table: ten bits of size, and one for the direction."""
-    return min(round(abs(value)), 1023) | (1024 if value < 0 else 0)
+    def _torque_comes_with_goals(self) -> bool:
+        """An AX-12's does by itself, unless its torque limit is zero; another's where its drive mode says so."""
+        if self.kind.protocol == 1:
+            return self.get("torque_limit") > 0
+        return bool(self.get("drive_mode") & _TORQUE_WITH_GOAL)
+
+
+def _within(value: float) -> int:
+    """Loads and speeds have ten bits for their size in the smallest table."""
+    return max(-1023, min(1023, round(value)))

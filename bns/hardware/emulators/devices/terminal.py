@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import select
 import sys
 import threading
@@ -102,6 +103,17 @@ class PseudoTerminal:
             finally:
                 for end in line:
                     os.close(end)
+
+    def baud(self) -> int | None:
+        """The rate that the host has set its end to; None if the system does not say, or the line is dead."""
+        import termios  # noqa: PLC0415  # Windows has none
+
+        with self._lock:
+            if self._master < 0:
+                return None
+            code = termios.tcgetattr(self._master)[5]
+        names = [name for name in dir(termios) if re.fullmatch(r"B\d+", name) and getattr(termios, name) == code]
+        return int(names[0][1:]) if names else None
 
     def cut(self) -> None:
         """The line goes dead, as when a Bluetooth link breaks; the device knows nothing of it."""
