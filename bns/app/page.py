@@ -7,8 +7,9 @@ from typing import Any
 
 import panel as pn
 
+from bns.app.design import template
 from bns.app.jobs import Jobs
-from bns.app.parts import CSS, WIDE, html
+from bns.app.parts import WIDE, html
 from bns.app.screens.data import DataScreen
 from bns.app.screens.effects import EffectsScreen
 from bns.app.screens.model import ModelScreen
@@ -23,16 +24,9 @@ def page(tabs: Tabs) -> Any:
     """The page of the tab that the address names; a reload shows the same tab, a new address a new one."""
     asked = pn.state.session_args.get("tab", [b""])[0].decode("ascii", "replace")
     name, tab = tabs.get(asked)
-    template = pn.template.BootstrapTemplate(title=TITLE, header_background="#23395d", favicon=ICON, raw_css=[CSS])
-    template.main.append(Screens(tab, name).view)
-    return template
-
-
-ICON = (
-    "data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 8 8'><circle cx='4' cy='4' r='3' "
-    "fill='%230072B2'/></svg>#.svg"
-)
-"""Panel wants to see an ending."""
+    made = template(TITLE)
+    made.main.append(Screens(tab, name).view)
+    return made
 
 
 class Screens:

@@ -6,8 +6,9 @@ from typing import Any
 
 import panel as pn
 
+from bns.app.design import template
 from bns.app.figures.runs import CurveFigure, ParallelFigure, RunsFigure
-from bns.app.parts import CSS, WIDE, Problem, beside, button, drawn, heading, html, row
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
 from bns.app.results.one_run import OneRun
 from bns.app.results.study import CURVES, OUTCOMES, PARAMETERS, Study
 from bns.errors import StoreError
@@ -18,11 +19,11 @@ _MOST_NAMES = 2_000
 """Of runs in a menu; filters make the list shorter."""
 
 
-def results_page(study: Study, icon: str) -> Any:
+def results_page(study: Study) -> Any:
     """A page of its own for every tab of the browser."""
-    template = pn.template.BootstrapTemplate(title=TITLE, header_background="#23395d", favicon=icon, raw_css=[CSS])
-    template.main.append(ResultsScreen(study).view)
-    return template
+    made = template(TITLE)
+    made.main.append(ResultsScreen(study).view)
+    return made
 
 
 class ResultsScreen:
