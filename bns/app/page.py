@@ -18,6 +18,13 @@ from bns.app.screens.where import WhereScreen
 from bns.app.tab import Tab, Tabs
 
 TITLE = "bns explore"
+SCREENS: dict[str, Any] = {
+    "Data": DataScreen,
+    "Model": ModelScreen,
+    "Where it fails": WhereScreen,
+    "Effects": EffectsScreen,
+    "Next": NextScreen,
+}
 
 
 def page(tabs: Tabs) -> Any:
@@ -30,19 +37,13 @@ def page(tabs: Tabs) -> Any:
 
 
 class Screens:
-    """The screens of a tab; a screen is drawn again when it is entered."""
+    """The screens of a tab; a screen is made when it is first entered, and drawn again whenever it is."""
 
     def __init__(self, tab: Tab, name: str) -> None:
         self._said = html('<p class="bns-say" role="status"></p>')
-        self._jobs = Jobs(pn.state.curdoc, self._say)
-        self._screens: dict[str, Any] = {
-            "Data": DataScreen(tab, self._jobs),
-            "Model": ModelScreen(tab, self._jobs),
-            "Where it fails": WhereScreen(tab, self._jobs),
-            "Effects": EffectsScreen(tab, self._jobs),
-            "Next": NextScreen(tab, self._jobs),
-        }
-        names = list(self._screens)
+        self._jobs = Jobs(pn.state.curdoc, self._say, self._changed)
+        self._tab, self._screens = tab, dict[str, Any]()
+        names = list(SCREENS)
         self._chosen = pn.widgets.RadioButtonGroup(
             name="Screen",
             options=names,
@@ -62,9 +63,16 @@ class Screens:
         self._enter(self._chosen.value)
 
     def _enter(self, name: str) -> None:
+        if name not in self._screens:
+            self._screens[name] = SCREENS[name](self._tab, self._jobs)
         screen = self._screens[name]
+        screen.enter()  # before it is shown: the browser lays it out once then
         self._shown.objects = [screen.view]
-        screen.enter()
+
+    def _changed(self, by: object) -> None:
+        screen = self._screens[self._chosen.value]
+        if screen is not by:
+            screen.enter()
 
     def _say(self, text: str) -> None:
         self._said.object = f'<p class="bns-say" role="status">{escape(text)}{" …" if text else ""}</p>'

@@ -83,7 +83,6 @@ class ResultsScreen:
 
     def _draw(self) -> None:
         rows = self._study.chosen({name: menu.value for name, menu in self._filters.items()})
-        self._count.object = f"<p id='bns-runs'>{len(rows)} of {len(self._study.runs)} finished runs.</p>"
         varied = self._study.varied(rows)
         words = {name: name.replace("_", " ") for name in varied}
         self._parallel.fill(rows, {**words, **{k: OUTCOMES[k] for k in ("diversity", "fitness_error", "success")}})
@@ -95,6 +94,7 @@ class ResultsScreen:
         for menu in self._names:
             kept = menu.value
             menu.options = options if kept in options.values() or not kept else {**options, kept: kept}
+        self._count.object = f"<p id='bns-runs'>{len(rows)} of {len(self._study.runs)} finished runs.</p>"
 
     def _pick(self, run_id: str) -> None:
         menu = self._names[self._next]

@@ -133,6 +133,7 @@ class DataScreen:
         self._part_problem.show("")
         self._columns.hide()
         self._refresh()
+        self._jobs.changed(self)
 
     def _failed(self, text: str) -> None:
         self._problem.show(text)

@@ -91,3 +91,4 @@ class ModelScreen:
     def _done(self, _none: Any) -> None:
         self._problem.show("")
         self.enter()
+        self._jobs.changed(self)
