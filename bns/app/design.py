@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import panel as pn
+from panel.theme.base import Inherit
 from panel.theme.bootstrap import Bootstrap
 
 from bns.app.parts import CSS
@@ -14,6 +15,10 @@ ICON = (
     "fill='%230072B2'/></svg>#.svg"
 )
 """Panel wants to see an ending."""
+_FOCUS = ":focus-visible { outline: 3px solid #e69f00 !important; outline-offset: 1px; }"
+"""Bootstrap shows it on its blue buttons only."""
+_LISTS = "select[multiple] { background-image: none !important; }"
+"""A list that is always open needs no arrow."""
 
 
 class Lean(Bootstrap):
@@ -21,6 +26,8 @@ class Lean(Bootstrap):
 
     Panel hands each component that comes later a copy of all of them (230 kB); two thirds of the browser's work went there.
     """
+
+    modifiers: ClassVar = {pn.widgets.Widget: {"stylesheets": [Inherit, _FOCUS, _LISTS]}}
 
     def params(self, viewable: Any, doc: Any = None) -> tuple[dict[str, Any], dict[str, Any]]:
         """As Panel's own, for a component that stands in a page which has the style sheets."""

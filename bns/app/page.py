@@ -16,6 +16,7 @@ from bns.app.screens.model import ModelScreen
 from bns.app.screens.next import NextScreen
 from bns.app.screens.where import WhereScreen
 from bns.app.tab import Tab, Tabs
+from bns.app.web.connection import watch_connection
 
 TITLE = "bns explore"
 SCREENS: dict[str, Any] = {
@@ -32,6 +33,7 @@ def page(tabs: Tabs) -> Any:
     asked = pn.state.session_args.get("tab", [b""])[0].decode("ascii", "replace")
     name, tab = tabs.get(asked)
     made = template(TITLE)
+    watch_connection(pn.state.curdoc)
     made.main.append(Screens(tab, name).view)
     return made
 
@@ -47,7 +49,7 @@ class Screens:
         self._chosen = pn.widgets.RadioButtonGroup(
             name="Screen",
             options=names,
-            value="Effects" if tab.bench else names[0],
+            value=tab.screen or ("Effects" if tab.bench else names[0]),
             button_type="primary",
             button_style="outline",
             **WIDE,
@@ -65,6 +67,7 @@ class Screens:
     def _enter(self, name: str) -> None:
         if name not in self._screens:
             self._screens[name] = SCREENS[name](self._tab, self._jobs)
+        self._tab.screen = name
         screen = self._screens[name]
         screen.enter()  # before it is shown: the browser lays it out once then
         self._shown.objects = [screen.view]

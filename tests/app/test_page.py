@@ -28,6 +28,7 @@ def test_a_sample_is_opened_the_error_falls_and_the_model_is_saved(browser, benc
     assert "14 trials" in page.locator("#bns-log").inner_text()
     assert page.get_by_role("checkbox", name="trial ").count() == len(bns.Measurements(LOG).findings)
     go(page, "Effects", "#bns-errors")
+    assert page.get_by_label("Trial", exact=True).input_value() != ""  # the one whose paths are drawn
     before = error_of(page, "as given")
     page.get_by_role("checkbox", name="motor-lag:").check()
     after = error_of(page, "+ motor-lag")

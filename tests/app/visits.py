@@ -94,7 +94,7 @@ def save(page, link, folder):
 
 def widest(page):
     """How far to the right anything reaches, pixels."""
-    parts = page.locator(".bk-Figure, .bns-scroll, select, input, button")
+    parts = page.locator(".bk-Figure, .bns-scroll, pre, select, input, button")
     return parts.evaluate_all("all => Math.max(...all.map(e => e.getBoundingClientRect().right))")
 
 

@@ -11,6 +11,7 @@ from bns.app.figures.runs import CurveFigure, ParallelFigure, RunsFigure
 from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
 from bns.app.results.one_run import OneRun
 from bns.app.results.study import CURVES, OUTCOMES, PARAMETERS, Study
+from bns.app.web.connection import watch_connection
 from bns.errors import StoreError
 
 TITLE = "bns explore: results"
@@ -22,6 +23,7 @@ _MOST_NAMES = 2_000
 def results_page(study: Study) -> Any:
     """A page of its own for every tab of the browser."""
     made = template(TITLE)
+    watch_connection(pn.state.curdoc)
     made.main.append(ResultsScreen(study).view)
     return made
 
