@@ -22,11 +22,11 @@ class Explorer:
 
     def __init__(self, shown: Tabs | Study, port: int = 0) -> None:
         require("app", "panel", "bokeh")
-        from bns.app.page import ICON, page  # noqa: PLC0415  # needs Panel
+        from bns.app.page import page  # noqa: PLC0415  # needs Panel
         from bns.app.results.page import results_page  # noqa: PLC0415
         from bns.app.web.server import PageServer  # noqa: PLC0415
 
-        made = (lambda: results_page(shown, ICON)) if isinstance(shown, Study) else (lambda: page(shown))
+        made = (lambda: results_page(shown)) if isinstance(shown, Study) else (lambda: page(shown))
         self._server = PageServer(made, port)  # Panel would show a partial, not call it
         self.address = self._server.address
         self._thread: threading.Thread | None = None

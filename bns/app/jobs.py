@@ -12,10 +12,12 @@ T = TypeVar("T")
 
 
 class Jobs:
-    """``document``: of Bokeh; ``say``: takes what is being done ("" for nothing)."""
+    """``document``: of Bokeh; ``say``: takes what is being done ("" for nothing); ``changed``: told by a screen that log or model
+    are others now, for the user may have gone to another screen meanwhile."""
 
-    def __init__(self, document: Any, say: Callable[[str], None]) -> None:
+    def __init__(self, document: Any, say: Callable[[str], None], changed: Callable[[object], None]) -> None:
         self._document, self._say, self._waiting = document, say, 0
+        self.changed = changed
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="bns-page")
 
     def run(self, text: str, work: Callable[[], T], done: Callable[[T], None], failed: Callable[[str], None]) -> None:

@@ -7,52 +7,49 @@ from typing import Any
 
 import panel as pn
 
+from bns.app.design import template
 from bns.app.jobs import Jobs
-from bns.app.parts import CSS, WIDE, html
+from bns.app.parts import WIDE, html
 from bns.app.screens.data import DataScreen
 from bns.app.screens.effects import EffectsScreen
 from bns.app.screens.model import ModelScreen
 from bns.app.screens.next import NextScreen
 from bns.app.screens.where import WhereScreen
 from bns.app.tab import Tab, Tabs
+from bns.app.web.connection import watch_connection
 
 TITLE = "bns explore"
+SCREENS: dict[str, Any] = {
+    "Data": DataScreen,
+    "Model": ModelScreen,
+    "Where it fails": WhereScreen,
+    "Effects": EffectsScreen,
+    "Next": NextScreen,
+}
 
 
 def page(tabs: Tabs) -> Any:
     """The page of the tab that the address names; a reload shows the same tab, a new address a new one."""
     asked = pn.state.session_args.get("tab", [b""])[0].decode("ascii", "replace")
     name, tab = tabs.get(asked)
-    template = pn.template.BootstrapTemplate(title=TITLE, header_background="#23395d", favicon=ICON, raw_css=[CSS])
-    template.main.append(Screens(tab, name).view)
-    return template
-
-
-ICON = (
-    "data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 8 8'><circle cx='4' cy='4' r='3' "
-    "fill='%230072B2'/></svg>#.svg"
-)
-"""Panel wants to see an ending."""
+    made = template(TITLE)
+    watch_connection(pn.state.curdoc)
+    made.main.append(Screens(tab, name).view)
+    return made
 
 
 class Screens:
-    """The screens of a tab; a screen is drawn again when it is entered."""
+    """The screens of a tab; a screen is made when it is first entered, and drawn again whenever it is."""
 
     def __init__(self, tab: Tab, name: str) -> None:
         self._said = html('<p class="bns-say" role="status"></p>')
-        self._jobs = Jobs(pn.state.curdoc, self._say)
-        self._screens: dict[str, Any] = {
-            "Data": DataScreen(tab, self._jobs),
-            "Model": ModelScreen(tab, self._jobs),
-            "Where it fails": WhereScreen(tab, self._jobs),
-            "Effects": EffectsScreen(tab, self._jobs),
-            "Next": NextScreen(tab, self._jobs),
-        }
-        names = list(self._screens)
+        self._jobs = Jobs(pn.state.curdoc, self._say, self._changed)
+        self._tab, self._screens = tab, dict[str, Any]()
+        names = list(SCREENS)
         self._chosen = pn.widgets.RadioButtonGroup(
             name="Screen",
             options=names,
-            value="Effects" if tab.bench else names[0],
+            value=tab.screen or ("Effects" if tab.bench else names[0]),
             button_type="primary",
             button_style="outline",
             **WIDE,
@@ -68,9 +65,17 @@ class Screens:
         self._enter(self._chosen.value)
 
     def _enter(self, name: str) -> None:
+        if name not in self._screens:
+            self._screens[name] = SCREENS[name](self._tab, self._jobs)
+        self._tab.screen = name
         screen = self._screens[name]
+        screen.enter()  # before it is shown: the browser lays it out once then
         self._shown.objects = [screen.view]
-        screen.enter()
+
+    def _changed(self, by: object) -> None:
+        screen = self._screens[self._chosen.value]
+        if screen is not by:
+            screen.enter()
 
     def _say(self, text: str) -> None:
         self._said.object = f'<p class="bns-say" role="status">{escape(text)}{" …" if text else ""}</p>'

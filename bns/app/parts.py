@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from importlib import resources
 from typing import Any
@@ -34,6 +34,14 @@ def button(name: str, clicked: Callable[[], object], kind: str = "default", **mo
     made = pn.widgets.Button(name=name, button_type=kind, width=None, **more)
     made.on_click(lambda _event: clicked())
     return made
+
+
+def offer(menu: Any, options: Mapping[str, Any] | Sequence[Any]) -> None:
+    """What a menu holds: as chosen where that is among it, else the first, which Panel takes only for a menu on the page."""
+    values = list(options.values()) if isinstance(options, Mapping) else list(options)
+    menu.options = options
+    if menu.value not in values:
+        menu.value = values[0] if values else None
 
 
 def drawn(figure: Any) -> Any:

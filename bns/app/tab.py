@@ -41,7 +41,8 @@ class Tab:
     ``data_words``, ``model_words``: what to write for them on a command line; ``files``: where the log lies; ``mapping``: how its
     columns were read, where the user wrote that; ``networks``: the name or file of those that are compared instead of the model;
     ``snapshots``: states of the switches that the user named. ``asked``: the files that were asked for last; where they could not
-    be read, ``why_no_log`` says why. ``alone``: what each effect earns by itself, as far as the diagnosis under way has come.
+    be read, ``why_no_log`` says why. ``screen``: the one that was looked at last.
+    ``alone``: what each effect earns by itself, as far as the diagnosis under way has come.
     """
 
     log: Measurements | None = None
@@ -62,6 +63,7 @@ class Tab:
     why_no_bench: str = ""
     asked: tuple[Path, ...] = ()
     why_no_log: str = ""
+    screen: str = ""
     _folder: Path | None = None
     _used: Measurements | None = None
     _compared: dict[Any, CompareResult] = field(default_factory=dict)
@@ -112,7 +114,7 @@ class Tab:
         """All that another tab is about; its own folder stays."""
         self.diagnosis.stop()
         for each in fields(self):
-            if each.name != "_folder":
+            if each.name not in {"_folder", "screen"}:
                 setattr(self, each.name, getattr(other, each.name))
 
     def twin(self) -> Tab:
@@ -125,6 +127,7 @@ class Tab:
             evolution=Background(),
             experiment=Background(),
             alone={},
+            screen="",
             _folder=None,
             _compared=dict(self._compared),
         )

@@ -32,6 +32,9 @@ class AtOnce:
     def run(self, _text, work, done, failed):
         done(work())
 
+    def changed(self, _screen):
+        pass
+
 
 def entered(screen, tab):
     made = screen(tab, AtOnce())

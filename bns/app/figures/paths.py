@@ -87,7 +87,7 @@ class LogFigure:
         self.paths = ColumnDataSource({"x": [[0.0]], "y": [[0.0]], "trial": [""], "marker": [""], "color": [BLUE]})
         self.findings = ColumnDataSource({"x": [], "y": [], "text": []})
         self.figure = blank(
-            title or "Measured paths; crosses: findings. Tap or brush paths to choose trials",
+            title or "Measured paths; crosses: findings",
             *EAST_NORTH,
             tools=SELECTING,
             height=height,

@@ -51,7 +51,7 @@ class RunsFigure:
         }
         self.figure.xaxis.axis_label, self.figure.yaxis.axis_label = x[1], y[1]
         drawn = f", {len(shown)} of them drawn" if len(shown) < len(rows) else ""
-        self.figure.title.text = f"{len(rows)} runs{drawn}; green: the fittest succeeds at the end"
+        self.figure.title.text = f"{len(rows)} runs{drawn}; green: success at the end"
 
 
 class ParallelFigure:
@@ -90,7 +90,7 @@ class ParallelFigure:
         self.figure.xaxis.ticker = FixedTicker(ticks=places)
         self.figure.xaxis.major_label_overrides = dict(enumerate(axes.values()))
         drawn = f"{len(shown)} of {len(rows)} runs drawn" if len(shown) < len(rows) else f"{len(rows)} runs"
-        self.figure.title.text = f"{drawn}, a line each; green: the fittest succeeds at the end"
+        self.figure.title.text = f"{drawn}, a line each; green: success at the end"
 
 
 def _heights(column: pd.Series) -> tuple[np.ndarray, tuple[str, str]]:

@@ -10,7 +10,7 @@ import panel as pn
 
 from bns.app.figures.time_axis import Stretch, TimeAxisFigure
 from bns.app.log.part import Part
-from bns.app.parts import WIDE, button, drawn, heading, row
+from bns.app.parts import WIDE, button, drawn, heading, offer, row
 from bns.app.tab import Tab
 
 
@@ -49,7 +49,7 @@ class CutPart:
             self._place.objects = [drawn(self._picture.figure)]
         if log is not self._log:
             self._log = log
-            self._trial.options = list(log.measured.tracks.names)
+            offer(self._trial, list(log.measured.tracks.names))
         self._show()
 
     def _show(self) -> None:

@@ -6,10 +6,12 @@ from typing import Any
 
 import panel as pn
 
+from bns.app.design import template
 from bns.app.figures.runs import CurveFigure, ParallelFigure, RunsFigure
-from bns.app.parts import CSS, WIDE, Problem, beside, button, drawn, heading, html, row
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
 from bns.app.results.one_run import OneRun
 from bns.app.results.study import CURVES, OUTCOMES, PARAMETERS, Study
+from bns.app.web.connection import watch_connection
 from bns.errors import StoreError
 
 TITLE = "bns explore: results"
@@ -18,11 +20,12 @@ _MOST_NAMES = 2_000
 """Of runs in a menu; filters make the list shorter."""
 
 
-def results_page(study: Study, icon: str) -> Any:
+def results_page(study: Study) -> Any:
     """A page of its own for every tab of the browser."""
-    template = pn.template.BootstrapTemplate(title=TITLE, header_background="#23395d", favicon=icon, raw_css=[CSS])
-    template.main.append(ResultsScreen(study).view)
-    return template
+    made = template(TITLE)
+    watch_connection(pn.state.curdoc)
+    made.main.append(ResultsScreen(study).view)
+    return made
 
 
 class ResultsScreen:
@@ -82,7 +85,6 @@ class ResultsScreen:
 
     def _draw(self) -> None:
         rows = self._study.chosen({name: menu.value for name, menu in self._filters.items()})
-        self._count.object = f"<p id='bns-runs'>{len(rows)} of {len(self._study.runs)} finished runs.</p>"
         varied = self._study.varied(rows)
         words = {name: name.replace("_", " ") for name in varied}
         self._parallel.fill(rows, {**words, **{k: OUTCOMES[k] for k in ("diversity", "fitness_error", "success")}})
@@ -94,6 +96,7 @@ class ResultsScreen:
         for menu in self._names:
             kept = menu.value
             menu.options = options if kept in options.values() or not kept else {**options, kept: kept}
+        self._count.object = f"<p id='bns-runs'>{len(rows)} of {len(self._study.runs)} finished runs.</p>"
 
     def _pick(self, run_id: str) -> None:
         menu = self._names[self._next]

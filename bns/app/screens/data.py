@@ -133,6 +133,7 @@ class DataScreen:
         self._part_problem.show("")
         self._columns.hide()
         self._refresh()
+        self._jobs.changed(self)
 
     def _failed(self, text: str) -> None:
         self._problem.show(text)
@@ -194,6 +195,7 @@ class DataScreen:
     def _of_open_log(self) -> list[Any]:
         return [
             drawn(self._picture.figure),
+            html("<p>To leave out trials, choose them in the list, or tap or brush their paths above.</p>"),
             row(self._left_out, pn.Column(self._leave, self._brushed)),
             self._part_problem.view,
             self._findings.view,

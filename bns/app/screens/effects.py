@@ -11,13 +11,14 @@ from bns.app.figures.errors import LadderFigure
 from bns.app.figures.paths import PathFigure
 from bns.app.html import error_list, message, note
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, offer, row
 from bns.app.screens.diagnosis import DiagnosisPart
 from bns.app.screens.one_effect import OneEffect
 from bns.app.screens.snapshots import SnapshotsPart
 from bns.app.switches import Switches, Term
 from bns.app.tab import Tab
 from bns.app.workbench import Shown
+from bns.diagnose.report.tables import ahead
 from bns.errors import ModelError
 from bns.physics.formula import ON, VARIABLES, formula_effect
 
@@ -46,7 +47,7 @@ class EffectsScreen:
         self._ladder = LadderFigure()
         self._before = PathFigure("as given")
         self._after = PathFigure("now", self._before)
-        self._horizon = pn.widgets.Select(name="Error how far ahead", options=["1s"], width=160)
+        self._horizon = pn.widgets.Select(name="Error how far ahead", options={ahead("1s"): "1s"}, width=160)
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
         self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
         self._diagnosis = DiagnosisPart(tab, self._learned, self._switch_to)
@@ -79,8 +80,8 @@ class EffectsScreen:
             self._list_effects()
             self._formula.visible = bench.on_wheels
             names = list(bench.ready.predictor.tracks.names)
-            self._trial.options = dict(zip(names, range(len(names)), strict=True))
-            self._horizon.options = list(bench.horizons)
+            offer(self._trial, dict(zip(names, range(len(names)), strict=True)))
+            self._horizon.options = {ahead(h): h for h in bench.horizons}
             self._horizon.value = bench.ready.predictor.near
         self._problem.show("")
         self.update()
@@ -272,7 +273,7 @@ class EffectsScreen:
             html(f"<details><summary>what may stand in it</summary>{variables}</details>"),
             **WIDE,
         )
-        left = pn.Column(self._diagnosis.view, self._switches, self._formula, **WIDE)
+        left = pn.Column(self._switches, self._formula, **WIDE)
         right = pn.Column(
             row(self._undo, self._redo, self._fit),
             row(self._horizon, self._trial),
@@ -284,7 +285,7 @@ class EffectsScreen:
             self._snapshots.view,
             **WIDE,
         )
-        self._body = beside(left, right, least=330, first=right)
+        self._body = pn.Column(self._diagnosis.view, beside(left, right, least=330, first=right), **WIDE)
         return pn.Column(self._problem.view, self._body, **WIDE)
 
 

@@ -12,7 +12,7 @@ from bns.api.propose import ProposeResult, checked_minutes, proposed
 from bns.app.background import Tell
 from bns.app.figures.floor import ArenaFigure, PowerFigure, Sides
 from bns.app.html import table
-from bns.app.parts import WIDE, Problem, beside, download, drawn, heading, html, row
+from bns.app.parts import WIDE, Problem, beside, download, drawn, heading, html, offer, row
 from bns.app.screens.working import Working
 from bns.app.tab import Tab
 from bns.app.workbench import Workbench
@@ -109,7 +109,7 @@ class ExperimentPart:
         curves = [(p.power_by_minutes, f"{p.first} / {p.second}") for p in pairs if p.power_by_minutes]
         self._power.fill([c for c, _ in curves], [name for _, name in curves])
         numbers = range(len(result.proposal.plan))
-        self._trial.options = {f"trial {n}": n for n in numbers}
+        offer(self._trial, {f"trial {n}": n for n in numbers})
         player = row(self._trial, self._time, align_items="end")
         self._found.objects = [player, self._table, drawn(self._power.figure), self._save]
         self._save.object = ""

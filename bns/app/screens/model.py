@@ -52,7 +52,7 @@ class ModelScreen:
 
     def enter(self) -> None:
         """The model as the tab has it."""
-        self._said.object = f"<pre id='bns-model'>{escape(self._in_words())}</pre>"
+        self._said.object = f"<pre id='bns-model' class='bns-copy'>{escape(self._in_words())}</pre>"
         self._bench_problem.show(self._tab.why_no_bench)
         used = self._tab.used
         suggested = None if used is None else used.suggested_wheelbase_m
@@ -91,3 +91,4 @@ class ModelScreen:
     def _done(self, _none: Any) -> None:
         self._problem.show("")
         self.enter()
+        self._jobs.changed(self)

@@ -36,8 +36,7 @@ class OneEffect:
         self._box.param.watch(lambda event: None if self._quiet else switch(effect.name, bool(event.new)), "value")
         self._text = html(effect_text(effect, (), {}, ""), margin=(0, 8, 4, 30))
         self._sliders: dict[str, Any] = {}
-        self._numbers = pn.Column(margin=(0, 8, 4, 22), **WIDE)
-        self.view = pn.Column(self._box, self._text, self._numbers, **WIDE)
+        self.view = pn.Column(self._box, self._text, **WIDE)
 
     def set_on(self, on: bool) -> None:
         """The switch as the state has it, without telling anybody."""
@@ -55,11 +54,12 @@ class OneEffect:
             self._text.object = text
         values = next((a.by_name for a in shown.model.effects if a.effect.name == name), None)
         if values is None:
-            self._numbers.objects, self._sliders = [], {}
+            if self._sliders:
+                self.view.objects, self._sliders = [self._box, self._text], {}
             return
         if not self._sliders:
             self._sliders = {p.name: self._slider(p, values[p.name]) for p in self.effect.parameters}
-            self._numbers.objects = list(self._sliders.values())
+            self.view.objects = [self._box, self._text, *self._sliders.values()]
         self._quiet = True
         for parameter, slider in self._sliders.items():
             slider.start, slider.end = min(slider.start, values[parameter]), max(slider.end, values[parameter])
@@ -79,6 +79,7 @@ class OneEffect:
             fixed_start=p.low,
             fixed_end=p.high,
             format="0.00000",
+            margin=(0, 8, 4, 30),
             **WIDE,
         )
         made.param.watch(lambda event: self._moved(p.name, event.new), "value")

@@ -9,7 +9,7 @@ import panel as pn
 
 from bns.app.html import change_text, mm, table
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, button, heading, html, row
+from bns.app.parts import WIDE, Problem, button, heading, html, offer, row
 from bns.app.switches import Switches
 from bns.app.tab import Tab
 from bns.app.workbench import Shown
@@ -36,7 +36,7 @@ class SnapshotsPart:
     def enter(self) -> None:
         """As the tab has them; what was not fitted yet is fitted beside the page."""
         bench, kept = self._tab.bench, dict(self._tab.snapshots)
-        self._chosen.options = list(kept)
+        offer(self._chosen, list(kept))
         self._there.visible = self._table.visible = bool(kept)
         if bench is None or not kept:
             return

@@ -13,7 +13,7 @@ from bns.app.figures.errors import WindowFigures
 from bns.app.figures.paths import PathFigure
 from bns.app.html import mm, note, table
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, row
+from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, offer, row
 from bns.app.tab import Tab
 from bns.app.workbench import Shown, Workbench
 from bns.diagnose.report.tables import ahead
@@ -28,7 +28,7 @@ class WhereScreen:
         self._tab, self._jobs = tab, jobs
         self._problem, self._pictures, self._path = Problem(), WindowFigures(), PathFigure("path")
         self._which = pn.widgets.RadioButtonGroup(name="Model", options=[GIVEN, NOW], value=GIVEN)
-        self._horizon = pn.widgets.Select(name="Error how far ahead", options=["1s"], width=160)
+        self._horizon = pn.widgets.Select(name="Error how far ahead", options={ahead("1s"): "1s"}, width=160)
         self._variable = pn.widgets.Select(name="Along", options=["time_in_trial_s"], width=260)
         self._worst = pn.widgets.Select(name="Worst moments", options=[], size=6, width=320)
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
@@ -61,8 +61,9 @@ class WhereScreen:
             self._bench = bench
             self._shown = None
             names = list(bench.ready.predictor.tracks.names)
-            self._trial.options = dict(zip(names, range(len(names)), strict=True))
-            self._horizon.options, self._horizon.value = list(bench.horizons), bench.ready.predictor.near
+            offer(self._trial, dict(zip(names, range(len(names)), strict=True)))
+            self._horizon.options = {ahead(h): h for h in bench.horizons}
+            self._horizon.value = bench.ready.predictor.near
             self._variable.options, self._to_choose = list(bench.ready.predictor.variables()), True
         self._begin()
 
