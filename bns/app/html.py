@@ -63,7 +63,19 @@ def found_errors(errors: PairedErrors | None) -> str:
             change = change_text(e.changes[index - 1]) if index else ""
             rows.append([ahead(horizon) if index == 0 else "", m.name, mm(m.rms_m), mm(m.median_m), change])
     columns = ["ahead", "model", "error, mm", "median, mm", "change, mm (95 %)"]
-    return table(columns, rows, "Position error on trials held out, all on the same windows", "bns-found")
+    found = table(columns, rows, "Position error on trials held out, all on the same windows", "bns-found")
+    return f"<details><summary>the errors before and after, at every horizon</summary>{found}</details>"
+
+
+def found_numbers(numbers: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> str:
+    """How large the effects are that a diagnosis found, with intervals, as `bns add` has them."""
+    said = [
+        f"<br>{escape(effect)}: <b>{escape(name)}</b> = {_in_words(n)}"
+        for effect, of_effect in numbers.items()
+        for name, n in of_effect.items()
+        if n["value"] is not None
+    ]
+    return "".join(said)
 
 
 def change_text(c: Change) -> str:

@@ -69,8 +69,8 @@ class Screens:
             self._screens[name] = SCREENS[name](self._tab, self._jobs)
         self._tab.screen = name
         screen = self._screens[name]
-        screen.enter()  # before it is shown: the browser lays it out once then
         self._shown.objects = [screen.view]
+        screen.enter()
 
     def _changed(self, by: object) -> None:
         screen = self._screens[self._chosen.value]

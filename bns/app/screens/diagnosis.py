@@ -10,7 +10,7 @@ import pandas as pd
 import panel as pn
 
 from bns.api.diagnose import DiagnoseResult, diagnose
-from bns.app.html import found_errors
+from bns.app.html import found_errors, found_numbers
 from bns.app.parts import WIDE, button, heading
 from bns.app.screens.working import Working
 from bns.app.switches import Term
@@ -28,7 +28,8 @@ class DiagnosisPart:
         self._work = Working("Diagnose in the background", self._start, lambda: tab.diagnosis, self._show, self._meanwhile)
         self._told = 0
         self._switch_on = button("Switch on what it found", self._take)
-        self.view = pn.Column(heading("What is missing?"), self._work.buttons, self._switch_on, self._work.said, **WIDE)
+        self._work.buttons.append(self._switch_on)
+        self.view = pn.Column(heading("What is missing?"), self._work.buttons, self._work.said, **WIDE)
 
     def enter(self) -> None:
         """As the tab has it: at work, done, or not begun."""
@@ -92,7 +93,8 @@ class DiagnosisPart:
         said, sure = escape(headline(result.diagnosis)), escape(certainty(result.diagnosis))
         words = "".join(f"<br>It looks like this: {escape(each)}." for each in result.diagnosis.terms_in_words)
         errors = result.diagnosis.errors_with_terms or result.diagnosis.errors
-        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}{words}</p>{found_errors(errors)}"
+        sizes = found_numbers(result.to_json()["parameters"])
+        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}{sizes}{words}</p>{found_errors(errors)}"
         self._found()
 
 

@@ -64,7 +64,8 @@ class WhereScreen:
             offer(self._trial, dict(zip(names, range(len(names)), strict=True)))
             self._horizon.options = {ahead(h): h for h in bench.horizons}
             self._horizon.value = bench.ready.predictor.near
-            self._variable.options, self._to_choose = list(bench.ready.predictor.variables()), True
+            self._to_choose = True
+            offer(self._variable, list(bench.ready.predictor.variables()))
         self._begin()
 
     def _begin(self) -> None:
@@ -73,14 +74,22 @@ class WhereScreen:
             return
         state, given = self._tab.now, self._which.value == GIVEN
 
-        def work() -> tuple[Shown, CompareResult]:
-            shown = bench.as_given if given else bench.shown(state)
-            return shown, self._tab.compared(shown.model)
+        def judged() -> Shown:
+            return bench.as_given if given else bench.shown(state)
 
-        self._jobs.run("comparing", work, lambda both: self._compared(*both), self._problem.show)
+        def compared() -> CompareResult:
+            return self._tab.compared(judged().model)
 
-    def _compared(self, shown: Shown, result: CompareResult) -> None:
-        self._shown, comparison = shown, result.comparison
+        self._jobs.run("judging every window", judged, self._judged, self._problem.show)
+        self._jobs.run("comparing", compared, self._compared, self._problem.show)  # of a long log, long after the pictures
+
+    def _judged(self, shown: Shown) -> None:
+        self._shown = shown
+        self._fill()
+        self._show_path()
+
+    def _compared(self, result: CompareResult) -> None:
+        comparison = result.comparison
         rows = [
             [ahead(h), mm(e["position_m"]), mm(e["position_se_m"]), mm(comparison.noise_floor_m(h)), int(e["windows"])]
             for h, e in comparison.errors.items()
@@ -102,10 +111,8 @@ class WhereScreen:
             f"trial {w.trial}, from {w.t_s:.2f} s: {1e3 * w.position_m:.1f} mm": (w.trial, w.t_s)
             for w in comparison.worst
         }
-        self._fill()
         if comparison.worst:
             self._worst.value = next(iter(self._worst.options.values()))
-        self._show_path()
 
     def _fill(self) -> None:
         if self._shown is None or self._bench is None:
