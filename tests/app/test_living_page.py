@@ -9,6 +9,8 @@ import bns
 from bns.examples import FOLDER
 from tests.app.visits import error_of, go, settled
 
+pytestmark = pytest.mark.slow
+
 LOG = FOLDER / "khepera-log.csv"
 
 
