@@ -137,7 +137,7 @@ def ranking_table(d: Diagnosis) -> Table:
         )
         rows.append([c.name, *gain, f"{e.p_value:.2g}", "; ".join(values), c.rejected_because])
     return _table(
-        ["effect", "gain a trial", "95 %", "chance of luck", "fitted numbers (95 %)", "why not considered"], rows
+        ["effect", "gain per trial", "95 %", "p-value", "fitted parameters (95 %)", "why not considered"], rows
     )
 
 
