@@ -1,15 +1,15 @@
-"""The page that says how many planted faults the tests notice."""
+"""The page that says how many mutants the tests kill."""
 
 import argparse
 from collections.abc import Mapping, Sequence
 
-HEAD = """# Planted faults
+HEAD = """# Mutation testing
 
-Written by `make mutants`: cosmic-ray exchanges one comparison, operator, number or truth value at a time in the rooms
+Written by `make mutants`: cosmic-ray changes one comparison, operator, number or truth value at a time in the modules
 where numbers are made, and the tests nearest to each must fail. A sample (seed {seed}, {minutes:g} minutes), drawn in
-turn from all rooms.
+turn from all groups of modules.
 
-| room | places | planted | noticed | share |
+| modules | mutation sites | mutants | killed | fraction |
 |---|---|---|---|---|
 """
 
@@ -22,4 +22,4 @@ def written(
     rows.append(("all", *(sum(column) for column in zip(*(row[1:] for row in rows), strict=True))))
     table = [f"| {room} | {size} | {tried} | {found} | {found / max(tried, 1):.0%} |" for room, size, tried, found in rows]
     listed = [f"- {room}: {text}" for room, texts in survivors.items() for text in texts]
-    return HEAD.format(seed=options.seed, minutes=options.minutes) + "\n".join([*table, "", "## Not noticed", "", *listed]) + "\n"
+    return HEAD.format(seed=options.seed, minutes=options.minutes) + "\n".join([*table, "", "## Survivors", "", *listed]) + "\n"
