@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import pandas as pd
@@ -20,6 +21,14 @@ from analysis.verdicts import AGREES, DIFFERS, UNDECIDED, Checked
 
 NAME = "findings"
 PAPER = "sections 4.6 and 5.9"
+OF_EXTREMES = frozenset((
+    "best_combination", "best_have_at_most", "worst_have_at_least", "best_in_range", "best_have_a_range", "worst_never_succeed",
+    "diversity_of_best_is_steady", "diversity_of_best_moves", "diversity_of_worst_grows", "diversity_of_worst_saturates",
+    "half_by",
+))  # fmt: skip
+"""Checks that speak of the best or the worst combinations."""
+COMBINATIONS = 500
+"""That the dissertation compared on each task."""
 _NOWHERE = ""
 """Where the findings of a task with too few runs stand."""
 
@@ -34,7 +43,8 @@ def draw(store: Results) -> list[FigureResult]:
 def checked(store: Results, chosen: Selection, *, early: bool = False) -> pd.DataFrame:
     """One row a finding and task: the dissertation's words, ours, verdict, section; one row a task with too few runs.
 
-    ``early``: findings of such a task have a row each as well, with the estimates that there are.
+    ``early``: findings of such a task have a row each as well, with the estimates that there are. What is said of the best and
+    the worst combinations is undecided then while not all of the dissertation's have enough runs: others may be better or worse.
     """
     ready = set(chosen.tasks) if early else _with_enough_runs(store, chosen)
     numbers = {task_number(chosen.robot, task): task for task in chosen.tasks}
@@ -45,6 +55,8 @@ def checked(store: Results, chosen: Selection, *, early: bool = False) -> pd.Dat
                 waiting[number] += 1
             elif number in numbers:
                 result = _check(store, chosen, finding["check"], numbers[number], arguments)
+                if early and finding["check"] in OF_EXTREMES:
+                    result = _among_all(result, _ranked(store, chosen, numbers[number]))
                 title = f"{number}, {task_title(chosen.robot, numbers[number])}"
                 row = {"task": title, "the dissertation": result.claim, "these results": result.ours, "verdict": result.verdict}
                 made.append(row | {"where": finding["where"]})
@@ -62,6 +74,20 @@ def _with_enough_runs(store: Results, chosen: Selection) -> set[str]:
         return set(combinations(store, chosen)[0].task)
     except NoDataError:
         return set()
+
+
+def _ranked(store: Results, chosen: Selection, task: str) -> int:
+    """Combinations of a task with enough runs."""
+    try:
+        return int((combinations(store, chosen)[0].task == task).sum())
+    except NoDataError:
+        return 0
+
+
+def _among_all(result: Checked, ranked: int) -> Checked:
+    if result.verdict == UNDECIDED or ranked >= COMBINATIONS:
+        return result
+    return replace(result, ours=f"{result.ours}; among {ranked} of {COMBINATIONS} combinations", verdict=UNDECIDED)
 
 
 def _each_task(finding: dict[str, Any]) -> list[tuple[int, dict[str, Any]]]:
