@@ -83,6 +83,7 @@ def test_a_stop_not_confirmed_is_louder_than_any_fault(fault):
     with pytest.raises(StopNotConfirmedError, match=r"CUT THE POWER NOW.*5\.0 s: the port is gone") as caught:
         inside()
     assert caught.value.__cause__ is fault
+    assert ("It was being stopped because" in str(caught.value)) == (fault is not None)
 
 
 def test_a_confirmed_stop_lets_the_fault_through():
