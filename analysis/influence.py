@@ -70,7 +70,8 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=len(tasks))
     n, said = int(rows.drop_duplicates("task").runs.sum()), coverage(store, chosen.sweeps, chosen.n)
     unknown = ("no mark where combinations differ no more than chance makes them",) if rows.variance.isna().any() else ()
-    bars = f"bars in (a) and (b): {BOOTSTRAP.removeprefix('pointwise ')}; in (c): 95 % of the splits"
+    luck = "in (a) longer downwards by what the widest of many gaps owes to chance"
+    bars = f"bars in (a) and (b): {BOOTSTRAP.removeprefix('pointwise ')}, {luck}; in (c): 95 % of the splits"
     if (few := rows.seeds.max()) < FEWEST_SEEDS:
         bars = f"no bars, and nothing in (c): {counted(few, 'seed')}, and {FEWEST_SEEDS} are needed"
     note(figure, "; ".join((*said.sentences, *unknown, bars)) + ".")

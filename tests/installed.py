@@ -52,7 +52,7 @@ def _take_over_kernels(folder: Path) -> None:
     theirs = new / "__pycache__" / cache_folder().name
     for source in new.rglob("*.py"):
         original = old / source.relative_to(new)
-        if not original.exists():  # what is shipped beside the package has no kernels
+        if not original.exists():  # the figures and sweeps that are shipped have no kernels
             continue
         date = original.stat()
         os.utime(source, ns=(date.st_atime_ns, date.st_mtime_ns))

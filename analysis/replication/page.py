@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from analysis.findings import COMBINATIONS
 from analysis.labels import source_position
 from analysis.replication.numbers import VERDICTS, Study
 
@@ -49,7 +50,7 @@ def _look(one: Study) -> str:
     each = [str(row.most) if row.least == row.most else f"{row.least} to {row.most}" for row in amount.itertuples()]
     shown = pd.DataFrame({
         "task": amount.task, "runs": [f"{runs:,}" for runs in amount.runs],
-        "combinations of 500": amount.combinations, "runs of each": each,
+        f"combinations of {COMBINATIONS}": amount.combinations, "runs of each": each,
         **{word: amount[word].astype(int) for word in VERDICTS.values()},
     })  # fmt: skip
     return f"**{ROBOTS.get(one.chosen.robot, one.chosen.robot)}**\n\n{table(shown)}"

@@ -31,19 +31,25 @@ from bns.trial.session import MOST_ROUNDS, TrialSetup, carry_out
 _Path = str | PathLike[str]
 
 
+class _Driven(Shown):
+    """What was driven on a robot, or its emulator, and kept in a folder."""
+
+    folder: Path
+
+    @cached_property
+    def measurements(self) -> Measurements:
+        """What was commanded and where the robot was, of every drive."""
+        return Measurements(self.folder / MEASUREMENTS)
+
+
 @dataclass(frozen=True, repr=False)
-class TrialResult(Shown):
+class TrialResult(_Driven):
     """A trial that is in the store. ``folder`` holds its journal and measurements, ``driven`` how the robot did."""
 
     run: RunResult
     folder: Path
     driven: Driven
     text: str
-
-    @cached_property
-    def measurements(self) -> Measurements:
-        """What was commanded and where the robot was, of every drive."""
-        return Measurements(self.folder / MEASUREMENTS)
 
     def summary(self) -> str:
         """When the goals were reached first, how the robot did, where everything is."""
@@ -59,16 +65,11 @@ class TrialResult(Shown):
 
 
 @dataclass(frozen=True, repr=False)
-class ExperimentResult(Shown):
+class ExperimentResult(_Driven):
     """Given commands that were driven. ``folder`` holds their journal and measurements."""
 
     folder: Path
     text: str
-
-    @cached_property
-    def measurements(self) -> Measurements:
-        """What was commanded and where the robot was, of every drive."""
-        return Measurements(self.folder / MEASUREMENTS)
 
     def summary(self) -> str:
         """How many trials were driven, and where the measurements are."""

@@ -85,7 +85,7 @@ class Experiment(NamedTuple):
 
 
 def drive_commands(path: Path, how: TrialSetup, results: Path, seed: int) -> Experiment:
-    """Drive every trial of a file, or those that are left of them; measurements beside the journal."""
+    """Drive every trial of a file, or those not yet driven; measurements are written into the journal's folder."""
     trials = read_commands(path, load_robot(how.rig.robot))
     for _, (x_m, y_m, _heading) in trials:
         if not how.rig.limits.surface.holds(x_m, y_m):

@@ -115,3 +115,13 @@ def test_variants_of_real_logs_are_refused_or_read_alike(tmp_path):
     ):
         with pytest.raises(DataError, match=words):
             checked(applied(wrong, {"columns": {}}))
+
+
+@pytest.mark.slow
+@at_hand
+def test_an_effect_that_predicts_better_than_a_curve_is_not_given_up_for_it(tmp_path):
+    """On ice a curve of the heading stands in for the acceleration limit, and predicts worse."""
+    case = cases()["ice-commands"]
+    answer = diagnosed(case, table_of(case, DATA), tmp_path)
+    assert answer["effects"] == ["acceleration-limit"]
+    assert answer["error"]["trial"]["after"] < 0.5 * answer["error"]["trial"]["before"]

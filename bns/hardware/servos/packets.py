@@ -99,7 +99,7 @@ class Wire2:
     word = 2
 
     def instruction(self, number: int, kind: int, parameters: bytes = b"") -> bytes:
-        """Header, a zero, number, length, instruction, parameters, CRC; a header within is told apart by a byte more."""
+        """Header, a zero, number, length, instruction, parameters, CRC; one more byte after a header inside (byte stuffing)."""
         stuffed = (bytes([kind]) + parameters).replace(_HEADER_2, _HEADER_2 + b"\xfd")
         packet = _HEADER_2 + bytes([0, number]) + (len(stuffed) + 2).to_bytes(2, "little") + stuffed
         return packet + crc16(packet).to_bytes(2, "little")

@@ -43,7 +43,8 @@ def _angle(speed: Array, step_s: Array, turn_m: float) -> Array:
 def _waves(wheels: Wheels, heading: Array, angles: list[Array]) -> list[Array]:
     """cos(angle + phase) of both wheels, the phase of each half of a trial as its other half asks for.
 
-    Where a half says little of it, the wave is as much smaller as the phase is uncertain.
+    The wave is multiplied by the expected cosine of its phase's error, I1(k)/I0(k) of a von Mises distribution (Mardia and Jupp,
+    Directional Statistics, section 3.5.4): without that, or with more, the fitted share is biased.
     """
     rates = [-wheels.left_m_s / wheels.wheelbase_m, wheels.right_m_s / wheels.wheelbase_m]
     parts = [rate * wave for rate, angle in zip(rates, angles, strict=True) for wave in (np.cos(angle), np.sin(angle))]
