@@ -9,6 +9,7 @@ from bokeh.models import ColumnDataSource, FactorRange, HoverTool, Span, Whisker
 
 from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank
 from bns.diagnose.predict.paired_errors import HorizonErrors
+from bns.diagnose.report.variables import label
 from bns.plotting.style import BLUE, GREY, RED
 
 
@@ -80,7 +81,7 @@ class WindowFigures:
         size = 4 + 14 * columns["error_mm"] / largest
         self.source.selected.indices = []
         self.source.data = {**columns, "along": table[variable].to_numpy(), "size": size}
-        self.along.xaxis.axis_label = variable
-        self.along.title.text = f"Along {variable}"
+        self.along.xaxis.axis_label = label(variable)
+        self.along.title.text = f"Along {label(variable)}"
         for span in self._noise:
             span.location = 1e3 * noise_floor_m if np.isfinite(noise_floor_m) else 0

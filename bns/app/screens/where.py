@@ -17,6 +17,7 @@ from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, offer, ro
 from bns.app.tab import Tab
 from bns.app.workbench import Shown, Workbench
 from bns.diagnose.report.tables import ahead
+from bns.diagnose.report.variables import label
 
 GIVEN, NOW = "as given", "as it is now"
 
@@ -29,7 +30,7 @@ class WhereScreen:
         self._problem, self._pictures, self._path = Problem(), WindowFigures(), PathFigure("path")
         self._which = pn.widgets.RadioButtonGroup(name="Model", options=[GIVEN, NOW], value=GIVEN)
         self._horizon = pn.widgets.Select(name="Error how far ahead", options={ahead("1s"): "1s"}, width=160)
-        self._variable = pn.widgets.Select(name="Along", options=["time_in_trial_s"], width=260)
+        self._variable = pn.widgets.Select(name="Along", options={label("time_in_trial_s"): "time_in_trial_s"}, width=260)
         self._worst = pn.widgets.Select(name="Worst moments", options=[], size=6, width=320)
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
         self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
@@ -65,7 +66,7 @@ class WhereScreen:
             self._horizon.options = {ahead(h): h for h in bench.horizons}
             self._horizon.value = bench.ready.predictor.near
             self._to_choose = True
-            offer(self._variable, list(bench.ready.predictor.variables()))
+            offer(self._variable, {label(v): v for v in bench.ready.predictor.variables()})
         self._begin()
 
     def _begin(self) -> None:
@@ -99,12 +100,12 @@ class WhereScreen:
         caption = f"Position error of the model {self._which.value}, nothing held out"
         self._errors.object = table(columns, rows, caption, "bns-compared") + note(self._bench.thinned if self._bench else "")
         explained = [
-            [p.variable, p.channel, f"{p.share:.2%}", f"{p.paired_comparison.p_value:.2g}"]
+            [label(p.variable), p.channel, f"{p.share:.2%}", f"{p.paired_comparison.p_value:.2g}"]
             for p in comparison.residual_dependence[:8]
         ]
         columns = ["variable", "velocity", "share of loss", "p"]
         self._explained.object = table(columns, explained, "What a free curve along each variable would explain")
-        best = [p.variable for p in comparison.residual_dependence if p.variable in self._variable.options]
+        best = [p.variable for p in comparison.residual_dependence if p.variable in self._variable.values]
         if best and self._to_choose:
             self._to_choose, self._variable.value = False, best[0]
         self._worst.options = {

@@ -14,31 +14,8 @@ from bns.diagnose.comparison import Comparison, Curve
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.report.text import ahead
+from bns.diagnose.report.variables import label
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, save, style
-
-LABELS = {
-    "left_m_s": "left wheel commanded (m/s)",
-    "right_m_s": "right wheel commanded (m/s)",
-    "speed_m_s": "speed commanded (m/s)",
-    "wheel_difference_m_s": "right − left commanded (m/s)",
-    "previous_speed_m_s": "speed before the change (m/s)",
-    "previous_wheel_difference_m_s": "right − left before the change (m/s)",
-    "time_in_command_s": "time in the command (s)",
-    "time_in_trial_s": "time in the trial (s)",
-    "session_s": "time in the session (s)",
-    "way_m": "way driven in the trial (m)",
-    "heading_rad": "heading (rad)",
-    "place": "place",
-    "a_lat_rad": "lateral amplitude (rad)",
-    "a_vert_rad": "vertical amplitude (rad)",
-    "omega_rad": "ω (rad)",
-    "alpha_rad": "α (rad)",
-    "previous_a_lat_rad": "lateral amplitude before (rad)",
-    "previous_a_vert_rad": "vertical amplitude before (rad)",
-    "previous_omega_rad": "ω before (rad)",
-    "previous_alpha_rad": "α before (rad)",
-    "cycle": "cycle of the trial",
-}
 
 
 @style()
@@ -78,7 +55,7 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.fill_between(curve.centre, curve.low, curve.high, alpha=0.3, color=OKABE_ITO[0], linewidth=0)
     axes.plot(curve.centre, curve.mean, color=OKABE_ITO[0], marker="o")
-    axes.set_xlabel(LABELS.get(curve.variable, curve.variable))
+    axes.set_xlabel(label(curve.variable))
 
 
 @style()

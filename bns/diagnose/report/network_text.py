@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.report.figures import LABELS
+from bns.diagnose.report.variables import LABELS
 from bns.diagnose.residuals.network_errors import FEWEST, FEWEST_TRIALS, MEMORY_S, NetworkErrors
 from bns.diagnose.settings import DEFAULTS
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, note, save, style
