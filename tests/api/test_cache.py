@@ -39,6 +39,7 @@ def entries(tmp_path):
     return sorted((tmp_path / "cache" / "bns" / "diagnose").glob("*"))
 
 
+@pytest.mark.slow
 def test_the_second_answer_is_the_first_and_costs_no_search(table, asked, tmp_path):
     first, again = (bns.diagnose(table, NOMINAL) for _ in range(2))
     assert len(asked) == 1

@@ -42,6 +42,7 @@ def test_a_share_never_falls_and_ends_at_one(table, work):
     assert max(b - a for a, b in pairwise(told)) < 0.75
 
 
+@pytest.mark.slow
 def test_proposing_and_reporting_share_theirs_between_their_parts(table, tmp_path):
     told = shares(lambda p: bns.report(table, NOMINAL, tmp_path / "r.html", minutes=1, progress=p))
     assert [share for share, _ in told] == sorted(share for share, _ in told)

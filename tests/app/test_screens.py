@@ -104,6 +104,7 @@ def body(snake):
     return tab
 
 
+@pytest.mark.slow
 def test_the_paths_of_a_snakes_markers_are_drawn(body):
     screen = entered(DataScreen, body)
     data = screen._picture.paths.data

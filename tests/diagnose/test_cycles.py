@@ -159,6 +159,7 @@ def test_what_is_left_out_is_named():
     assert re.match(r"1 12 cycle 3: the markers are \+\d+ cm further apart", said[2])
 
 
+@pytest.mark.slow
 def test_a_run_of_the_snake_leaves_measurements_that_networks_are_held_against(tmp_path, capsys):
     rows, nets = tmp_path / "run.csv", tmp_path / "nets.safetensors"
     small = [

@@ -68,6 +68,7 @@ def test_an_effect_that_keeps_little_of_its_gain_beside_the_term_is_out():
     assert lost_mm == pytest.approx(5.0, rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_lists_what_imitates_apart_and_offers_the_term_with_its_error():
     table = measured(warming(), trials=24, seed=3)
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL, barred=("warm-up",))

@@ -23,6 +23,7 @@ def wild_of(table):
     return [predictor.tracks.names[i] for i in standing_out(problem, problem.fit(NOMINAL))]
 
 
+@pytest.mark.slow
 def test_two_bad_trials_of_38_hide_nothing_and_are_named():
     good, bad = hidden(wheelbase={"factor": 1.04}), hidden(wheelbase={"factor": 0.6})
     predictor = WheelPredictor(tracks_of(with_bad(good, bad)))

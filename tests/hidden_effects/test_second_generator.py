@@ -37,6 +37,7 @@ def test_a_wheel_drives_what_its_cause_says(cause, speed, driven):
     assert _wheel(cause, 1, speed, 0.0, 0.0, _State()) == pytest.approx(driven)
 
 
+@pytest.mark.slow
 def test_a_log_has_the_columns_the_trials_and_the_losses_that_are_stated():
     table = world("none", seed=2)
     assert set(table) == {"trial", "t_s", "left_m_s", "right_m_s", "x_m", "y_m", "heading_rad"}

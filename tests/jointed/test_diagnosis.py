@@ -147,6 +147,7 @@ def test_a_joint_of_an_arm_whose_zero_is_off_is_named(bent_arm):
     assert bent_arm.diagnosis.numbers["joint-zero-elbow"]["offset_rad"]["value"] == pytest.approx(0.08, abs=0.005)
 
 
+@pytest.mark.slow
 def test_a_weak_joint_of_an_arm_is_named_with_its_strength(arm):
     found = bns.diagnose(log(10, seed=2, strength=0.5), bns.Model(arm))
     assert found.effects == ("weak-joint-elbow",)

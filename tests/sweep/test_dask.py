@@ -115,6 +115,7 @@ def test_a_client_whose_thread_starts_too_late_is_tried_again(cluster, monkeypat
     assert len(tried) == 2
 
 
+@pytest.mark.slow
 def test_scheduler_without_workers_is_explained():
     with Cluster(0) as empty, pytest.raises(ClusterError, match=r"no worker has joined.*dask worker tcp://"):
         DaskExecutor(empty.address, patience_s=10).__enter__()

@@ -71,6 +71,7 @@ def test_shards_of_the_local_executor_give_what_one_process_gives(tmp_path):
     assert len(list((tmp_path / "a" / "slurm" / "small").glob("*_submitted.pkl"))) == 2  # none a second time
 
 
+@pytest.mark.slow
 def test_a_job_whose_time_is_up_stores_what_it_has_and_takes_another_turn(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
     executor = submitit.LocalExecutor(tmp_path / "slurm", max_num_timeout=10)
