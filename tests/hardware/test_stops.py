@@ -26,7 +26,7 @@ def test_lost_answers_cost_a_khepera_s_stop_little(tmp_path):
 
 
 def test_a_khepera_whose_line_was_gone_is_stopped_once_it_is_back(tmp_path):
-    """A thread that answers on the emulated line must notice that it is back; on a busy machine some of the five wait for that."""
+    """A thread that answers on the emulated line must notice that it is back; a busy machine lets some wait for that."""
     assert still_s("khepera", 5, ["hang-up"]).min() <= stops.AIM_S + 0.04
 
 
