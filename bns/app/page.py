@@ -65,12 +65,18 @@ class Screens:
         self._enter(self._chosen.value)
 
     def _enter(self, name: str) -> None:
-        if name not in self._screens:
+        first = name not in self._screens
+        if first:
             self._screens[name] = SCREENS[name](self._tab, self._jobs)
         self._tab.screen = name
         screen = self._screens[name]
-        self._shown.objects = [screen.view]
+        # drawn before the browser gets it: what changes afterwards could overtake it
         screen.enter()
+        if first:
+            self._shown.append(screen.view)
+        # hidden, not taken out: what is on its way to a screen must still find it there
+        for other, one in self._screens.items():
+            one.view.visible = other == name
 
     def _changed(self, by: object) -> None:
         screen = self._screens[self._chosen.value]

@@ -7,7 +7,7 @@ import pytest
 import bns
 from bns.cli.main import main
 from bns.examples import FOLDER
-from tests.app.visits import SLOW_MS, drag, go, save, settled, shown, widest
+from tests.app.visits import SLOW_MS, drag, figures, go, save, settled, shown, widest
 
 pytestmark = pytest.mark.slow
 
@@ -65,7 +65,7 @@ def test_what_is_left_out_takes_no_part_in_any_number_and_comes_back(visit, tmp_
     name = str(log.trials["trial"].iloc[1])
     page.get_by_label("Trial to cut").select_option(name)
     start = page.get_by_label("keep from (s)")
-    drag(page, page.locator(".bk-Figure").nth(1), (0.3, 0.4), (0.7, 0.5), lambda: float(start.input_value()) > 0)
+    drag(page, figures(page).nth(1), (0.3, 0.4), (0.7, 0.5), lambda: float(start.input_value()) > 0)
     start.fill("2")
     start.press("Enter")
     page.get_by_label("to (s)", exact=True).fill("6.5")

@@ -8,7 +8,7 @@ import bns
 from bns.app.switches import Switches
 from bns.app.workbench import Workbench
 from bns.examples import FOLDER
-from tests.app.visits import Command, drag, error_of, go, save, settled, shown, widest
+from tests.app.visits import Command, drag, error_of, figures, go, save, settled, shown, widest
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +30,7 @@ def test_a_sample_is_opened_the_error_falls_and_the_model_is_saved(browser, benc
     assert "14 trials" in page.locator("#bns-log").inner_text()
     assert page.get_by_role("checkbox", name="trial ").count() == len(bns.Measurements(LOG).findings)
     go(page, "Effects", "#bns-errors")
-    assert page.get_by_label("Trial", exact=True).input_value() != ""  # the one whose paths are drawn
+    assert page.get_by_label("Trial", exact=True).filter(visible=True).input_value() != ""  # the one whose paths are drawn
     before = error_of(page, "as given")
     page.get_by_role("checkbox", name="motor-lag:").check()
     after = error_of(page, "+ motor-lag")
@@ -83,7 +83,7 @@ def test_brushing_one_picture_counts_the_windows_in_it(visit):
     page.get_by_text("All 200 windows").wait_for()
     shown(page, "where")
     brushed = page.get_by_text(re.compile(r"\d+ windows brushed, of \d+ trials"))
-    drag(page, page.locator(".bk-Figure").first, (0.3, 0.2), (0.8, 0.5), brushed.count)
+    drag(page, figures(page).first, (0.3, 0.2), (0.8, 0.5), brushed.count)
 
 
 def test_a_diagnosis_outlives_a_reload_and_leads_to_the_next_experiment(visit):
@@ -107,7 +107,7 @@ def test_a_diagnosis_outlives_a_reload_and_leads_to_the_next_experiment(visit):
     page.get_by_role("link", name="Save the session").wait_for()  # what follows stands still from here on
     side = page.get_by_label("x from (m)")
     before = side.input_value()
-    drag(page, page.locator(".bk-Figure").first, (0.2, 0.25), (0.9, 0.85), lambda: side.input_value() != before)
+    drag(page, figures(page).first, (0.2, 0.25), (0.9, 0.85), lambda: side.input_value() != before)
     page.get_by_label("Minutes of driving").fill("2")
     page.get_by_role("button", name="Propose the next experiment").click()
     page.locator("#bns-pairs, .bns-error").first.wait_for()

@@ -7,7 +7,7 @@ from bns.app.results.study import Study, is_store
 from bns.errors import StoreError
 
 pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
-from tests.app.visits import settled, shown, widest
+from tests.app.visits import figures, settled, shown, widest
 
 pytestmark = pytest.mark.slow
 
@@ -63,7 +63,7 @@ def test_runs_are_filtered_compared_and_driven_again_in_the_browser(results, vis
     page.get_by_label("Run B", exact=True).select_option(index=4)
     page.locator("#bns-run-b").wait_for()
     page.get_by_role("button", name="Drive it again to see its path").first.click()
-    page.locator(".bk-Figure").nth(3).wait_for()  # the path beside the three that are there from the start
+    figures(page).nth(3).wait_for()  # the path beside the three that are there from the start
     settled(page)
     shown(page, "results")
     page.close()

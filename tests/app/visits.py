@@ -53,6 +53,11 @@ def go(page, screen, sign):
     page.locator(sign).wait_for()
 
 
+def figures(page):
+    """The pictures of the screen that is shown; those of the others are hidden."""
+    return page.locator(".bk-Figure").filter(visible=True)
+
+
 def settled(page):
     """Until nothing is at work and what was shown is drawn."""
     page.get_by_role("status").filter(has_text="…").wait_for(state="detached")

@@ -42,12 +42,15 @@ class GoalFigure:
             source.data = {"x": shown[:, 0], "y": shown[:, 1]}
 
 
+_DRAG = "Drag to draw the arena"
+
+
 class ArenaFigure:
     """Where the robot was seen, the arena as a rectangle that the mouse draws, and what explanations expect of one trial."""
 
     def __init__(self, drawn: Callable[[Sides], None]) -> None:
         self.figure: Any = blank(
-            "Drag to draw the arena", *EAST_NORTH, tools="box_select,pan,wheel_zoom,reset", height=360, **FLOOR
+            _DRAG, *EAST_NORTH, tools="box_select,pan,wheel_zoom,reset", height=360, **FLOOR
         )
         self._seen = ColumnDataSource({"x": [], "y": []})
         self._arena = ColumnDataSource({"left": [], "right": [], "bottom": [], "top": []})
@@ -85,6 +88,11 @@ class ArenaFigure:
         if event.final and g.get("type") == "rect":
             x, y = sorted((g["x0"], g["x1"])), sorted((g["y0"], g["y1"]))
             drawn((float(x[0]), float(x[1]), float(y[0]), float(y[1])))
+
+    def clear(self) -> None:
+        """No trial."""
+        self.trial(_DRAG, np.zeros(0), [], [])
+        self._dots.data = {"x": [], "y": [], "color": []}
 
     def seen(self, places: Array) -> None:
         """Where the robot was (points, 2), m."""

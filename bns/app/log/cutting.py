@@ -33,24 +33,18 @@ class CutPart:
         ends = row(self._trial, self._from, self._to, self._keep, self._whole, align_items="end")
         self.view = pn.Column(heading("Cut a trial: brush what is kept"), ends, self._place, visible=False, **WIDE)
 
-    def enter(self) -> None:
-        """The page shows this again: a picture that was taken off it hears the mouse no more, so it is made again."""
-        self._place.objects = []
-        self.refresh()
-
     def refresh(self) -> None:
         """The trials of the tab's log."""
         log = self._tab.log
         self.view.visible = log is not None
         if log is None:
             return
-        if not self._place.objects:
-            self._picture = TimeAxisFigure(self._brushed)
-            self._place.objects = [drawn(self._picture.figure)]
         if log is not self._log:
             self._log = log
             offer(self._trial, list(log.measured.tracks.names))
         self._show()
+        if not self._place.objects:  # once there is something on it: a picture that is hidden has no size to begin with
+            self._place.objects = [drawn(self._picture.figure)]
 
     def _show(self) -> None:
         log, name = self._tab.log, self._trial.value

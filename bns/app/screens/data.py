@@ -54,7 +54,6 @@ class DataScreen:
 
     def enter(self) -> None:
         """The log as the tab has it."""
-        self._cut.enter()
         self._refresh()
 
     def _refresh(self) -> None:
@@ -66,14 +65,14 @@ class DataScreen:
             if self._tab.asked:
                 self._failed(self._tab.why_no_log)
             return
-        if not self._open_log.objects:  # a picture that is hidden has no size to begin with, which Bokeh complains of
-            self._open_log.objects = self._of_open_log()
         self._said.object = f"<p id='bns-log'><b>{escape(log.summary().splitlines()[0])}</b>{self._taking_part()}</p>"
         self._findings.enter()
         self._cut.refresh()
         names = [str(n) for n in log.trials["trial"]]
         self._left_out.options, self._left_out.value = names, list(self._tab.part.trials)
         self._draw()
+        if not self._open_log.objects:  # a picture that is hidden has no size to begin with, which Bokeh complains of
+            self._open_log.objects = self._of_open_log()
 
     def _taking_part(self) -> str:
         """How much takes part, where something does not."""

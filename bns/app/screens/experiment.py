@@ -61,15 +61,16 @@ class ExperimentPart:
         bench = self._tab.bench
         if bench is None:
             return
-        self._picture = ArenaFigure(self._draw)  # a picture that was taken off the page hears the mouse no more
-        self._floor.objects = [drawn(self._picture.figure)]
         places = bench.ready.predictor.tracks.pose[:, :2]
         self._picture.seen(places)
         self._picture.arena(self._arena())
         if bench is not self._bench:
             self._bench, self._found.objects = bench, []
+            self._picture.clear()
             low, high = np.quantile(places, [0.005, 0.995], axis=0)
             self._draw((float(low[0]), float(high[0]), float(low[1]), float(high[1])))
+        if not self._floor.objects:
+            self._floor.objects = [drawn(self._picture.figure)]
         self._work.enter()
 
     def _arena(self) -> Sides:
