@@ -88,7 +88,7 @@ closing-the-gap: setup ## from a run on a robot to an extended model, and how co
 	$(BIN)/bns diagnose $(OUT)/log.parquet --model $(GAP)/drawing.yaml --figures $(OUT)/figures
 	$(BIN)/bns add $(OUT)/log.parquet wheel-mismatch motor-lag --model $(GAP)/drawing.yaml -o $(OUT)/extended.yaml --figures $(OUT)/figures
 	$(BIN)/bns sweep $(GAP)/before.yaml $(GAP)/after.yaml $(GAP)/direct.yaml --results $(OUT)
-	$(BIN)/python -m analysis.transfer "gap-before=the drawing" "gap-after=the extended model" \
+	$(BIN)/python -m analysis.transfer "gap-before=the user's model" "gap-after=the extended model" \
 		--reference "gap-direct=the robot itself" --to $(GAP)/robot.yaml --results $(OUT) --out $(OUT)/figures
 
 propose-benchmark: setup ## robot time until confusable explanations are told apart: proposed commands against random ones
