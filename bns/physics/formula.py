@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
@@ -99,13 +99,15 @@ def formula_effect(
     logged, unknown = _sorted(name, code.names - known, set(columns), None if numbers is None else set(numbers))
     if not unknown:
         raise ModelError(f"formula {name}: {term!r} has no number to fit; multiply it by one, as in k * ({term}).")
+    linear = _is_linear(code, unknown)
     return Effect(
         name=name,
         stage="body",
         parameters=tuple(
-            Parameter(p, "1", -1e3, 1e3, (-10.0, 10.0), 0.0 if p == unknown[0] else 1.0, "of a formula")
+            Parameter(p, "1", -1e3, 1e3, (-10.0, 10.0), 0.0 if linear or p == unknown[0] else 1.0, "of a formula")
             for p in unknown
         ),
+        starts=((0.0,) * len(unknown),) if linear else (),
         equation=f"{on}' = {on} + {term}",
         residuals="as the formula says",
         lookalikes=(),
@@ -113,6 +115,24 @@ def formula_effect(
         after=FORMULAS,
         needs_place=bool(code.names & _PLACE) or on in {"east", "north"},
     )
+
+
+def _is_linear(code: Compiled, numbers: Sequence[str]) -> bool:
+    """Whether a term is a sum of its numbers times something else each: one step of least squares finds these from nothing."""
+    rng = np.random.default_rng(0)
+    rest = {n: rng.uniform(0.1, 0.9, 16) for n in sorted(code.names - set(numbers))}
+
+    def value(at: Array) -> Array:
+        with np.errstate(all="ignore"):
+            found = eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **rest, **dict(zip(numbers, at, strict=True))})
+        return np.asarray(found, dtype=np.float64)
+
+    one, other = rng.normal(size=(2, len(numbers)))
+    try:
+        both, apart = value(2 * one - 3 * other), 2 * value(one) - 3 * value(other)
+    except ArithmeticError:
+        return False
+    return bool(np.isfinite(both).all() and np.allclose(both, apart))
 
 
 def value_of(term: str, names: Mapping[str, Any]) -> Array:

@@ -32,6 +32,25 @@ def kicked(table, trials):
     return table
 
 
+def resting(table, lasting_s=3.0):
+    """After every trial the robot is told to stand, and is watched."""
+    n = round(lasting_s / FRAME_S)
+    rests = table.groupby("trial").tail(1)
+    rests = rests.loc[rests.index.repeat(n)].assign(left_m_s=0.0, right_m_s=0.0)
+    rests["t_s"] += FRAME_S * (1 + rests.groupby("trial").cumcount())
+    return pd.concat([table, rests]).sort_values(["trial", "t_s"], ignore_index=True).ffill()
+
+
+def with_memory(table, memory=0.9, seed=1):
+    """Frames share errors of the tracker: of 1.5 mm and 15 mrad, as under filters that smooth poses."""
+    rng, off = np.random.default_rng(seed), np.zeros((len(table), 3))
+    fresh = rng.standard_normal(off.shape) * np.sqrt(1 - memory**2)
+    for k in range(1, len(off)):
+        off[k] = memory * off[k - 1] + fresh[k]
+    x_m, y_m, heading_rad = (np.array([0.0015, 0.0015, 0.015]) * off).T
+    return table.assign(x_m=table.x_m + x_m, y_m=table.y_m + y_m, heading_rad=table.heading_rad + heading_rad)
+
+
 def found_in(table):
     predictor = WheelPredictor(tracks_of(table))
     problem = problem_for(predictor, NOMINAL)
@@ -50,6 +69,11 @@ def test_lost_and_mistaken_markers_do_not_stand_out():
     table.loc[hit, ["x_m", "y_m"]] += rng.uniform(-0.3, 0.3, (hit.sum(), 2))
     table = table.drop(index=rng.choice(len(table), 60, replace=False))
     assert found_in(table) == []
+
+
+def test_a_tracker_whose_errors_have_a_memory_stands_out_nowhere_though_the_robot_stands():
+    """A filter that takes errors for independent is surest of a robot that stands, and wrong for many frames on end."""
+    assert found_in(with_memory(resting(measured(NOMINAL, trials=30, seed=5, noise=(1e-5, 1e-5))))) == []
 
 
 @pytest.mark.parametrize("frames", [3, 6, 14])

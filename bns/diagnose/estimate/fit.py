@@ -255,26 +255,31 @@ class Problem:
         new = [j for j in new if np.abs(added.jacobian[..., j]).max() > 0]
         if not new or elpd_diff <= 0:
             return PairedComparison(elpd_diff, dse, 1.0)
-        columns = added.jacobian[..., new] if self.predictor.luck is None else self._chords(base, added, new)
+        columns = self._chords(added, new)
         joint = np.concatenate([base.jacobian, columns], axis=2)
         return PairedComparison(
             elpd_diff, dse, chance(self.normal_equations(joint, base.whitened), base.jacobian.shape[2])
         )
 
-    def _chords(self, base: Fit, added: Fit, new: Sequence[int]) -> Array:
+    def _chords(self, added: Fit, new: Sequence[int]) -> Array:
         """Change of the whitened innovations for each new number on its whole way from neutral, (frames, 3, numbers).
 
-        A body's response may be far from straight: where a silent joint bends no further its slope is 0, and its way is long.
+        The way may be far from straight: where a silent joint bends no further its slope is 0, and its way is long; what a
+        limit of the acceleration does where it was found says little of what it did on the way there from none.
         """
         out = []
         for j in new:
             number = added.free[j]
             changed = added.values[j] - number.parameter.neutral
-            if abs(changed) < increment(number, added.values[j]) or not np.isfinite(changed):
+            if not np.isfinite(changed):
+                changed, lacking = 1.0, self.whitened(added.model.without(number.effect))
+            elif abs(changed) < increment(number, added.values[j]):
                 out.append(added.jacobian[..., j])
                 continue
-            lacking = self.whitened(moved_by(added.model, added.free, -changed * np.eye(len(added.free))[j]))
-            out.append((added.whitened - lacking) / changed)
+            else:
+                lacking = self.whitened(moved_by(added.model, added.free, -changed * np.eye(len(added.free))[j]))
+            way = (added.whitened - lacking) / changed
+            out.append(way if np.abs(way).max() > 0 else added.jacobian[..., j])
         return np.stack(out, axis=2)
 
     def _jacobian(

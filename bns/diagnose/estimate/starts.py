@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
+from math import prod
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from bns.physics.model import Model
 _SHARES = DEFAULTS.estimate.start_shares
 NOTHING = DEFAULTS.estimate.start_nothing
 _LIMITS = DEFAULTS.estimate.start_limits
+_MOST = DEFAULTS.estimate.start_most
 
 
 def listed(
@@ -80,9 +82,9 @@ def _starts(effect: Effect, predictor: Predictor, model: Model) -> Iterator[tupl
         yield from effect.starts
         return
     grids = [list(_grid(p)) for p in effect.parameters]
-    if len(grids) == 2:  # along each axis: the effect of two numbers is nearly the sum of both
+    if len(grids) == 2 or prod(map(len, grids)) > _MOST:  # along each axis: the effect of all is nearly the sum of each
         neutral = tuple(effect.neutral.values())
-        for axis in range(2):
+        for axis in range(len(grids)):
             for value in grids[axis]:
                 yield tuple(value if i == axis else n for i, n in enumerate(neutral))
     else:

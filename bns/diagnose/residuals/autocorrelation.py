@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracking_noise import robust_sd
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.residuals.unforeseen import unforeseen
 from bns.diagnose.settings import DEFAULTS
-from bns.engine.pose_filter import displacements
 
 LAGS = DEFAULTS.residuals.lags
 LEAST_ALIKE = DEFAULTS.residuals.least_alike
@@ -70,13 +70,7 @@ def autocorrelations(problem: Problem, fit: Fit) -> list[Autocorrelation]:
 
 def _unforeseen_ways(problem: Problem, fit: Fit) -> list[Array]:
     """For each trial what the track moved beyond the model in each frame, (frames, 3), each command's mean taken off."""
-    tracks, steps = problem.predictor.tracks, problem.predictor.steps(fit.model)
-    heading = np.roll(tracks.pose[:, 2], 1)
-    east, north = steps.drift_m.T
-    drift = [np.cos(heading) * east + np.sin(heading) * north, np.cos(heading) * north - np.sin(heading) * east]
-    off = displacements(tracks.pose, tracks.is_first) - steps.body
-    off[:, :2] -= np.stack(drift, axis=1)
-    off[:, 2] = np.angle(np.exp(1j * off[:, 2]))
+    tracks, off = problem.predictor.tracks, unforeseen(problem, fit)
     usual = np.maximum(robust_sd(off, axis=0), 1e-12)
     out = []
     for trial, (a, b) in enumerate(pairwise(tracks.first)):

@@ -125,6 +125,8 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     (x0, x1), (y0, y1) = (np.quantile(predictor.tracks.pose[:, i], [0.02, 0.98]) for i in (0, 1))
     bumps = tuple(_bumps(x0, x1, y0, y1))
     yield Family(PLACE, SHARE, bumps)
+    yield Family(PLACE, "east", tuple(f"moving * {b}" for b in bumps))
+    yield Family(PLACE, "north", tuple(f"moving * {b}" for b in bumps))
     yield Family(PLACE, "w", tuple(f"moving * {bump}" for bump in bumps))
     x, y = f"(x - {(x0 + x1) / 2:.3g})", f"(y - {(y0 + y1) / 2:.3g})"
     bends = (x, y, f"{x}**2", f"{x} * {y}", f"{y}**2")

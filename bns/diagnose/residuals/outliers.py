@@ -3,6 +3,10 @@
 A patch of floor that few trials cross, a wheel that slips, a cable that snags: too few trials show it for a curve along any
 variable to be certain, and what is not foreseen there passes for scatter of the drive. But honest scatter is alike
 everywhere: no window of frames is many times as far off as most are.
+
+Errors of a tracker that share something with those of the frames before are far off as well, and longest where the robot
+stands and nothing else is expected. They are no motion. So a window counts only if the track alone shows it too: what it moved
+from one end of the window to the other is many times as far from the prediction as in most windows.
 """
 
 from __future__ import annotations
@@ -14,11 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracking_noise import robust_sd
+from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.residuals.unforeseen import unforeseen_way
 from bns.diagnose.settings import DEFAULTS
 
 WIDTH = DEFAULTS.residuals.outlier_frames
 FAR = DEFAULTS.residuals.outlier_far
+MOVED = DEFAULTS.residuals.outlier_moved
 TRIALS = DEFAULTS.residuals.outlier_trials
 JUMP = DEFAULTS.residuals.fault_jump
 WAYS = DEFAULTS.residuals.fault_ways
@@ -46,7 +53,8 @@ def outliers(problem: Problem, fit: Fit) -> list[Outlier]:
     sums = whitened[start[:, None] + np.arange(WIDTH)].sum(axis=1) / np.sqrt(WIDTH)
     usual = robust_sd(sums, axis=0)
     size = np.abs(sums / np.maximum(usual, 1e-9)).max(axis=1)
-    order = [i for i in np.argsort(-size) if size[i] > FAR]
+    moved = _moved(problem, fit, start)
+    order = [i for i in np.argsort(-size) if size[i] > FAR and moved[i] > MOVED]
     worst = {int(tracks.trial[start[i]]): i for i in reversed(order)}
     found = [Outlier(tracks.names[t], float(tracks.own_s[start[i]]), float(size[i])) for t, i in worst.items()]
     return sorted(found, key=lambda o: -o.size) if len(found) >= TRIALS else []
@@ -57,11 +65,24 @@ def _windows(first: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.concatenate([np.arange(a + 1, b - WIDTH + 1, WIDTH) for a, b in pairwise(first)]).astype(np.int64)
 
 
+def _moved(problem: Problem, fit: Fit, start: NDArray[np.int64]) -> Array:
+    """How much farther off the way of each window is than in most windows, in its worst direction, (windows,).
+
+    Of the track alone: no filter follows it. The least of three windows, each a frame shorter at both ends, so that no single
+    mistaken marker counts.
+    """
+    ways = [unforeseen_way(problem, fit, start - 1 + i, start + WIDTH - 1 - i) for i in range(3)]
+    sizes = [np.abs(way / np.maximum(robust_sd(way, axis=0), 1e-12)).max(axis=1) for way in ways]
+    return np.asarray(np.min(sizes, axis=0))
+
+
 def _jumped(problem: Problem, fit: Fit) -> NDArray[np.bool_]:
-    """Frames (frames,) that are farther off than any robot gets within one."""
+    """Frames (frames,) that are farther off than any robot gets within one, or where the tracker was seen to jump."""
     possible = JUMP + WAYS * problem.predictor.way_m / problem.pose_filter.noise[0]
     off = np.abs(fit.whitened)
-    return np.asarray((off[:, :2].max(axis=1) > possible) | (off[:, 2] > TURN))
+    far = (off[:, :2].max(axis=1) > possible) | (off[:, 2] > TURN)
+    marked = problem.predictor.tracks.jumped
+    return np.asarray(far if marked is None else far | marked)
 
 
 def _near(frames: NDArray[np.bool_], start: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -232,7 +232,7 @@ class StepwiseSelection:
             believed = not self._rejected(
                 fit, name, bounds=False
             )  # at a bound it may be: there it does, and earns, nothing
-            if believed and name == newest:
+            if believed and name == newest and not at_bound(fit, name):  # an exchange since may have left it nothing to do
                 continue
             lacking = without(problem, fit, name)
             if not believed or not self._earned_over(problem, lacking, fit, name):

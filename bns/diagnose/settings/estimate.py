@@ -112,6 +112,12 @@ class Estimate:
         "starts",
         f"Starts of a number that is neutral at infinity: so many, evenly spaced on a logarithmic scale; {BY_HAND}.",
     )
+    start_most: int = setting(
+        216,
+        "starts",
+        "All combinations of starts are tried up to this many (three ordinary numbers); beyond, one number at a time: four "
+        "numbers would have 1,296 starts, seven 280,000.",
+    )
     clock_blocks: int = setting(
         8, "blocks", "Blocks of a trial. An earlier and a later half would differ where the clock drifts too."
     )
