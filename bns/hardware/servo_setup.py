@@ -50,7 +50,8 @@ def rates(protocols: Sequence[int] = PROTOCOLS, every: bool = False) -> list[Rat
 
 
 class OnTheBus(NamedTuple):
-    """A number at which something answers; `model` is 0 where the answer is garbled, as by two servos of the same number."""
+    """A number at which something answers; `model` is 0 where the answer is garbled, or comes twice, as by two servos of the same
+    number."""
 
     number: int
     baud: int
@@ -75,7 +76,9 @@ class ServoBus:
         self.port, self._clock = port, clock
         self._packets = {protocol: PacketHandler(float(protocol)) for protocol in PROTOCOLS}
         self._line, self._baud = ClockedPort(port, clock), 0
+        self._bits = 0
         self.at(BAUD)
+        self._line.find_echo()
 
     def at(self, baud: int) -> None:
         """Go on at this rate; HardwareError if the port cannot be opened or set to it."""
@@ -91,7 +94,8 @@ class ServoBus:
             for number in range(_LAST_ID + 1) if numbers is None else numbers:
                 model, result, _ = self._asked(lambda p=packets, n=number: p.ping(self._line, n))  # type: ignore[misc]
                 if result != COMM_RX_TIMEOUT:
-                    yield OnTheBus(number, baud, int(model) if result == COMM_SUCCESS else 0, protocol)
+                    alone = result == COMM_SUCCESS and not self._more_comes()
+                    yield OnTheBus(number, baud, int(model) if alone else 0, protocol)
 
     def set_id(self, new: int, old: int | None = None, looked: Sequence[Rate] | None = None) -> OnTheBus:
         """Give the servo on the bus a number, and the rate of a chain; HardwareError unless it is alone there (or alone has the
@@ -128,6 +132,8 @@ class ServoBus:
         if table is None:
             return
         mend = f"bns servos check --fix --port {self.port}"
+        if alarm := self._alarm(servo, table):
+            yield Finding(False, f"servo {number}: alarm: {alarm}", "see what holds or heats it; then switch it off and on")
         for what, wanted in table.wanted.items():
             if not what.endswith("angle_limit"):
                 value = self.read(servo, what)
@@ -142,6 +148,14 @@ class ServoBus:
         fed = limits.low_v <= volts <= limits.high_v
         supply = f"a supply of {limits.low_v:g} to {limits.high_v:g} V; the makers allow {table.volts[1]:g} V"
         yield Finding(fed, f"servo {number}: {volts:.1f} V", "" if fed else supply)
+
+    def _alarm(self, servo: OnTheBus, table: ServoTable) -> str:
+        """What it says is wrong with it, or nothing."""
+        self.read(servo, "torque_enable")
+        if not self._bits & table.alarm_bits:
+            return ""
+        hardware = self.read(servo, "hardware_error") if "hardware_error" in table.registers else 0
+        return table.in_words(self._bits & table.alarm_bits, hardware)
 
     def mend(self, servo: OnTheBus) -> list[str]:
         """Write the settings that a drive needs, read them back; names of those that were changed."""
@@ -166,7 +180,7 @@ class ServoBus:
             return 0, result, bits
 
         self.at(servo.baud)
-        _, result, _ = self._asked(call)
+        _, result, self._bits = self._asked(call)
         if result != COMM_SUCCESS or len(found) != size:
             raise HardwareError(f"servo {servo.number} does not answer ({packets.getTxRxResult(result)}); check its cable.")
         return table.value(name, int.from_bytes(bytes(found), "little"))
@@ -187,6 +201,12 @@ class ServoBus:
             now = servo._replace(baud=next(baud for baud, code in table.bauds.items() if code == value))
         if (found := self.read(now, name)) != value:
             raise HardwareError(f"servo {servo.number}: {name} is {found} after {value} was written; switch it off and on.")
+
+    def _more_comes(self) -> bool:
+        try:
+            return self._line.more_comes()
+        except (OSError, TerminalError) as error:
+            raise HardwareError(f"the port {self.port} is gone ({error}).") from error
 
     def close(self) -> None:
         """Give the port free."""
