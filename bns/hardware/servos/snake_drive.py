@@ -157,7 +157,7 @@ class SnakeDrive:
             )
         self._angles, end_s = target, asked_s + way_rad / speed_rad_s + self._settings.settle_s
         while (left_s := end_s - self._clock.now_s()) > 0:
-            self._clock.sleep(min(_TICK_S, left_s))
+            self._clock.sleep(self._watch.next_look_s(min(_TICK_S, left_s), self._eye.picture_s))
             self._look()
 
     def _look(self) -> Sight | None:
