@@ -109,6 +109,22 @@ def test_joints_between_the_markers_that_turn_unseen_are_a_picture_that_hangs(dr
     assert clock.now_s() - began_s < 2.0
 
 
+class Slow(Chain):
+    """Behind an adapter that holds every answer back: the way is over before the servos have confirmed it."""
+
+    def move(self, angles_rad, speeds):
+        self._clock.sleep(0.3)
+        return super().move(angles_rad, speeds)
+
+
+def test_a_robot_behind_a_slow_adapter_is_looked_at_in_every_posture(drive):
+    """A cycle has thirteen; after a second without a look a drive ends."""
+    on = drive([], chain=Slow)
+    on.straighten()
+    on.carry_out(GENTLE)
+    assert len(on.done()) == 1
+
+
 class Turning(Chain):
     """Servos that turn as fast as they are told to."""
 

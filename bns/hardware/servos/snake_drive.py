@@ -157,10 +157,11 @@ class SnakeDrive:
                 f"joint {short + 1} was to go to {math.degrees(target[short]):.0f}° and was only told "
                 f"{math.degrees(sent[short]):.0f}°: widen the angle limits in its servo"
             )
-        self._angles, end_s = target, asked_s + way_rad / speed_rad_s + self._settings.settle_s
-        while (left_s := end_s - self._clock.now_s()) > 0:
-            self._clock.sleep(self._watch.next_look_s(min(_TICK_S, left_s), self._eye.picture_s))
+        self._angles, end_s, looked = target, asked_s + way_rad / speed_rad_s + self._settings.settle_s, False
+        while (left_s := end_s - self._clock.now_s()) > 0 or not looked:  # a slow adapter leaves no time, and is looked at too
+            self._clock.sleep(self._watch.next_look_s(min(_TICK_S, max(left_s, 0.0)), self._eye.picture_s))
             self._look()
+            looked = True
 
     def _look(self) -> Sight | None:
         """Look at servos and markers; a row if there is something new to see."""
