@@ -30,6 +30,7 @@ _LAST_ID = 252
 _MOST_DELAY = 25
 """A return delay of 50 µs: above it, a round of twelve servos takes milliseconds longer for nothing."""
 _EEPROM_S = 0.02
+_SURE = 3
 _QUARTER_RAD = 1.5707963267948966
 _NAMES = {"return_delay": "return delay", "status_return": "status return level"}
 
@@ -92,10 +93,10 @@ class ServoBus:
             self.at(baud)
             packets = self._packets[protocol]
             for number in range(_LAST_ID + 1) if numbers is None else numbers:
-                model, result, _ = self._asked(lambda p=packets, n=number: p.ping(self._line, n))  # type: ignore[misc]
+                model, result = self._pinged(packets, number)
                 if result != COMM_RX_TIMEOUT:
-                    alone = result == COMM_SUCCESS and not self._more_comes()
-                    yield OnTheBus(number, baud, int(model) if alone else 0, protocol)
+                    alone = result == COMM_SUCCESS and not all(self._comes_twice(packets, number, i) for i in range(_SURE))
+                    yield OnTheBus(number, baud, model if alone else 0, protocol)
 
     def set_id(self, new: int, old: int | None = None, looked: Sequence[Rate] | None = None) -> OnTheBus:
         """Give the servo on the bus a number, and the rate of a chain; HardwareError unless it is alone there (or alone has the
@@ -202,7 +203,14 @@ class ServoBus:
         if (found := self.read(now, name)) != value:
             raise HardwareError(f"servo {servo.number}: {name} is {found} after {value} was written; switch it off and on.")
 
-    def _more_comes(self) -> bool:
+    def _pinged(self, packets: PacketHandler, number: int) -> tuple[int, int]:
+        model, result, _ = self._asked(lambda: packets.ping(self._line, number))
+        return int(model), result
+
+    def _comes_twice(self, packets: PacketHandler, number: int, again: int) -> bool:
+        """Whether two servos answer; `again`: it was asked before, and the second answer may have been a late one."""
+        if again:
+            self._pinged(packets, number)
         try:
             return self._line.more_comes()
         except (OSError, TerminalError) as error:

@@ -66,6 +66,19 @@ def test_two_servos_of_one_id_that_answer_one_after_the_other_do_not_move(chain)
         chain(numbers=(1, 2, 2, 3), prepare=lambda bus: bus.servos[1].put("return_delay", 0))
 
 
+def test_a_late_answer_is_no_second_servo(chain):
+    """While the chain is opened, an answer that was given up comes behind the one to the next question."""
+    late = [WIRES[1].status(2, 0, b"\x0c\0")]
+
+    def prepare(bus):
+        answers = bus.receive
+        bus.receive = lambda data: answers(data) + (late.pop() if late and data[2] == 2 else b"")
+
+    driver, _, _ = chain(prepare=prepare)
+    assert not late
+    assert driver.read(2, "present_position") == 512
+
+
 @pytest.mark.parametrize("size", [1, 8])
 def test_a_late_answer_of_another_length_is_no_answer(chain, size):
     """The SDK would take its checksum, or the beginning of what it holds, for the value."""

@@ -28,6 +28,8 @@ with extra("robot"):
 
 ATTEMPTS = 6
 _BETWEEN_S = 0.02
+_SURE = 2
+"""So often a second answer comes again if there is a second servo, and not if it was a late one."""
 _REBOOTS_S = 0.5
 """A guess: the manual does not say how long a servo takes."""
 
@@ -78,7 +80,7 @@ class DynamixelChain:
 
     def _setting_that_is_wrong(self, number: int) -> str:
         model = self.read(number, "model_number")
-        if self._port.more_comes():
+        if self._port.more_comes() and all(self._comes_twice(number) for _ in range(_SURE)):
             return f"servo {number} answers twice: two servos have this id. Connect them one at a time: bns servos set-id"
         if model != self.table.number:
             return f"servo {number} is of the model {name_of(self.table.protocol, model)}, not {self.table.model}"
@@ -87,6 +89,10 @@ class DynamixelChain:
                 return f"servo {number} has {name} {value}, not {self.table.wanted[name]} (bns servos check --fix sets it)"
         self._angle_limits(number)  # now: behind a slow adapter it would hold up the first look at a robot that moves
         return ""
+
+    def _comes_twice(self, number: int) -> bool:
+        self.read(number, "model_number")
+        return self._port.more_comes()
 
     def read(self, number: int, name: str, alarms: bool = False) -> int:
         """A register; ServoError if the servo does not answer or reports an alarm (which `alarms` lets pass)."""
