@@ -79,6 +79,19 @@ def test_a_late_answer_is_no_second_servo(chain):
     assert driver.read(2, "present_position") == 512
 
 
+def test_a_late_answer_for_one_angle_limit_is_not_the_other(chain):
+    late = [WIRES[1].status(2, 0, b"\0\0")]
+
+    def prepare(bus):
+        answers = bus.receive
+        asked = (bytes([6, 4]), bytes([8, 2]))  # address and size, with and without the lower limit
+        bus.receive = lambda data: (late.pop() if late and data[2] == 2 and data[5:7] in asked else b"") + answers(data)
+
+    driver, _, _ = chain(prepare=prepare)
+    assert not late
+    assert driver._angle_limits(2) == (0, 1023)
+
+
 @pytest.mark.parametrize("size", [1, 8])
 def test_a_late_answer_of_another_length_is_no_answer(chain, size):
     """The SDK would take its checksum, or the beginning of what it holds, for the value."""

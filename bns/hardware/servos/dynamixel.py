@@ -210,8 +210,13 @@ class DynamixelChain:
         return max(low, min(high, self.table.centre + round(angle_rad / self.table.rad_per_step)))
 
     def _angle_limits(self, number: int) -> tuple[int, int]:
+        """Both in one answer: a late one for one of them would pass for the other."""
         if number not in self._limits_of:
-            self._limits_of[number] = self.read(number, "cw_angle_limit"), self.read(number, "ccw_angle_limit")
+            names = "cw_angle_limit", "ccw_angle_limit"
+            first, last = sorted(names, key=lambda name: self.table.registers[name].address)
+            block, address = self._block(number, first, last), self.table.registers[first].address
+            low, high = (self.table.in_block(name, block, address) for name in names)
+            self._limits_of[number] = low, high
         return self._limits_of[number]
 
     def health(self) -> Mapping[int, Health]:
