@@ -149,3 +149,29 @@ def test_kernels_of_somebody_else_are_not_run(temporary, tmp_path, monkeypatch, 
     assert tmp_path / "theirs" not in folder.parents
     assert folder.parent.stat().st_mode & 0o077 == 0
     assert os.environ.pop("NUMBA_CACHE_DIR") == str(folder)  # for the processes that are started from here
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="there are no pseudo-terminals here")
+@pytest.mark.parametrize("code", [3, 4])
+def test_a_terminal_that_was_closed_leaves_the_exit_code_as_it_is(code):
+    """A trial whose terminal goes tells by it whether its robot stands, and nobody reads what it says."""
+    master, slave = os.openpty()
+    program = (
+        "import os, signal, sys, time; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "from bns.cli import main as cli; from bns.errors import BnsError\n"
+        f"BnsError.exit_code = {code}\n"
+        "def ends(options):\n"
+        "    print('ready', flush=True)\n"
+        "    while os.isatty(1): time.sleep(0.01)\n"
+        "    print('out'); print('err', file=sys.stderr)\n"
+        "    raise BnsError('the end')\n"
+        "cli.take_trust = ends\n"
+        "sys.exit(cli.main(['status']))\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", program], stdin=slave, stdout=slave, stderr=slave) as process:
+        os.close(slave)
+        said = b""
+        while b"ready" not in said:
+            said += os.read(master, 4096)
+        os.close(master)
+        assert process.wait(60) == code

@@ -19,8 +19,11 @@ from bns.hardware.tracking.sight import Sight
 STILL_M = 0.003
 """A picture in which no point of the robot moves so far shows the same scene."""
 _NOSE_M = 0.05
-_FROZEN_WAY_M = 0.03
-"""Way of the faster wheel in that time: a robot that drives it has moved, or turned, by ten times `STILL_M`."""
+_FROZEN_WAY_M, _FROZEN_S = 0.02, 0.1
+"""Way of the faster wheel in that time, and how long that is at least: a robot that drives it has moved, or turned, by six times
+`STILL_M`; a fast one by ten times, as its camera may be late."""
+_SUSPECT_M = 0.007
+"""After so much of that way, a picture that shows none of it is looked at more often."""
 _WINDOW_S = 2.0
 _SHARE, _OFF_M, _OFF_RAD = 0.5, 0.04, 0.6
 """Seen and expected motion may differ by half of the way (or turn), and this: a fifth of a second at full speed."""
@@ -67,6 +70,8 @@ class Agreement:
         self._scene = SameScene()
         self._since_s: float | None = None
         self._wheels_off = 0
+        self.suspects = False
+        """Whether the robot should have been seen to move and was not, for less than what pauses the trial."""
 
     def ordered(self, t_s: float, left_m_s: float, right_m_s: float) -> None:
         """Speeds of the wheels from now on."""
@@ -91,7 +96,8 @@ class Agreement:
             return
         nose = _NOSE_M * np.array([math.cos(sight.pose[2]), math.sin(sight.pose[2])])
         way_m = self._scene.since_it_moved(np.array([sight.pose[:2] + nose, sight.pose[:2] - nose]), self._way_m(sight.t_s))
-        if way_m > _FROZEN_WAY_M:
+        self.suspects = way_m > _SUSPECT_M
+        if way_m > max(_FROZEN_WAY_M, _FROZEN_S * max(abs(speed) for speed in self._orders[-1][1:])):
             raise TrialPausedError(
                 f"the robot was ordered to drive {100 * way_m:.0f} cm and the picture shows it where it was: the camera hangs or "
                 "shows another scene, or the robot is held. Look at it: bns track"

@@ -59,6 +59,9 @@ class Limits:
     gives_up_s: float = 4 * 3600.0
 
 
+_OVERDUE_S = 0.005
+
+
 class Watch:
     """Judges every look at a driving robot; raises what ends the drive."""
 
@@ -81,6 +84,13 @@ class Watch:
         self._check_picture(now_s, picture_s)
         if now_s - self._seen_s > self._limits.lost_s:
             raise OutOfSight(f"the tracker has not seen the robot for {now_s - self._seen_s:.1f} s")
+
+    def next_look_s(self, tick_s: float, picture_s: float | None) -> float:
+        """How long until the next look: `tick_s`, or until the newest picture has to have been followed by another, if sooner."""
+        if picture_s is None:
+            return tick_s
+        left_s = max(picture_s, self._began_s) + self._limits.picture_s - self._clock.now_s()
+        return min(tick_s, max(left_s, 0.0) + _OVERDUE_S)
 
     def still_filmed(self, picture_s: float | None) -> None:
         """The part of `check` that concerns a robot which stands and may be out of sight: somebody looks, new pictures come."""

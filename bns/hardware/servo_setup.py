@@ -30,6 +30,7 @@ _LAST_ID = 252
 _MOST_DELAY = 25
 """A return delay of 50 µs: above it, a round of twelve servos takes milliseconds longer for nothing."""
 _EEPROM_S = 0.02
+_SURE = 3
 _QUARTER_RAD = 1.5707963267948966
 _NAMES = {"return_delay": "return delay", "status_return": "status return level"}
 
@@ -50,7 +51,8 @@ def rates(protocols: Sequence[int] = PROTOCOLS, every: bool = False) -> list[Rat
 
 
 class OnTheBus(NamedTuple):
-    """A number at which something answers; `model` is 0 where the answer is garbled, as by two servos of the same number."""
+    """A number at which something answers; `model` is 0 where the answer is garbled, or comes twice, as by two servos of the same
+    number."""
 
     number: int
     baud: int
@@ -75,7 +77,9 @@ class ServoBus:
         self.port, self._clock = port, clock
         self._packets = {protocol: PacketHandler(float(protocol)) for protocol in PROTOCOLS}
         self._line, self._baud = ClockedPort(port, clock), 0
+        self._bits = 0
         self.at(BAUD)
+        self._line.find_echo()
 
     def at(self, baud: int) -> None:
         """Go on at this rate; HardwareError if the port cannot be opened or set to it."""
@@ -89,9 +93,10 @@ class ServoBus:
             self.at(baud)
             packets = self._packets[protocol]
             for number in range(_LAST_ID + 1) if numbers is None else numbers:
-                model, result, _ = self._asked(lambda p=packets, n=number: p.ping(self._line, n))  # type: ignore[misc]
+                model, result = self._pinged(packets, number)
                 if result != COMM_RX_TIMEOUT:
-                    yield OnTheBus(number, baud, int(model) if result == COMM_SUCCESS else 0, protocol)
+                    alone = result == COMM_SUCCESS and not all(self._comes_twice(packets, number, i) for i in range(_SURE))
+                    yield OnTheBus(number, baud, model if alone else 0, protocol)
 
     def set_id(self, new: int, old: int | None = None, looked: Sequence[Rate] | None = None) -> OnTheBus:
         """Give the servo on the bus a number, and the rate of a chain; HardwareError unless it is alone there (or alone has the
@@ -128,6 +133,8 @@ class ServoBus:
         if table is None:
             return
         mend = f"bns servos check --fix --port {self.port}"
+        if alarm := self._alarm(servo, table):
+            yield Finding(False, f"servo {number}: alarm: {alarm}", "see what holds or heats it; then switch it off and on")
         for what, wanted in table.wanted.items():
             if not what.endswith("angle_limit"):
                 value = self.read(servo, what)
@@ -142,6 +149,14 @@ class ServoBus:
         fed = limits.low_v <= volts <= limits.high_v
         supply = f"a supply of {limits.low_v:g} to {limits.high_v:g} V; the makers allow {table.volts[1]:g} V"
         yield Finding(fed, f"servo {number}: {volts:.1f} V", "" if fed else supply)
+
+    def _alarm(self, servo: OnTheBus, table: ServoTable) -> str:
+        """What it says is wrong with it, or nothing."""
+        self.read(servo, "torque_enable")
+        if not self._bits & table.alarm_bits:
+            return ""
+        hardware = self.read(servo, "hardware_error") if "hardware_error" in table.registers else 0
+        return table.in_words(self._bits & table.alarm_bits, hardware)
 
     def mend(self, servo: OnTheBus) -> list[str]:
         """Write the settings that a drive needs, read them back; names of those that were changed."""
@@ -166,7 +181,7 @@ class ServoBus:
             return 0, result, bits
 
         self.at(servo.baud)
-        _, result, _ = self._asked(call)
+        _, result, self._bits = self._asked(call)
         if result != COMM_SUCCESS or len(found) != size:
             raise HardwareError(f"servo {servo.number} does not answer ({packets.getTxRxResult(result)}); check its cable.")
         return table.value(name, int.from_bytes(bytes(found), "little"))
@@ -187,6 +202,19 @@ class ServoBus:
             now = servo._replace(baud=next(baud for baud, code in table.bauds.items() if code == value))
         if (found := self.read(now, name)) != value:
             raise HardwareError(f"servo {servo.number}: {name} is {found} after {value} was written; switch it off and on.")
+
+    def _pinged(self, packets: PacketHandler, number: int) -> tuple[int, int]:
+        model, result, _ = self._asked(lambda: packets.ping(self._line, number))
+        return int(model), result
+
+    def _comes_twice(self, packets: PacketHandler, number: int, again: int) -> bool:
+        """Whether two servos answer; `again`: it was asked before, and the second answer may have been a late one."""
+        if again:
+            self._pinged(packets, number)
+        try:
+            return self._line.more_comes()
+        except (OSError, TerminalError) as error:
+            raise HardwareError(f"the port {self.port} is gone ({error}).") from error
 
     def close(self) -> None:
         """Give the port free."""

@@ -57,6 +57,45 @@ def test_a_camera_that_sends_the_same_bits_again_and_again_stops_the_robot(tmp_p
     assert first["t_s"] - 3.0 <= 0.6
 
 
+@pytest.mark.parametrize("at_s", [3.0, 3.03, 3.06, 3.09])
+def test_a_picture_that_is_overdue_is_missed_at_once_and_not_at_the_next_look(tmp_path, at_s):
+    """Within `picture_s` of the last one, whenever that came: a look a tenth of a second would find it up to so much later."""
+    how = setup("khepera", Fault("stuck-marker", at_s=at_s, for_s=99.0), **ARUCO)
+    with Stopping() as stopping, open_rig(how, 0, tmp_path / "j.jsonl", stopping) as opened:
+        assert opened.platform.drive(FAST).ended.startswith("the camera has sent no new picture for 0.2")
+    first = next(e for e in events(tmp_path / "j.jsonl", "stop") if e["t_s"] > at_s)
+    assert first["t_s"] - first["seconds"] - at_s <= 0.27
+
+
+def stands_unseen(speed_m_s, every_s=0.01):
+    """How long a robot that is ordered to go on is seen where it was, until the trial pauses; whether that was suspected."""
+    agreement = Agreement(0.5, WHEELBASE_M)
+    agreement.ordered(0.0, speed_m_s, speed_m_s)
+    for t_s in np.arange(0.0, 9.0, every_s).tolist():
+        suspected = agreement.suspects
+        try:
+            agreement.seen(Sight(t_s, START))
+        except TrialPausedError:
+            return t_s, suspected
+    raise AssertionError("it never paused")
+
+
+@pytest.mark.parametrize(("speed_m_s", "within_s"), [(0.06, (0.5, 0.55)), (0.1, (0.38, 0.42)), (0.3, (0.29, 0.32))])
+def test_two_centimetres_unseen_are_a_frozen_scene_and_a_tenth_of_a_second_at_full_speed(speed_m_s, within_s):
+    """Orders count from 0.2 s on. A camera may be late, which is no way for a slow robot and centimetres for a fast one."""
+    lasted_s, suspected = stands_unseen(speed_m_s)
+    assert within_s[0] <= lasted_s <= within_s[1]
+    assert suspected
+
+
+def test_a_robot_that_stands_by_order_is_not_suspected():
+    agreement = Agreement(0.5, WHEELBASE_M)
+    agreement.ordered(0.0, 0.0, 0.0)
+    for t_s in np.arange(0.0, 9.0, 0.1).tolist():
+        agreement.seen(Sight(t_s, START))
+    assert not agreement.suspects
+
+
 def test_a_marker_that_points_another_way_pauses_the_trial():
     """Ahead is 113 degrees from where the robot goes."""
     agreement, goes = Agreement(0.5, WHEELBASE_M), np.radians(90 - 113)

@@ -23,9 +23,10 @@ def chain(tmp_path, clock):
     """chain(*faults, numbers, asked, **registers) -> driver, bus, line."""
     opened = []
 
-    def build(*faults, numbers=IDS, asked=IDS, **registers):
+    def build(*faults, numbers=IDS, asked=IDS, prepare=lambda _bus: None, **registers):
         struck = Faults(tuple(faults), 1, "bus")
         bus = Bus([Servo(n, clock, struck, **registers) for n in numbers], clock, struck)
+        prepare(bus)
         line = PseudoTerminal(bus, tmp_path, f"bus{len(opened)}")
         opened.append(line)
         driver = DynamixelChain(str(line.path), asked, clock, HardwareLog(None, clock))
@@ -35,6 +36,91 @@ def chain(tmp_path, clock):
     yield build
     for each in reversed(opened):
         each.close()
+
+
+def test_an_adapter_that_echoes_is_found_out(chain):
+    """An echo of a question looks like an answer with an alarm, and the echo of a write like its confirmation."""
+    driver, bus, _ = chain(prepare=lambda bus: setattr(bus, "echoes", True))
+    driver.arm()
+    assert driver.move([0.1, 0.2, 0.3], [1.0] * 3) == pytest.approx([0.1, 0.2, 0.3], abs=RAD_PER_STEP)
+    assert driver.stop().confirmed
+    assert driver.retries == 0
+    assert not any(servo.get("torque_enable") for servo in bus.servos)
+
+
+@pytest.mark.parametrize(
+    ("prepare", "message"),
+    [
+        (lambda bus: setattr(bus.servos[1], "latched", 32), "^servo 2: overload; see to it, then switch the servos off and on"),
+        (lambda bus: bus.servos[1].put("status_return", 1), "servo 2 has status_return 1, not 2 .bns servos check --fix"),
+        (lambda bus: bus.servos[1].put("status_return", 0), "servo 2 is missing"),
+    ],
+)
+def test_what_is_wrong_with_a_servo_is_said_before_it_moves(chain, prepare, message):
+    with pytest.raises(HardwareError, match=message):
+        chain(prepare=prepare)
+
+
+def test_two_servos_of_one_id_that_answer_one_after_the_other_do_not_move(chain):
+    with pytest.raises(HardwareError, match="servo 2 answers twice: two servos have this id"):
+        chain(numbers=(1, 2, 2, 3), prepare=lambda bus: bus.servos[1].put("return_delay", 0))
+
+
+def test_a_late_answer_is_no_second_servo(chain):
+    """While the chain is opened, an answer that was given up comes behind the one to the next question."""
+    late = [WIRES[1].status(2, 0, b"\x0c\0")]
+
+    def prepare(bus):
+        answers = bus.receive
+        bus.receive = lambda data: answers(data) + (late.pop() if late and data[2] == 2 else b"")
+
+    driver, _, _ = chain(prepare=prepare)
+    assert not late
+    assert driver.read(2, "present_position") == 512
+
+
+def test_a_late_answer_for_one_angle_limit_is_not_the_other(chain):
+    late = [WIRES[1].status(2, 0, b"\0\0")]
+
+    def prepare(bus):
+        answers = bus.receive
+        asked = (bytes([6, 4]), bytes([8, 2]))  # address and size, with and without the lower limit
+        bus.receive = lambda data: (late.pop() if late and data[2] == 2 and data[5:7] in asked else b"") + answers(data)
+
+    driver, _, _ = chain(prepare=prepare)
+    assert not late
+    assert driver._angle_limits(2) == (0, 1023)
+
+
+@pytest.mark.parametrize("size", [1, 8])
+def test_a_late_answer_of_another_length_is_no_answer(chain, size):
+    """The SDK would take its checksum, or the beginning of what it holds, for the value."""
+    driver, bus, _ = chain()
+    answers, late = bus.receive, [WIRES[1].status(2, 0, b"\2" * size)]
+    bus.receive = lambda data: (late.pop() if late else b"") + answers(data)
+    assert driver.read(2, "present_position") == 512
+    assert driver.retries == 1
+
+
+def test_a_stray_byte_before_an_answer_is_none_of_it(chain):
+    driver, bus, _ = chain()
+    answers = bus.receive
+    bus.receive = lambda data: b"\xff" + answers(data)
+    assert driver.read(2, "present_position") == 512
+    assert driver.retries == 0
+
+
+def test_a_servo_whose_answer_was_given_up_is_asked_again_when_that_cannot_come_any_more(chain, clock):
+    driver, bus, _ = chain()
+    answers, asked = bus.receive, []
+    bus.receive = lambda data: (asked.append(clock.now_s()), answers(data))[1]
+    bus.servos[1].put("status_return", 0)
+    with pytest.raises(ServoError, match=r"servo 2: read present_position: .*no status packet!; asked 6 times"):
+        driver.read(2, "present_position")
+    assert np.diff(asked) == pytest.approx(driver._port.packet_timeout / 1000 + 0.02, abs=0.001)
+    before_s = clock.now_s()
+    driver.read(1, "present_position")
+    assert asked[-1] == before_s
 
 
 def answered(clock, data, **registers):

@@ -109,6 +109,22 @@ def test_joints_between_the_markers_that_turn_unseen_are_a_picture_that_hangs(dr
     assert clock.now_s() - began_s < 2.0
 
 
+class Slow(Chain):
+    """Behind an adapter that holds every answer back: the way is over before the servos have confirmed it."""
+
+    def move(self, angles_rad, speeds):
+        self._clock.sleep(0.3)
+        return super().move(angles_rad, speeds)
+
+
+def test_a_robot_behind_a_slow_adapter_is_looked_at_in_every_posture(drive):
+    """A cycle has thirteen; after a second without a look a drive ends."""
+    on = drive([], chain=Slow)
+    on.straighten()
+    on.carry_out(GENTLE)
+    assert len(on.done()) == 1
+
+
 class Turning(Chain):
     """Servos that turn as fast as they are told to."""
 
@@ -167,6 +183,32 @@ def test_markers_that_must_come_nearer_and_do_not_are_a_picture_that_hangs(drive
         on._go_to(np.tile([0.5, 0.0], 6), 0.5, 1.5)
     assert 0.0 < clock.now_s() - began_s <= within_s
     assert on._turned_rad < 0.65
+
+
+@pytest.mark.parametrize(("unknown_s", "turned_rad", "pauses"), [(0.02, 0.45, 0), (0.02, 0.55, 1), (0.2, 0.55, 0), (0.2, 0.7, 1)])
+def test_a_camera_whose_delay_is_known_is_believed_for_less_turning(drive, clock, unknown_s, turned_rad, pauses):
+    on = drive(BETWEEN, unknown_s=unknown_s)
+    on.straighten()
+    on._look()
+    on._turned_rad += turned_rad
+    clock.sleep(0.1)
+    with pytest.raises(TrialPausedError, match="joints have turned by") if pauses else nullcontext():
+        on._look()
+
+
+@pytest.mark.parametrize(("unknown_s", "nearer_m", "pauses"), [(0.02, 0.006, 0), (0.02, 0.0095, 1), (0.2, 0.0095, 0)])
+def test_a_camera_whose_delay_is_known_shows_a_centimetre(drive, clock, unknown_s, nearer_m, pauses):
+    """The joints have turned by less than what would be noticed by itself."""
+    on, far_m = drive([4, 6], unknown_s=unknown_s), apart_m(np.zeros(12), shipped_parameters())
+    on.straighten()
+    on._look()
+    bends = (np.where(np.isin(np.arange(12), [4, 6]), angle, 0.0) for angle in np.arange(0.0, 0.5, 0.002))
+    on._chain._at = next(joints for joints in bends if far_m - apart_m(joints, shipped_parameters()) > nearer_m)
+    with pytest.raises(TrialPausedError, match="cm of the markers' distance") if pauses else nullcontext():
+        for _ in range(6):
+            clock.sleep(0.1)
+            on._look()
+    assert on._turned_rad < 0.5
 
 
 @pytest.mark.parametrize("ends_s", [0.2, 0.5, 0.9])

@@ -13,7 +13,9 @@ from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
 from bns.hardware.servo_setup import ServoBus, adapter
+from bns.hardware.servos.ax12_table import AX12, OVERLOAD
 from bns.hardware.servos.snake_settings import snake_settings
+from bns.hardware.servos.x430_table import XL430_W250
 
 
 @pytest.fixture
@@ -25,7 +27,8 @@ def bus(tmp_path, monkeypatch):
 
     def build(*ids, **registers):
         servos = [Servo(number, clock, Faults(), **registers) for number in ids]
-        opened.append(PseudoTerminal(Bus(servos, clock), tmp_path, f"servos{len(opened)}"))
+        build.bus = Bus(servos, clock)
+        opened.append(PseudoTerminal(build.bus, tmp_path, f"servos{len(opened)}"))
         return servos, str(opened[-1].path)
 
     build.clock = clock
@@ -55,6 +58,38 @@ def test_two_servos_of_one_id_are_noticed(bus, capsys):
     code, said = call(capsys, "set-id", 5, "--port", port)
     assert code == 2
     assert "Connect one servo alone: id 1 at 1000000 baud: garbled" in said.err
+
+
+def test_two_servos_of_one_id_that_answer_one_after_the_other_are_noticed(bus, capsys):
+    """A new servo waits half a millisecond with its answer, one that was set up does not."""
+    servos, port = bus(1, 1, 2)
+    servos[0].put("return_delay", 0)
+    code, said = call(capsys, "scan", "--port", port)
+    assert code == 2
+    assert "id 1 at 1000000 baud: garbled; more than one servo has this id" in said.out
+    assert "id 2 at 1000000 baud: AX-12" in said.out
+
+
+def test_an_adapter_that_echoes_changes_nothing(bus, capsys, monkeypatch):
+    servos, port = bus(0, 1, 2)
+    bus.bus.echoes = True
+    monkeypatch.setattr("bns.hardware.servo_setup._LAST_ID", 2)
+    code, said = call(capsys, "scan", "--protocol", 1, "--port", port)
+    assert code == 0
+    assert said.out.splitlines()[:3] == [f"id {n} at 1000000 baud: AX-12" for n in range(3)]
+    assert call(capsys, "check", "--protocol", 1, "--fix", "--port", port)[0] == 0
+    assert [s.get("return_delay") for s in servos] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("kind", [AX12, XL430_W250], ids=lambda kind: kind.model)
+def test_check_shows_an_alarm_that_has_not_gone(bus, capsys, kind):
+    servos, port = bus(1, 2, kind=kind, return_delay=0, baud_rate=kind.bauds[1_000_000])
+    assert ": alarm:" not in call(capsys, "check", "--protocol", kind.protocol, "--port", port)[1].out
+    servos[1].latched = OVERLOAD
+    code, said = call(capsys, "check", "--protocol", kind.protocol, "--port", port)
+    assert code == 2
+    assert "BAD  servo 2: alarm: overload\n     try: see what holds or heats it" in said.out
+    assert "servo 1: alarm" not in said.out
 
 
 def test_a_new_servo_gets_its_id(bus, capsys):

@@ -39,12 +39,13 @@ def rigged(tmp_path, clock):
     """rigged(*faults, **driver) -> platform, emulation, journal."""
     opened = []
 
-    def build(*faults, stopping=None, lost_s=None, **driver):
+    def build(*faults, stopping=None, lost_s=None, prepare=lambda _emulation: None, **driver):
         rig = shipped_rig("snake")
         limits = replace(rig.limits, lost_s=lost_s or rig.limits.lost_s)
         rig = replace(rig, driver={**rig.driver, **driver}, limits=limits)
         emulation = snake.emulate(rig, Path(tempfile.mkdtemp(dir=tmp_path)), clock, FaultPlan(faults, 1), 0)
         opened.append(emulation)
+        prepare(emulation)
         journal = HardwareLog(tmp_path / f"snake{len(opened)}.jsonl", clock)
         platform = snake.open_platform(emulation.rig, clock, journal, stopping or Stopping())
         opened.extend([journal, platform])
@@ -126,8 +127,7 @@ def test_servos_that_fail_pause_the_trial_with_the_robot_stopped(rigged, fault, 
 
 
 def test_a_limit_in_a_servo_that_cuts_the_gait_is_named(rigged):
-    on = rigged()
-    on.emulation.servos[2].put("ccw_angle_limit", 530)
+    on = rigged(prepare=lambda emulation: emulation.servos[2].put("ccw_angle_limit", 530))
     with pytest.raises(TrialPausedError, match=r"joint 3 was to go to 2\d° and was only told 5°: widen the angle limits"):
         on.platform.drive(np.array([GENTLE], np.float32))
     assert not any(torques(on))

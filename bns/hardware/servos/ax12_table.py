@@ -84,6 +84,7 @@ AX12 = ServoTable(
         9_600: 207,
     },
     wanted={"return_delay": 0, "status_return": 2, "cw_angle_limit": 0, "ccw_angle_limit": 1023},
+    needed=("status_return",),
     alarms=ERRORS,
     minus_bit=1024,
 )

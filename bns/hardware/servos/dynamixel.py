@@ -18,7 +18,7 @@ from bns.hardware.link.terminal_error import TerminalError
 from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.dynamixel_port import ClockedPort
 from bns.hardware.servos.packets import BROADCAST
-from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import Health, ServoAlarmError, ServoError, ServoLimits
 from bns.hardware.servos.servo_models import name_of
 from bns.hardware.servos.servo_table import BAUD, ServoTable
 from bns.hardware.stop import Stop
@@ -28,6 +28,8 @@ with extra("robot"):
 
 ATTEMPTS = 6
 _BETWEEN_S = 0.02
+_SURE = 2
+"""So often a second answer comes again if there is a second servo, and not if it was a late one."""
 _REBOOTS_S = 0.5
 """A guess: the manual does not say how long a servo takes."""
 
@@ -55,24 +57,42 @@ class DynamixelChain:
         self._check()
 
     def _check(self) -> None:
-        wrong = [text for number in self.ids if (text := self._what_is_wrong(number))]
+        wrong = self._all_that_is_wrong()
+        if wrong and not self._port.echoes:
+            self._port.find_echo()
+            wrong = self._all_that_is_wrong() if self._port.echoes else wrong
         if wrong:
             self.close()
             raise HardwareError("; ".join(wrong) + ". Check cables, power and ids (bns doctor lists who answers).")
 
+    def _all_that_is_wrong(self) -> list[str]:
+        return [text for number in self.ids if (text := self._what_is_wrong(number))]
+
     def _what_is_wrong(self, number: int) -> str:
         try:
-            model = self.read(number, "model_number")
+            return self._setting_that_is_wrong(number)
+        except ServoAlarmError as error:
+            return f"{error}; see to it, then switch the servos off and on"
         except ServoError as error:
             if "corrupt" in str(error):
                 return f"servo {number}: answers are garbled; two servos may have this id ({error})"
             return f"servo {number} is missing ({error})"
+
+    def _setting_that_is_wrong(self, number: int) -> str:
+        model = self.read(number, "model_number")
+        if self._port.more_comes() and all(self._comes_twice(number) for _ in range(_SURE)):
+            return f"servo {number} answers twice: two servos have this id. Connect them one at a time: bns servos set-id"
         if model != self.table.number:
             return f"servo {number} is of the model {name_of(self.table.protocol, model)}, not {self.table.model}"
         for name in self.table.needed:
             if (value := self.read(number, name)) != self.table.wanted[name]:
                 return f"servo {number} has {name} {value}, not {self.table.wanted[name]} (bns servos check --fix sets it)"
+        self._angle_limits(number)  # now: behind a slow adapter it would hold up the first look at a robot that moves
         return ""
+
+    def _comes_twice(self, number: int) -> bool:
+        self.read(number, "model_number")
+        return self._port.more_comes()
 
     def read(self, number: int, name: str, alarms: bool = False) -> int:
         """A register; ServoError if the servo does not answer or reports an alarm (which `alarms` lets pass)."""
@@ -110,7 +130,8 @@ class DynamixelChain:
             self._journal.note("servo", id=number, what=what, result=result, error=bits, value=value)
             if result == COMM_SUCCESS:
                 if bits & ~self.table.alarm_bits or (bits and not alarms):
-                    raise ServoError(f"servo {number}: {self.table.in_words(bits, self._hardware_error(number, bits))}")
+                    alarm = self.table.in_words(bits, self._hardware_error(number, bits))
+                    raise ServoAlarmError(f"servo {number}: {alarm}")
                 return value
             problem = problem or str(self._packets.getTxRxResult(result))
         raise ServoError(f"servo {number}: {what}: {problem}; asked {attempts} times")
@@ -189,8 +210,13 @@ class DynamixelChain:
         return max(low, min(high, self.table.centre + round(angle_rad / self.table.rad_per_step)))
 
     def _angle_limits(self, number: int) -> tuple[int, int]:
+        """Both in one answer: a late one for one of them would pass for the other."""
         if number not in self._limits_of:
-            self._limits_of[number] = self.read(number, "cw_angle_limit"), self.read(number, "ccw_angle_limit")
+            names = "cw_angle_limit", "ccw_angle_limit"
+            first, last = sorted(names, key=lambda name: self.table.registers[name].address)
+            block, address = self._block(number, first, last), self.table.registers[first].address
+            low, high = (self.table.in_block(name, block, address) for name in names)
+            self._limits_of[number] = low, high
         return self._limits_of[number]
 
     def health(self) -> Mapping[int, Health]:
@@ -228,7 +254,8 @@ class DynamixelChain:
             data, result, bits = self._packets.readTxRx(self._port, number, start, size)
             found[:] = [bytes(data)]
             refused = bits & ~self.table.alarm_bits
-            return 0, result if result != COMM_SUCCESS or refused or len(data) == size else COMM_RX_CORRUPT, bits
+            good = result != COMM_SUCCESS or refused or self._port.took(self.table.protocol, number, size)
+            return 0, result if good else COMM_RX_CORRUPT, bits
 
         self._checked(number, f"read {first}" + f" to {last}" * (last != first), call, alarms, attempts)
         return found[0]

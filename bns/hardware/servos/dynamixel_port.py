@@ -3,27 +3,55 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import NamedTuple
 
 from bns.extras import extra
 from bns.hardware.clock import Clock
 from bns.hardware.link.serial_link import open_port
+from bns.hardware.link.terminal_error import TerminalError
+from bns.hardware.servos.packets import BROADCAST, PING, READ, WIRES
 
 with extra("robot"):
     from dynamixel_sdk import PortHandler
 
 _SLICE_S = 0.002
 _BITS_A_BYTE = 10.0
+_ECHO_S = 0.04
+"""An adapter that echoes has done so by then: twice the 16 ms for which slow ones hold bytes back, and a little."""
+_LATE_S = 0.02
+"""An answer may still come for so long after it was given up, by the SDK after 34 ms and more."""
+_SHORTEST_2 = 9
+_SECOND_S = 0.01
+"""Servos with the same number answer within half a millisecond of each other: return delays go up to 508 µs."""
+
+
+class Asked(NamedTuple):
+    """Whom a packet asks, and whether only if it is there."""
+
+    number: int
+    ping: bool
+
+
+def _asked(packet: Sequence[int]) -> Asked:
+    second = len(packet) > _SHORTEST_2 and packet[2] == 0xFD and packet[3] == 0
+    return Asked(packet[4], packet[7] == PING) if second else Asked(packet[2], packet[4] == PING)
 
 
 class ClockedPort(PortHandler):
-    """The SDK's port, with time-outs on the trial's clock."""
+    """The SDK's port, with time-outs on the trial's clock.
+
+    `echoes`: some adapters hand back what they send, before the answer to it. It looks like an answer, with an alarm.
+    """
 
     is_open: bool
 
     def __init__(self, port: str, clock: Clock) -> None:
         super().__init__(port)
-        self._clock = clock
+        self._clock, self.echoes = clock, False
+        self._asked, self._heard = Asked(-1, False), b""
+        self._owes, self._late_until_s = -1, 0.0
         self._silent: Callable[[], bool] = lambda: False
         self._late: Callable[[], bool] = lambda: False
 
@@ -40,6 +68,59 @@ class ClockedPort(PortHandler):
         self.tx_time_per_byte = 1000.0 * _BITS_A_BYTE / cflag_baud
         return True
 
+    def find_echo(self) -> None:
+        """Whether the adapter echoes: no servo answers a question to all what is in its registers."""
+        asked = WIRES[1].instruction(BROADCAST, READ, b"\0\1")
+        with suppress(OSError, TerminalError):  # then whatever comes next finds the port gone
+            self.clearPort()
+            self.echoes = self._written(asked)[1]
+
+    def writePort(self, packet: Sequence[int]) -> int:  # noqa: N802  # the SDK's name
+        """Write, and take what an adapter echoes: without its echo a packet counts as not written.
+
+        A servo whose answer was given up is asked again only when that cannot come any more: it would be taken for the new one.
+        """
+        self._asked = _asked(packet)
+        if self._asked.number == self._owes and self._clock.now_s() < self._late_until_s:
+            self._clock.sleep(self._late_until_s - self._clock.now_s())
+            self.clearPort()
+        self._owes = -1 if self._asked.number == self._owes else self._owes
+        if self.echoes:
+            written, came = self._written(packet)
+            return written if came else 0
+        return int(super().writePort(packet))
+
+    def readPort(self, length: int) -> bytes:  # noqa: N802  # the SDK's name
+        """Read, and keep it for `took`."""
+        data = bytes(super().readPort(length))
+        self._heard += data
+        return data
+
+    def took(self, protocol: int, number: int, size: int) -> bool:
+        """Whether the answer that was taken last has so many bytes of data. The SDK does not look: a late one to another question
+        passes for an answer, its checksum for data."""
+        if protocol == 1:
+            return self._heard[-(size + 6) :].startswith(bytes([0xFF, 0xFF, number, size + 2]))
+        packet, left = None, self._heard
+        while (found := WIRES[protocol].taken(left))[0] is not None:
+            packet, left = found
+        return packet is not None and packet.number == number and len(packet.parameters) == size + 1
+
+    def _written(self, packet: Sequence[int]) -> tuple[int, bool]:
+        """How much of it, and whether it came back."""
+        in_vain = self._clock.in_vain(_ECHO_S)
+        written, found = super().writePort(packet), b""
+        while not (came := found.endswith(bytes(packet))) and not in_vain():
+            found += self.ser.read(max(1, len(packet) - len(found)))  # more only where a late answer comes first
+        if not came:
+            self._clock.waited(_ECHO_S)
+        return written, came
+
+    def more_comes(self) -> bool:
+        """Whether bytes follow an answer that was taken: another servo with the same number, whose return delay is another."""
+        self._clock.sleep(_SECOND_S)
+        return self.ser.in_waiting > 0
+
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802  # the SDK's name
         """As the SDK has it: the time of the bytes, twice the adapter's latency, and a little."""
         super().setPacketTimeout(packet_length)
@@ -48,11 +129,14 @@ class ClockedPort(PortHandler):
     def clearPort(self) -> None:  # noqa: N802  # the SDK's name
         """Throw away what came too late; the SDK's own only waits until everything is sent."""
         self.ser.reset_input_buffer()
+        self._heard = b""
         self._silent = self._clock.in_vain(math.inf)  # from before the question on: an answer can be quick
 
     def isPacketTimeout(self) -> bool:  # noqa: N802  # the SDK's name
         """Whether to give up."""
-        if self._silent():
+        silent = self._silent()
+        if silent:
             self._clock.waited(self.packet_timeout / 1000.0)
-            return True
-        return self._late()
+        if (over := silent or self._late()) and not self._asked.ping:
+            self._owes, self._late_until_s = self._asked.number, self._clock.now_s() + _LATE_S
+        return over

@@ -13,6 +13,10 @@ class ServoError(Exception):
     """A servo that does not answer, or answers with an alarm."""
 
 
+class ServoAlarmError(ServoError):
+    """A servo that answers, with an alarm."""
+
+
 class StuckServoError(ServoError):
     """A servo that has been at the limit of its torque for too long: something holds its joint, most often the body itself."""
 

@@ -22,11 +22,12 @@ from bns.physics.snake.parameters import shipped_parameters
 _TICK_S = 0.15
 _STRAIGHTENING_RAD_S = 0.5
 _STILL_M = 0.002
-_FROZEN_RAD = 0.65
+_FROZEN_RAD, _FROZEN_RAD_LATE = 0.5, 0.65
 """Joints between the markers that turn so far move a marker by that: after 0.35 rad at most in 182 drives of the model, seen by
-five pictures a second. Joints beyond them do not count: an end of the body that swings by 1 rad moves neither."""
-_FROZEN_M = 0.012
-"""Markers that the joints bring so much nearer, or further apart, are seen to move: after 2 mm at most in the same drives."""
+five pictures a second. A camera that may be late is believed for longer. Joints beyond them do not count: an end of the body
+that swings by 1 rad moves neither."""
+_FROZEN_M, _FROZEN_M_LATE = 0.008, 0.012
+"""Markers that the joints bring so much nearer, or further apart, are seen to move: after 3 mm at most in the same drives."""
 _SPRUNG_RAD = 0.2
 """A joint that turned by so much more than its servo can had been held by the body and was let go."""
 _READINGS = 32
@@ -54,7 +55,8 @@ class SnakeDrive:
         journal: HardwareLog,
         unknown_s: float = UNKNOWN_S,
     ) -> None:
-        self._unknown_s = unknown_s
+        self._unknown_s, known = unknown_s, unknown_s <= KNOWN_S
+        self._frozen_rad, self._frozen_m = (_FROZEN_RAD, _FROZEN_M) if known else (_FROZEN_RAD_LATE, _FROZEN_M_LATE)
         self._chain, self._eye, self._watch, self._settings = chain, eye, watch, settings
         self._clock, self._journal = clock, journal
         self._strain = StrainWatch(settings.limits)
@@ -155,10 +157,11 @@ class SnakeDrive:
                 f"joint {short + 1} was to go to {math.degrees(target[short]):.0f}° and was only told "
                 f"{math.degrees(sent[short]):.0f}°: widen the angle limits in its servo"
             )
-        self._angles, end_s = target, asked_s + way_rad / speed_rad_s + self._settings.settle_s
-        while (left_s := end_s - self._clock.now_s()) > 0:
-            self._clock.sleep(min(_TICK_S, left_s))
+        self._angles, end_s, looked = target, asked_s + way_rad / speed_rad_s + self._settings.settle_s, False
+        while (left_s := end_s - self._clock.now_s()) > 0 or not looked:  # a slow adapter leaves no time, and is looked at too
+            self._clock.sleep(self._watch.next_look_s(min(_TICK_S, max(left_s, 0.0)), self._eye.picture_s))
             self._look()
+            looked = True
 
     def _look(self) -> Sight | None:
         """Look at servos and markers; a row if there is something new to see."""
@@ -205,7 +208,7 @@ class SnakeDrive:
         if self._shape.is_another(markers) or self._shown is None:
             self._shown = span
         unseen_m = max(span[0] - self._shown[1], self._shown[0] - span[1])
-        if unseen_rad > _FROZEN_RAD or unseen_m > _FROZEN_M:
+        if unseen_rad > self._frozen_rad or unseen_m > self._frozen_m:
             raise TrialPausedError(
                 f"joints have turned by {math.degrees(unseen_rad):.0f}°, {100 * max(unseen_m, 0.0):.1f} cm of the markers' "
                 "distance, and the picture shows both markers where they were: the camera hangs or shows another scene. Look at "

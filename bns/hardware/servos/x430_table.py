@@ -115,7 +115,7 @@ XL430_W250 = ServoTable(
         "cw_angle_limit": 0,
         "ccw_angle_limit": _POSITION,
     },
-    needed=("drive_mode", "operating_mode"),
+    needed=("status_return", "drive_mode", "operating_mode"),
     alarms=ALARMS,
     still_steps=3,
     locked_below=64,

@@ -150,7 +150,7 @@ class KheperaIII:
                 return self._once(command, answer, min(times.timeout_s * 2**attempt, left_s), attempt > 0)
             except NoReplyError as error:
                 problem, attempt = str(error), attempt + 1
-        raise RobotLostError(f"{problem}; asked {attempt} times")
+        raise RobotLostError(f"{problem}; asked {attempt} times in {self._clock.now_s() - began_s:.1f} s")
 
     def _once(self, command: bytes, answer: str, timeout_s: float, again: bool = False) -> tuple[str, ...]:
         line = self._link.exchange(command + b"\n", timeout_s, again).decode("latin-1")

@@ -14,7 +14,7 @@ from bns.hardware.safety import Watch
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight
 
-_TICK_S, _POLL_S = 0.1, 0.01
+_TICK_S, _POLL_S, _SUSPECTS_S = 0.1, 0.01, 0.03
 _SAME_S = 1e-4
 """Two times closer than this are one."""
 
@@ -73,17 +73,24 @@ class WheelDrive:
         self._orders.append(Order(asked_s, left, right))
         self._agreement.ordered(asked_s, left, right)
         self._journal.note("command", left_m_s=left, right_m_s=right, duration_s=duration_s)
-        end_s, looks = asked_s + duration_s, 0
+        end_s, slept_s = asked_s + duration_s, 0.0
         while self._clock.now_s() + _TICK_S < end_s:
-            self._clock.sleep(_TICK_S)
+            slept_s += self._sleep()
             self._look()
-            looks += 1
-            if looks % self._heartbeat_looks == 0:
+            if slept_s > (self._heartbeat_looks - 0.5) * _TICK_S:
+                slept_s = 0.0
                 self._agreement.measured(self._clock.now_s(), *self._wheels.speed_m_s())
         self._clock.sleep(end_s - self._clock.now_s())
         while self._look() is None:
             self._clock.sleep(_POLL_S)
         self._ends_s.append(self._clock.now_s())
+
+    def _sleep(self) -> float:
+        """Until the next look: sooner where no picture comes, or one that does not fit; for how long."""
+        tick_s = _SUSPECTS_S if self._agreement.suspects else _TICK_S
+        tick_s = self._watch.next_look_s(tick_s, self._eye.picture_s)
+        self._clock.sleep(tick_s)
+        return tick_s
 
     def finish(self) -> None:
         """The last command goes on until its end has been filmed: a pose after it is needed to know where that was."""

@@ -38,6 +38,8 @@ class Bus:
         self._heard = dict.fromkeys(WIRES, b"")
         self._garbled = False
         self._lock = threading.Lock()
+        self.echoes = False
+        """Whether the adapter hands back what it sends."""
         self.cut_line: Callable[[float], None] = lambda _seconds: None
         self.baud: Callable[[], int | None] = lambda: None
         """At which rate the host speaks; None: as every servo."""
@@ -48,14 +50,19 @@ class Bus:
             answers, spoken = b"", {servo.kind.protocol for servo in self.servos}
             found = {protocol: self._packets(protocol, data) for protocol in WIRES}
             if not any(found[protocol] for protocol in spoken) and any(found.values()):
-                self._clock.fell_silent()  # nobody here speaks that
+                self._fall_silent()  # nobody here speaks that
             for protocol in spoken:
                 for packet in found[protocol]:
                     answer = b"" if self._lost() else self._carried_out(packet, protocol)
                     if not answer:
-                        self._clock.fell_silent()
+                        self._fall_silent()
                     answers += answer
-            return answers
+            return data + answers if self.echoes else answers
+
+    def _fall_silent(self) -> None:
+        """Nobody answers; but an echo may not be on the line yet, and whoever waits for it must not give up."""
+        if not self.echoes:
+            self._clock.fell_silent()
 
     def _packets(self, protocol: int, data: bytes) -> list[Packet]:
         """The whole packets that were heard. What is not in this protocol is noise to those that speak it."""
@@ -96,6 +103,8 @@ class Bus:
         answers = [self._one(servo, kind, parameters, wire) for servo in meant]
         if number == BROADCAST and (kind != PING or protocol == 2):
             return b"".join(answers) if kind == PING else b""  # in protocol 2 each waits for the one before
+        if len({servo.get("return_delay") for servo in meant}) == len(meant):
+            return b"".join(answers)  # one after the other
         return self._on_the_wire(answers, wire)
 
     def _hears(self, servo: Servo, protocol: int) -> bool:
