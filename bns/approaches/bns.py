@@ -6,13 +6,15 @@ the networks learn from that, and the evolution goes on with them.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
-from bns.approaches.parts.base import Option, Options, Setting
+from bns.approaches.parts.base import Choice, Option, Options, Setting
+from bns.approaches.parts.ensemble import USES, Ensemble, WorstSimulator
 from bns.approaches.parts.neuro_simulation import NeuroSimulation
-from bns.bootstrap.trainer import Trainer
+from bns.bootstrap.simulators import NetworkSimulator, Simulator
+from bns.bootstrap.trainer import Learner
 from bns.errors import SpecError
 from bns.tasks import Task
 
@@ -21,24 +23,39 @@ STEPS = 10
 
 
 class BootstrappedNeuroSimulation(NeuroSimulation):
-    """The four steps; driving is the loop's.
+    """The four steps; driving is the loop's. All options go beyond the dissertation.
 
-    ``margin`` goes beyond the dissertation: algorithm 2 rewards touching the edge of a goal, and a small error of the
-    networks then misses it. Goals that are narrower in evolution than on the robot leave room for such errors. They
-    narrow by a tenth of the margin after each round whose fittest controller reaches all of them in simulation, and
-    widen by as much after any other: goals that nobody reaches lead nowhere.
+    ``margin``: algorithm 2 rewards touching the edge of a goal, and a small error of the networks then misses it. Goals
+    that are narrower in evolution than on the robot leave room for such errors. They narrow by a tenth of the margin
+    after each round whose fittest controller reaches all of them in simulation, and widen by as much after any other:
+    goals that nobody reaches lead nowhere.
+
+    ``ensemble``: so many networks for each displacement (`bns.approaches.parts.ensemble`). ``use``: evolution works on
+    their mean, on the one that thinks worst of a controller, or on one of them, drawn for each round.
     """
 
     options: ClassVar[Options] = {
-        "margin": Option(0.0, 0.0, 1.0, "m by which goals become narrower in evolution, all around")
+        "margin": Option(0.0, 0.0, 1.0, "m by which goals become narrower in evolution, all around"),
+        "ensemble": Option(1, 1, 100, "networks for each displacement"),
+        "use": Choice("mean", USES, "what evolution works on where networks are several"),
     }
 
-    def __init__(self, setting: Setting, trainer: Trainer) -> None:
+    def __init__(self, setting: Setting, trainer: Learner) -> None:
         """Goals as wide as they are."""
-        self._narrowed = 0
+        self._narrowed = self._rounds = 0
         if setting.options["margin"]:
             self._check_margin(setting)
         super().__init__(setting, trainer)
+
+    @classmethod
+    def start(cls, setting: Setting) -> Self:
+        """Untrained networks, as many as the options say."""
+        size, use = setting.whole("ensemble"), setting.chosen("use")
+        if size > 1:
+            return cls(setting, Ensemble.start(setting, size))
+        if use != "mean":
+            raise SpecError(f"approach bns+use={use}: there is one network; add networks, such as ensemble=3.")
+        return super().start(setting)
 
     @staticmethod
     def _check_margin(setting: Setting) -> None:
@@ -46,7 +63,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
             raise SpecError(
                 f"approach bns+margin: robot {setting.robot.name} cannot narrow its goals; use bns without a margin."
             )
-        _narrower(setting, setting.options["margin"])
+        _narrower(setting, setting.number("margin"))
 
     def pick(self, evaluation: int) -> np.ndarray:
         """Step 1: the winner of the real-world selection tournament."""
@@ -54,6 +71,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
 
     def advance(self) -> None:
         """Steps 2 and 3: train, copy the training networks over the evolution networks, evolve on those."""
+        self._rounds += 1
         self.train()
         self.copy()
         self.evolve()
@@ -62,9 +80,20 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
             all_reached = scores.goals_reached[best] == len(self.setting.task.goals_m)
             self._narrowed = min(self._narrowed + 1, STEPS) if all_reached else max(self._narrowed - 1, 0)
 
+    def simulator_now(self) -> Simulator:
+        """The networks, or what ``use`` makes of several."""
+        robot, goals, several = self.setting.robot, self.goals(), self.trainer
+        if not isinstance(several, Ensemble) or self.setting.options["use"] == "mean":
+            return super().simulator_now()
+        if self.setting.options["use"] == "worst":
+            members = tuple(NetworkSimulator(robot, goals, networks) for networks in several.networks())
+            return WorstSimulator(members, NetworkSimulator(robot, goals, self.weights))
+        self.weights = several.drawn(self._rounds)
+        return NetworkSimulator(robot, goals, self.weights)
+
     def goals(self) -> Task:
         """The task with goals as narrow as they now are in evolution."""
-        return _narrower(self.setting, self.setting.options["margin"] * self._narrowed / STEPS)
+        return _narrower(self.setting, self.setting.number("margin") * self._narrowed / STEPS)
 
 
 def _narrower(setting: Setting, margin_m: float) -> Task:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -17,6 +18,28 @@ from bns.spec import RunSpec
 def untrained(robot: Robot, key: Key) -> np.ndarray:
     """The networks that a robot's training begins with (networks, W)."""
     return initial_weights(key, len(robot.networks), robot.hidden, robot.input_count, robot.nguyen_widrow)
+
+
+class Learner(Protocol):
+    """What learns from drives: a `Trainer`, or several as one."""
+
+    data: TrainingData
+
+    @property
+    def failures(self) -> int:
+        """How often arithmetic failed."""
+
+    def add(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
+        """Take in what the robot did, as `Trainer.add`."""
+
+    def train(self) -> None:
+        """One round on all training patterns."""
+
+    def evolution_weights(self) -> np.ndarray:
+        """A copy of the networks (networks, W) for evolution to work on."""
+
+    def errors(self) -> tuple[float, float]:
+        """Mean squared errors on training and on validation patterns."""
 
 
 @dataclass
@@ -53,10 +76,13 @@ class Trainer:
             self.robot.learnable(moved),
         )
 
-    def train(self) -> None:
-        """Iterate on all training patterns. A network that is no longer finite begins anew, and is counted."""
-        patterns = self.data.training
-        if self.robot.repeats_inputs:
+    def train(self, times: np.ndarray | None = None) -> None:
+        """Iterate on all training patterns. A network that is no longer finite begins anew, and is counted.
+
+        ``times`` (patterns,): how often each of them counts, where not all count once.
+        """
+        patterns = self.data.training if times is None else self.data.training.counted(times)
+        if self.robot.repeats_inputs or times is not None:
             for net, (inputs, targets, counts) in enumerate(patterns.merged()):
                 self.rule.train_one(net, inputs, targets, counts, len(targets), self.iterations)
         else:
