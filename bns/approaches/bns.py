@@ -6,12 +6,14 @@ the networks learn from that, and the evolution goes on with them.
 
 from __future__ import annotations
 
+from collections import deque
 from typing import ClassVar, Self
 
 import numpy as np
 
 from bns.approaches.parts.base import Choice, Option, Options, Setting
 from bns.approaches.parts.ensemble import USES, Ensemble, WorstSimulator
+from bns.approaches.parts.informed import SNAPSHOTS, most_informative
 from bns.approaches.parts.neuro_simulation import NeuroSimulation
 from bns.bootstrap.simulators import NetworkSimulator, Simulator
 from bns.bootstrap.trainer import Learner
@@ -32,17 +34,22 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
 
     ``ensemble``: so many networks for each displacement (`bns.approaches.parts.ensemble`). ``use``: evolution works on
     their mean, on the one that thinks worst of a controller, or on one of them, drawn for each round.
+
+    ``informed``: step 1 takes, out of this share of the population, fittest first, the controller that networks disagree on
+    most (`bns.approaches.parts.informed`): those of the ensemble, or those of the latest rounds.
     """
 
     options: ClassVar[Options] = {
         "margin": Option(0.0, 0.0, 1.0, "m by which goals become narrower in evolution, all around"),
         "ensemble": Option(1, 1, 100, "networks for each displacement"),
         "use": Choice("mean", USES, "what evolution works on where networks are several"),
+        "informed": Option(0.0, 0.0, 1.0, "share of the population, fittest first, of which the most informative is driven"),
     }
 
     def __init__(self, setting: Setting, trainer: Learner) -> None:
         """Goals as wide as they are."""
         self._narrowed = self._rounds = 0
+        self._latest: deque[np.ndarray] = deque(maxlen=SNAPSHOTS)
         if setting.options["margin"]:
             self._check_margin(setting)
         super().__init__(setting, trainer)
@@ -66,7 +73,13 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         _narrower(setting, setting.number("margin"))
 
     def pick(self, evaluation: int) -> np.ndarray:
-        """Step 1: the winner of the real-world selection tournament."""
+        """Step 1: the winner of the real-world selection tournament, or what the committee disagrees on."""
+        if share := self.setting.number("informed"):
+            several, evolver = self.trainer, self.evolver
+            committee = several.networks() if isinstance(several, Ensemble) else list(self._latest)
+            found = most_informative(self.setting.robot, committee, evolver.population, evolver.order, share)
+            if found is not None:
+                return self.plan(evolver.population.controller(found))
         return self.plan(self.evolver.pick(evaluation))
 
     def advance(self) -> None:
@@ -74,6 +87,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         self._rounds += 1
         self.train()
         self.copy()
+        self._latest.append(self.weights)
         self.evolve()
         if self.setting.options["margin"]:
             scores, best = self.evolver.scores, self.evolver.order[0]
