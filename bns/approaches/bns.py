@@ -13,10 +13,11 @@ import numpy as np
 
 from bns.approaches.parts.base import Choice, Option, Options, Setting
 from bns.approaches.parts.ensemble import USES, Ensemble, WorstSimulator
+from bns.approaches.parts.hybrid import MODELS, NO_MODEL, Arcs, HybridSimulator, arcs_of
 from bns.approaches.parts.informed import SNAPSHOTS, most_informative
 from bns.approaches.parts.neuro_simulation import NeuroSimulation
 from bns.bootstrap.simulators import NetworkSimulator, Simulator
-from bns.bootstrap.trainer import Learner
+from bns.bootstrap.trainer import Learner, Trainer
 from bns.errors import SpecError
 from bns.tasks import Task
 
@@ -37,6 +38,8 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
 
     ``informed``: step 1 takes, out of this share of the population, fittest first, the controller that networks disagree on
     most (`bns.approaches.parts.informed`): those of the ensemble, or those of the latest rounds.
+
+    ``model``: a physics model foretells first, and the networks learn what it gets wrong (`bns.approaches.parts.hybrid`).
     """
 
     options: ClassVar[Options] = {
@@ -44,10 +47,12 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         "ensemble": Option(1, 1, 100, "networks for each displacement"),
         "use": Choice("mean", USES, "what evolution works on where networks are several"),
         "informed": Option(0.0, 0.0, 1.0, "share of the population, fittest first, of which the most informative is driven"),
+        "model": Choice(NO_MODEL, MODELS, "physics whose errors the networks learn", (".yaml", ".yml")),
     }
 
-    def __init__(self, setting: Setting, trainer: Learner) -> None:
-        """Goals as wide as they are."""
+    def __init__(self, setting: Setting, trainer: Learner, arcs: Arcs | None = None) -> None:
+        """Goals as wide as they are; arcs: the model whose errors the trainer learns."""
+        self._arcs = arcs
         self._narrowed = self._rounds = 0
         self._latest: deque[np.ndarray] = deque(maxlen=SNAPSHOTS)
         if setting.options["margin"]:
@@ -57,12 +62,13 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     @classmethod
     def start(cls, setting: Setting) -> Self:
         """Untrained networks, as many as the options say."""
-        size, use = setting.whole("ensemble"), setting.chosen("use")
-        if size > 1:
-            return cls(setting, Ensemble.start(setting, size))
-        if use != "mean":
+        size, use, arcs = setting.whole("ensemble"), setting.chosen("use"), arcs_of(setting)
+        if size == 1 and use != "mean":
             raise SpecError(f"approach bns+use={use}: there is one network; add networks, such as ensemble=3.")
-        return super().start(setting)
+        known = arcs.displacements if arcs else None
+        if size > 1:
+            return cls(setting, Ensemble.start(setting, size, known), arcs)
+        return cls(setting, Trainer.start(setting.robot, setting.key, setting.spec, known), arcs)
 
     @staticmethod
     def _check_margin(setting: Setting) -> None:
@@ -96,14 +102,17 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
 
     def simulator_now(self) -> Simulator:
         """The networks, or what ``use`` makes of several."""
-        robot, goals, several = self.setting.robot, self.goals(), self.trainer
-        if not isinstance(several, Ensemble) or self.setting.options["use"] == "mean":
-            return super().simulator_now()
-        if self.setting.options["use"] == "worst":
-            members = tuple(NetworkSimulator(robot, goals, networks) for networks in several.networks())
-            return WorstSimulator(members, NetworkSimulator(robot, goals, self.weights))
-        self.weights = several.drawn(self._rounds)
-        return NetworkSimulator(robot, goals, self.weights)
+        several, use = self.trainer, self.setting.chosen("use")
+        if isinstance(several, Ensemble) and use == "worst":
+            return WorstSimulator(tuple(map(self._on, several.networks())), self._on(self.weights))
+        if isinstance(several, Ensemble) and use == "sampled":
+            self.weights = several.drawn(self._rounds)
+        return self._on(self.weights)
+
+    def _on(self, weights: np.ndarray) -> Simulator:
+        """These networks, after the model where there is one."""
+        networks = NetworkSimulator(self.setting.robot, self.goals(), weights)
+        return networks if self._arcs is None else HybridSimulator(self._arcs.robot, self.goals(), self._arcs, networks)
 
     def goals(self) -> Task:
         """The task with goals as narrow as they now are in evolution."""

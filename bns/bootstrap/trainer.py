@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,7 +11,7 @@ import numpy as np
 from bns.engine.patterns import PatternSet, TrainingData
 from bns.engine.philox import Key
 from bns.engine.rprop import Rprop
-from bns.engine.snn import INPUTS, initial_weights, predict
+from bns.engine.snn import INPUTS, PER_NEURON, initial_weights, predict
 from bns.robots.base import Robot
 from bns.spec import RunSpec
 
@@ -18,6 +19,19 @@ from bns.spec import RunSpec
 def untrained(robot: Robot, key: Key) -> np.ndarray:
     """The networks that a robot's training begins with (networks, W)."""
     return initial_weights(key, len(robot.networks), robot.hidden, robot.input_count, robot.nguyen_widrow)
+
+
+Known = Callable[[np.ndarray], np.ndarray]
+"""Displacements (n, networks), SI, of commands (n, components)."""
+
+
+def _beginning(robot: Robot, key: Key, known: Known | None) -> np.ndarray:
+    """Untrained networks, which say 0 where they only add to what is known."""
+    weights = untrained(robot, key)
+    if known:
+        weights[:, PER_NEURON - 1 :: PER_NEURON] = 0
+        weights[:, -1] = 0
+    return weights
 
 
 class Learner(Protocol):
@@ -52,25 +66,29 @@ class Trainer:
     rule: Rprop
     data: TrainingData
     failures: int = 0
+    known: Known | None = None
+    """What is known of commands without networks: these learn the rest, and begin with no rest."""
 
     @classmethod
-    def start(cls, robot: Robot, key: Key, spec: RunSpec) -> Trainer:
+    def start(cls, robot: Robot, key: Key, spec: RunSpec, known: Known | None = None) -> Trainer:
         """Untrained networks and no patterns."""
-        weights = untrained(robot, key)
+        weights = _beginning(robot, key, known)
         return cls(
             robot,
             key,
             spec.training_iterations_per_evaluation,
             Rprop.start(weights, spec.training_algorithm, robot.sigmoid_output, robot.flat_spot),
             TrainingData.empty(INPUTS, len(robot.networks)),
+            known=known,
         )
 
     def add(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
         """Take in what the robot did: measured poses (m, columns) of its commands (n, components), m <= n."""
         moved = self.robot.measured_displacements(poses)
+        rest = moved - self.known(commands[: len(poses)]) if self.known else moved
         self.failures += self.data.add(
             self.robot.inputs(commands)[:, : len(poses)],
-            self.robot.targets(moved),
+            self.robot.targets(rest),
             self.key,
             evaluation,
             self.robot.learnable(moved),
@@ -89,7 +107,7 @@ class Trainer:
             self.rule.train(patterns.inputs, patterns.targets, patterns.count, self.iterations)
         for failed in np.flatnonzero(~np.isfinite(self.rule.weights).all(axis=1)):
             self.failures += 1
-            self.rule.restart(int(failed), untrained(self.robot, self.key)[failed])
+            self.rule.restart(int(failed), _beginning(self.robot, self.key, self.known)[failed])
 
     def evolution_weights(self) -> np.ndarray:
         """A copy of the networks for evolution to work on."""

@@ -12,8 +12,8 @@ from math import factorial
 import numpy as np
 
 from bns.approaches.parts.base import Setting
-from bns.bootstrap.simulators import NetworkSimulator
-from bns.bootstrap.trainer import Trainer
+from bns.bootstrap.simulators import Simulator
+from bns.bootstrap.trainer import Known, Trainer
 from bns.engine.evolution import Population
 from bns.engine.philox import Purpose, uniforms
 from bns.engine.snn import side_by_side
@@ -35,10 +35,10 @@ class Ensemble:
         """How often each pattern counts for each member, (members, patterns)."""
 
     @classmethod
-    def start(cls, setting: Setting, size: int) -> Ensemble:
+    def start(cls, setting: Setting, size: int, known: Known | None = None) -> Ensemble:
         """Untrained networks; the first member's are those that a run without an ensemble begins with."""
         keys = [setting.key, *(setting.own_key(f"network {number}") for number in range(1, size))]
-        return cls(setting, [Trainer.start(setting.robot, key, setting.spec) for key in keys])
+        return cls(setting, [Trainer.start(setting.robot, key, setting.spec, known) for key in keys])
 
     @property
     def failures(self) -> int:
@@ -81,8 +81,8 @@ class Ensemble:
 class WorstSimulator:
     """A controller is as fit as the member says that thinks least of it; paths are those of the members' mean."""
 
-    members: tuple[NetworkSimulator, ...]
-    mean: NetworkSimulator
+    members: tuple[Simulator, ...]
+    mean: Simulator
     foretells: bool = True
 
     def score(self, population: Population, stream: RandomStream | None = None, parents: Scores | None = None) -> Scores:

@@ -20,8 +20,8 @@ class NeuroSimulation(Evolving):
 
     def __init__(self, setting: Setting, trainer: Learner) -> None:
         """With networks as they are."""
-        self.trainer, self.weights = trainer, trainer.evolution_weights()
-        super().__init__(setting, NetworkSimulator(setting.robot, setting.task, self.weights))
+        self.setting, self.trainer, self.weights = setting, trainer, trainer.evolution_weights()
+        super().__init__(setting, self.simulator_now())
 
     @classmethod
     def start(cls, setting: Setting) -> Self:
