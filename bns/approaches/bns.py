@@ -16,6 +16,7 @@ from bns.approaches.parts.ensemble import USES, Ensemble, WorstSimulator
 from bns.approaches.parts.hybrid import MODELS, NO_MODEL, Arcs, HybridSimulator, arcs_of
 from bns.approaches.parts.informed import SNAPSHOTS, most_informative
 from bns.approaches.parts.neuro_simulation import NeuroSimulation
+from bns.approaches.parts.surprise import IN_A_ROW, Surprise
 from bns.bootstrap.simulators import NetworkSimulator, Simulator
 from bns.bootstrap.trainer import Learner, Trainer
 from bns.errors import SpecError
@@ -39,6 +40,10 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     ``informed``: step 1 takes, out of this share of the population, fittest first, the controller that networks disagree on
     most (`bns.approaches.parts.informed`): those of the ensemble, or those of the latest rounds.
 
+    ``window``: networks learn from so many latest drives. ``restart``: they begin with untrained weights, and the latest drives
+    alone, once these were foretold worse than usual by that factor (`bns.approaches.parts.surprise`). The population goes on.
+    Both are for robots that change.
+
     ``model``: a physics model foretells first, and the networks learn what it gets wrong (`bns.approaches.parts.hybrid`).
     """
 
@@ -48,12 +53,15 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         "use": Choice("mean", USES, "what evolution works on where networks are several"),
         "informed": Option(0.0, 0.0, 1.0, "share of the population, fittest first, of which the most informative is driven"),
         "model": Choice(NO_MODEL, MODELS, "physics whose errors the networks learn", (".yaml", ".yml")),
+        "window": Option(0, 0, 100_000, "latest drives that networks learn from; 0: all"),
+        "restart": Option(0.0, 0.0, 1000.0, "times the usual error at which a drive is a surprise; 0: nothing is"),
     }
 
     def __init__(self, setting: Setting, trainer: Learner, arcs: Arcs | None = None) -> None:
         """Goals as wide as they are; arcs: the model whose errors the trainer learns."""
         self._arcs = arcs
         self._narrowed = self._rounds = 0
+        self._surprise = Surprise(setting.number("restart"))
         self._latest: deque[np.ndarray] = deque(maxlen=SNAPSHOTS)
         if setting.options["margin"]:
             self._check_margin(setting)
@@ -87,6 +95,22 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
             if found is not None:
                 return self.plan(evolver.population.controller(found))
         return self.plan(self.evolver.pick(evaluation))
+
+    def learn(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
+        """Take what a drive measured into the training set, and older drives out if the options say so."""
+        error = self._error(commands[: len(poses)], poses) if self.setting.options["restart"] else 0.0
+        super().learn(commands, poses, evaluation)
+        if window := self.setting.whole("window"):
+            self.trainer.forget(window)
+        if self.setting.options["restart"] and self._surprise.changed(error):
+            self.trainer.forget(IN_A_ROW)
+            self.trainer.restart()
+
+    def _error(self, commands: np.ndarray, poses: np.ndarray) -> float:
+        """Root of the mean square of what the simulator gets wrong of a drive, command by command, in units of targets."""
+        robot = self.setting.robot
+        said, seen = (robot.measured_displacements(path) for path in (self.simulator.poses(commands), poses))
+        return float(np.sqrt(np.mean((robot.targets(said) - robot.targets(seen)) ** 2)))
 
     def advance(self) -> None:
         """Steps 2 and 3: train, copy the training networks over the evolution networks, evolve on those."""

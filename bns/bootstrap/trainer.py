@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -49,6 +49,12 @@ class Learner(Protocol):
     def train(self) -> None:
         """One round on all training patterns."""
 
+    def forget(self, keep: int) -> None:
+        """Drop the patterns of all drives but the latest so many."""
+
+    def restart(self) -> None:
+        """Begin with untrained networks again."""
+
     def evolution_weights(self) -> np.ndarray:
         """A copy of the networks (networks, W) for evolution to work on."""
 
@@ -68,6 +74,8 @@ class Trainer:
     failures: int = 0
     known: Known | None = None
     """What is known of commands without networks: these learn the rest, and begin with no rest."""
+    drives: list[tuple[int, int]] = field(default_factory=list)
+    """Training and validation patterns of each drive that is remembered."""
 
     @classmethod
     def start(cls, robot: Robot, key: Key, spec: RunSpec, known: Known | None = None) -> Trainer:
@@ -86,6 +94,7 @@ class Trainer:
         """Take in what the robot did: measured poses (m, columns) of its commands (n, components), m <= n."""
         moved = self.robot.measured_displacements(poses)
         rest = moved - self.known(commands[: len(poses)]) if self.known else moved
+        before = self.data.training.count, self.data.validation.count
         self.failures += self.data.add(
             self.robot.inputs(commands)[:, : len(poses)],
             self.robot.targets(rest),
@@ -93,6 +102,18 @@ class Trainer:
             evaluation,
             self.robot.learnable(moved),
         )
+        self.drives.append((self.data.training.count - before[0], self.data.validation.count - before[1]))
+
+    def forget(self, keep: int) -> None:
+        """Drop the patterns of all drives but the latest so many."""
+        old, self.drives = self.drives[:-keep], self.drives[-keep:]
+        self.data.training.forget(sum(training for training, _ in old))
+        self.data.validation.forget(sum(validation for _, validation in old))
+
+    def restart(self) -> None:
+        """Begin with untrained networks again."""
+        for net, weights in enumerate(_beginning(self.robot, self.key, self.known)):
+            self.rule.restart(net, weights)
 
     def train(self, times: np.ndarray | None = None) -> None:
         """Iterate on all training patterns. A network that is no longer finite begins anew, and is counted.

@@ -45,6 +45,13 @@ class PatternSet:
         self.present[:, self.count : new] = True if present is None else present
         self.count = new
 
+    def forget(self, first: int) -> None:
+        """Drop the first so many patterns."""
+        left = self.count - first
+        for kept in (self.inputs, self.targets, self.present):
+            kept[:, :left] = kept[:, first : self.count].copy()
+        self.count = left
+
     def in_use(self) -> np.ndarray:
         """A copy of the inputs so far, (inputs, count)."""
         return self.inputs[:, : self.count].copy()

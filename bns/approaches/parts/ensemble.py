@@ -53,6 +53,16 @@ class Ensemble:
         times = np.searchsorted(_POISSON, np.array(draws).reshape(len(draws), new), side="right")
         self.times = np.hstack([self.times, times.astype(np.float32)])
 
+    def forget(self, keep: int) -> None:
+        """Drop what all members learned from, but for the latest drives."""
+        self.members[0].forget(keep)
+        self.times = self.times[:, self.times.shape[1] - self.data.training.count :]
+
+    def restart(self) -> None:
+        """All members."""
+        for member in self.members:
+            member.restart()
+
     def train(self) -> None:
         """Every member, on its own rows."""
         for member, times in zip(self.members, self.times, strict=True):
