@@ -173,6 +173,12 @@ def test_a_wheel_that_wears_is_noticed_within_three_drives_and_a_world_that_stay
         assert [i + 1 for i in range(1, 26) if found[i] < found[i - 1]] == dropped
 
 
+def test_the_snake_forgets_likewise():
+    snake = {"robot": "snake", "task": "two-regions", "evaluations": 9}
+    every, latest = (evals(approach=f"bns{more}", **snake)["training_patterns"] for more in ("", "+window=2+restart=2"))
+    assert 0 < latest[-1] < every[-1]
+
+
 @pytest.mark.slow
 def test_the_command_line_takes_a_change(bns, worn, tmp_path):
     small = [f"--{key.replace('_', '-')}={value}" for key, value in SMALL.items()]
