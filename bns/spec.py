@@ -96,7 +96,8 @@ class RunSpec:
     )
     approach: str = _field(
         "bns",
-        "what learns from the drives and picks the next one; its options follow its name: bns+margin=0.03+ensemble=3",
+        "what learns from the drives and picks the next one; its options (docs/approaches.md) follow its name: "
+        "bns+margin=0.03+ensemble=3",
         parts=APPROACHES,
         later=True,
     )
