@@ -24,16 +24,25 @@ class Option(NamedTuple):
         return isinstance(self.default, int)
 
 
-Options = Mapping[str, Option]
+class Choice(NamedTuple):
+    """A word out of some that an approach lets one choose; ``or_file``: endings of files that may stand instead of one."""
+
+    default: str
+    choices: tuple[str, ...]
+    text: str
+    or_file: tuple[str, ...] = ()
 
 
-def parsed_options(name: str, options: Options) -> dict[str, float]:
+Options = Mapping[str, Option | Choice]
+
+
+def parsed_options(name: str, options: Options) -> dict[str, float | str]:
     """Values of an approach's options in a name such as ``on-robot+population=10``; those not given at their defaults.
 
     SpecError for an option that there is none of, twice the same, or a value that is not allowed.
     """
     approach, *given = name.split(OPTION_MARK)
-    values = {option: known.default for option, known in options.items()}
+    values: dict[str, float | str] = {option: known.default for option, known in options.items()}
     for number, part in enumerate(given):
         option, _, text = part.partition("=")
         if not options:
@@ -42,8 +51,16 @@ def parsed_options(name: str, options: Options) -> dict[str, float]:
             raise SpecError(unknown_name(f"option of approach {approach}", option, options))
         if option in {earlier.partition("=")[0] for earlier in given[:number]}:
             raise SpecError(f"approach {name!r}: {option} is given twice; keep one of them.")
-        values[option] = _value(f"approach {name!r}: {option}", text, options[option])
+        known, where = options[option], f"approach {name!r}: {option}"
+        values[option] = _word(where, text, known) if isinstance(known, Choice) else _value(where, text, known)
     return values
+
+
+def _word(where: str, text: str, option: Choice) -> str:
+    if text not in option.choices and not text.endswith(option.or_file or ("\0",)):
+        files = f", or a file ending in {' or '.join(option.or_file)}" if option.or_file else ""
+        raise SpecError(f"{where} is {text!r}; it must be one of {', '.join(option.choices)}{files} ({option.text}).")
+    return text
 
 
 def _value(where: str, text: str, option: Option) -> float:

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from bns.change import Change, change_of
 from bns.errors import SpecError, unknown_name
 from bns.options import OPTION_MARK, parsed_options
 from bns.registry import APPROACHES, WORLDS, Registry
@@ -41,12 +42,15 @@ def _field(
     or_file: tuple[str, ...] = (),
     parts: Registry | None = None,
     later: bool = False,
+    changes: bool = False,
 ) -> Any:
     """``or_file``: endings of file names that may stand instead of one of the choices; ``parts``: so may a package's part.
 
     ``later``: the parameter came after runs had been named without it, so that its default is left out of their names.
+    ``changes``: two values may follow one another, as `bns.change` says.
     """
-    bounds = {"low": low, "high": high, "choices": choices, "or_file": or_file, "parts": parts, "later": later}
+    bounds = {"low": low, "high": high, "choices": choices, "or_file": or_file, "parts": parts}
+    bounds |= {"later": later, "changes": changes}
     return dataclasses.field(default=default, metadata={"help": text, **bounds})
 
 
@@ -62,10 +66,12 @@ class RunSpec:
     task: str = _field("circle", "goal task of that robot")
     world: str = _field(
         "substitute",
-        "what answers a controller, or a model file (.yaml) that physics drives",
+        "what answers a controller, or a model file (.yaml) that physics drives; one that changes at evaluation 50: "
+        "'physics>worn.yaml@50'",
         choices=("substitute", "physics", "robot"),
         or_file=(".yaml", ".yml"),
         parts=WORLDS,
+        changes=True,
     )
     seed: int = _field(0, "seed of this run", low=0, high=2**32 - 1)
     root_seed: int = _field(0, "seed of the whole study", low=0, high=2**32 - 1)
@@ -90,7 +96,8 @@ class RunSpec:
     )
     approach: str = _field(
         "bns",
-        "what learns from the drives and picks the next one; its options follow its name: precomputed+data=0.5",
+        "what learns from the drives and picks the next one; its options (docs/approaches.md) follow its name: "
+        "bns+margin=0.03+ensemble=3",
         parts=APPROACHES,
         later=True,
     )
@@ -106,6 +113,11 @@ class RunSpec:
             raise SpecError(
                 f"min_commands is {self.min_commands} and max_commands {self.max_commands}; "
                 "the shortest list must not be longer than the longest: set both."
+            )
+        if (change := change_of(self.world)) and change.at > self.evaluations:
+            raise SpecError(
+                f"world is {self.world!r}, which changes at evaluation {change.at}; the run has {self.evaluations} evaluations: "
+                "let it change earlier, or set more evaluations."
             )
 
     def canonical_json(self) -> str:
@@ -145,6 +157,9 @@ def checked(name: str, value: Any) -> Any:
     if not fits:
         raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.")
     if wanted is str:
+        if meta["changes"] and (change := change_of(value)):
+            _check_change(name, value, change)
+            return value
         if meta["parts"] and not meta["choices"] and value != FIELDS[name].default:
             _check_part(meta["parts"], value)
         if meta["choices"] and value not in meta["choices"] and not value.endswith(meta["or_file"] or ("\0",)):
@@ -156,6 +171,13 @@ def checked(name: str, value: Any) -> Any:
     if not math.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):
         raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.{_percent_hint(name, value)}")
     return value
+
+
+def _check_change(name: str, value: str, change: Change) -> None:
+    """SpecError if one of the two is no such value, or a robot that nobody can swap."""
+    for world in (change.before, change.after):
+        if checked(name, world) == "robot":
+            raise SpecError(f"{name} is {value!r}; a real robot does not change by itself: take simulated worlds.")
 
 
 def _check_part(parts: Registry, value: str) -> None:

@@ -11,7 +11,7 @@ import bns
 
 PACKAGE = Path(bns.__file__).parent
 FLOORS = (
-    {"errors", "examples", "extras", "options", "registry", "safe_yaml", "shipped", "spec", "measurements", "__init__"},
+    {"change", "errors", "examples", "extras", "options", "registry", "safe_yaml", "shipped", "spec", "measurements", "__init__"},
     {"engine"},
     {"tasks"},
     {"robots"},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bns.approaches.parts.base import Approach, Setting
+from bns.approaches.parts.hybrid import NO_MODEL
 from bns.engine.philox import Key
 from bns.errors import SpecError
 from bns.options import OPTION_MARK, parsed_options
@@ -26,5 +27,10 @@ def start_approach(robot: Robot, task: Task, key: Key, spec: RunSpec) -> Approac
 
 def check_networked(spec: RunSpec) -> None:
     """SpecError if the approach has no networks that could be kept."""
-    if not approach_named(spec.approach).networked:
+    kind = approach_named(spec.approach)
+    if not kind.networked:
         raise SpecError(f"the approach {spec.approach} has no networks to write; leave --save-snn out.")
+    if parsed_options(spec.approach, kind.options).get("model", NO_MODEL) != NO_MODEL:
+        raise SpecError(
+            f"the approach {spec.approach} has networks that know only what its model gets wrong; leave --save-snn out."
+        )

@@ -109,7 +109,7 @@ class Anytime(Physical):
         self.simulator = UncertainSimulator(self.robot, self.setting.task, model, True, self.space, self.known)
         spec, key = self.setting.spec, self.setting.own_key(f"restart {self.updates}")
         fresh = self.robot.initial_population(key, spec.population_size, spec.min_commands, spec.max_commands)
-        worst = self.evolver.order[len(self.evolver.order) - round(self.setting.options["restart"] * len(fresh)) :]
+        worst = self.evolver.order[len(self.evolver.order) - round(self.setting.number("restart") * len(fresh)) :]
         self.evolver.replace(worst, fresh)
 
 

@@ -6,13 +6,19 @@ the networks learn from that, and the evolution goes on with them.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections import deque
+from typing import ClassVar, Self
 
 import numpy as np
 
-from bns.approaches.parts.base import Option, Options, Setting
+from bns.approaches.parts.base import Choice, Option, Options, Setting
+from bns.approaches.parts.ensemble import USES, Ensemble, WorstSimulator
+from bns.approaches.parts.hybrid import MODELS, NO_MODEL, Arcs, HybridSimulator, arcs_of
+from bns.approaches.parts.informed import SNAPSHOTS, most_informative
 from bns.approaches.parts.neuro_simulation import NeuroSimulation
-from bns.bootstrap.trainer import Trainer
+from bns.approaches.parts.surprise import IN_A_ROW, Surprise
+from bns.bootstrap.simulators import NetworkSimulator, Simulator
+from bns.bootstrap.trainer import Learner, Trainer
 from bns.errors import SpecError
 from bns.tasks import Task
 
@@ -21,24 +27,56 @@ STEPS = 10
 
 
 class BootstrappedNeuroSimulation(NeuroSimulation):
-    """The four steps; driving is the loop's.
+    """The four steps; driving is the loop's. All options go beyond the dissertation.
 
-    ``margin`` goes beyond the dissertation: algorithm 2 rewards touching the edge of a goal, and a small error of the
-    networks then misses it. Goals that are narrower in evolution than on the robot leave room for such errors. They
-    narrow by a tenth of the margin after each round whose fittest controller reaches all of them in simulation, and
-    widen by as much after any other: goals that nobody reaches lead nowhere.
+    ``margin``: algorithm 2 rewards touching the edge of a goal, and a small error of the networks then misses it. Goals
+    that are narrower in evolution than on the robot leave room for such errors. They narrow by a tenth of the margin
+    after each round whose fittest controller reaches all of them in simulation, and widen by as much after any other:
+    goals that nobody reaches lead nowhere.
+
+    ``ensemble``: so many networks for each displacement (`bns.approaches.parts.ensemble`). ``use``: evolution works on
+    their mean, on the one that thinks worst of a controller, or on one of them, drawn for each round.
+
+    ``informed``: step 1 takes, out of this share of the population, fittest first, the controller that networks disagree on
+    most (`bns.approaches.parts.informed`): those of the ensemble, or those of the latest rounds.
+
+    ``window``: networks learn from so many latest drives. ``restart``: they begin with untrained weights, and the latest drives
+    alone, once these were foretold worse than usual by that factor (`bns.approaches.parts.surprise`). The population goes on.
+    Both are for robots that change.
+
+    ``model``: a physics model foretells first, and the networks learn what it gets wrong (`bns.approaches.parts.hybrid`).
     """
 
     options: ClassVar[Options] = {
-        "margin": Option(0.0, 0.0, 1.0, "m by which goals become narrower in evolution, all around")
+        "margin": Option(0.0, 0.0, 1.0, "m by which goals become narrower in evolution, all around"),
+        "ensemble": Option(1, 1, 100, "networks for each displacement"),
+        "use": Choice("mean", USES, "what evolution works on where networks are several"),
+        "informed": Option(0.0, 0.0, 1.0, "share of the population, fittest first, of which the most informative is driven"),
+        "model": Choice(NO_MODEL, MODELS, "physics whose errors the networks learn", (".yaml", ".yml")),
+        "window": Option(0, 0, 100_000, "latest drives that networks learn from; 0: all"),
+        "restart": Option(0.0, 0.0, 1000.0, "times the usual error at which a drive is a surprise; 0: nothing is"),
     }
 
-    def __init__(self, setting: Setting, trainer: Trainer) -> None:
-        """Goals as wide as they are."""
-        self._narrowed = 0
+    def __init__(self, setting: Setting, trainer: Learner, arcs: Arcs | None = None) -> None:
+        """Goals as wide as they are; arcs: the model whose errors the trainer learns."""
+        self._arcs = arcs
+        self._narrowed = self._rounds = 0
+        self._surprise = Surprise(setting.number("restart"))
+        self._latest: deque[np.ndarray] = deque(maxlen=SNAPSHOTS)
         if setting.options["margin"]:
             self._check_margin(setting)
         super().__init__(setting, trainer)
+
+    @classmethod
+    def start(cls, setting: Setting) -> Self:
+        """Untrained networks, as many as the options say."""
+        size, use, arcs = setting.whole("ensemble"), setting.chosen("use"), arcs_of(setting)
+        if size == 1 and use != "mean":
+            raise SpecError(f"approach bns+use={use}: there is one network; add networks, such as ensemble=3.")
+        known = arcs.displacements if arcs else None
+        if size > 1:
+            return cls(setting, Ensemble.start(setting, size, known), arcs)
+        return cls(setting, Trainer.start(setting.robot, setting.key, setting.spec, known), arcs)
 
     @staticmethod
     def _check_margin(setting: Setting) -> None:
@@ -46,25 +84,63 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
             raise SpecError(
                 f"approach bns+margin: robot {setting.robot.name} cannot narrow its goals; use bns without a margin."
             )
-        _narrower(setting, setting.options["margin"])
+        _narrower(setting, setting.number("margin"))
 
     def pick(self, evaluation: int) -> np.ndarray:
-        """Step 1: the winner of the real-world selection tournament."""
+        """Step 1: the winner of the real-world selection tournament, or what the committee disagrees on."""
+        if share := self.setting.number("informed"):
+            several, evolver = self.trainer, self.evolver
+            committee = several.networks() if isinstance(several, Ensemble) else list(self._latest)
+            found = most_informative(self.setting.robot, committee, evolver.population, evolver.order, share)
+            if found is not None:
+                return self.plan(evolver.population.controller(found))
         return self.plan(self.evolver.pick(evaluation))
+
+    def learn(self, commands: np.ndarray, poses: np.ndarray, evaluation: int) -> None:
+        """Take what a drive measured into the training set, and older drives out if the options say so."""
+        error = self._error(commands[: len(poses)], poses) if self.setting.options["restart"] else 0.0
+        super().learn(commands, poses, evaluation)
+        if window := self.setting.whole("window"):
+            self.trainer.forget(window)
+        if self.setting.options["restart"] and self._surprise.changed(error):
+            self.trainer.forget(IN_A_ROW)
+            self.trainer.restart()
+
+    def _error(self, commands: np.ndarray, poses: np.ndarray) -> float:
+        """Root of the mean square of what the simulator gets wrong of a drive, command by command, in units of targets."""
+        robot = self.setting.robot
+        said, seen = (robot.measured_displacements(path) for path in (self.simulator.poses(commands), poses))
+        return float(np.sqrt(np.mean((robot.targets(said) - robot.targets(seen)) ** 2)))
 
     def advance(self) -> None:
         """Steps 2 and 3: train, copy the training networks over the evolution networks, evolve on those."""
+        self._rounds += 1
         self.train()
         self.copy()
+        self._latest.append(self.weights)
         self.evolve()
         if self.setting.options["margin"]:
             scores, best = self.evolver.scores, self.evolver.order[0]
             all_reached = scores.goals_reached[best] == len(self.setting.task.goals_m)
             self._narrowed = min(self._narrowed + 1, STEPS) if all_reached else max(self._narrowed - 1, 0)
 
+    def simulator_now(self) -> Simulator:
+        """The networks, or what ``use`` makes of several."""
+        several, use = self.trainer, self.setting.chosen("use")
+        if isinstance(several, Ensemble) and use == "worst":
+            return WorstSimulator(tuple(map(self._on, several.networks())), self._on(self.weights))
+        if isinstance(several, Ensemble) and use == "sampled":
+            self.weights = several.drawn(self._rounds)
+        return self._on(self.weights)
+
+    def _on(self, weights: np.ndarray) -> Simulator:
+        """These networks, after the model where there is one."""
+        networks = NetworkSimulator(self.setting.robot, self.goals(), weights)
+        return networks if self._arcs is None else HybridSimulator(self._arcs.robot, self.goals(), self._arcs, networks)
+
     def goals(self) -> Task:
         """The task with goals as narrow as they now are in evolution."""
-        return _narrower(self.setting, self.setting.options["margin"] * self._narrowed / STEPS)
+        return _narrower(self.setting, self.setting.number("margin") * self._narrowed / STEPS)
 
 
 def _narrower(setting: Setting, margin_m: float) -> Task:

@@ -77,7 +77,7 @@ class Transferability(Physical):
         super().__init__(setting, robot, space)
         self.archive, self.fixed = TransferArchive(), PhysicsSimulator(robot, setting.task, space.drawing)
         self.evolver = self.pareto = ParetoEvolver.start(robot, setting.task, setting.key, setting.spec, self.fixed)
-        self.pareto.tolerated_m = setting.options["tolerated"] * robot.radii_m[0]
+        self.pareto.tolerated_m = setting.number("tolerated") * robot.radii_m[0]
         self.pareto.begin(self.fixed)
 
     def pick(self, evaluation: int) -> np.ndarray:

@@ -57,9 +57,7 @@ class Recorder:
         self._path = (np.empty((0, 0)), self.last_poses, self.last_poses)
         if self._full:
             self._probes = robot.random_controllers(key, PROBES, PROBE_COMMANDS)
-            self._probe_world = [
-                self._final(self._drive(self._probes.controller(i), Purpose.PROBE, 1 + i)) for i in range(PROBES)
-            ]
+            self._probe_world = self._probed()
             self._probe_before: list[np.ndarray] | None = None
 
     def add_evaluated(self, evaluation: int, drive: Drive, simulator: Simulator) -> None:
@@ -150,7 +148,13 @@ class Recorder:
                 best_fitness_world=self._robot.evaluate_path(driven, self._task)[0],
                 mean_fitness=generation.mean_fitness,
             )
+        if evaluation == getattr(self._world, "changes_at", None):
+            self._probe_world = self._probed()
         self._add_probes(evaluation, self._probes, approach.simulator)
+
+    def _probed(self) -> list[np.ndarray]:
+        """Where the probes end in the world as it is now."""
+        return [self._final(self._drive(self._probes.controller(i), Purpose.PROBE, 1 + i)) for i in range(PROBES)]
 
     def _add_path(
         self, evaluation: int, who: str, controller: np.ndarray, poses: np.ndarray, simulated: np.ndarray

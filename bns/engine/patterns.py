@@ -45,9 +45,22 @@ class PatternSet:
         self.present[:, self.count : new] = True if present is None else present
         self.count = new
 
+    def forget(self, first: int) -> None:
+        """Drop the first so many patterns."""
+        left = self.count - first
+        for kept in (self.inputs, self.targets, self.present):
+            kept[:, :left] = kept[:, first : self.count].copy()
+        self.count = left
+
     def in_use(self) -> np.ndarray:
         """A copy of the inputs so far, (inputs, count)."""
         return self.inputs[:, : self.count].copy()
+
+    def counted(self, times: np.ndarray) -> PatternSet:
+        """The same patterns, each to be learned from as if it had been seen so many times (count,): 0 leaves it out."""
+        present = self.present.astype(np.float32)
+        present[:, : self.count] *= times
+        return PatternSet(self.inputs, self.targets, self.count, present)
 
     def merged(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """For each network its distinct patterns: inputs (inputs, m), mean target (m,), how many each stands for (m,); float32.

@@ -8,6 +8,7 @@ H is a multiple of four, because the kernels take four hidden neurons at a time.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,17 @@ def _nguyen_widrow(hidden: int, inputs: int) -> tuple[np.ndarray, np.ndarray]:
     low, high = np.zeros((hidden, PER_NEURON)), np.full((hidden, PER_NEURON), to_hidden)
     low[:, INPUTS], high[:, INPUTS + 1] = -to_hidden, to_output
     return np.append(low.ravel(), -to_output), np.append(high.ravel(), to_output)
+
+
+def side_by_side(parts: Sequence[np.ndarray], share: float = 1.0) -> np.ndarray:
+    """Networks (networks, W) whose outputs, before any sigmoid, are ``share`` times the sum of those of all parts.
+
+    Hidden neurons of all parts stand side by side: the sum of networks is a wider network, so that kernels need not know.
+    """
+    neurons = np.concatenate([part[:, :-1].reshape(len(part), -1, PER_NEURON) for part in parts], axis=1)
+    neurons[:, :, -1] *= np.float32(share)
+    bias = np.float32(share) * np.sum([part[:, -1:] for part in parts], axis=0, dtype=np.float32)
+    return np.ascontiguousarray(np.hstack([neurons.reshape(len(neurons), -1), bias]), np.float32)
 
 
 @inline

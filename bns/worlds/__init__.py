@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from bns.change import change_of
 from bns.errors import SpecError
 from bns.registry import WORLDS
 from bns.robots.base import Robot
 from bns.worlds.base import World
+from bns.worlds.changing import ChangingWorld
 from bns.worlds.physics import build as build_physics
 
 _NEEDED = ("digest", "drive", "repeatable", "renderable")
@@ -16,6 +18,8 @@ def build_world(name: str, robot: Robot) -> World:
 
     ModelError if there is no such file, or the robot's physics takes none; SpecError if a package's world is none.
     """
+    if change := change_of(name):
+        return ChangingWorld(build_world(change.before, robot), build_world(change.after, robot), change.at)
     if name.endswith((".yaml", ".yml")):
         return build_physics(robot, name)
     world: World = WORLDS.load(name).build(robot)

@@ -22,6 +22,7 @@ class LoggedWorld:
         self._trials: list[pd.DataFrame] = []
         self.digest = world.digest
         self.repeatable, self.renderable = world.repeatable, world.renderable
+        self.changes_at = getattr(world, "changes_at", None)
 
     def drive(self, commands: np.ndarray, key: Key, purpose: Purpose, step: int) -> np.ndarray:
         """As the world it stands before."""

@@ -9,6 +9,7 @@ from bns.bootstrap.loop import run
 from bns.engine.evolution import Population
 from bns.engine.philox import Key
 from bns.errors import SpecError
+from bns.options import parsed_options
 from bns.robots import load_robot
 from bns.spec import RunSpec
 from bns.tasks import load_task
@@ -56,7 +57,8 @@ def test_no_margin_gives_the_numbers_of_the_dissertation_s_way_and_a_margin_othe
 def test_goals_narrow_by_a_tenth_when_all_are_reached_and_widen_when_they_are_not():
     task = load_task("khepera", "circle")
     spec = RunSpec(approach="bns+margin=0.03", **SMALL)
-    setting = Setting(load_robot("khepera"), task, Key(0, 0), spec, {"margin": 0.03})
+    options = parsed_options(spec.approach, BootstrappedNeuroSimulation.options)
+    setting = Setting(load_robot("khepera"), task, Key(0, 0), spec, options)
     approach, radii_cm = BootstrappedNeuroSimulation.start(setting), []
     approach.learn(np.full((2, 3), 10_000.0, np.float32), np.zeros((2, 3)), 1)
     for reached in [True] * 12 + [False] * 3:

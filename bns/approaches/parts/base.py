@@ -11,12 +11,12 @@ import numpy as np
 from bns.bootstrap.evolver import Generation
 from bns.bootstrap.simulators import Simulator
 from bns.engine.philox import Key, Purpose
-from bns.options import Option, Options
+from bns.options import Choice, Option, Options
 from bns.robots.base import Robot
 from bns.spec import RunSpec
 from bns.tasks import Task
 
-__all__ = ["Approach", "Option", "Options", "Setting"]
+__all__ = ["Approach", "Choice", "Option", "Options", "Setting"]
 
 
 @dataclass(frozen=True)
@@ -27,16 +27,24 @@ class Setting:
     task: Task
     key: Key
     spec: RunSpec
-    options: Mapping[str, float]
+    options: Mapping[str, float | str]
+
+    def number(self, name: str) -> float:
+        """An option that is a number."""
+        return float(self.options[name])
 
     def whole(self, name: str) -> int:
         """An option that is a whole number."""
         return int(self.options[name])
 
+    def chosen(self, name: str) -> str:
+        """An option that is a word, or a file."""
+        return str(self.options[name])
+
     def share(self, name: str) -> int:
         """So many of the run's evaluations as an option's share says: one at least, and one is left at least if there are two."""
         evaluations = self.spec.evaluations
-        return max(1, min(round(self.options[name] * evaluations), evaluations - 1))
+        return max(1, min(round(self.number(name) * evaluations), evaluations - 1))
 
     def generator(self, step: int) -> np.random.Generator:
         """Draws of the approach's own, apart from all others, for each step anew."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from bns.approaches.parts.base import Setting
 from bns.approaches.parts.evolving import Evolving
-from bns.bootstrap.simulators import NetworkSimulator
-from bns.bootstrap.trainer import Trainer
+from bns.bootstrap.simulators import NetworkSimulator, Simulator
+from bns.bootstrap.trainer import Learner, Trainer
 from bns.tasks import Task
 
 
@@ -18,10 +18,10 @@ class NeuroSimulation(Evolving):
 
     networked: ClassVar[bool] = True
 
-    def __init__(self, setting: Setting, trainer: Trainer) -> None:
+    def __init__(self, setting: Setting, trainer: Learner) -> None:
         """With networks as they are."""
-        self.trainer, self.weights = trainer, trainer.evolution_weights()
-        super().__init__(setting, NetworkSimulator(setting.robot, setting.task, self.weights))
+        self.setting, self.trainer, self.weights = setting, trainer, trainer.evolution_weights()
+        super().__init__(setting, self.simulator_now())
 
     @classmethod
     def start(cls, setting: Setting) -> Self:
@@ -42,7 +42,11 @@ class NeuroSimulation(Evolving):
         """The training networks over the evolution networks."""
         with self.timed("evolution_cpu_s"):
             self.weights = self.trainer.evolution_weights()
-            self.simulator = NetworkSimulator(self.setting.robot, self.goals(), self.weights)
+            self.simulator = self.simulator_now()
+
+    def simulator_now(self) -> Simulator:
+        """What evolution works on from now on."""
+        return NetworkSimulator(self.setting.robot, self.goals(), self.weights)
 
     def goals(self) -> Task:
         """The task that evolution is asked to do."""

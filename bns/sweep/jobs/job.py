@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from bns.change import change_of
 from bns.spec import RunSpec
 from bns.store.record import RunRecord
 from bns.sweep.jobs import memory
@@ -44,6 +45,11 @@ def warm(robot: str = "khepera", world: str = "substitute") -> None:
     from bns.engine.jit import note_compiled  # noqa: PLC0415
     from bns.tasks import default_task  # noqa: PLC0415
 
+    if change := change_of(world):
+        for one in (change.before, change.after):
+            warm(robot, one)
+        note_compiled(robot, world)
+        return
     run(
         RunSpec(
             robot=robot,
