@@ -79,6 +79,23 @@ def test_gaps_repeats_and_losses_are_listed(table):
     assert len(usable) == len(odd) - 1
 
 
+@pytest.mark.parametrize("pose_first", [True, False])
+def test_a_pose_and_a_command_of_one_time_are_one_row(table, pose_first):
+    one = table[table.trial == 0].reset_index(drop=True)
+    changes = one.index[one.left_m_s.ne(one.left_m_s.shift()) & (one.index > 0) & one.left_m_s.notna()]
+    told, seen = one.loc[changes].copy(), one.copy()
+    told[["x_m", "y_m", "heading_rad"]] = np.nan
+    wheels = ["left_m_s", "right_m_s"]
+    if pose_first:  # which was taken under the command before
+        seen.loc[changes, wheels] = one.loc[changes - 1, wheels].to_numpy()
+    else:
+        seen.loc[changes, wheels] = np.nan
+    logged = pd.concat([seen, told] if pose_first else [told, seen]).sort_values("t_s", kind="stable", ignore_index=True)
+    usable, findings = checked(logged)
+    assert findings == []
+    pd.testing.assert_frame_equal(usable.reset_index(drop=True), one, check_dtype=False)
+
+
 def test_tracks_hold_commands_as_they_were_in_force(table):
     tracks = tracks_of(table)
     assert len(tracks) == 3

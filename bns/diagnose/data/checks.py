@@ -47,12 +47,14 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     table.loc[left_out_rows(table), list(POSE)] = np.nan
     findings: list[Finding] = []
     _held(table, findings)
+    spare = _merge_rows_of_one_time(table)
     t, pose, own = table["t_s"].to_numpy(), table[list(POSE)].to_numpy(), own_rows(table)
     kept = []
-    for trial, at in rows_by_trial(table):
+    for trial, rows in rows_by_trial(table):
+        at = rows[~spare[rows]]
         if not (_is_sound(t[at[own[at]]], pose[at[own[at]]]) and (np.diff(t[at]) > 0).all()):
             good = _looked_through(trial, table.iloc[at], findings)
-            at = good.index.to_numpy()  # noqa: PLW2901  # rows are numbered from 0
+            at = good.index.to_numpy()  # rows are numbered from 0
             pose[at] = good[list(POSE)].to_numpy()
         kept.append(at)
     chosen = np.concatenate([np.zeros(0, np.int64), *kept])
@@ -153,6 +155,25 @@ def _held(table: pd.DataFrame, findings: list[Finding]) -> None:
             "tracker slower than the log? `repeated_poses: lost` in the mapping of `bns import` takes them out"
         )
         findings.append(Finding(str(table["trial"].iloc[row]), row, text))
+
+
+def _merge_rows_of_one_time(table: pd.DataFrame) -> np.ndarray:
+    """A pose and a command that were logged as two rows of the same time become one, the first: the later command holds.
+
+    In place; the second rows, (rows,) of bool, have nothing more to say.
+    """
+    t, trial = table["t_s"].to_numpy(), pd.factorize(table["trial"])[0]
+    seen = _tracked(table).to_numpy()
+    first = np.flatnonzero((t[1:] == t[:-1]) & (trial[1:] == trial[:-1]) & (seen[1:] != seen[:-1]))
+    first = first[np.append(True, np.diff(first) > 1)] if len(first) else first  # of three rows the first two
+    spare = np.zeros(len(t), dtype=bool)
+    spare[first + 1] = True
+    for column in table.columns if len(first) else ():
+        values = table[column].to_numpy(copy=True)
+        gone = ~seen[first + 1] if column in POSE else pd.isna(values[first + 1])
+        values[first] = np.where(gone, values[first], values[first + 1])
+        table[column] = values
+    return spare
 
 
 def forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
