@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bns.diagnose.data.tracks import Tracks
+from bns.diagnose.predict.horizons import IN_WORDS
+from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import Unexplained
@@ -17,6 +19,7 @@ from bns.diagnose.settings import DEFAULTS
 
 MOST_EFFECTS = DEFAULTS.select.most_effects
 NOTABLE = DEFAULTS.verdict.notable
+CHANCE = DEFAULTS.residuals.chance
 
 
 def notes_on(
@@ -29,13 +32,13 @@ def notes_on(
     withdrawn: Sequence[str] = (),
     imitating: Sequence[str] = (),
     terms: Sequence[str] = (),
-    lowered: bool = True,
+    with_terms: PairedErrors | None = None,
 ) -> Iterator[str]:
     """All notes, one sentence or two each.
 
     ``longer``: explanations with one effect more that fit as well; ``withdrawn``: effects with which the error does not fall;
     ``imitating``: those that earn too little beside flexible terms; ``terms``: these in words;
-    ``lowered``: the error falls with them.
+    ``with_terms``: the held-out errors without and with them.
     """
     for name, why in selection.implausible.items():
         yield f"{name} fits best, and implausibly: {why}. No other set predicts as well: check it by an independent measurement."
@@ -55,12 +58,12 @@ def notes_on(
     for names in longer:
         yield f"{' with '.join(names)} would explain as much, with one effect more."
     yield from _on_rest(rest, tracks)
-    if formula is not None and not formula.signal:
+    if formula is not None and not formula.signal and formula.paired_comparison.p_value < CHANCE:
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
         yield f"A candidate for it: {formula.on} + {formula.term} with {values}."
     yield from (f"What no effect explains looks like this: {words}." for words in terms)
-    if terms and not lowered:
-        yield "Predictions of trials held out get no better with that for certain: it describes, and need not be added."
+    if terms and with_terms is not None and not with_terms.falls:
+        yield _no_lower(with_terms)
     if hint is not None:
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
         yield f"{hint.name} may be missing, but {len(tracks)} trials do not settle it; about {more} more would."
@@ -78,6 +81,18 @@ def on_worst(both: WithoutWorst) -> str:
     verdict, effects = both.with_them
     said = f"{verdict} ({', '.join(effects)})" if effects else verdict
     return f"{begun}; with them the verdict would be {said}. Look what happened there; `--without` leaves them out."
+
+
+def _no_lower(with_terms: PairedErrors) -> str:
+    """What to do with a term with which the error does not fall at all horizons."""
+    if not with_terms.rose_at:
+        return "Predictions of trials held out get no better with that for certain: it describes, and need not be added."
+    rose, fell = (" and ".join(IN_WORDS.get(h, h) for h in names) for names in (with_terms.rose_at, with_terms.fell_at))
+    though = f", though it falls over {fell}" if fell else ""
+    return (
+        f"With that the error of trials held out rises over {rose}{though}: it describes the robot, and must not be added to a "
+        "model that has to predict that far."
+    )
 
 
 def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:

@@ -204,10 +204,18 @@ def diagnose(
     wild = standing_out(found.selection.problem, found.selection.fit)
     if not len(wild):
         return found
-    without = _diagnosed(predictor.not_counting(wild.tolist()), model, extra, tick, barred, alone)
+    without = _diagnosed(predictor.not_counting(wild.tolist()), model, extra, tick, barred, alone, found.selection)
     names = tuple(predictor.tracks.names[i] for i in wild)
     both = WithoutWorst(names, (found.verdict, found.effects), (without.verdict, without.effects))
     return replace(without, without_worst=both, notes=(on_worst(both), *without.notes))
+
+
+def _from_better_numbers(selection: SelectionResult, before: SelectionResult | None) -> SelectionResult:
+    """The same effects with numbers near those of another search, where these fit better: places have many valleys."""
+    if before is None or set(before.accepted) != set(selection.accepted):
+        return selection
+    again = selection.problem.fit(before.fit.model)
+    return replace(selection, fit=again) if again.loss < selection.fit.loss else selection
 
 
 def _diagnosed(
@@ -217,13 +225,14 @@ def _diagnosed(
     tick: Callable[[str], None],
     barred: Collection[str],
     alone: Callable[[Candidate], None],
+    before: SelectionResult | None = None,
 ) -> Diagnosis:
-    """One search, and what it leaves."""
+    """One search, and what it leaves; ``before``: a search on nearly the same, whose numbers may be the better start."""
     search = StepwiseSelection(predictor, model, extra, tick, barred, alone)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
-    selection = refitted(search.run(), predictor, model)
+    selection = refitted(_from_better_numbers(search.run(), before), predictor, model)
     tick("errors on trials held out")
     errors = errors_before_and_after(selection, model)
     withdrawn: tuple[str, ...] = ()
@@ -250,7 +259,6 @@ def _diagnosed(
     verdict = _verdict(selection, left, hint)
     words = tuple(in_words(term, predictor) for term in terms)
     with_terms = _errors_with_terms(selection, model, found) if found and terms else None
-    lowered = with_terms is None or with_terms.falls
     tick("longer explanations")
     tried = {c.name for step in selection.steps for c in step.ranking}
     others = [
@@ -270,7 +278,7 @@ def _diagnosed(
         imitating,
         errors,
         with_terms,
-        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, imitating, words, lowered)),
+        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, imitating, words, with_terms)),
         calibration=calibrated(predictor, model, barred),
     )
 

@@ -15,6 +15,16 @@ from bns.diagnose.settings import DEFAULTS
 
 HORIZONS = ("command", "1s", "5s", "trial")
 _SECONDS = dict(DEFAULTS.predict.horizons_s)
+IN_WORDS = {
+    "command": "one command",
+    "1s": "1 second",
+    "5s": "5 seconds",
+    "trial": "the whole trial",
+    "cycle": "one cycle",
+    "change": "one change of cycles",
+    "stretch": "one stretch",
+}
+"""How far ahead, as people read it."""
 
 
 @dataclass(frozen=True)

@@ -115,6 +115,16 @@ class PairedErrors:
         """
         return _falls([e.total for e in self.horizons.values() if e.total is not None])
 
+    @property
+    def fell_at(self) -> tuple[str, ...]:
+        """Horizons at which the error certainly falls from the first model to the last."""
+        return tuple(h for h, e in self.horizons.items() if e.total is not None and e.total.fell)
+
+    @property
+    def rose_at(self) -> tuple[str, ...]:
+        """Horizons at which it certainly rises."""
+        return tuple(h for h, e in self.horizons.items() if e.total is not None and e.total.rose)
+
     def between(self, before: str, after: str) -> bool:
         """Does the error fall from one model to the one that follows it? As `falls`."""
         return _falls([c for e in self.horizons.values() for c in [e.change_between(before, after)]])

@@ -12,25 +12,17 @@ from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.load import Measured
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import HorizonErrors, ModelError
 from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.values import numbers_of
 
 Table = dict[str, list[Any]]
-_AHEAD = {
-    "command": "one command",
-    "1s": "1 second",
-    "5s": "5 seconds",
-    "trial": "the whole trial",
-    "cycle": "one cycle",
-    "change": "one change of cycles",
-    "stretch": "one stretch",
-}
 
 
 def ahead(horizon: str) -> str:
     """A horizon in words; one that says it itself stays as it is."""
-    return _AHEAD.get(horizon, horizon)
+    return IN_WORDS.get(horizon, horizon)
 
 
 def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:

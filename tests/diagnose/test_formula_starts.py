@@ -1,0 +1,48 @@
+"""A formula that the diagnosis offers can be added in the time of one fit, however many numbers it has."""
+
+import numpy as np
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.starts import _starts, fit_with
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.physics.formula import formula_effect
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+@pytest.mark.parametrize(
+    ("term", "linear"),
+    [
+        ("k0 * u + k1 * u * abs(u)", True),
+        ("k0 * fresh + k1 * max(fresh, 0) + k2 * u**3", True),
+        ("k * v * exp(-a * x)", False),
+        ("k * max(u - a, 0)", False),
+        ("k * v + 1", False),
+    ],
+)
+def test_a_sum_of_numbers_times_something_starts_at_nothing(term, linear):
+    effect = formula_effect("mine", term, "wheels" if "u" in term else "v")
+    assert bool(effect.starts) == linear
+    if linear:
+        assert set(effect.neutral.values()) == {0.0}
+
+
+def test_seven_numbers_are_found_at_once():
+    places = (0.02, 0.05, 0.08, 0.11, 0.14, 0.17)
+    bends = [f"max(u - {c:g}, 0)" for c in places]
+    term = "k0 * u + " + " + ".join(f"k{i + 1} * {b}" for i, b in enumerate(bends))
+    predictor = WheelPredictor(tracks_of(measured(hidden(speed_gain={"gain": 0.9}), trials=8)))
+    problem = problem_for(predictor, NOMINAL)
+    effect = formula_effect("mine", term, "wheels")
+    assert len(list(_starts(effect, predictor, NOMINAL))) == 1
+    found = fit_with(problem, problem.fit(NOMINAL), effect).model.values_of("mine")
+    u = np.linspace(0.02, 0.2, 10)
+    curve = found["k0"] * u + sum(found[f"k{i + 1}"] * np.maximum(u - c, 0) for i, c in enumerate(places))
+    np.testing.assert_allclose(curve, -0.1 * u, atol=0.002)
+
+
+def test_many_numbers_of_another_kind_start_one_at_a_time():
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=2)))
+    starts = list(_starts(formula_effect("mine", "k * v * exp(-a * x - b * y - c * x * y - e * x**2)", "v"), predictor, NOMINAL))
+    assert len(starts) == 30
