@@ -129,10 +129,10 @@ def _is_linear(code: Compiled, numbers: Sequence[str]) -> bool:
 
     one, other = rng.normal(size=(2, len(numbers)))
     try:
-        both, apart = value(2 * one - 3 * other), 2 * value(one) - 3 * value(other)
+        values = [value(at) for at in (one, other, 2 * one - 3 * other)]
     except ArithmeticError:
         return False
-    return bool(np.isfinite(both).all() and np.allclose(both, apart))
+    return bool(np.isfinite(values[:2]).all() and np.allclose(values[2], 2 * values[0] - 3 * values[1]))
 
 
 def value_of(term: str, names: Mapping[str, Any]) -> Array:

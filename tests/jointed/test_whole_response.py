@@ -28,4 +28,4 @@ def test_a_chord_is_the_change_from_neutral_and_at_neutral_the_slope(gain, colum
     fit = SimpleNamespace(
         model=model, free=free, values=np.array([gain]), whitened=saturated(model), jacobian=np.zeros((2, 3, 1))
     )
-    np.testing.assert_allclose(problem._chords(None, fit, [0])[..., 0], column, atol=1e-12)
+    np.testing.assert_allclose(problem._chords(fit, [0])[..., 0], column, atol=1e-12)
