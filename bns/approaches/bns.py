@@ -41,10 +41,10 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     most (`bns.approaches.parts.informed`): those of the ensemble, or those of the latest rounds.
 
     ``window``: networks learn from so many latest drives. ``restart``: they begin with untrained weights, and the latest drives
-    alone, once these were foretold worse than usual by that factor (`bns.approaches.parts.surprise`). The population goes on.
-    Both are for robots that change.
+    alone, once their prediction errors exceed the usual ones by that factor (`bns.approaches.parts.surprise`).
+    The population stays. Both are for robots that change.
 
-    ``model``: a physics model foretells first, and the networks learn what it gets wrong (`bns.approaches.parts.hybrid`).
+    ``model``: a physics model predicts first, and the networks learn what it gets wrong (`bns.approaches.parts.hybrid`).
     """
 
     options: ClassVar[Options] = {

@@ -116,7 +116,7 @@ class Trainer:
             self.rule.restart(net, weights)
 
     def train(self, times: np.ndarray | None = None) -> None:
-        """Iterate on all training patterns. A network that is no longer finite begins anew, and is counted.
+        """Iterate on all training patterns. A network that is no longer finite is initialised again, and counted.
 
         ``times`` (patterns,): how often each of them counts, where not all count once.
         """

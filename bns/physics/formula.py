@@ -127,12 +127,14 @@ def _is_linear(code: Compiled, numbers: Sequence[str]) -> bool:
             found = eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **rest, **dict(zip(numbers, at, strict=True))})
         return np.asarray(found, dtype=np.float64)
 
-    one, other = rng.normal(size=(2, len(numbers)))
-    try:
-        values = [value(at) for at in (one, other, 2 * one - 3 * other)]
-    except ArithmeticError:
-        return False
-    return bool(np.isfinite(values[:2]).all() and np.allclose(values[2], 2 * values[0] - 3 * values[1]))
+    for one, other in rng.normal(size=(4, 2, len(numbers))):  # some of them of other signs: an absolute value is not linear
+        try:
+            values = [value(at) for at in (one, other, 2 * one - 3 * other)]
+        except ArithmeticError:
+            return False
+        if not (np.isfinite(values[:2]).all() and np.allclose(values[2], 2 * values[0] - 3 * values[1])):
+            return False
+    return True
 
 
 def value_of(term: str, names: Mapping[str, Any]) -> Array:

@@ -19,6 +19,9 @@ from tests.diagnose.worlds import NOMINAL, hidden, measured
         ("k * v * exp(-a * x)", False),
         ("k * max(u - a, 0)", False),
         ("k * v + 1", False),
+        ("abs(k) * v", False),
+        ("max(k, 0) * v", False),
+        ("min(a, b) * v", False),
     ],
 )
 def test_a_sum_of_numbers_times_something_starts_at_nothing(term, linear):

@@ -1,15 +1,18 @@
 """Verdicts on small worlds, end to end."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosis import _from_better_numbers, diagnose
 from bns.diagnose.estimate.plausibility import implausible
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.decoys import DECOYS
 from bns.physics.formula import formula_effect
@@ -142,3 +145,24 @@ def test_slopes_of_a_smaller_model_lead_to_the_same_fit():
     errors = np.sqrt(np.diag(anew.covariance))
     assert (np.abs(known.values - anew.values) < 0.3 * errors).all()  # a loss of a hundredth is as good as settled
     np.testing.assert_allclose(np.sqrt(np.diag(known.covariance)), errors, rtol=0.05)
+
+
+def test_the_newest_is_dropped_where_an_exchange_left_it_nothing_to_do():
+    """At its bound it moves nothing: presented, it would read as a delay of 0 s."""
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=12, seed=1)))
+    search = StepwiseSelection(predictor, NOMINAL)
+    idle = NOMINAL.with_effect("command-delay", delay_s=0.0)
+    problem = problem_for(predictor, idle)
+    assert search._backward_step(problem, problem.fit(idle, 0), ("command-delay",))[2] == ()
+
+
+def test_the_same_effects_take_the_numbers_that_fit_better():
+    """A patch of floor has many valleys; another search on nearly the same trials may have ended in a deeper one."""
+    predictor = WheelPredictor(tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=12, seed=1)))
+    problem = problem_for(predictor, NOMINAL)
+    off, right = (problem.fit(NOMINAL.with_effect("wheelbase", factor=f), rounds) for f, rounds in ((1.02, 0), (1.05, None)))
+    ends = [SelectionResult(problem, off, fit, ("wheelbase",), (), ()) for fit in (off, right)]
+    assert _from_better_numbers(ends[0], ends[1]).fit.loss <= right.loss
+    assert _from_better_numbers(ends[1], ends[0]).fit is right
+    assert _from_better_numbers(ends[0], replace(ends[1], accepted=("motor-lag",))).fit is off
+    assert _from_better_numbers(ends[0], None).fit is off

@@ -1,4 +1,4 @@
-"""Physics first: a model of two wheels foretells every command, and networks learn what it gets wrong.
+"""Physics first: a model of two wheels predicts every command, and networks learn what it gets wrong.
 
 Untrained networks add nothing, so that a run begins with the model instead of with noise. The model must have no memory (no
 lag, no delay): then a command's motion is one arc, which a first short step of it gives away, and a population costs a
@@ -39,7 +39,7 @@ class Arcs:
     model: Model
 
     def displacements(self, commands: np.ndarray) -> np.ndarray:
-        """What commands (n, components) do, (n, networks), in the robot's own way of telling it."""
+        """What commands (n, components) do, (n, networks), as the robot defines displacements."""
         left, right, duration = self.robot.wheel_speeds_m_s(commands.astype(np.float64))
         model, start = replace(self.model, dt_s=STEP_S), self.robot.start_pose()
         steps = np.full((1, len(commands)), STEP_S)
@@ -47,7 +47,7 @@ class Arcs:
         moved = rotated(np.diff(short[:, :2], axis=0), -short[:-1, 2])
         turn, times = np.diff(short[:, 2]), duration / STEP_S
         moved = _stretched(moved, turn, times)
-        # End to end, as one long path: how a path is told apart into displacements is the robot's matter.
+        # End to end, as one long path: the robot itself defines what the displacements of a path are.
         heading = start[0, 2] + np.concatenate([[0.0], np.cumsum(turn * times)])
         places = start[0, :2] + np.cumsum(rotated(moved, heading[:-1]), axis=0)
         return self.robot.measured_displacements(np.column_stack([places, heading[1:]]))

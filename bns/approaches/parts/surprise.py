@@ -1,4 +1,4 @@
-"""When did the robot change? When networks that foretold its drives are suddenly wrong about them."""
+"""When did the robot change? When the networks' prediction errors suddenly rise."""
 
 from __future__ import annotations
 
