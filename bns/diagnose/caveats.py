@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
 
 MOST_EFFECTS = DEFAULTS.select.most_effects
+LEAST_FALL = DEFAULTS.select.least_fall
 NOTABLE = DEFAULTS.verdict.notable
 CHANCE = DEFAULTS.residuals.chance
 
@@ -30,6 +33,7 @@ def notes_on(
     hint: Candidate | None,
     longer: Sequence[tuple[str, ...]] = (),
     withdrawn: Sequence[str] = (),
+    negligible: Mapping[str, Mapping[str, Mapping[str, Any]]] = MappingProxyType({}),
     imitating: Sequence[str] = (),
     terms: Sequence[str] = (),
     with_terms: PairedErrors | None = None,
@@ -37,8 +41,8 @@ def notes_on(
     """All notes, one sentence or two each.
 
     ``longer``: explanations with one effect more that fit as well; ``withdrawn``: effects with which the error does not fall;
-    ``imitating``: those that earn too little beside flexible terms; ``terms``: these in words;
-    ``with_terms``: the held-out errors without and with them.
+    ``negligible``: those that matter to no prediction, with their numbers; ``imitating``: those that earn too little beside
+    flexible terms; ``terms``: these in words; ``with_terms``: the held-out errors without and with them.
     """
     for name, why in selection.implausible.items():
         yield f"{name} fits best, and implausibly: {why}. No other set predicts as well: check it by an independent measurement."
@@ -53,6 +57,12 @@ def notes_on(
         yield (
             f"{' with '.join(withdrawn)} would fit better by likelihood, but predictions of trials held out get no better "
             "(root mean square of the same windows): not presented as an explanation."
+        )
+    for name, numbers in negligible.items():
+        said = ", ".join(f"{key} = {number['value']:.3g} {number['unit']}" for key, number in numbers.items())
+        yield (
+            f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "
+            "more, so it is not named. It may be an artefact of the log, such as rounded time stamps."
         )
     yield from _on_effects(selection, tracks)
     for names in longer:

@@ -8,6 +8,7 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_KNOTS_S
 from bns.diagnose.residuals.symbolic import Formula
 from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, value_of
 
@@ -117,6 +118,25 @@ def _changes(term: Formula, _: Predictor) -> str:
     return f"of a fresh change of speed wheels {'lack' if rest < 0 else 'add'} {abs(rest):.0%}, fading within 0.15 s"
 
 
+def _response(term: Formula, _: Predictor) -> str:
+    """From the wheel's speed after a step of its command from 0 to 1."""
+    grid = np.linspace(0.0, 2.0 * RESPONSE_KNOTS_S[-1], 10 * _POINTS)
+
+    def ago(from_s: float, to_s: float) -> Array:
+        return np.clip((grid - from_s) / (to_s - from_s), 0.0, 1.0)
+
+    speed = 1.0 + value_of(term.term, {**term.values, "u": np.ones_like(grid), "ago": ago})
+    end = float(speed[-1])
+    half = float(grid[np.argmax(speed >= end / 2.0)])
+    settled = float(grid[np.max(np.flatnonzero(np.abs(speed - end) > 0.05 * abs(end)), initial=0)])
+    over = float(speed.max()) / end - 1.0
+    beyond = f", goes beyond it by {over:.0%} after {grid[int(speed.argmax())]:.2g} s" if over > 0.02 else ""
+    return (
+        f"after a change of its command a wheel has half of the new speed after {half:.2g} s{beyond}, and stays within 5% of it "
+        f"from {settled:.2g} s on"
+    )
+
+
 def _largest(term: Formula, predictor: Predictor) -> str:
     """The largest change of the velocity over speeds, turns, headings and places that were seen."""
     seen = predictor.variables()
@@ -145,4 +165,5 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("recent work of each wheel", "wheels"): _work,
     ("speed in steps", "wheels"): _steps,
     ("changes of speed of each wheel", "wheels"): _changes,
+    (RESPONSE, "wheels"): _response,
 }

@@ -136,6 +136,12 @@ class Residuals:
         "Bends of a curve along a wheel's way since it changed direction: play in gears is a few hundredths of a wheelbase; "
         "it is nothing at the last one.",
     )
+    response_knots_s: tuple[float, ...] = setting(
+        (0.0, 0.04, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0, 1.35, 1.8, 2.5),
+        "s",
+        "Bends of a wheel's free response to a change of its command, closer where it is fresh: motors answer within tenths of a "
+        f"second, what rings or winds up settles within two; {BY_HAND}.",
+    )
     surface_knots: tuple[tuple[float, ...], tuple[float, ...]] = setting(
         ((0.0, 0.4, 1.0), (0.0, 0.3, 0.6, 1.0)),
         "of the highest speed, and of the sharpest turn",
