@@ -71,7 +71,7 @@ def compared(store: Results) -> tuple[pd.DataFrame, pd.DataFrame]:
     on = [*_CELL, "seed"]
     pairs = runs[~default].merge(runs.loc[default, [*on, *MEASURES]], on=on, suffixes=("", "_default"))
     if pairs.empty:
-        raise NoDataError("no run of a reading has one of the default reading beside it; run bns sweep sweeps/readings.yaml")
+        raise NoDataError("no run of a reading has one of the default reading beside it; run bns sweep readings")
     rows = [_row(key, own) for key, own in pairs.groupby([*_READING, *_CELL])]
     return pairs, pd.DataFrame(rows)
 

@@ -32,8 +32,8 @@ def _draw(robot: str, path: Path) -> FigureResult:
     tracks = tracks_of(path)
     data = errors(robot, tracks)
     kinds = (
-        ("position_m", 100.0, "where the middle is", "cm"),
-        ("heading_rad", 180 / np.pi, "where it faces", "degrees"),
+        ("position_m", 100.0, "position of the middle", "cm"),
+        ("heading_rad", 180 / np.pi, "heading", "degrees"),
         ("gap_m", 100.0, "how far apart\nthe markers are", "cm"),
     )
     figure, axes = panels(len(kinds), 3.3)

@@ -144,7 +144,7 @@ def without_extras(tmp_path, monkeypatch, *commands):
 
 def test_a_comparison_needs_no_extra_and_that_of_a_body_names_it(tmp_path, monkeypatch):
     done = without_extras(tmp_path, monkeypatch, of_the_sample_log("compare"), of_the_sample_log("compare", "snake"))
-    assert "position error" in done.stdout
+    assert "error of predictions" in done.stdout
     assert done.returncode == 2
     assert "pip install 'bns[snake]'" in done.stderr
 

@@ -51,7 +51,7 @@ def summed_up(summary: Summary, results: Path) -> str:
 
 def status_table(rows: Sequence[SweepRow]) -> str:
     """One line a sweep and task."""
-    head = ("sweep", "task", "done", "of", "failed", "quarantined", "other", "mean s a run", "last run began (UTC)")
+    head = ("sweep", "task", "done", "of", "failed", "quarantined", "other", "mean s per run", "last run began (UTC)")
     lines = [head] + [
         (
             row.sweep,

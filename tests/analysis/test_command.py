@@ -104,7 +104,7 @@ def no_runs_yet(results):
 def test_an_empty_store_says_what_to_run(tmp_path, capsys, make):
     make(tmp_path / "results")
     assert main(["--results", str(tmp_path / "results")]) == 2
-    assert "make sweep-khepera BUDGET=10m" in capsys.readouterr().err
+    assert "bns sweep khepera-small" in capsys.readouterr().err
     with pytest.raises(StoreError, match="no runs in"):
         Results(tmp_path / "results")
 

@@ -117,7 +117,7 @@ def _used_in_words(tracks: Tracks, predictor: JointedPredictor) -> str:
     more = f"{unstable} were not stable, and " if unstable else ""
     return (
         f"{used} of {used + wild + unstable + aside} {what} are compared; {more}{wild} nobody can foresee: a little luck moves "
-        f"the robot far in them{f'; {aside} are left aside, evenly chosen, for speed' if aside else ''}"
+        f"the robot far in them{f'; {aside} are excluded, evenly spaced, for speed' if aside else ''}"
     )
 
 
