@@ -81,9 +81,9 @@ def draw(store: Results) -> list[FigureResult]:
         f"{LATE:.0%} of the evaluations; bars: {MEANS}, of the CPU time 10 to 90 % of the runs.",
     )
     shows = (
-        f"Above: fraction of the last {LATE:.0%} of a run's evaluations after which its fittest controller visits all goals within "
-        f"{' and '.join(map(str, NEAR_CM))} cm, mean over runs ({MEANS}). Below: CPU time of a run (median, 10 to 90 %). By "
-        f"generations and training iterations after each evaluation; {runs_each} per point, n = {n:,} runs of {SWEEP}."
+        f"Above: fraction of the last {LATE:.0%} of a run's evaluations after which its fittest controller visits all goals "
+        f"within {' and '.join(map(str, NEAR_CM))} cm, mean over runs ({MEANS}). Below: CPU time of a run (median, 10 to 90 %). "
+        f"By generations and training iterations after each evaluation; {runs_each} per point, n = {n:,} runs of {SWEEP}."
     )
     return [FigureResult(NAME, TITLE, figure, shows, n, (SWEEP,), said.missing, data=rows)]
 

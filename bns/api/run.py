@@ -298,4 +298,6 @@ def _text(r: RunResult) -> str:
 
 
 def _first(success: Any, evaluation: Any) -> str:
-    return f"first at evaluation {evaluation[success][0]}, in {success.mean():.0%} of the evaluations" if success.any() else "never"
+    if not success.any():
+        return "never"
+    return f"first at evaluation {evaluation[success][0]}, in {success.mean():.0%} of the evaluations"

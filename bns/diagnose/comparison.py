@@ -178,7 +178,7 @@ def _curves(
 
 
 def _edges(values: Array) -> Array:
-    """Of bins of as many values each; neighbours that are both far narrower than usual, where values nearly repeat, are joined."""
+    """Of bins of as many values each; where values nearly repeat, neighbours that are both far narrower than usual are joined."""
     edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
     narrow = np.diff(edges) < np.ptp(values) / BINS**2
     return edges[np.concatenate([[True], ~(narrow[:-1] & narrow[1:]), [True]])] if len(edges) > 2 else edges

@@ -117,7 +117,7 @@ def test_a_figure_without_data_is_skipped_with_one_line(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == len(figures()) + 1
     assert any(
-        line.startswith("success-by-mutation (figures 4.7 and 5.23) skipped: 2 runs failed and none finished; run make")
+        line.startswith("success-by-mutation (figures 4.7 and 5.23) skipped: 2 runs failed and none finished; run bns sweep")
         for line in lines
     )
     assert not list((tmp_path / "figures").glob("*.png"))

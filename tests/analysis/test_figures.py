@@ -271,10 +271,10 @@ def test_why_there_is_nothing_to_compare_is_said(tmp_path, module):
     with pytest.raises(NoDataError, match=r"^2 runs failed and none finished; run bns sweep khepera-small"):
         module.draw(Results(tmp_path / "bad"))
     written(tmp_path / "one", "one", [record(one)])
-    with pytest.raises(NoDataError, match=r"^no sweep compares .* \(1 finished run\); run make"):
+    with pytest.raises(NoDataError, match=r"^no sweep compares .* \(1 finished run\); run bns sweep"):
         module.draw(Results(tmp_path / "one"))
     written(tmp_path / "one", "more", [failed(single)])
-    with pytest.raises(NoDataError, match=r"\(1 finished run, 1 failed\); run make"):
+    with pytest.raises(NoDataError, match=r"\(1 finished run, 1 failed\); run bns sweep"):
         module.draw(Results(tmp_path / "one"))
 
 

@@ -52,7 +52,7 @@ def test_a_late_command_ties_with_a_late_clock():
 def test_an_early_clock_is_no_late_command():
     answer = diagnosed(hidden(clock_offset={"offset_s": -0.08})).as_json()
     assert (answer["verdict"], answer["effects"]) == ("effects", ["clock-offset"])
-    assert "clock-offset is a fault of the measuring, not of the robot." in answer["notes"]
+    assert "clock-offset is an error of the measurement, not of the robot." in answer["notes"]
 
 
 def test_what_no_list_holds_is_called_so_and_a_formula_offered():
