@@ -92,3 +92,13 @@ def test_peak_is_that_of_the_attributes():
 
     assert peak_of(H200).flops == pytest.approx(66.9e12, rel=1e-3)
     assert peak_of(H200).bytes_s == pytest.approx(4.9e12, rel=1e-2)
+
+
+@pytest.mark.parametrize(("device", "notes"), [("cpu", 0), ("cuda", 1)])
+def test_a_run_on_a_gpu_says_once_that_this_is_experimental(device, notes, monkeypatch, capsys):
+    from bns.cli.commands import run
+    from bns.cli.main import main
+
+    monkeypatch.setattr(run, "run_by_hand", lambda *_given, **_named: "done")
+    assert main(["run", "--device", device]) == 0
+    assert capsys.readouterr().err.count("--device cuda is experimental") == notes

@@ -21,7 +21,7 @@ from bns.cli.commands import simulators as simulating
 from bns.cli.commands import sweep as sweeping
 from bns.cli.compiling import say_if_compiling
 from bns.cli.options.option_types import add_spec_options, duration, positive
-from bns.cli.options.sweep_options import DEVICES
+from bns.cli.options.sweep_options import DEVICES, say_if_experimental
 from bns.cli.options.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.cli.parser import SHELLS, Completion, Parser, add_results, add_trust, take_trust
 from bns.cli.streams import usable_streams
@@ -169,6 +169,7 @@ def run(options: argparse.Namespace) -> int:
     say_if_compiling(spec)
     kept = options.save_snn, options.render, options.measurements
     print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, *kept, device=options.device))
+    say_if_experimental(options.device)
     return 0
 
 

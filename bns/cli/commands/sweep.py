@@ -9,7 +9,7 @@ from dataclasses import asdict
 from bns.cli.commands.diagnose import Adder
 from bns.cli.compiling import say_if_compiling
 from bns.cli.options.option_types import as_json, duration, positive
-from bns.cli.options.sweep_options import add_cluster_options, backend_name, request_of
+from bns.cli.options.sweep_options import add_cluster_options, backend_name, request_of, say_if_experimental
 from bns.cli.parser import add_results, add_trust
 from bns.errors import SpecError
 from bns.spec import RunSpec
@@ -91,6 +91,7 @@ def sweep(options: argparse.Namespace) -> int:
             failed += summary.new_failed
             if summary.stopped_by in {"interrupt", "terminated"}:
                 return INTERRUPTED if summary.stopped_by == "interrupt" else TERMINATED
+    say_if_experimental(options.device)
     return 1 if failed else 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,15 @@ def add_cluster_options(
     add("--slurm", type=_named, action="append", default=[], metavar="NAME=VALUE", help="option of sbatch (repeatable)")
     add("--try-locally", action="store_true", help="run the SLURM jobs on this machine, as a test")
     add("--wait", action="store_true", help="wait until the SLURM jobs are done")
+
+
+def say_if_experimental(device: str) -> None:
+    """A line on stderr after work on a GPU."""
+    if device != "cpu":
+        print(
+            f"bns: note: --device {device} is experimental; before you rely on its results, compare some of them with the CPU's",
+            file=sys.stderr,
+        )
 
 
 def backend_name(options: argparse.Namespace) -> str:
