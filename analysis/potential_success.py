@@ -51,7 +51,7 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     n, said = int(sum(cells.runs.sum() for cells in tops.values())), coverage(store, chosen.sweeps, chosen.n)
     note(figure, "; ".join((f"{n:,} runs in the best combinations", *said.missing, f"bands: {BOOTSTRAP}")) + ".")
     shows = (
-        f"Share of runs whose fittest controller visits all goals within {RADIUS_CM} cm, of the best "
+        f"Fraction of runs whose fittest controller visits all goals within {RADIUS_CM} cm, of the best "
         f"{max(map(len, tops.values()))} combinations of each task; bands are {BOOTSTRAP}. n = {n:,} runs of "
         f"{', '.join(chosen.sweeps)}. The best are picked by success at the last evaluation, so they are seen at their luckiest."
     )

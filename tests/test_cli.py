@@ -161,7 +161,7 @@ def test_bad_input_is_named_and_ends_with_2(arguments, message, capsys, tmp_path
         (["sweep", "x.yaml", "--budget", "soon"], r"'soon' is not a time; write 90s, 10m or 1h30m"),
         (["sweep", "x.yaml", "--jobs", "0"], r"whole number of 1 or more"),
         (["run", "--pop", "20"], r"there is no option --pop\. Did you mean --population-size\?"),
-        (["run", "circle"], r"usage: bns run [^§]*circle: nothing is expected there"),
+        (["run", "circle"], r"usage: bns run [^§]*circle: unexpected argument"),
         (["swep", "x.yaml"], r"usage: bns sweep [^§]*there is no command swep\. Did you mean sweep\?"),
         (["--jsn", "status"], r"there is no option --jsn"),
         (["diagnose", "log.csv", "--modl", "khepera"], r"usage: bns diagnose [^§]*Did you mean --model\?"),

@@ -24,9 +24,9 @@ def test_without_a_driver(what, tmp_path, bns):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--jobs", "2"], "--device cuda is the GPU of this machine, and --jobs shares runs out"),
-        (["--executor", "dask"], "--device cuda is the GPU of this machine, and --executor dask shares runs out"),
-        (["--dry-run"], "--dry-run knows the pace of cores, not of a GPU"),
+        (["--jobs", "2"], "--device cuda is the GPU of this machine, and --jobs distributes runs over cores"),
+        (["--executor", "dask"], "--device cuda is the GPU of this machine, and --executor dask distributes runs over cores"),
+        (["--dry-run"], "--dry-run knows the speed of cores, not of a GPU"),
     ],
 )
 def test_options_that_do_not_go_together(options, message, tmp_path, capsys):

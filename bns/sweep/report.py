@@ -45,7 +45,7 @@ def summed_up(summary: Summary, results: Path) -> str:
     elif summary.stopped_by == "ranking":
         text += "; the rest cannot change the ranking"
     elif summary.stopped_by:
-        text += f"; stopped: {_WHY[summary.stopped_by]}; the same command goes on from here"
+        text += f"; stopped: {_WHY[summary.stopped_by]}; the same command continues from here"
     return text
 
 

@@ -60,7 +60,7 @@ def _repeats(successes: Sequence[bool]) -> list[str]:
 
 def _stops(seconds: Sequence[float]) -> str:
     if not seconds:
-        return "nothing was driven in this session"
+        return "no drive in this session"
     most = f"{_ms(float(np.median(seconds)))} at the median, {_ms(max(seconds))} at most"
     return f"stops: {len(seconds)} confirmed, {most}"
 

@@ -63,7 +63,7 @@ def backend_name(options: argparse.Namespace) -> str:
     if options.executor not in {None, options.device} or options.jobs is not None:
         given = "--jobs" if options.jobs is not None else f"--executor {options.executor}"
         raise SpecError(
-            f"--device {options.device} is the GPU of this machine, and {given} shares runs out among cores. Leave one of them "
+            f"--device {options.device} is the GPU of this machine, and {given} distributes runs over cores. Leave one of them "
             "out; several machines with a GPU each take --shard K/N."
         )
     return str(options.device)
