@@ -54,9 +54,10 @@ def _draw(robot: str, path: Path) -> FigureResult:
     said = f"{len(tracks)} random controllers, {int(tracks.stable.sum())} stable cycles of {len(tracks.stable)}"
     note(figure, f"{said}; root mean square; bars: 95 %, by controller. Cycles are predicted from where the markers were seen.")
     shows = (
-        f"Errors of the static simulator of the {robot} on {said}, driven in the physics world, from which no network has learned: "
-        "over one cycle, over the change to the next, over three cycles and the changes between them, over all stable cycles that a "
-        "controller began with. changes: the change of posture moves the markers; rigid: the markers are on one body."
+        f"Errors of the static simulator of the {robot} on {said}, driven in the physics world, from which no network has "
+        "learned: over one cycle, over the change to the next, over three cycles and the changes between them, over all stable "
+        "cycles that a controller began with. changes: the change of posture moves the markers; rigid: the markers are on one "
+        "body."
     )
     see = "The gain of an option is what it takes off the first of each group."
     title = f"What options of the simulator gain, {robot}"
