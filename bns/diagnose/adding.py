@@ -90,7 +90,7 @@ def add_effects(
     for effect, _ in effects:
         if any(a.effect.name == effect.name for a in model.effects):
             raise ModelError(
-                f"The model {model.name} has {effect.name} already; it is refitted whenever something is added."
+                f"The model {model.name} already has {effect.name}; it is fitted again whenever an effect is added."
             )
     effects = [(fitting(effect, model, predictor.tracks), written) for effect, written in effects]
     memory = {} if memory is None else memory
@@ -150,16 +150,16 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
         if number.effect not in added:
             continue
         if value in {p.low, p.high} and value != p.neutral:
-            yield f"{number.effect}: {p.name} is at its bound, {value:g} {p.unit}: the data ask for more than the model allows."
+            yield f"{number.effect}: {p.name} is at its bound, {value:g} {p.unit}: the data require more than the model allows."
     for name in sorted(added):
         why = implausible(fit, name, bounds=False)
         if why:
-            yield f"{name} fits best, and implausibly: {why}."
+            yield f"{name} fits best with an implausible value: {why}."
         elif does_nothing(fit, name):
-            yield f"{name} does nothing that these data show: its 95 % interval includes the value at which it changes nothing."
+            yield f"{name} has no visible effect in these data: its 95 % interval includes the neutral value (no effect)."
     for before, after in pairwise(next(iter(errors.horizons.values())).models):
         if not errors.between(before.name, after.name):
-            yield f"with {after.name} the error on trials held out does not fall."
+            yield f"with {after.name}, the error on held-out trials does not fall."
 
 
 def does_nothing(fit: Fit, name: str) -> bool:

@@ -352,14 +352,14 @@ def too_little(tracks: Tracks, fewest: int) -> str:
     frames = np.diff(tracks.first)
     if np.median(frames) < 2:
         return (
-            "Most trials have a single tracked pose; a displacement needs two: log the pose before and after commands."
+            "Most trials have only one tracked pose; a displacement needs two: log the pose before and after commands."
         )
     on_wheels = tracks.duration_s.shape[1] > 0
     if on_wheels and not ((np.abs(tracks.left_m_s) + np.abs(tracks.right_m_s)) * tracks.duration_s).any():
-        return "The robot was never told to move; give it commands of different speeds."
+        return "The robot was never commanded to move; drive it with commands of different speeds."
     ends = [tracks.pose[a:b, :2] for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
     if max(float(np.ptp(p, axis=0).max()) for p in ends if len(p)) < 5e-3:
-        return "The robot never moved by more than 5 mm, whatever it was told: is it tracked, are its motors on?"
+        return "The robot never moved by more than 5 mm, whatever the command: is it tracked, and are its motors on?"
     return ""
 
 

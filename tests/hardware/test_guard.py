@@ -110,7 +110,7 @@ def test_a_robot_stands_when_its_trial_is_there_and_does_nothing(tmp_path, nurse
 @pytest.mark.parametrize(
     ("cause", "link", "why"),
     [
-        ("camera frozen (scene)", "serial", "the picture shows it where it was"),
+        ("camera frozen (scene)", "serial", "the picture shows no motion"),
         ("camera frozen (scene)", "bus", "the picture shows both markers where they were"),
     ],
 )
@@ -184,7 +184,7 @@ def test_a_guard_that_is_killed_is_started_again_and_the_drive_ends(held):
     first = guard.process
     os.kill(first, signal.SIGKILL)
     until(guard.tripped)
-    assert guard.tripped() == "the guard of the robot's port was gone"
+    assert guard.tripped() == "the guard of the robot's port had ended"
     assert guard.process != first
     assert driver.stop(HANGS_S).confirmed
     assert not robot.moves()

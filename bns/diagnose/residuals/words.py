@@ -36,7 +36,7 @@ _VELOCITIES = {
     "s": "sideways velocity",
     "east": "velocity east",
     "north": "velocity north",
-    "share": "the share of the commanded motion that is driven",
+    "share": "the fraction of the commanded motion that is driven",
     "wheels": "the speed of each wheel",
     "left": "the speed of the left wheel",
     "right": "the speed of the right wheel",
@@ -73,14 +73,14 @@ def _reversal(term: Formula, _: Predictor) -> str:
     way = np.linspace(0.0, 1.0, 10 * _POINTS)
     lost = -float(np.trapezoid(_curve(term, "since", way, u=1.0), way))
     verb = "loses" if lost >= 0 else "gains"
-    return f"a wheel {verb} {1e3 * abs(lost):.3g} mm of its way whenever it changes direction"
+    return f"a wheel {verb} {1e3 * abs(lost):.3g} mm of its distance whenever it changes direction"
 
 
 def _swing(term: Formula, _: Predictor) -> str:
     back, across = _curve(term, "swing", np.array([1.0, 0.5]))
     return (
-        f"{_slower(-back)} while the motion's direction is opposite to that of the last half wheelbase of way, "
-        f"{_slower(-across)} while it is square to it"
+        f"{_slower(-back)} while the direction of motion is opposite to that over the last half wheelbase of distance, "
+        f"{_slower(-across)} while it is perpendicular to it"
     )
 
 
@@ -94,7 +94,7 @@ def _speed(term: Formula, predictor: Predictor) -> str:
         at, got = np.append(at, -fastest), np.append(got, back)
     pairs = ", ".join(f"{a:.3g} m/s gives {b:.3g} m/s" for a, b in zip(at, got, strict=True))
     whose = {LEFT: "the left wheel", RIGHT: "the right wheel"}.get(term.on, "a wheel")
-    return f"{whose}'s speed is not in proportion to its command: {pairs}"
+    return f"{whose}'s speed is not proportional to its command: {pairs}"
 
 
 def _work(term: Formula, _: Predictor) -> str:
@@ -109,13 +109,13 @@ def _steps(term: Formula, _: Predictor) -> str:
     speeds = np.linspace(0.0, 1.0, 100 * _POINTS)
     jumps = np.flatnonzero(np.diff(_curve(term, "u", speeds)) > 0)
     step = float(np.median(np.diff(speeds[jumps]))) if len(jumps) > 1 else float("nan")
-    return f"wheels' speeds come in steps of {step:.3g} m/s"
+    return f"wheel speeds come in steps of {step:.3g} m/s"
 
 
 def _changes(term: Formula, _: Predictor) -> str:
     jump = np.array([0.1])
     rest = float(_curve(term, "fresh", jump, u=0.1)[0] / jump[0])
-    return f"of a fresh change of speed wheels {'lack' if rest < 0 else 'add'} {abs(rest):.0%}, fading within 0.15 s"
+    return f"just after a change of speed, {abs(rest):.0%} of it is {'missing' if rest < 0 else 'added'}, fading within 0.15 s"
 
 
 def _response(term: Formula, _: Predictor) -> str:
