@@ -6,6 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
+from bns.app.parts import together
 from bns.errors import BnsError
 
 T = TypeVar("T")
@@ -27,17 +28,18 @@ class Jobs:
 
         def ended(future: Future[T]) -> None:
             def show() -> None:
-                self._waiting -= 1
-                self._say("" if self._waiting == 0 else text)
-                try:
-                    result = future.result()
-                except BnsError as fault:
-                    failed(str(fault))
-                except Exception as fault:
-                    failed(f"This should not have happened: {type(fault).__name__}: {fault}")
-                    raise
-                else:
-                    done(result)
+                with together():
+                    self._waiting -= 1
+                    self._say("" if self._waiting == 0 else text)
+                    try:
+                        result = future.result()
+                    except BnsError as fault:
+                        failed(str(fault))
+                    except Exception as fault:
+                        failed(f"This should not have happened: {type(fault).__name__}: {fault}")
+                        raise
+                    else:
+                        done(result)
 
             self._document.add_next_tick_callback(show)
 

@@ -9,7 +9,7 @@ import panel as pn
 
 from bns.app.design import template
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, html
+from bns.app.parts import WIDE, html, on_change
 from bns.app.screens.data import DataScreen
 from bns.app.screens.effects import EffectsScreen
 from bns.app.screens.model import ModelScreen
@@ -54,7 +54,7 @@ class Screens:
             button_style="outline",
             **WIDE,
         )
-        self._chosen.param.watch(lambda event: self._enter(event.new), "value")
+        on_change(self._chosen, lambda: self._enter(self._chosen.value))
         self._shown = pn.Column(**WIDE)
         self.view = pn.Column(self._chosen, self._said, self._shown, **WIDE)
         pn.state.onload(lambda: self._loaded(name))

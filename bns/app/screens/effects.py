@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import panel as pn
@@ -11,10 +10,11 @@ from bns.app.figures.errors import LadderFigure
 from bns.app.figures.paths import PathFigure
 from bns.app.html import error_list, message, note
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, offer, row
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, offer, on_change, row
 from bns.app.screens.diagnosis import DiagnosisPart
 from bns.app.screens.one_effect import OneEffect
 from bns.app.screens.snapshots import SnapshotsPart
+from bns.app.sliders import Slider
 from bns.app.switches import Switches, Term
 from bns.app.tab import Tab
 from bns.app.workbench import Shown
@@ -49,7 +49,7 @@ class EffectsScreen:
         self._after = PathFigure("now", self._before)
         self._horizon = pn.widgets.Select(name="Error how far ahead", options={ahead("1s"): "1s"}, width=160)
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
-        self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
+        self._time = Slider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
         self._diagnosis = DiagnosisPart(tab, self._learned, self._switch_to)
         self._snapshots = SnapshotsPart(tab, jobs, self._go_to, lambda: str(self._horizon.value))
         self._name = pn.widgets.TextInput(name="Name", value="mine", width=110)
@@ -261,8 +261,8 @@ class EffectsScreen:
             (self._time, self._show_time),
             (self._on, self._check_term),
         ):
-            _on_change(widget, "value", act)
-        _on_change(self._term, "value_input", self._check_term)
+            on_change(widget, act)
+        on_change(self._term, self._check_term, "value_input")
 
     def _laid_out(self) -> Any:
         variables = "; ".join(f"{name}: {text}" for name, text in VARIABLES.items())
@@ -287,7 +287,3 @@ class EffectsScreen:
         )
         self._body = pn.Column(self._diagnosis.view, beside(left, right, least=330, first=right), **WIDE)
         return pn.Column(self._problem.view, self._body, **WIDE)
-
-
-def _on_change(widget: Any, what: str, act: Callable[[], object]) -> None:
-    widget.param.watch(lambda _event: act(), what)
