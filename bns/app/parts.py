@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from html import escape
 from importlib import resources
 from typing import Any
@@ -36,7 +36,9 @@ def together() -> AbstractContextManager[None]:
     Else what Panel changes (layouts, texts) goes at once, and what is changed of a picture only at the end: one could name a part
     that the browser gets with the other, later.
     """
-    held: AbstractContextManager[None] = pn.io.hold(freeze=True)
+    if not pn.state.loaded:  # the browser gets the page as a whole; what is held back until then, Panel drops
+        return nullcontext()
+    held: AbstractContextManager[None] = pn.io.hold()
     return held
 
 

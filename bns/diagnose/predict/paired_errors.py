@@ -10,6 +10,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -254,21 +255,26 @@ class _Windows:
         return Change(change, *self.draws.interval(after.drawn - before.drawn))
 
 
+@lru_cache(maxsize=4)
+def _drawn(trials: int) -> Array:
+    """How often each of so many trials was drawn, (draws, trials): the same at every horizon that all of them have windows of."""
+    return np.random.default_rng(_SEED).multinomial(trials, np.full(trials, 1 / trials), size=DRAWS).astype(np.float64)
+
+
 @dataclass(frozen=True)
 class _Draws:
     """Bootstrap samples of the trials that have windows: how often each was drawn (draws, trials), and of how many windows."""
 
     used: NDArray[np.bool_]
     windows: Array
-    drawn: NDArray[np.int64] | None
+    drawn: Array | None
 
     @classmethod
     def over(cls, counts: NDArray[np.int64]) -> _Draws:
         used = counts > 0
         n = int(used.sum())
         enough = n >= FEWEST_TRIALS
-        drawn = np.random.default_rng(_SEED).multinomial(n, np.full(n, 1 / n), size=DRAWS) if enough else None
-        return cls(used, counts[used].astype(float), drawn)
+        return cls(used, counts[used].astype(float), _drawn(n) if enough else None)
 
     def rms(self, squares: Array) -> Array:
         """Root mean square of every sample, (draws,); ``squares`` (trials,): sums of squares. Empty where trials are few."""
