@@ -14,7 +14,8 @@ from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.servos.bridge import BridgeChain
 from bns.hardware.servos.bridge_frames import HELLO, MOVE, START, STATE, STOP, WATCHDOG_S, Frame, decoded, encoded
 from bns.hardware.servos.servo_chain import ServoError, ServoLimits
-from tests.hardware.simulated_board import Board, BoardClock, build, lacking
+
+from .simulated_board import Board, BoardClock, build, lacking
 
 SKETCH = Path(str(resources.files("bns.hardware"))) / "bridge_sketch" / "bridge_sketch.ino"
 pytestmark = pytest.mark.skipif(bool(lacking()), reason=lacking())

@@ -15,7 +15,7 @@ from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.terminal import put_through
 
-HERE = Path(__file__).parent / "arduino"
+HERE = Path(__file__).parent
 CORE = Path("/usr/share/arduino/hardware/arduino/avr")
 BOOT_LOADER = CORE / "bootloaders" / "stk500v2" / "stk500boot_v2_mega2560.hex"
 HZ = 16_000_000

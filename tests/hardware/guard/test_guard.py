@@ -26,8 +26,8 @@ from bns.hardware.servos.bridge import BridgeChain
 from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.wheels.khepera import BAUD, KheperaIII
 
-from . import outlive
-from .robots_on_the_line import LINKS, Robot
+from .. import outlive
+from ..robots_on_the_line import LINKS, Robot
 
 HANGS_S = 30.0
 RECIPES = {
