@@ -91,7 +91,7 @@ class ManualBus:
 
     def _whole(self):
         heard = self._heard
-        while len(heard) >= 3 and (heard[0], heard[1]) != (0xFF, 0xFF) or len(heard) >= 3 and heard[2] == 0xFF:
+        while len(heard) >= 3 and (heard[:2] != b"\xff\xff" or heard[2] == 0xFF):
             del heard[0]
         if len(heard) < 4 or len(heard) < 4 + heard[3]:
             return None
