@@ -22,7 +22,7 @@ from bns.hardware.guard.client import Guard
 from bns.hardware.guard.recipe import khepera_recipe
 
 from .forked_trial import HANGS_S, Nursery, end_of
-from .robots_on_the_line import LINKS, Robot
+from .robots_on_the_line import LINKS, ManualRobot, Robot
 
 
 class Seen(NamedTuple):
@@ -138,9 +138,9 @@ GONE_S = {"link gone": 1.0, "link gone, then SIGKILL": 1.0}
 """How long the link stays away; the time until the robot stands counts from its return."""
 
 
-def outlived(nursery, link, cause, folder, gone_s=0.0):
+def outlived(nursery, link, cause, folder, gone_s=0.0, kind=Robot):
     """One trial that this befell while its robot moved; AssertionError if the robot went on, or anything is left over."""
-    robot = Robot(link, folder)
+    robot = kind(link, folder)
     try:
         still_s, alone_s, ended = _befell(nursery, robot, cause, folder, gone_s)
         _guard_ends(robot, folder)
@@ -249,7 +249,7 @@ def latency_s(folder):
     return [float(np.quantile(guarded, q) - np.quantile(bare, q)) for q in (0.5, 0.99)]
 
 
-def main(count, causes=(), log=None):
+def main(count, causes=(), log=None, kind=Robot):
     with tempfile.TemporaryDirectory() as folder:
         median_s, most_s = latency_s(Path(folder))
     print(f"The guard adds {1000 * median_s:.2f} ms at the median, {1000 * most_s:.2f} ms at the 99th percentile.")
@@ -257,11 +257,11 @@ def main(count, causes=(), log=None):
     print("| cause | link | times | stood after, ms: median, worst | within 500 ms | the trial's process ended with |")
     print("|---|---|---|---|---|---|")
     for cause in causes:
-        for link in LINKS:
+        for link in LINKS if kind is Robot else LINKS[:2]:
             seen = []
             for _ in range(count):
                 with tempfile.TemporaryDirectory() as folder:
-                    seen.append(outlived(nursery, link, cause, Path(folder)))
+                    seen.append(outlived(nursery, link, cause, Path(folder), kind=kind))
                 if log is not None:
                     line = {"cause": cause, "link": link, "until_s": time.monotonic(), **seen[-1]._asdict()}
                     log.write(json.dumps(line) + "\n")
@@ -281,5 +281,6 @@ if __name__ == "__main__":
     asked.add_argument("count", type=int, help="how often each")
     asked.add_argument("causes", nargs="*")
     asked.add_argument("-o", type=argparse.FileType("a"), dest="log")
+    asked.add_argument("--manual", action="store_true", help="robots written from the makers' manuals alone; no bridge")
     given = asked.parse_args()
-    main(given.count, given.causes, given.log)
+    main(given.count, given.causes, given.log, ManualRobot if given.manual else Robot)

@@ -28,7 +28,7 @@ from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.wheels.khepera import BAUD, KheperaIII
 
 from .. import outlive
-from ..robots_on_the_line import LINKS, Robot
+from ..robots_on_the_line import LINKS, ManualRobot, Robot
 
 HANGS_S = 30.0
 RECIPES = {
@@ -92,9 +92,9 @@ def trial_dies(guard):
     guard._next.end()
 
 
-@pytest.mark.parametrize("link", LINKS)
-def test_a_robot_stands_when_its_trial_is_killed(tmp_path, nursery, link):
-    seen = outlive.outlived(nursery, link, "SIGKILL", tmp_path)
+@pytest.mark.parametrize(("link", "kind"), [*((link, Robot) for link in LINKS), ("serial", ManualRobot), ("bus", ManualRobot)])
+def test_a_robot_stands_when_its_trial_is_killed(tmp_path, nursery, link, kind):
+    seen = outlive.outlived(nursery, link, "SIGKILL", tmp_path, kind=kind)
     assert seen.ended == -signal.SIGKILL
     assert [e["kind"] for e in seen.events] == ["tripped", "stopped"]
     assert seen.events[0]["why"] == "the trial's process is gone"

@@ -6,7 +6,7 @@ from bns.errors import HardwareError
 from bns.hardware.servos.bridge_frames import WATCHDOG_S
 from bns.hardware.servos.servo_chain import ServoError
 
-from .manual_bus import DELAY, ID, TORQUE, ManualBus, ManualServo, angle_rad
+from ..manual_bus import DELAY, ID, TORQUE, ManualBus, ManualServo, angle_rad
 from .simulated_board import Board, lacking
 
 pytestmark = pytest.mark.skipif(bool(lacking()), reason=lacking())
