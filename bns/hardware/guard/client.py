@@ -56,9 +56,13 @@ class _Process(NamedTuple):
         return cls(process, control)
 
     def end(self) -> None:
-        """Not needed."""
+        """Not needed; one that was stopped (SIGSTOP) is killed."""
         self.control.close()
-        self.process.wait(_READY_S)
+        try:
+            self.process.wait(_ENDS_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
 
 
 class Guard:

@@ -28,7 +28,7 @@ five pictures a second. A camera that may be late is believed for longer. Joints
 that swings by 1 rad moves neither."""
 _FROZEN_M, _FROZEN_M_LATE = 0.008, 0.012
 """Markers that the joints bring so much nearer, or further apart, are seen to move: after 3 mm at most in the same drives."""
-_COPIED_RAD, _DELAYS = 0.1, 5
+_COPIED_RAD, _DELAYS = 0.05, 5
 """Joints between the markers that turn so far move a marker by more than `SAME_M`; of so many delays that a camera may have."""
 _SPRUNG_RAD = 0.2
 """A joint that turned by so much more than its servo can had been held by the body and was let go."""

@@ -284,6 +284,14 @@ def test_a_trial_that_ends_leaves_no_guard(held):
     assert standby.returncode == 0
 
 
+def test_what_stands_by_ends_even_if_it_was_stopped(held):
+    _, guard = held("serial")
+    standby = guard._next.process
+    standby.send_signal(signal.SIGSTOP)
+    assert guard.close()
+    assert standby.returncode == -signal.SIGKILL
+
+
 def test_what_stands_by_ends_with_the_trial(held):
     _, guard = held("serial")
     guard._next.control.close()
