@@ -92,6 +92,10 @@ class Watch:
         left_s = max(picture_s, self._began_s) + self._limits.picture_s - self._clock.now_s()
         return min(tick_s, max(left_s, 0.0) + _OVERDUE_S)
 
+    def overdue(self, picture_s: float) -> bool:
+        """Whether a picture that came then should have been followed by another by now."""
+        return self._clock.now_s() - max(picture_s, self._began_s) > self._limits.picture_s
+
     def still_filmed(self, picture_s: float | None) -> None:
         """The part of `check` that concerns a robot which stands and may be out of sight: somebody looks, new pictures come."""
         self._check_picture(self._in_time(), picture_s)

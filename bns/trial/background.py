@@ -71,7 +71,12 @@ class BackgroundDriver:
     @property
     def waited_share(self) -> float:
         """Share of the time (by the computer's clock) since the first drive that the robot waited for computations."""
-        return self._waiting.share
+        return self._waiting.share(self._waiting.waited_s)
+
+    @property
+    def worked_share(self) -> float:
+        """Share of the same time in which training and evolution went on."""
+        return min(self._waiting.share(self._rounds.worked_s), 1.0)  # the last round goes on after the last drive
 
     def drive(self, evaluation: int, controller: np.ndarray, advance: Work) -> Drive:
         """Drive a controller, or take what was driven in the past, with the rounds that went with it.
@@ -119,14 +124,15 @@ class BackgroundDriver:
 class Rounds:
     """Repeats one round of work in a thread until it is told that it is enough; whole rounds only, so that they can be repeated.
 
-    `waited_s`: how long the robot stood waiting for the last round of the last drive, by the computer's clock.
+    `waited_s`: how long the robot stood waiting for the last round of the last drive, by the computer's clock; `worked_s`: how
+    long all work took so far.
     """
 
     def __init__(self, most: int) -> None:
         self._most = most
         self._pool = ThreadPoolExecutor(1, "training")
         self._enough = threading.Event()
-        self.waited_s = 0.0
+        self.waited_s = self.worked_s = 0.0
 
     def close(self) -> None:
         """End the thread, after its round."""
@@ -152,7 +158,9 @@ class Rounds:
     def _repeat(self, work: Work) -> int:
         count = 0
         while count == 0 or (count < self._most and not self._enough.is_set()):
+            began_s = time.perf_counter()
             work()
+            self.worked_s += time.perf_counter() - began_s
             count += 1
         return count
 
@@ -162,22 +170,21 @@ class Waiting:
 
     def __init__(self) -> None:
         self._began_s: float | None = None
-        self._stands_since_s = self._waited_s = 0.0
+        self._stands_since_s = self.waited_s = 0.0
 
     def ends(self) -> None:
         """The robot is driven again."""
         now_s = time.perf_counter()
         if self._began_s is None:
             self._began_s = self._stands_since_s = now_s
-        self._waited_s += now_s - self._stands_since_s
+        self.waited_s += now_s - self._stands_since_s
 
     def begins(self, before_s: float) -> None:
         """The robot stands; it has been waiting for `before_s` already."""
         self._stands_since_s = time.perf_counter() - before_s
 
-    @property
-    def share(self) -> float:
+    def share(self, seconds: float) -> float:
         """Of the time since the first drive; 0 without one."""
         if self._began_s is None:
             return 0.0
-        return self._waited_s / max(self._stands_since_s - self._began_s, 1e-9)
+        return seconds / max(self._stands_since_s - self._began_s, 1e-9)

@@ -17,7 +17,8 @@ class TrialResult:
     """The run, and how this session of it went.
 
     stops_s: how long each confirmed stop took; ends: why drives ended early; waited_share: of the time, that the robot
-    waited for computations; rounds: of training and evolution that went on while it drove; wall_s: how long it took;
+    waited for computations; worked_share: of the time, in which training and evolution went on; rounds: of these, while it
+    drove; wall_s: how long it took;
     repeats: success of each drive of the final controller, if it was driven more than once.
     """
 
@@ -25,6 +26,7 @@ class TrialResult:
     stops_s: Sequence[float]
     ends: Sequence[str]
     waited_share: float
+    worked_share: float
     rounds: int
     started: datetime
     wall_s: float
@@ -44,8 +46,8 @@ def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
         f"trial {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {what}",
         f"{len(evals['evaluation'])} evaluations, {driven_min:.1f} min of driving, {result.wall_s:.0f} s by the wall clock",
         "all goals reached: " + "; ".join(firsts),
-        f"the robot waited for computations {result.waited_share:.1%} of the time; {result.rounds} rounds of training and "
-        "evolution were carried out while it drove",
+        f"the robot waited for computations {result.waited_share:.1%} of the time; training and evolution used "
+        f"{result.worked_share:.0%} of it, in {result.rounds} rounds",
         _stops(result.stops_s),
         *([early] if early else []),
         *_repeats(result.repeats),

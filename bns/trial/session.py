@@ -205,7 +205,8 @@ def _looped(
     if "evals" not in result.tables:
         raise TrialPausedError(f"all {spec.evaluations} evaluations were skipped: there is no result")
     wall_s = (datetime.now(UTC) - started).total_seconds()
-    return TrialResult(result, driver.stops_s, driver.ends, background.waited_share, background.rounds, started, wall_s)
+    shares = background.waited_share, background.worked_share
+    return TrialResult(result, driver.stops_s, driver.ends, *shares, background.rounds, started, wall_s)
 
 
 def _repeated(spec: RunSpec, how: TrialSetup, driver: TrialDriver, folder: TrialFolder, result: TrialResult) -> None:

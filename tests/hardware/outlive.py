@@ -1,41 +1,28 @@
 """Whether a robot outlives its supervisor: `python -m tests.hardware.outlive 20` kills, stops, hangs and unplugs so often each.
 
-The emulated robot lives in this process, the trial in another one, the guard in a third. Time is the computer's.
+The emulated robot lives in this process, the trial in another one, the guard in a third. Time is the computer's. With
+`-o FILE` every drive is written there as a line of JSON.
 """
 
+import argparse
 import fcntl
 import json
 import os
-import pty
-import select
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from bns.errors import BnsError
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.guard.client import Guard
 from bns.hardware.guard.recipe import khepera_recipe
-from bns.hardware.platforms import khepera, snake
-from bns.hardware.rig import shipped_rig
-from bns.hardware.safety import Stopping, Surface
-from bns.hardware.tracking.sight import Sight
-from bns.hardware.wheels.khepera import KheperaIII
-from bns.robots.khepera import UNITS_PER_M_S
-from bns.trial.session import TrialSetup, open_rig
 
-from .robots_on_the_line import LINKS, Robot, hold_terminal
-
-HANGS_S = 60.0
-"""Only a hang takes so long."""
+from .forked_trial import HANGS_S, Nursery, end_of
+from .robots_on_the_line import LINKS, ManualRobot, Robot
 
 
 class Seen(NamedTuple):
@@ -51,197 +38,85 @@ class Seen(NamedTuple):
     alone_s: float = float("nan")
 
 
-class Glances:
-    """A tracker of a robot that goes about its business: a snake that wriggles, a Khepera on the circle that it was sent on.
+class Befalls(NamedTuple):
+    """What a cause has to do with."""
 
-    `frozen` is "bits" when the camera's last picture comes again and again, "scene" when only a clock in it goes on.
-    """
-
-    frozen = ""
-    sent_s = None
-
-    def __init__(self, clock, wheels):
-        self._clock, self._wheels, self._filmed_s, self._last = clock, wheels, 0.0, None
-
-    @property
-    def picture_s(self):
-        return self._last.t_s
-
-    def look(self):
-        now_s = self._clock.now_s()
-        if not self.frozen:
-            self._filmed_s = now_s
-        if self.frozen != "bits":
-            self._last = self._seen(now_s)
-        return self._last
-
-    def _seen(self, now_s):
-        if self._wheels is None:
-            middle = 0.05 * np.array([np.sin(5.0 * self._filmed_s), np.cos(5.0 * self._filmed_s)])  # never at rest
-            half = np.array([0.0, 0.3])
-            points = {"yellow": middle - half, "green": middle + half}
-            return Sight(now_s, np.array([*middle, np.pi / 2]), 0.0, points)
-        left, right = self._wheels
-        turned = (right - left) / 0.0884 * (0.0 if Glances.sent_s is None else self._filmed_s - Glances.sent_s)
-        radius_m = 0.0884 / 2 * (right + left) / (right - left)
-        middle = np.array([-radius_m, 0.0])
-        place = middle + radius_m * np.array([np.cos(turned), np.sin(turned)])
-        return Sight(now_s, np.array([*place, np.pi / 2 + turned]))
-
-    def close(self):
-        pass
-
-
-def knowing_when(set_speed):
-    """The driver's order, noted when it was carried out."""
-
-    def ordered(self, left, right):
-        sent = set_speed(self, left, right)
-        Glances.sent_s = self._clock.now_s()
-        return sent
-
-    return ordered
-
-
-def freeze(what):
-    def freezes(*_):
-        Glances.frozen = what
-
-    return freezes
-
-
-def drive(link, port, journal):
-    """The trial's process: drives for ever, and hangs when a signal says so."""
-    robot = "khepera" if link == "serial" else "snake"
-    wheels = np.array([15000.0, 20000.0]) / UNITS_PER_M_S if link == "serial" else None
-    khepera.open_tracker = snake.open_tracker = lambda _settings, clock: Glances(clock, wheels)
-    KheperaIII.set_speed_m_s = knowing_when(KheperaIII.set_speed_m_s)
-    rig = shipped_rig(robot)
-    settings = {} if robot == "khepera" else {**rig.driver, "wiring": link}
-    everywhere = replace(rig.limits, surface=Surface(-9.0, 9.0, -9.0, 9.0))
-    rig = replace(rig, port=port, driver=settings, limits=everywhere)
-    signal.signal(signal.SIGRTMIN, freeze("bits"))
-    signal.signal(signal.SIGRTMIN + 1, freeze("scene"))
-    signal.signal(signal.SIGUSR1, lambda *_: time.sleep(3600))
-    commands = np.array([[15000.0, 20000.0, 1e6]] if robot == "khepera" else 999 * [[0.5, 0.3, 0.5, 0.5, 1.0]], np.float32)
-    try:
-        with Stopping() as stopping, open_rig(TrialSetup(rig, yes=True), 0, Path(journal), stopping) as opened:
-            opened.platform.drive(commands)
-    except BnsError as error:
-        Path(journal).with_name("said").write_text(str(error))
-        return error.exit_code
-    return 0
-
-
-def zygote():
-    """Forks a shell and a trial for every line on standard input: imports cost a second, forks nothing."""
-    for line in sys.stdin:
-        asked = json.loads(line)
-        shell = os.fork()
-        if shell == 0:
-            try:
-                shell_of(asked, os.fdopen(os.dup(1), "w"))
-            finally:
-                os._exit(0)
-        os.waitpid(shell, 0)
-
-
-def shell_of(asked, out):
-    """Holds the terminal, and tells what becomes of the process in its foreground; hands SIGHUP on, as shells do."""
-    hold_terminal(os.open(asked["terminal"], os.O_RDWR | os.O_NOCTTY))
-    child = os.fork()
-    if child == 0:
-        os.setpgid(0, 0)
-        signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-        os.tcsetpgrp(0, os.getpgrp())
-        code = 70
-        try:
-            code = drive(asked["link"], asked["port"], asked["journal"])
-        finally:
-            os._exit(code)
-    signal.signal(signal.SIGHUP, lambda *_: os.kill(child, signal.SIGHUP))
-    print(child, file=out, flush=True)
-    _, status = os.waitpid(child, os.WUNTRACED)
-    while os.WIFSTOPPED(status):
-        print(json.dumps({"stopped": os.WSTOPSIG(status)}), file=out, flush=True)
-        _, status = os.waitpid(child, os.WUNTRACED)
-    print(json.dumps({"ended": os.waitstatus_to_exitcode(status)}), file=out, flush=True)
-
-
-class Nursery:
-    """Trials in processes of their own, each with a terminal of its own."""
-
-    def __init__(self):
-        self._zygote = subprocess.Popen(
-            [sys.executable, "-m", "tests.hardware.outlive", "zygote"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-
-    def begin(self, link, port, journal):
-        """Process number and terminal of a new one."""
-        terminal, far = pty.openpty()
-        asked = {"link": link, "port": str(port), "journal": str(journal), "terminal": os.ttyname(far)}
-        self._zygote.stdin.write(json.dumps(asked) + "\n")
-        self._zygote.stdin.flush()
-        number = int(self._zygote.stdout.readline())
-        os.close(far)
-        return number, terminal
-
-    def heard(self):
-        """What became of it: it stopped, or ended."""
-        assert select.select([self._zygote.stdout], [], [], HANGS_S)[0], "the trial's process hangs"
-        return json.loads(self._zygote.stdout.readline())
-
-    def close(self):
-        self._zygote.stdin.close()
-        self._zygote.stdout.close()
-        self._zygote.wait(HANGS_S)
-
-
-def end_of(nursery, terminal):
-    """Exit status; what it prints until then is read, so that it does not wait for that."""
-    end_s = time.monotonic() + HANGS_S
-    while not select.select([nursery._zygote.stdout], [], [], 0.01)[0]:
-        assert time.monotonic() < end_s, "the trial's process hangs"
-        if terminal is not None and select.select([terminal], [], [], 0)[0]:
-            try:
-                os.read(terminal, 4096)
-            except OSError:
-                terminal = None
-    return nursery.heard()
+    robot: Robot
+    process: int
+    terminal: int
+    slept: Path
 
 
 def _signalled(number):
-    def cause(robot, process, terminal):
-        os.kill(process, number)
+    def cause(to):
+        os.kill(to.process, number)
+
+    return cause
+
+
+def _guard_signalled(number):
+    def cause(to):
+        os.kill(guard_of(to.process, to.robot.path), number)
 
     return cause
 
 
 def _typed(key):
-    def cause(robot, process, terminal):
-        os.write(terminal, key)
+    def cause(to):
+        os.write(to.terminal, key)
 
     return cause
 
 
-def _closed(robot, process, terminal):
-    os.close(terminal)
+def _closed(to):
+    os.close(to.terminal)
 
 
-def _unplugged(robot, process, terminal):
-    robot.line.cut()
+def _unplugged(to):
+    to.robot.line.cut()
 
 
-def _killed_and_unplugged(robot, process, terminal):
-    robot.line.cut()
-    os.kill(process, signal.SIGKILL)
+def _killed_and_unplugged(to):
+    to.robot.line.cut()
+    os.kill(to.process, signal.SIGKILL)
 
 
+def _held(seconds, slept_s=0.0):
+    """Trial and guard stand still together, as on a computer that sleeps, and go on; the clock says how long it slept."""
+
+    def cause(to):
+        both = to.process, guard_of(to.process, to.robot.path)
+        for process in both:
+            os.kill(process, signal.SIGSTOP)
+        time.sleep(seconds)
+        if slept_s:
+            written = to.slept.with_suffix(".new")
+            written.write_text(str(slept_s + (float(to.slept.read_text()) if to.slept.exists() else 0.0)))
+            written.replace(to.slept)
+        for process in both[::-1]:
+            os.kill(process, signal.SIGCONT)
+
+    return cause
+
+
+def guard_of(process, port):
+    """The process number of a trial's guard: the child that has the port open. Another one stands by."""
+    port = os.path.realpath(port)
+    for child in Path(f"/proc/{process}/task/{process}/children").read_text().split():
+        if any(os.path.realpath(file) == port for file in Path(f"/proc/{child}/fd").iterdir()):
+            return int(child)
+    raise AssertionError("the trial has no guard")
+
+
+HELD, SLEPT = "trial and guard stopped for a second", "the computer slept"
+SUSPENDS = {"Ctrl-Z", "SIGTSTP"}
 CAUSES = {
     "SIGKILL": _signalled(signal.SIGKILL),
     "SIGSTOP": _signalled(signal.SIGSTOP),
     "SIGHUP": _signalled(signal.SIGHUP),
     "SIGTERM": _signalled(signal.SIGTERM),
+    "SIGQUIT": _signalled(signal.SIGQUIT),
+    "SIGTSTP": _signalled(signal.SIGTSTP),
     "Ctrl-C": _typed(b"\x03"),
     "Ctrl-\\": _typed(b"\x1c"),
     "Ctrl-Z": _typed(b"\x1a"),
@@ -251,6 +126,10 @@ CAUSES = {
     "camera frozen (scene)": _signalled(signal.SIGRTMIN + 1),
     "link gone": _unplugged,
     "link gone, then SIGKILL": _killed_and_unplugged,
+    "the guard is killed": _guard_signalled(signal.SIGKILL),
+    "the guard is terminated": _guard_signalled(signal.SIGTERM),
+    HELD: _held(1.0),
+    SLEPT: _held(0.02, 600.0),
 }
 _ARMED_S = 4.0
 """By then the servos have their torque and the body is straight; before, nothing depends on the camera."""
@@ -259,9 +138,9 @@ GONE_S = {"link gone": 1.0, "link gone, then SIGKILL": 1.0}
 """How long the link stays away; the time until the robot stands counts from its return."""
 
 
-def outlived(nursery, link, cause, folder, gone_s=0.0):
+def outlived(nursery, link, cause, folder, gone_s=0.0, kind=Robot):
     """One trial that this befell while its robot moved; AssertionError if the robot went on, or anything is left over."""
-    robot = Robot(link, folder)
+    robot = kind(link, folder)
     try:
         still_s, alone_s, ended = _befell(nursery, robot, cause, folder, gone_s)
         _guard_ends(robot, folder)
@@ -284,7 +163,9 @@ def _befell(nursery, robot, cause, folder, gone_s):
         robot.until(True, HANGS_S)
         time.sleep(_ARMED_S if cause.startswith("camera") and robot.link != "serial" else 0.25)
         began_s = time.monotonic()
-        CAUSES[cause](robot, process, terminal)
+        CAUSES[cause](Befalls(robot, process, terminal, nursery.slept))
+        if cause in {HELD, SLEPT}:
+            began_s = time.monotonic()
         alone_s = float("nan")
         if cause in GONE_S:
             end_s = began_s + (gone_s or GONE_S[cause])
@@ -311,10 +192,12 @@ def _end(nursery, cause, process, terminal):
         if cause == "SIGSTOP":
             assert "stopped" in nursery.heard()
         os.kill(process, signal.SIGKILL)
-    if cause == "Ctrl-Z":
+    if cause in SUSPENDS:
         assert end_of(nursery, terminal) == {"stopped": signal.SIGTSTP}
         os.kill(process, signal.SIGCONT)
-    return end_of(nursery, terminal)["ended"]
+    while "ended" not in (found := end_of(nursery, terminal)):
+        assert cause in {HELD, SLEPT}
+    return found["ended"]
 
 
 def _guard_ends(robot, folder):
@@ -366,7 +249,7 @@ def latency_s(folder):
     return [float(np.quantile(guarded, q) - np.quantile(bare, q)) for q in (0.5, 0.99)]
 
 
-def main(count, causes=()):
+def main(count, causes=(), log=None, kind=Robot):
     with tempfile.TemporaryDirectory() as folder:
         median_s, most_s = latency_s(Path(folder))
     print(f"The guard adds {1000 * median_s:.2f} ms at the median, {1000 * most_s:.2f} ms at the 99th percentile.")
@@ -374,11 +257,15 @@ def main(count, causes=()):
     print("| cause | link | times | stood after, ms: median, worst | within 500 ms | the trial's process ended with |")
     print("|---|---|---|---|---|---|")
     for cause in causes:
-        for link in LINKS:
+        for link in LINKS if kind is Robot else LINKS[:2]:
             seen = []
             for _ in range(count):
                 with tempfile.TemporaryDirectory() as folder:
-                    seen.append(outlived(nursery, link, cause, Path(folder)))
+                    seen.append(outlived(nursery, link, cause, Path(folder), kind=kind))
+                if log is not None:
+                    line = {"cause": cause, "link": link, "until_s": time.monotonic(), **seen[-1]._asdict()}
+                    log.write(json.dumps(line) + "\n")
+                    log.flush()
             took_ms = 1000 * np.array([s.still_s for s in seen])
             ends = ", ".join(sorted({str(s.ended) for s in seen}))
             took = f"{np.median(took_ms):.0f}, {took_ms.max():.0f} | {(took_ms <= 500).sum()}"
@@ -390,4 +277,10 @@ def main(count, causes=()):
 
 
 if __name__ == "__main__":
-    zygote() if sys.argv[1] == "zygote" else main(int(sys.argv[1]), sys.argv[2:])
+    asked = argparse.ArgumentParser()
+    asked.add_argument("count", type=int, help="how often each")
+    asked.add_argument("causes", nargs="*")
+    asked.add_argument("-o", type=argparse.FileType("a"), dest="log")
+    asked.add_argument("--manual", action="store_true", help="robots written from the makers' manuals alone; no bridge")
+    given = asked.parse_args()
+    main(given.count, given.causes, given.log, ManualRobot if given.manual else Robot)

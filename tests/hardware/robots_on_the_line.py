@@ -21,7 +21,12 @@ from bns.hardware.wheels.khepera import firmware
 from bns.physics.model import load_model
 from bns.robots.khepera import START
 
+from .manual_bus import DELAY, TORQUE, ManualBus, ManualServo
+from .manual_khepera import ManualKhepera
+
 LINKS = ("serial", "bus", "bridge")
+_WAY_S = 0.01
+"""Of a manual's Khepera, one way."""
 STILL_M_S = 0.005
 
 
@@ -106,6 +111,46 @@ class Robot:
             self._bridge.close()
         self.line.close()
         self.clock.close()
+
+
+class ManualRobot(Robot):
+    """A robot written from the makers' manuals alone: a Khepera, or twelve servos on a bus."""
+
+    def __init__(self, link, folder):
+        self.link, self.clock, self.heard, self._bridge = link, WorldsClock(), [], None
+        self._khepera = ManualKhepera() if link == "serial" else None
+        self._bus = None if link == "serial" else ManualBus([ManualServo(number) for number in range(1, 13)])
+        if self._bus is not None:
+            for servo in self._bus.servos:
+                servo.table[DELAY] = 0
+        self._turning = threading.Lock()
+        self.line = PseudoTerminal(self, folder, link)
+        self.path = self.line.path
+
+    def receive(self, data):
+        self.heard.append((time.monotonic(), data))
+        if self._bus is None:
+            time.sleep(_WAY_S)  # there; and back, below
+            self.moves()
+            answer = self._khepera.hears(data)
+            time.sleep(_WAY_S)
+            return answer
+        answers = b""
+        for byte in data:
+            later_s, answer = self._bus.heard(self.clock.now_s(), byte)
+            answers += answer
+            time.sleep(later_s if answer else 0.0)
+        return answers
+
+    def written(self):
+        pass
+
+    def moves(self):
+        if self._bus is not None:
+            return any(servo.table[TORQUE] for servo in self._bus.servos)
+        with self._turning:
+            self._khepera.turn(self.clock.now_s())
+        return max(np.abs(self._khepera.wheels_m_s)) > STILL_M_S
 
 
 class DistantRobot(Robot):

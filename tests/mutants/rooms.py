@@ -19,13 +19,15 @@ ROOMS: dict[str, tuple[str, str]] = {
     ),
     "safety": (
         "bns/hardware/safety.py",
-        "tests/hardware/test_safety.py tests/hardware/test_safety_edges.py tests/hardware/test_confirmed_stop.py",
+        "tests/hardware/stopping/test_safety.py tests/hardware/stopping/test_safety_edges.py "
+        "tests/hardware/stopping/test_confirmed_stop.py",
     ),
     "drivers": (
         "bns/hardware/wheels/khepera.py bns/hardware/servos/dynamixel.py bns/hardware/servos/servo_chain.py "
         "bns/hardware/servos/bridge.py bns/hardware/servos/packets.py bns/hardware/servos/servo_table.py",
-        "tests/hardware/test_confirmed_stop.py tests/hardware/test_khepera.py tests/hardware/test_khepera_asks.py "
-        "tests/hardware/test_ax12.py tests/hardware/test_bridge.py tests/hardware/test_x430.py",
+        "tests/hardware/stopping/test_confirmed_stop.py tests/hardware/wheels/test_khepera.py "
+        "tests/hardware/wheels/test_khepera_asks.py tests/hardware/servos/test_ax12.py tests/hardware/servos/test_bridge.py "
+        "tests/hardware/servos/test_x430.py tests/hardware/servos/test_packets.py",
     ),
 }
 """Name -> files that are changed, tests that must notice; patterns with spaces between."""

@@ -32,6 +32,7 @@ KINDS: Mapping[str, str] = {
     "lost-marker": "the tracker sees no marker",
     "stuck-marker": "the tracker shows an old picture as if it were new",
     "late-tracker": "the tracker's poses are older than their time stamps, by for_s, from at_s on",
+    "frozen-picture": "the camera sends one picture again and again; only a clock in its corner goes on",
     "frozen-scene": "the tracker keeps showing the scene of when this began",
     "swapped-markers": "lights change places in the report",
     "reflection": "a light that is no marker appears",

@@ -52,6 +52,11 @@ def _film(lens: Lens, wears: Wears, clock: EmulatedClock, faults: Faults, seed: 
         now_s = clock.now_s()
         if faults.strikes("stuck-marker", now_s):
             return last[0].copy() if last else None
+        if last and faults.strikes("frozen-picture", now_s):
+            ticked = last[0].copy()
+            ticked[:8, :8] += 40
+            last[:] = [ticked]
+            return ticked
         patches = [] if faults.strikes("lost-marker", now_s) else wears(now_s)
         if faults.strikes("reflection", now_s):
             patches.append(disc(YELLOW_BGR, 0.04, draw.uniform(-0.5, 0.5), draw.uniform(-0.5, 0.5), 0.0))

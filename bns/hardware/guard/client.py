@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -35,12 +35,43 @@ _ENDS_S = 2.0
 _SLICE_S = 0.05
 
 
+class _Process(NamedTuple):
+    """A guard's process, which waits for its set-up, and the socket to it.
+
+    One stands by while another guards: to start the interpreter takes a busy computer longer than to stop a robot.
+    """
+
+    process: subprocess.Popen[bytes]
+    control: socket.socket
+
+    @classmethod
+    def begun(cls) -> Self:
+        """A new one; it ends when the socket is closed."""
+        control, far = socket.socketpair()
+        script = [sys.executable, "-I", "-S", "-c", _CODE, str(_FOLDER.parent)]
+        with far:
+            process = subprocess.Popen(
+                script, stdin=far.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+            )
+        return cls(process, control)
+
+    def end(self) -> None:
+        """Not needed; one that was stopped (SIGSTOP) is killed."""
+        self.control.close()
+        try:
+            self.process.wait(_ENDS_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
 class Guard:
     """Starts the process, tells it that the trial lives, and hears when it has stopped the robot.
 
     `path` is the port to give to the robot's driver. A trial that gives no sign of life for `silent_s` is taken to hang. What the
-    guard does is written into `log`. A guard that has died is started again. One whose trial is gone goes on trying to stop the
-    robot until that has not been heard for `gives_up_s`. `sysfs` is where the system tells which device a port is.
+    guard does is written into `log`. A guard that has died is replaced by one that stands by, which stops the robot at once. One
+    whose trial is gone goes on trying to stop the robot until that has not been heard for `gives_up_s`. `sysfs` is where the
+    system tells which device a port is.
     """
 
     def __init__(
@@ -57,30 +88,39 @@ class Guard:
         self.path = ""
         self._armed, self._told_s, self._tried_s = False, 0.0, 0.0
         self._why: str | None = None
+        self._next: _Process | None = None
         if not Path(port).exists():
             raise HardwareError(no_port(port))
         self._start()
+        self._next = _Process.begun()
 
     def _start(self) -> None:
         folder = Path(self.path).parent if self.path else Path(tempfile.mkdtemp(prefix="bns-guard-"))
-        folder.mkdir(exist_ok=True)
         self.path = str(folder / "port")
-        self._control, far = socket.socketpair()
-        script = [sys.executable, "-I", "-S", "-c", _CODE, str(_FOLDER.parent)]
-        with far:
-            self._process = subprocess.Popen(
-                script, stdin=far.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-            )
-        self._said = b""
-        setup = self._setup | {"port": self._port, "link": self.path, "process": os.getpid()}
-        setup |= {"log": self._log and str(self._log.absolute()), "stop": self._recipe.as_json()}
-        self._control.sendall((json.dumps(setup) + "\n").encode())
-        answer = self._first_answer()
+        answer = self._begin(folder)
         self._control.setblocking(False)
         if answer["kind"] == "refused":
             self._gone(folder)
             raise HardwareError(why_not_opened(self._port, OSError(answer["errno"], answer["what"])))
         self._setup["identity"] = answer["identity"]
+
+    def _begin(self, folder: Path) -> dict[str, Any]:
+        """What the process that stands by answers to its set-up; if that was killed as well, what a new one answers."""
+        standby, self._next = self._next, None
+        if standby is not None:
+            with suppress(OSError, HardwareError):
+                return self._set_up(standby, folder)
+            standby.end()
+        return self._set_up(_Process.begun(), folder)
+
+    def _set_up(self, begun: _Process, folder: Path) -> dict[str, Any]:
+        self._process, self._control = begun
+        self._said = b""
+        folder.mkdir(exist_ok=True)
+        setup = self._setup | {"port": self._port, "link": self.path, "process": os.getpid()}
+        setup |= {"log": self._log and str(self._log.absolute()), "stop": self._recipe.as_json()}
+        self._control.sendall((json.dumps(setup) + "\n").encode())
+        return self._first_answer()
 
     def _gone(self, folder: Path) -> None:
         self._control.close()
@@ -143,6 +183,8 @@ class Guard:
             self._process.wait(_ENDS_S)
         ended = self._process.returncode is not None
         self._process.returncode = 0 if not ended else self._process.returncode  # it outlives this process on purpose
+        if self._next is not None:
+            self._next.end()
         return ended
 
     def _tell(self, what: bytes) -> None:
@@ -167,7 +209,7 @@ class Guard:
         for line in lines:
             event = json.loads(line)
             if event["kind"] == "tripped":
-                self._why = f"the guard stopped the robot: {event['why']}"
+                self._why = self._why or f"the guard stopped the robot: {event['why']}"
 
     def _restart(self) -> None:
         """The guard was killed: a new one takes the port, and the drive ends."""
@@ -181,6 +223,8 @@ class Guard:
             self._start()
             if self._armed:
                 self.arm()
+                self.stop_now()  # the driver's own stop waits for its next look, and for the port to be opened again
+            self._next = _Process.begun()
 
 
 class GuardedClock(RealClock):

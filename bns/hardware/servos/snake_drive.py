@@ -14,7 +14,7 @@ from bns.hardware.safety import OutOfSight, Watch
 from bns.hardware.servos.servo_chain import ServoChain, StrainWatch, StuckServoError
 from bns.hardware.servos.shape import apart_m
 from bns.hardware.servos.snake_settings import SnakeSettings
-from bns.hardware.tracking.eye import Eye
+from bns.hardware.tracking.eye import SAME_M, Eye
 from bns.hardware.tracking.sight import Sight
 from bns.physics.snake.gait import PARAMETERS, cycle_angles
 from bns.physics.snake.parameters import shipped_parameters
@@ -28,6 +28,8 @@ five pictures a second. A camera that may be late is believed for longer. Joints
 that swings by 1 rad moves neither."""
 _FROZEN_M, _FROZEN_M_LATE = 0.008, 0.012
 """Markers that the joints bring so much nearer, or further apart, are seen to move: after 3 mm at most in the same drives."""
+_COPIED_RAD, _DELAYS = 0.05, 5
+"""Joints between the markers that turn so far move a marker by more than `SAME_M`; of so many delays that a camera may have."""
 _SPRUNG_RAD = 0.2
 """A joint that turned by so much more than its servo can had been held by the body and was let go."""
 _READINGS = 32
@@ -67,6 +69,11 @@ class SnakeDrive:
         """When the joints were read, and how far apart the markers are by them, m; since the last one that sprang."""
         self._shown: tuple[float, float] | None = None
         """Least and greatest distance, by the joints, of the markers in the scene that the picture shows."""
+        self._copy, self._turns = SameScene(SAME_M), list[tuple[float, float]]()
+        """When the joints were read, and how far they had turned by then."""
+        self._first_s = self._came_s = 0.0
+        self._copied_s: float | None = None
+        """When a picture came that the camera has sent again since, while the joints turned."""
         self._joints_rad: np.ndarray | None = None
         self._read_s = 0.0
         self._angles = np.zeros(len(settings.ids))
@@ -159,7 +166,8 @@ class SnakeDrive:
             )
         self._angles, end_s, looked = target, asked_s + way_rad / speed_rad_s + self._settings.settle_s, False
         while (left_s := end_s - self._clock.now_s()) > 0 or not looked:  # a slow adapter leaves no time, and is looked at too
-            self._clock.sleep(self._watch.next_look_s(min(_TICK_S, max(left_s, 0.0)), self._eye.picture_s))
+            newest_s = self._eye.picture_s if self._copied_s is None else self._copied_s
+            self._clock.sleep(self._watch.next_look_s(min(_TICK_S, max(left_s, 0.0)), newest_s))
             self._look()
             looked = True
 
@@ -173,12 +181,17 @@ class SnakeDrive:
         if sight is not None:
             self._markers = np.concatenate([sight.points[name] for name in _MARKERS])
             self._follow(sight.t_s)
+            self._compare(sight.t_s)
             if self._seen and sight.t_s > self._seen[-1][0]:
                 self._seen.append((sight.t_s, self._markers))
             if self.rows and sight.t_s - self._began_s > self.rows[-1]["t_s"]:
                 here = {name: self.rows[-1][name] for name in ("cycle", *PARAMETERS)}
                 self.rows.append(self._row(sight.t_s) | here)
         self._watch.check(sight, self._eye.picture_s)
+        if self._copied_s is not None and self._watch.overdue(self._copied_s):
+            raise TrialPausedError(
+                "the camera sends the same picture again and again while the joints turn: it hangs. Look at it: bns track"
+            )
         return sight
 
     def _glance(self) -> None:
@@ -198,6 +211,7 @@ class SnakeDrive:
             if turned_rad > furthest_rad + _SPRUNG_RAD:
                 self._apart, self._shown = [], None
         self._joints_rad, self._read_s = joints_rad, read_s
+        self._turns = [*self._turns[1 - _READINGS :], (read_s, self._turned_rad)]
         self._apart = [*self._apart[1 - _READINGS :], (read_s, apart_m(joints_rad, self._parameters))]
 
     def _follow(self, filmed_s: float) -> None:
@@ -214,6 +228,18 @@ class SnakeDrive:
                 "distance, and the picture shows both markers where they were: the camera hangs or shows another scene. Look at "
                 "it: bns track"
             )
+
+    def _compare(self, filmed_s: float) -> None:
+        """Whether this picture is one that came before: no camera sees two markers in the same places while one of them moves.
+
+        A clock in the picture may go on. A tracker that sees a robot at rest always in the same place is not judged.
+        """
+        if self._copy.is_another(self._markers.reshape(2, 2)) or not self._eye.wanders:
+            self._first_s, self._came_s = filmed_s, self._eye.picture_s or filmed_s
+        times, turned_rad = np.array(self._turns).T
+        delays_s = np.linspace(0.0, self._unknown_s, _DELAYS)
+        then_rad, now_rad = (np.interp(t_s - delays_s, times, turned_rad) for t_s in (self._first_s, filmed_s))
+        self._copied_s = self._came_s if (now_rad - then_rad).min() > _COPIED_RAD else None
 
     def _apart_m(self, filmed_s: float) -> tuple[float, float]:
         """Least and greatest distance of the markers, by the joints, at the times at which the picture can have been taken."""

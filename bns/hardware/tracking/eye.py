@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,8 +12,16 @@ from bns.hardware.clock import Clock
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.tracking.sight import Sight, Tracker, unwrapped
 
+SAME_M = 1e-5
+"""A camera's noise alone moves what it sees by ten times that, and more."""
 _FRESH_S = 0.1
 _LOOKS, _BETWEEN_S = 10, 0.02
+
+
+def _wanders(sights: list[Sight]) -> bool:
+    """Whether no two pictures show all points of a robot in the same places."""
+    pictures = list({sight.t_s: np.concatenate([*sight.points.values(), sight.pose]) for sight in sights}.values())
+    return len(pictures) > 1 and all(np.abs(a - b).max() > SAME_M for a, b in pairwise(pictures))
 
 
 class Eye:
@@ -23,6 +32,8 @@ class Eye:
     ) -> None:
         self._tracker, self._clock, self._journal, self._delay_s = tracker, clock, journal, delay_s
         self._heading_rad, self._newest_s = heading_rad, -1.0
+        self.wanders = False
+        """Whether a robot that stands is seen in another place in every picture, if only by a hundredth of a millimetre."""
         if facts := getattr(tracker, "facts", None):  # of a camera: how it takes its pictures
             journal.note("tracker", **facts)
 
@@ -64,6 +75,7 @@ class Eye:
             if sight is not None and sight.t_s >= began_s:  # an older one may be from before it was put there
                 sights.append(sight)
             if len(sights) == _LOOKS:
+                self.wanders = _wanders(sights)
                 points = {name: np.mean([s.points[name] for s in sights], axis=0) for name in sight.points} if sight else {}
                 return Sight(sights[-1].t_s, np.mean([s.pose for s in sights], axis=0), sights[-1].residual_m, points)
             self._clock.sleep(_BETWEEN_S)

@@ -35,7 +35,12 @@ static FILE *answers;
 static avr_t *avr;
 static avr_uart_t *uart[2];
 static avr_irq_t *input[2];
-static queue_t to_board, to_bus, come[2];
+static queue_t to_board, come[2];
+static struct {
+  uint64_t at;
+  uint8_t byte;
+} due[ROOM];  // what servos will have sent by then, soonest first: a late answer is on its way while the next question goes out
+static unsigned due_count;
 static uint8_t said[ROOM];
 static unsigned said_count;
 static uint64_t said_at, bus_free_at;
@@ -78,15 +83,27 @@ static avr_cycle_count_t next_from_host(avr_t *board, avr_cycle_count_t when, vo
   return to_board.head == to_board.tail ? 0 : when + HOST_BYTE;
 }
 
+static void send_at(uint64_t at, uint8_t byte) {
+  unsigned place = due_count++;
+  if (due_count == ROOM) exit(6);
+  for (; place && due[place - 1].at > at; place--) due[place] = due[place - 1];
+  due[place].at = at;
+  due[place].byte = byte;
+}
+
+// Servos that send at the same time pull the line down for each other.
 static avr_cycle_count_t next_from_bus(avr_t *board, avr_cycle_count_t when, void *param) {
   (void)board, (void)param;
-  if (to_bus.head == to_bus.tail) return 0;
-  const uint8_t byte = to_bus.bytes[to_bus.tail++ % ROOM];
+  const uint64_t at = due[0].at;
+  uint8_t byte = 0xFF;
+  unsigned taken = 0;
+  for (; taken < due_count && due[taken].at < at + BUS_BYTE; taken++) byte &= due[taken].byte;
+  memmove(due, due + taken, (due_count -= taken) * sizeof *due);
   if (board_speaks)
     fault(TALKED_OVER);
   else
     deliver(1, byte);
-  return to_bus.head == to_bus.tail ? 0 : when + BUS_BYTE;
+  return !due_count ? 0 : due[0].at > when ? due[0].at : when + 1;
 }
 
 static void said_to_host(struct avr_irq_t *irq, uint32_t value, void *param) {
@@ -109,10 +126,12 @@ static void written_to_bus(struct avr_irq_t *irq, uint32_t value, void *param) {
   }
   give(&kind, 1), give(&now, 8), give(&byte, 1), fflush(answers);
   take(&later, 4), take(&count, 2);
-  to_bus.head = to_bus.tail = 0;
-  take(to_bus.bytes, count);
-  to_bus.head = count;
-  if (count) avr_cycle_timer_register(avr, bus_free_at - now + later + BUS_BYTE, next_from_bus, NULL);
+  for (uint16_t i = 0; i < count; i++) {
+    uint8_t answer;
+    take(&answer, 1);
+    send_at(bus_free_at + later + (i + 1) * BUS_BYTE, answer);
+  }
+  if (count) avr_cycle_timer_register(avr, due[0].at > now ? due[0].at - now : 1, next_from_bus, NULL);
 }
 
 static void turned_round(struct avr_irq_t *irq, uint32_t value, void *param) {

@@ -22,7 +22,7 @@ from bns.trial.folder import measured, past_evaluations
 from bns.trial.operator import TerminalOperator, UnattendedOperator
 from bns.trial.session import TrialSetup, open_rig
 
-from . import soak
+from .. import soak
 
 START = np.array([0.0, 0.0, np.pi / 2])
 COMMANDS = np.array([[12000, 9000, 900], [8000, 14000, 900]], np.float32)

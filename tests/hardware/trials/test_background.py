@@ -9,7 +9,7 @@ from bns.bootstrap.loop import run
 from bns.errors import HardwareError
 from bns.robots import load_robot
 from bns.spec import RunSpec
-from bns.trial.background import BackgroundDriver, Rounds
+from bns.trial.background import BackgroundDriver, Rounds, Waiting
 from bns.trial.evaluation import Evaluation
 from bns.worlds.robot import RobotWorld
 
@@ -58,7 +58,21 @@ def test_rounds_go_on_until_the_drive_is_over_or_they_are_enough():
     held = threading.Event()
     assert rounds.while_driving(lambda: "at once", lambda: held.wait(0.1)) == ("at once", 1)
     assert rounds.waited_s > 0.05
+    assert rounds.worked_s >= 0.1
     rounds.close()
+
+
+def test_shares_of_the_time_are_of_that_since_the_first_drive(monkeypatch):
+    """Driven for 8 s, with work for 6 s of these; then 2 s pass until the next drive, which takes 10 s."""
+    clock = iter([100.0, 108.0, 110.0, 120.0])
+    monkeypatch.setattr("bns.trial.background.time.perf_counter", lambda: next(clock))
+    waiting = Waiting()
+    assert waiting.share(1.0) == 0.0
+    for _ in range(2):
+        waiting.ends()
+        waiting.begins(0.0)
+    assert waiting.share(waiting.waited_s) == pytest.approx(0.1)
+    assert waiting.share(6.0) == pytest.approx(0.3)
 
 
 def test_a_fault_of_the_work_is_raised_after_the_drive():

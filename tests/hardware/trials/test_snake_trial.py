@@ -27,7 +27,7 @@ from bns.robots import load_robot
 from bns.robots.snake.table import GAIT
 from bns.trial.folder import measured, past_evaluations
 
-from . import soak
+from .. import soak
 
 GENTLE = [0.5, 0.1, 0.6, 0.7, 1.0]
 ROLLING = [1.45, 1.3, 0.2, 1.5, 1.0]

@@ -1,8 +1,6 @@
 """The Arduino's sketch on a simulated Mega 2560: real core, real boot loader, between the driver and emulated servos."""
 
 import os
-from importlib import resources
-from pathlib import Path
 
 import pytest
 
@@ -10,19 +8,12 @@ from bns.errors import HardwareError
 from bns.hardware.emulators.devices.bridge import BOOT_S, BridgeEmulator
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.faults import Fault, Faults
-from bns.hardware.link.hardware_log import HardwareLog
-from bns.hardware.servos.bridge import BridgeChain
 from bns.hardware.servos.bridge_frames import HELLO, MOVE, START, STATE, STOP, WATCHDOG_S, Frame, decoded, encoded
 from bns.hardware.servos.servo_chain import ServoError, ServoLimits
-from tests.hardware.simulated_board import Board, BoardClock, build, lacking
 
-SKETCH = Path(str(resources.files("bns.hardware"))) / "bridge_sketch" / "bridge_sketch.ino"
+from .simulated_board import Board, EmulatedBus, lacking
+
 pytestmark = pytest.mark.skipif(bool(lacking()), reason=lacking())
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    return build(SKETCH, tmp_path_factory.mktemp("sketch"))
 
 
 @pytest.fixture
@@ -33,25 +24,10 @@ def board(built, clock):
     def power_on(*faults, count=3, **registers):
         struck = Faults(tuple(faults), 1, "bus")
         servos = [Servo(n + 1, clock, struck, **registers) for n in range(count)]
-        opened.append(Board(built, servos, clock, struck))
+        opened.append(Board(built, EmulatedBus(servos, clock, struck)))
         return opened[-1]
 
     yield power_on
-    for each in opened:
-        each.close()
-
-
-@pytest.fixture
-def driven():
-    """driven(board, count) -> the driver, on the board's time."""
-    opened = []
-
-    def build(board, count=3, limits=None):
-        clock = BoardClock(board)
-        opened.append(BridgeChain(board.path, count, clock, HardwareLog(None, clock), limits))
-        return opened[-1]
-
-    yield build
     for each in opened:
         each.close()
 

@@ -1,4 +1,4 @@
-"""A Mega 2560 in simavr with its real boot loader and the sketch built with the real Arduino core, in front of emulated servos.
+"""A Mega 2560 in simavr with its real boot loader and the sketch built with the real Arduino core, in front of servos.
 
 Nothing moves on by itself: the board runs only while somebody waits on its `clock`, whose time is that of its own oscillator. So
 every time measured here is the board's, whatever else this computer does.
@@ -11,11 +11,10 @@ import subprocess
 import tty
 from pathlib import Path
 
-from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.terminal import put_through
 
-HERE = Path(__file__).parent / "arduino"
+HERE = Path(__file__).parent
 CORE = Path("/usr/share/arduino/hardware/arduino/avr")
 BOOT_LOADER = CORE / "bootloaders" / "stk500v2" / "stk500boot_v2_mega2560.hex"
 HZ = 16_000_000
@@ -62,12 +61,12 @@ def _call(*command):
 class Board:
     """`path` is its serial port; opening a pseudo-terminal resets nothing, so `reset` is called instead.
 
-    `faults` of the half-duplex bus, one byte a kind, as in `board.c`; `answered`: status packets that servos have sent.
+    `bus.heard(now_s, byte)` tells what comes back, and how many seconds after the byte. `faults` of the half-duplex bus, one
+    byte a kind, as in `board.c`; `answered`: status packets that servos have sent.
     """
 
-    def __init__(self, built, servos, servo_clock: EmulatedClock, faults=None):
-        self.bus, self._servo_clock, self.cycle, self.faults = Bus(servos, servo_clock, faults), servo_clock, 0, 0
-        self.answered = 0
+    def __init__(self, built, bus):
+        self.bus, self.cycle, self.faults, self.answered = bus, 0, 0, 0
         self._process = subprocess.Popen(
             [str(path) for path in built], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         )
@@ -120,12 +119,19 @@ class Board:
         self._process.stdin.flush()
 
     def _on_the_bus(self, cycle, byte):
-        self._servo_clock.sleep(cycle / HZ - self._servo_clock.now_s())
-        before_s = self._servo_clock.now_s()
-        answer = self.bus.receive(bytes([byte]))
+        later_s, answer = self.bus.heard(cycle / HZ, byte)
         self.answered += bool(answer)
-        later_s = self._servo_clock.now_s() - before_s - len(answer) * 10e-6
         self._ask(struct.pack("<IH", max(round(later_s * HZ), 0), len(answer)) + answer)
+
+
+class EmulatedBus(Bus):
+    """The emulated servos of this repository, on the board's time."""
+
+    def heard(self, now_s, byte):
+        self._clock.sleep(now_s - self._clock.now_s())
+        before_s = self._clock.now_s()
+        answer = self.receive(bytes([byte]))
+        return self._clock.now_s() - before_s - len(answer) * 10e-6, answer
 
 
 class BoardClock:

@@ -12,7 +12,7 @@ from bns.robots import load_robot
 from bns.trial.again.repeats import drive_repeats, final_evaluation
 from bns.trial.folder import past_evaluations, past_repeats
 
-from . import soak
+from .. import soak
 
 TRIAL = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", *soak.QUICK, "--evaluations", 2]
 

@@ -22,7 +22,7 @@ from bns.hardware.wheels.khepera_settings import khepera_settings
 from bns.hardware.wheels.wheel_drive import RobotLostError
 from bns.trial.session import TrialSetup, open_rig
 
-from .robots_on_the_line import DistantRobot
+from ..robots_on_the_line import DistantRobot
 
 MOST = ReplyLimits(1.0, 0.0, 100.0)
 

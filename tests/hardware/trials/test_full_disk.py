@@ -18,7 +18,7 @@ from bns.hardware.safety import Stopping
 from bns.trial.folder import measurements_however_it_ends, past_evaluations
 from bns.trial.session import TrialSetup, open_rig
 
-from . import soak
+from .. import soak
 
 TRIAL = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", *soak.QUICK, "--evaluations", "5"]
 

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import re
 import shutil
 import signal
 import socket
@@ -26,8 +27,8 @@ from bns.hardware.servos.bridge import BridgeChain
 from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.wheels.khepera import BAUD, KheperaIII
 
-from . import outlive
-from .robots_on_the_line import LINKS, Robot
+from .. import outlive
+from ..robots_on_the_line import LINKS, ManualRobot, Robot
 
 HANGS_S = 30.0
 RECIPES = {
@@ -86,9 +87,14 @@ def until(true):
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize("link", LINKS)
-def test_a_robot_stands_when_its_trial_is_killed(tmp_path, nursery, link):
-    seen = outlive.outlived(nursery, link, "SIGKILL", tmp_path)
+def trial_dies(guard):
+    guard._control.close()
+    guard._next.end()
+
+
+@pytest.mark.parametrize(("link", "kind"), [*((link, Robot) for link in LINKS), ("serial", ManualRobot), ("bus", ManualRobot)])
+def test_a_robot_stands_when_its_trial_is_killed(tmp_path, nursery, link, kind):
+    seen = outlive.outlived(nursery, link, "SIGKILL", tmp_path, kind=kind)
     assert seen.ended == -signal.SIGKILL
     assert [e["kind"] for e in seen.events] == ["tripped", "stopped"]
     assert seen.events[0]["why"] == "the trial's process is gone"
@@ -137,6 +143,27 @@ def test_what_the_terminal_does_stops_the_robot_first(tmp_path, nursery, cause, 
     assert (seen.ended, seen.said) == (3, said)
 
 
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc, for clocks that say that the computer slept")
+@pytest.mark.parametrize("link", ["serial", "bus"])
+def test_a_computer_that_slept_stops_the_robot_first(tmp_path, nursery, link):
+    """Trial and guard stand still for 0.02 s, and the clocks say ten minutes: no other cause is there."""
+    seen = outlive.outlived(nursery, link, outlive.SLEPT, tmp_path)
+    assert seen.ended == 3
+    assert seen.events[0]["why"] == "the computer slept for 600.0 s"
+    assert "the computer slept for 600.0 s" in seen.said
+
+
+def test_a_trial_that_stood_still_together_with_its_guard_stops_the_robot(tmp_path, nursery):
+    seen = outlive.outlived(nursery, "bus", outlive.HELD, tmp_path)
+    assert seen.ended == 3
+    assert re.search(r"nobody looked at the robot for \d|no sign of life for \d", seen.said)
+
+
+def test_a_trial_whose_guard_is_killed_is_paused(tmp_path, nursery):
+    seen = outlive.outlived(nursery, "bridge", "the guard is killed", tmp_path)
+    assert (seen.ended, seen.said) == (3, "the guard of the robot's port was gone")
+
+
 @pytest.mark.parametrize("link", LINKS)
 def test_a_link_that_comes_back_after_the_trial_has_gone_carries_the_stop(tmp_path, nursery, link):
     seen = outlive.outlived(nursery, link, "link gone, then SIGKILL", tmp_path)
@@ -174,18 +201,26 @@ def test_a_driver_can_stop_what_the_guard_has_stopped(held, link):
         driver.close()
 
 
-def test_a_guard_that_is_killed_is_started_again_and_the_drive_ends(held):
+@pytest.mark.parametrize("both", [False, True])
+def test_a_guard_that_is_killed_is_replaced_by_one_that_stops_the_robot(tmp_path, held, both):
     robot, guard = held("serial")
     clock = GuardedClock(guard)
     driver = driver_of("serial", guard, clock)
     guard.arm()
     set_off("serial", driver)
     robot.until(True)
-    first = guard.process
+    first, standby = guard.process, guard._next.process
     os.kill(first, signal.SIGKILL)
+    if both:
+        standby.kill()
+        standby.wait(HANGS_S)
     until(guard.tripped)
     assert guard.tripped() == "the guard of the robot's port had ended"
     assert guard.process != first
+    assert (guard.process == standby.pid) is not both
+    until(lambda: outlive._events(tmp_path))
+    assert outlive._events(tmp_path)[0]["why"] == "the trial was asked to stop"
+    robot.until(False)  # before its driver asks for that
     assert driver.stop(HANGS_S).confirmed
     assert not robot.moves()
 
@@ -234,7 +269,7 @@ def test_a_robot_is_stopped_over_a_slow_link(tmp_path):
     os.write(line, b"D,l20000,l20000\n")
     robot.until(True)
     guard.arm()
-    guard._control.close()
+    trial_dies(guard)
     robot.until(False)
     assert guard._process.wait(HANGS_S) == 0
     os.close(line)
@@ -243,8 +278,24 @@ def test_a_robot_is_stopped_over_a_slow_link(tmp_path):
 
 def test_a_trial_that_ends_leaves_no_guard(held):
     _, guard = held("serial")
+    standby = guard._next.process
     assert guard.close()
     assert not os.path.lexists(guard.path)
+    assert standby.returncode == 0
+
+
+def test_what_stands_by_ends_even_if_it_was_stopped(held):
+    _, guard = held("serial")
+    standby = guard._next.process
+    standby.send_signal(signal.SIGSTOP)
+    assert guard.close()
+    assert standby.returncode == -signal.SIGKILL
+
+
+def test_what_stands_by_ends_with_the_trial(held):
+    _, guard = held("serial")
+    guard._next.control.close()
+    assert guard._next.process.wait(HANGS_S) == 0
 
 
 def test_a_port_in_use_is_named(tmp_path):
@@ -325,7 +376,7 @@ def test_a_device_that_takes_the_ports_name_hears_nothing_unless_it_is_the_robot
     os.close(line)
     shutil.rmtree(tmp_path / "sys")
     robot.line.cut()
-    guard._control.close()
+    trial_dies(guard)
     before = len(robot.heard)
     robot.plug_in()
     say_what_is_there(tmp_path / "sys", robot.path, "FT1234" if same else "FT9999")
@@ -344,7 +395,7 @@ def test_a_guard_whose_port_never_comes_back_ends_after_the_time_that_the_rig_sa
     guard = Guard(str(robot.path), RECIPES["serial"], HANGS_S, tmp_path / "guard.jsonl", gives_up_s=1.5)
     guard.arm()
     robot.line.cut()
-    guard._control.close()
+    trial_dies(guard)
     began_s = time.monotonic()
     assert guard._process.wait(HANGS_S) == 0
     assert time.monotonic() - began_s > 1.4

@@ -65,6 +65,21 @@ class Pictures:
         return self._last
 
 
+class Copied(Pictures):
+    """The same picture again and again from some time on, with new stamps; `rests`: the noise of the others as well."""
+
+    def __init__(self, clock, from_s, rests=False, rate_hz=15):
+        super().__init__(clock, np.inf)
+        self.from_s, self._rests, self._rate_hz = from_s, rests, rate_hz
+
+    def look(self):
+        filmed_s = np.floor(self._clock.now_s() * self._rate_hz) / self._rate_hz
+        if filmed_s >= self.from_s or (self._rests and self._last is not None):
+            self._last, self.picture_s = replace(self._last, t_s=filmed_s), filmed_s
+            return self._last
+        return super().look()
+
+
 @pytest.fixture
 def drive(clock):
     """drive(joints that obey, when the pictures end) -> a drive of a robot whose markers are seen to stand still."""
@@ -211,6 +226,48 @@ def test_a_camera_whose_delay_is_known_shows_a_centimetre(drive, clock, unknown_
     assert on._turned_rad < 0.5
 
 
+def little(on, rad=0.2):
+    """Joints turn by less than what would be noticed without a look at the noise."""
+    on._go_to(np.tile([0.0, rad], 6), rad, 0.4)
+
+
+@pytest.mark.parametrize("rate_hz", [5, 15])
+@pytest.mark.parametrize("unknown_s", [0.02, 0.2])
+def test_a_picture_that_is_sent_again_and_again_is_none(drive, clock, rate_hz, unknown_s):
+    """Whatever its stamps say: without the noise of a camera it is a copy."""
+    on = drive(BETWEEN, chain=Turning, unknown_s=unknown_s)
+    on._eye._tracker = pictures = Copied(clock, np.inf, rate_hz=rate_hz)
+    on.straighten()
+    pictures.from_s = began_s = clock.now_s() + 0.05
+    with pytest.raises(TrialPausedError, match="sends the same picture again and again while the joints turn"):
+        little(on)
+    assert clock.now_s() - began_s < 0.55
+    assert on._turned_rad < 0.5
+
+
+def test_a_robot_that_stands_may_be_seen_in_the_same_place(drive, clock):
+    on = drive(BETWEEN, chain=Turning)
+    on._eye._tracker = pictures = Copied(clock, np.inf)
+    on.straighten()
+    pictures.from_s = clock.now_s()
+    for _ in range(10):
+        on._look()
+        clock.sleep(0.1)
+
+
+def test_a_tracker_without_noise_is_not_judged_by_its_noise(drive, clock):
+    on = drive(BETWEEN, chain=Turning)
+    on._eye._tracker = Copied(clock, np.inf, rests=True)
+    on.straighten()
+    little(on)
+
+
+def test_pictures_with_noise_are_no_copies(drive):
+    on = drive(BETWEEN, chain=Turning)
+    on.straighten()
+    little(on)
+
+
 @pytest.mark.parametrize("ends_s", [0.2, 0.5, 0.9])
 def test_a_camera_that_stops_while_the_servos_get_their_torque_is_noticed(drive, clock, ends_s):
     """By 0.8 s they have it; then the robot is looked for, for another second."""
@@ -219,7 +276,7 @@ def test_a_camera_that_stops_while_the_servos_get_their_torque_is_noticed(drive,
     assert clock.now_s() - ends_s < 0.45
 
 
-@pytest.mark.parametrize(("kind", "within_s"), [("stuck-marker", 0.6), ("frozen-scene", 1.0)])
+@pytest.mark.parametrize(("kind", "within_s"), [("stuck-marker", 0.6), ("frozen-picture", 0.6), ("frozen-scene", 1.0)])
 @pytest.mark.parametrize("at_s", [3.1, 4.4])
 def test_an_emulated_robot_is_stopped_when_its_camera_hangs(tmp_path, clock, kind, within_s, at_s):
     """Bits and scene; the emulated camera takes a picture every 0.2 s."""
@@ -228,8 +285,8 @@ def test_an_emulated_robot_is_stopped_when_its_camera_hangs(tmp_path, clock, kin
     journal = HardwareLog(tmp_path / "journal.jsonl", clock)
     platform = snake.open_platform(replace(on.rig, limits=rig.limits), clock, journal, Stopping())
     try:
-        if kind == "frozen-scene":
-            with pytest.raises(TrialPausedError, match="the picture shows both markers where they were"):
+        if kind != "stuck-marker":
+            with pytest.raises(TrialPausedError, match=r"same picture again|the picture shows both markers where they were"):
                 platform.drive(np.array([GENTLE] * 5, np.float32))
         else:
             assert "no new picture" in platform.drive(np.array([GENTLE] * 5, np.float32)).ended

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from . import stops
+from .. import stops
 
 
 def still_s(robot, count, causes, **driver):

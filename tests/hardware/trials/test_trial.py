@@ -1,0 +1,205 @@
+"""Whole trials on the emulated Khepera, from command to table."""
+
+import io
+import itertools
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from contextlib import nullcontext
+
+import numpy as np
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from bns.console import view
+from bns.hardware.link.hardware_log import events
+from bns.trial.folder import past_evaluations
+
+from .. import soak
+from .calls import TRIAL, call, evaluated, faults, journal_of
+
+
+def test_from_command_to_table_and_replay(tmp_path, capsys):
+    assert call(*TRIAL, "--evaluations", 3, "--results", tmp_path) == 0
+    said = capsys.readouterr().out
+    assert "3 evaluations" in said
+    assert "stops: 3 confirmed" in said
+    assert "the robot waited for computations" in said
+    rows = evaluated(tmp_path, "trials-emulated")
+    assert rows["evaluation"].tolist() == [1, 2, 3]
+    assert set(rows["world"]) == {"robot"}
+    assert (rows["fitness_world"] == rows["evaluated_fitness_world"]).all()
+    journal = journal_of(tmp_path)
+    assert (journal.parent / "path.png").exists()
+
+    assert call("trial", "--replay", journal, "--results", tmp_path) == 0
+    again = evaluated(tmp_path, "trials-replayed")
+    same = [c for c in rows.columns if c not in {"run_id", "sweep"} and not c.endswith("_s")]
+    pd.testing.assert_frame_equal(rows[same], again[same])
+
+
+def test_measurements_are_one_table_of_commands_and_poses(tmp_path):
+    assert call(*TRIAL, "--evaluations", 2, "--results", tmp_path) == 0
+    journal = journal_of(tmp_path)
+    table = pd.read_csv(journal.parent / "measurements.csv")
+    assert {"trial", "t_s", "left_m_s", "right_m_s", "x_m", "y_m", "heading_rad", "session_s", "battery_v"} <= set(table)
+    for _, drive in table.groupby("trial"):
+        assert (drive["t_s"].diff().dropna() > 0).all()
+        assert drive["t_s"].iloc[0] == 0
+        assert drive["left_m_s"].iloc[:-1].between(0.0, 0.21).all()
+        assert np.isnan(drive["left_m_s"].iloc[-1])
+        assert drive["heading_rad"].diff().abs().max() < 0.6
+    kinds = {e["kind"] for e in events(journal)}
+    assert {"trial", "sent", "received", "seen", "command", "driven", "evaluated", "stop", "complete"} <= kinds
+
+
+def test_what_was_driven_is_what_was_asked_but_for_rounding(tmp_path):
+    assert call(*TRIAL, "--evaluations", 2, "--results", tmp_path) == 0
+    for done in past_evaluations(journal_of(tmp_path)):
+        count = len(done.commands)
+        assert count
+        assert len(done.poses) == count + 1
+        np.testing.assert_allclose(done.commands[:, :2], done.picked[:count, :2], atol=1.0)
+        np.testing.assert_allclose(done.commands[:, 2], done.picked[:count, 2], atol=35.0)
+
+
+def test_a_pause_is_gone_on_with_and_nothing_is_lost(tmp_path, capsys):
+    plan = faults(tmp_path, {"kind": "hang-up", "at_s": 12, "for_s": 2})
+    asked = [*TRIAL, "--evaluations", 4, "--results", tmp_path]
+    assert call(*asked, *plan) == 3
+    assert "the robot was lost" in capsys.readouterr().err
+    before = past_evaluations(journal_of(tmp_path))
+    assert 1 <= len(before) < 4
+    assert (journal_of(tmp_path).parent / "measurements.csv").exists()
+    assert call(*asked) == 2
+    assert "Go on with --resume" in capsys.readouterr().err
+    assert call(*asked, "--resume") == 0
+    after = past_evaluations(journal_of(tmp_path))
+    assert len(after) == 4
+    for old, new in zip(before, after, strict=False):
+        np.testing.assert_array_equal(old.poses, new.poses)
+    assert evaluated(tmp_path, "trials-emulated")["evaluation"].tolist() == [1, 2, 3, 4]
+
+
+def test_a_resumed_trial_is_the_trial_that_a_replay_gives(tmp_path):
+    plan = faults(tmp_path, {"kind": "hang-up", "at_s": 12, "for_s": 2})
+    asked = [*TRIAL, "--evaluations", 3, "--results", tmp_path, "--most-rounds", 3]
+    assert call(*asked, *plan) == 3
+    assert call(*asked, "--resume") == 0
+    assert call("trial", "--replay", journal_of(tmp_path), "--results", tmp_path) == 0
+    first, again = evaluated(tmp_path, "trials-emulated"), evaluated(tmp_path, "trials-replayed")
+    np.testing.assert_array_equal(first["best_fitness"], again["best_fitness"])
+    assert len(first) == 3
+
+
+def test_a_stop_that_cannot_be_confirmed_is_shouted(tmp_path, capsys):
+    plan = faults(tmp_path, {"kind": "hang-up", "at_s": 5, "for_s": 10_000})
+    assert call(*TRIAL, "--evaluations", 3, "--results", tmp_path, *plan) == 4
+    said = capsys.readouterr().err
+    assert "THE ROBOT MAY STILL BE MOVING: CUT THE POWER NOW" in said
+    assert "is gone" in said
+    *_, last = events(journal_of(tmp_path), "stop")
+    assert not last["confirmed"]
+
+
+def test_leaving_the_surface_ends_the_drive_not_the_trial(tmp_path, capsys):
+    rig = tmp_path / "rig.yaml"
+    text = "robot: khepera\nport: x\nsurface_m: {x: [-0.3, 0.3], y: [-0.3, 0.3]}\n"
+    rig.write_text(text + "tracker: {kind: wii, device: x, height_m: 2.4, view_rad: 0.75}\n")
+    assert call(*TRIAL, "--evaluations", 4, "--results", tmp_path, "--rig", rig) == 0
+    assert "left the surface" in capsys.readouterr().out
+    driven = list(events(journal_of(tmp_path), "driven"))
+    assert any("left the surface" in e["ended"] for e in driven)
+    assert all(e["confirmed"] for e in events(journal_of(tmp_path), "stop"))
+
+
+def test_a_robot_out_of_sight_is_stopped_soon(tmp_path):
+    plan = faults(tmp_path, {"kind": "lost-marker", "at_s": 6, "for_s": 3})
+    call(*TRIAL, "--evaluations", 2, "--results", tmp_path, *plan)
+    found = list(events(journal_of(tmp_path), "seen", "stop"))
+    seen = [e["t_s"] for e in found if e["kind"] == "seen"]
+    gap_s = next(b for a, b in itertools.pairwise(seen) if b - a > 0.4)
+    stop = next(e for e in found if e["kind"] == "stop" and 6 < e["t_s"] < gap_s)
+    assert stop["confirmed"]
+    assert stop["t_s"] - 6 < 0.5 + 0.2 + 0.45
+
+
+@pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")])
+def test_signals_stop_the_robot_first(tmp_path, number, word):
+    asked = [str(a) for a in (*TRIAL, "--evaluations", 50, "--results", tmp_path)]
+    asked[asked.index("inf")] = "30"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "bns", *asked], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
+    )
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        found = list((tmp_path / "trials").glob("*/journal.jsonl"))
+        if found and '"kind":"evaluated"' in found[0].read_text():
+            break
+        time.sleep(0.1)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 3, said
+    assert word in said
+    assert "Traceback" not in said
+    *_, last = events(journal_of(tmp_path), "stop")
+    assert last["confirmed"]
+    assert past_evaluations(journal_of(tmp_path))
+
+
+def test_a_torn_last_line_is_passed_over(tmp_path):
+    assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path) == 0
+    journal = journal_of(tmp_path)
+    whole = len(list(events(journal)))
+    with journal.open("a") as file:
+        file.write('{"t_s": 3.0, "ki')
+    assert len(list(events(journal))) == whole
+    assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path, "--resume") == 0
+
+
+@pytest.mark.slow
+def test_ten_trials_with_faults_at_random(tmp_path):
+    ends = [soak.judged(seed, tmp_path) for seed in range(10)]
+    assert set(ends) <= {"done", "paused, resumed", "stop not confirmed, and shouted", "refused before it moved"}
+    assert ends.count("done") >= 2
+
+
+def test_the_live_view_shows_robot_and_rig(tmp_path, monkeypatch):
+    console, seen = Console(width=200, record=True, file=io.StringIO()), []
+
+    def watching(spec, more, _now):
+        return nullcontext(lambda row: seen.append((spec, row, more())))
+
+    monkeypatch.setattr("bns.trial.session.live_view", watching)
+    assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path) == 0
+    console.print(view(*seen[0]))
+    shown = console.export_text()
+    for heading in ("7 cm", "20 cm", "battery", "last stop", "ended early"):
+        assert heading in shown
+    assert re.search(r"7\.9 V", shown)
+    assert re.search(r"\d+ ms", shown)
+    assert "unstable" not in shown
+
+
+def test_a_trial_can_end_with_success(tmp_path, monkeypatch, capsys):
+    worth = iter([False, True, False, True, True, True])
+    monkeypatch.setattr("bns.bootstrap.recorder.Recorder.add_evaluated", _succeeding(worth))
+    assert call(*TRIAL, "--evaluations", 9, "--until-success", 2, "--results", tmp_path) == 0
+    assert "5 evaluations" in capsys.readouterr().out
+    assert evaluated(tmp_path, "trials-emulated")["evaluated_success"].tolist() == [False, True, False, True, True]
+
+
+def _succeeding(worth):
+    from bns.bootstrap.recorder import Recorder
+
+    real = Recorder.add_evaluated
+
+    def add(self, *arguments):
+        real(self, *arguments)
+        self._evaluated["evaluated_success"] = next(worth)
+
+    return add
