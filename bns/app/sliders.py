@@ -11,6 +11,7 @@ from bns.app.parts import WIDE, together
 
 _UNTITLED = ".bk-slider-title { display: none; }"
 _IN_A_LINE = ".bk-input-group { flex-direction: row; align-items: center; gap: 8px; } label { white-space: nowrap; }"
+_DIGITS = "0.00000"
 NAMES = """
 for (const kind of ["Slider", "RangeSlider", "DateSlider"]) {
   const view = Bokeh.Models.get(kind).prototype.default_view
@@ -47,11 +48,11 @@ class NumberSlider:
         step = (end - start) / steps
         self._moved, self._quiet = moved, False
         self._box = pn.widgets.FloatInput(
-            name=name, value=value, step=step, start=bounds[0], end=bounds[1], format="0.00000", width=300, margin=0,
+            name=name, value=value, step=step, start=bounds[0], end=bounds[1], format=_DIGITS, width=300, margin=0,
             stylesheets=[_IN_A_LINE],
         )  # fmt: skip
         self._slider = Slider(
-            name=short, value=value, start=start, end=end, step=step, show_value=False, margin=(0, 0, 5, 0),
+            name=short, value=value, start=start, end=end, step=step, show_value=False, format=_DIGITS, margin=(0, 0, 5, 0),
             stylesheets=[_UNTITLED], **WIDE,
         )  # fmt: skip
         for widget in (self._box, self._slider):

@@ -147,10 +147,10 @@ def test_a_screen_reader_can_name_everything(visit):
     slider.wait_for()
     page.get_by_label("tau_s (s), by hand").wait_for()
     slider.focus()
-    before = slider.get_attribute("aria-valuenow")
+    before = slider.get_attribute("aria-valuetext")
     page.keyboard.press("ArrowRight")
     error_of(page, "by hand")
-    assert slider.get_attribute("aria-valuenow") != before
+    assert slider.get_attribute("aria-valuetext") != before
     for screen, sign in (
         ("Data", "#bns-log"),
         ("Model", "#bns-model"),
@@ -170,7 +170,7 @@ def test_what_one_change_brings_comes_in_one_message(visit):
     """In several, a picture could get data that name a part which the browser does not have yet."""
     visited = visit(LOG)
     page, came = visited.browser.new_page(), []
-    page.on("websocket", lambda socket: socket.on("framereceived", came.append))
+    page.on("websocket", lambda socket: socket.on("framereceived", lambda frame: came.append(frame)))
     page.goto(visited.address)
     page.get_by_role("checkbox", name="motor-lag:").check()
     error_of(page, "+ motor-lag")

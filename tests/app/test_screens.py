@@ -109,6 +109,14 @@ def test_velocities_stand_in_words_with_units():
             assert name not in said
 
 
+def test_trials_have_the_names_of_the_log_in_the_picture_of_all_trials():
+    tab = Tab()
+    tab.open(LOG, "log.csv")
+    screen = entered(WhereScreen, tab)
+    names = [str(name) for name in tab.log.trials["trial"]]
+    assert screen._pictures.trial.xaxis[0].major_label_overrides == dict(enumerate(names))
+
+
 class Ticks:
     """A document whose next tick comes when the test says so."""
 
