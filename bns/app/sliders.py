@@ -18,11 +18,24 @@ for (const kind of ["Slider", "RangeSlider", "DateSlider"]) {
   const render = view.prototype.render
   view.prototype.render = function() {
     render.call(this)
-    for (const handle of this.shadow_el.querySelectorAll(".noUi-handle")) handle.setAttribute("aria-label", this.model.title)
+    const handles = [...this.shadow_el.querySelectorAll(".noUi-handle")]
+    for (const handle of handles) handle.setAttribute("aria-label", this.model.title)
+    const say = (values) => handles.forEach((handle, i) => handle.setAttribute("aria-valuetext", this.pretty(values[i])))
+    this._noUiSlider.off("update.said")
+    this._noUiSlider.on("update.said", (_texts, _handle, values) => queueMicrotask(() => say(values)))
+  }
+}
+const box = Bokeh.Models.get("Spinner").prototype.default_view.prototype
+const rendered = box.render
+box.render = function() {
+  rendered.call(this)
+  for (const way of ["up", "down"]) {
+    this.shadow_el.querySelector(`.bk-spin-btn-${way}`)?.setAttribute("aria-label", `a step ${way}`)
   }
 }
 """
-"""Script: Bokeh gives the handle of a slider the role of one, and no name."""
+"""Script: Bokeh gives the handle of a slider the role of one, no name, and two digits of its value, whatever the format; and the
+arrows beside a number no name."""
 
 
 class Slider(pn.widgets.FloatSlider):

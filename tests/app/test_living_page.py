@@ -162,7 +162,7 @@ def test_a_screen_reader_can_name_everything(visit):
         settled(page)
         if screen in {"Where it fails", "Effects"}:
             assert page.get_by_role("slider", name="Time in the trial (s)").filter(visible=True).count() == 1
-        unnamed = UNNAMED.findall(page.locator("body").aria_snapshot())
+        unnamed = [found.group() for found in UNNAMED.finditer(page.locator("body").aria_snapshot())]
         assert unnamed == [], screen
 
 
@@ -170,7 +170,11 @@ def test_what_one_change_brings_comes_in_one_message(visit):
     """In several, a picture could get data that name a part which the browser does not have yet."""
     visited = visit(LOG)
     page, came = visited.browser.new_page(), []
-    page.on("websocket", lambda socket: socket.on("framereceived", lambda frame: came.append(frame)))
+
+    def keep(frame):
+        came.append(frame)
+
+    page.on("websocket", lambda socket: socket.on("framereceived", keep))
     page.goto(visited.address)
     page.get_by_role("checkbox", name="motor-lag:").check()
     error_of(page, "+ motor-lag")
