@@ -41,7 +41,7 @@ def test_trial_without_a_pose_is_left_out_and_listed(tmp_path, capsys):
     path = log_of(tmp_path, rows("a", 60, x=lambda n: "") + rows("b", 60) + rows("c", 60))
     measured = load_measured(path)
     assert measured.tracks.names == ("b", "c")
-    assert [finding.trial for finding in measured.findings if "left out" in finding.text] == ["a"]
+    assert [finding.trial for finding in measured.findings if "excluded" in finding.text] == ["a"]
     assert main(["compare", str(path), "--model", "khepera"]) == 0
 
 

@@ -155,7 +155,7 @@ def test_what_is_left_out_is_named():
     assert len(cycles) == TRIALS * CYCLES - 2
     said = [f"{f.trial} {f.row} {f.text}" for f in findings]
     assert said[0] == "0 2 cycle 2: a marker lost at its begin or end; left out"
-    assert said[1] == "1 8 cycle 1: nobody says whether it was stable; left out"
+    assert said[1] == "1 8 cycle 1: it is not known whether it was stable; left out"
     assert re.match(r"1 12 cycle 3: the distance of the markers changes by \+\d+ cm", said[2])
 
 

@@ -127,7 +127,7 @@ def _cycle(trial: str, number: int, rows: pd.DataFrame, findings: list[Finding])
     elif begin[list(MARKERS)].isna().any() or end[list(MARKERS)].isna().any():
         reason = "a marker lost at its begin or end"
     elif said.empty:
-        reason = "nobody says whether it was stable"
+        reason = "it is not known whether it was stable"
     if reason:
         findings.append(Finding(trial, row, f"cycle {number}: {reason}; left out"))
         return None
