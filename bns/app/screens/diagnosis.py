@@ -17,6 +17,8 @@ from bns.app.switches import Term
 from bns.app.tab import Tab
 from bns.diagnose.report.plain_language import certainty, headline
 
+_THEN = "<br>Switch it on, see the error fall in the table, and save the mended model on the screen Next."
+
 
 class DiagnosisPart:
     """``found``: called when there is something new to show; ``switch_on``: with the effects that were found."""
@@ -94,7 +96,8 @@ class DiagnosisPart:
         words = "".join(f"<br>It looks like this: {escape(each)}." for each in result.diagnosis.terms_in_words)
         errors = result.diagnosis.errors_with_terms or result.diagnosis.errors
         sizes = found_numbers(result.to_json()["parameters"])
-        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}{sizes}{words}</p>{found_errors(errors)}"
+        then = "" if self._switch_on.disabled else _THEN
+        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}{sizes}{words}{then}</p>{found_errors(errors)}"
         self._found()
 
 
