@@ -14,7 +14,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test test-slow lint dist docs sweep-khepera sweep-budget figures bench bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants replication
+.PHONY: help setup test test-slow lint dist docs sweep-khepera sweep-budget figures bench bench-check bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants replication
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -69,6 +69,9 @@ replication: setup ## docs/replication.md, what of the dissertation replicates, 
 
 bench: setup ## speed, as ratios against named peers measured in the same run
 	$(BIN)/python -m tests.bench --json "$(RESULTS)/bench.json"
+
+bench-check: setup ## is a ratio of the last `make bench` worse by 15 % than the committed one (tests/bench/ratios.csv)?
+	$(BIN)/python -m tests.bench.ratios "$(RESULTS)/bench.json"
 
 bench-gpu: setup ## both studies on this machine's GPU, from slices of them (needs: pip install -e '.[cuda]' in .venv)
 	$(BIN)/python -m tests.bench.gpu --json "$(RESULTS)/bench-gpu.json"

@@ -1,4 +1,4 @@
-"""Approaches beside each other: success against evaluations and against robot minutes, and minutes until success lasts."""
+"""Approaches compared: success against evaluations and against robot minutes, and minutes until success lasts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from analysis.robot_time import LASTING, minutes_until_lasting, success_by_minut
 from bns.plotting.style import OKABE_ITO, lettered, note, panels, style
 
 NAME = "approaches"
-PAPER = "section 2.6, its approaches beside BNS"
+PAPER = "section 2.6, its approaches compared with BNS"
 SWEEPS = "approaches"
 """Names of the sweeps that compare approaches begin so."""
 MINUTES = 60
@@ -57,14 +57,14 @@ def _draw(evals: pd.DataFrame) -> FigureResult:
     where = f"{task_title(first.robot, first.task)}, world {first.world}"
     note(figure, f"{where}; {counted(n, 'run')}, {least} at least of each approach; bands: {INTERVALS}.")
     shows = (
-        f"Task {where}, {first.sweep}. (a, b) Share of runs whose fittest controller completes the task after so many "
+        f"Task {where}, {first.sweep}. (a, b) Fraction of runs whose fittest controller completes the task after so many "
         f"evaluations, and robot minutes (every drive charged, with the spec's overhead). (c) Share of runs in which {LASTING} "
         f"successes in a row have not begun yet (Kaplan-Meier). n = {n} runs, {least} at least of each approach; {INTERVALS}."
     )
     table = pd.DataFrame(tables)
     name = f"{NAME}-{first.sweep}-{first.robot}-{first.task}-{str(first.world).split('/')[-1].removesuffix('.yaml')}"
     return FigureResult(
-        name, f"Approaches beside each other: {where}", figure, shows, n, (str(first.sweep),), data=table, table=table
+        name, f"Approaches compared: {where}", figure, shows, n, (str(first.sweep),), data=table, table=table
     )
 
 

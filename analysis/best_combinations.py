@@ -76,7 +76,7 @@ def _draw(store: Results, chosen: Selection, task: str, rows: pd.DataFrame) -> F
     unconfirmed = () if reruns else (f"not confirmed on fresh seeds: {how}",)
     note(figure, "; ".join((f"{n:,} runs", *said.missing, *(unconfirmed and ("not confirmed",)), f"bars: {INTERVALS}")) + ".")
     shows = (
-        f"The {len(best)} best combinations of {counted(len(rows), 'combination')}, by the share of runs whose fittest "
+        f"The {len(best)} best combinations of {counted(len(rows), 'combination')}, by the fraction of runs whose fittest "
         f"controller {criterion(store, chosen)} at the last evaluation. As swept: n = {n:,} runs of "
         f"{', '.join(chosen.sweeps)}, the ones that picked them, so too high; confirmed: {reruns:,} runs on fresh seeds. "
         f"Bars are 95 % Wilson intervals ({INDEPENDENCE})."
@@ -109,4 +109,4 @@ def _in_words(rows: pd.DataFrame, best: pd.DataFrame, equal: int) -> str:
     said = f"The first has {100 * best.success.iloc[0]:.0f} % as swept"
     if best.confirm_runs.iloc[0]:
         said += f" and {100 * best.confirm_successes.iloc[0] / best.confirm_runs.iloc[0]:.0f} % on fresh seeds"
-    return f"{said}; {equal} of the {len(rows) - 1} others cannot be told from it (Fisher's exact test, Holm, {LEVEL:g})."
+    return f"{said}; {equal} of the {len(rows) - 1} others cannot be distinguished from it (Fisher's test, Holm, {LEVEL:g})."

@@ -54,7 +54,7 @@ def cells(store: Results) -> pd.DataFrame:
 def draw(store: Results) -> list[FigureResult]:
     rows = cells(store)
     if rows.empty:
-        raise NoDataError(f"no finished run of the sweep {SWEEP!r}; run make sweep-budget")
+        raise NoDataError(f"no finished run of the sweep {SWEEP!r}; run bns sweep budget")
     tasks = sorted(set(zip(rows.robot, rows.task, strict=True)), key=lambda pair: task_order(*pair))
     looks = dict(zip(sorted(rows.iterations.unique()), ordered_styles(rows.iterations.nunique()), strict=True))
     columns = sorted(rows.generations.unique())
@@ -66,24 +66,24 @@ def draw(store: Results) -> list[FigureResult]:
             ax.set_ylim(-2, 102)
         below.set_yscale("log")
         _lines(below, here, looks, columns, "cpu_s", "cpu_low_s", "cpu_high_s")
-        below.set_xlabel("generations an evaluation")
+        below.set_xlabel("generations per evaluation")
         above[0].set_title(task_title(robot, task))
     _share_costs(axes[:, -1])
     for cm, ax in zip(NEAR_CM, axes[0], strict=False):
         ax.set_ylabel(f"success within\n{cm} cm (%)")
     handles, labels = max((ax.get_legend_handles_labels() for ax in axes[:, 0]), key=lambda pair: len(pair[1]))
-    figure.legend(handles, labels, loc="outside upper center", ncols=4, title="training iterations an evaluation")
+    figure.legend(handles, labels, loc="outside upper center", ncols=4, title="training iterations per evaluation")
     n, runs_each = int(rows.runs.sum()), each(rows.runs.min(), rows.runs.max())
     said = coverage(store, (SWEEP,), n)
     note(
         figure,
-        "; ".join((*said.sentences, f"{runs_each} a point")) + ". Success: share of the last "
+        "; ".join((*said.sentences, f"{runs_each} per point")) + ". Success: fraction of the last "
         f"{LATE:.0%} of the evaluations; bars: {MEANS}, of the CPU time 10 to 90 % of the runs.",
     )
     shows = (
-        f"Above: share of the last {LATE:.0%} of a run's evaluations after which its fittest controller visits all goals within "
-        f"{' and '.join(map(str, NEAR_CM))} cm, mean over runs ({MEANS}). Below: CPU time of a run (median, 10 to 90 %). By "
-        f"generations and training iterations after each evaluation; {runs_each} a point, n = {n:,} runs of {SWEEP}."
+        f"Above: fraction of the last {LATE:.0%} of a run's evaluations after which its fittest controller visits all goals "
+        f"within {' and '.join(map(str, NEAR_CM))} cm, mean over runs ({MEANS}). Below: CPU time of a run (median, 10 to 90 %). "
+        f"By generations and training iterations after each evaluation; {runs_each} per point, n = {n:,} runs of {SWEEP}."
     )
     return [FigureResult(NAME, TITLE, figure, shows, n, (SWEEP,), said.missing, data=rows)]
 
@@ -104,7 +104,7 @@ def _share_costs(axes: Sequence[Axes]) -> None:
     for ax in axes:
         ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
         _plain(ax.yaxis)
-    axes[0].set_ylabel("CPU time a run (s)")
+    axes[0].set_ylabel("CPU time per run (s)")
     hours = axes[-1].secondary_yaxis("right", functions=(lambda s: s * RUNS / 3600, lambda h: h * 3600 / RUNS))
     _plain(hours.yaxis)
     hours.set_ylabel(f"core-hours for {RUNS:,} runs")

@@ -40,7 +40,7 @@ def _draw(store: Results, chosen: Selection, parameter: str, name: str) -> Figur
     too_few = (f"{counted(thin, 'run')} in curves of fewer than {least} not drawn",) if thin else ()
     note(figure, "; ".join((f"Success: {what}", *said.sentences, *too_few, f"bands: {INTERVALS}")) + ".")
     shows = (
-        f"Share of runs whose fittest controller, driven in the world after each evaluation, {what}, by {TITLES[parameter]}; "
+        f"Fraction of runs whose fittest controller, driven in the world after each evaluation, {what}, by {TITLES[parameter]}; "
         f"all other parameters pooled. n = {n:,} runs of {', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals "
         f"({INDEPENDENCE})."
     )

@@ -36,7 +36,7 @@ _NOWHERE = ""
 def draw(store: Results) -> list[FigureResult]:
     found = [(chosen, table) for chosen in selections(store) if not (table := checked(store, chosen)).empty]
     if not found:
-        raise NoDataError("no finished run is of a robot and task of the dissertation; run make sweep-khepera BUDGET=10m")
+        raise NoDataError("no finished run is of a robot and task of the dissertation; run bns sweep khepera-small")
     return [_drawn(store, chosen, table) for chosen, table in found]
 
 

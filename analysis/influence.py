@@ -77,8 +77,8 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     note(figure, "; ".join((*said.sentences, *unknown, bars)) + ".")
     shows = (
         f"What each parameter does to success (the fittest controller {criterion(store, chosen)}), seeds as the unit. (a) The "
-        f"source's measure: how far the curves of its values lie apart at most. (b) Functional analysis of variance: share of "
-        f"the variance between combinations at the last evaluation that it explains by itself, chance taken off. (c) "
+        f"dissertation's measure: the largest gap between the curves of its values. (b) Functional analysis of variance: "
+        f"fraction of the variance between combinations at the last evaluation that it explains by itself, chance taken off. (c) "
         f"Permutation: how much of its R² a regression tree loses on seeds it has not seen, when the values are shuffled. "
         f"n = {n:,} runs of {', '.join(chosen.sweeps)}, {rows.seeds.max()} seeds."
     )

@@ -25,7 +25,7 @@ RADIUS_CM = 20
 def draw(store: Results) -> list[FigureResult]:
     robots = [chosen for chosen in selections(store) if RADIUS_CM in radii_cm(store, chosen)]
     if not robots:
-        raise NoDataError(f"no finished run has goal points with a radius of {RADIUS_CM} cm; run make sweep-khepera")
+        raise NoDataError(f"no finished run has goal points with a radius of {RADIUS_CM} cm; run bns sweep khepera-small")
     return [_draw(store, chosen) for chosen in robots]
 
 
@@ -43,7 +43,7 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     rows = ranking(store, chosen)
     tops = {task: extremes(rows, task)[0] for task in chosen.tasks if (rows.task == task).sum() > 1}
     if not tops:
-        raise NoDataError("no task has two combinations with enough runs; run bns sweep sweeps/khepera-small.yaml")
+        raise NoDataError("no task has two combinations with enough runs; run bns sweep khepera-small")
     lines = {task: curve(store, chosen, task, cells) for task, cells in tops.items()}
     figure, axes = panels(1, 3.4)
     _panel(axes[0, 0], chosen, lines)
@@ -51,7 +51,7 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     n, said = int(sum(cells.runs.sum() for cells in tops.values())), coverage(store, chosen.sweeps, chosen.n)
     note(figure, "; ".join((f"{n:,} runs in the best combinations", *said.missing, f"bands: {BOOTSTRAP}")) + ".")
     shows = (
-        f"Share of runs whose fittest controller visits all goals within {RADIUS_CM} cm, of the best "
+        f"Fraction of runs whose fittest controller visits all goals within {RADIUS_CM} cm, of the best "
         f"{max(map(len, tops.values()))} combinations of each task; bands are {BOOTSTRAP}. n = {n:,} runs of "
         f"{', '.join(chosen.sweeps)}. The best are picked by success at the last evaluation, so they are seen at their luckiest."
     )

@@ -44,7 +44,7 @@ def extremes(rows: pd.DataFrame, task: str) -> tuple[pd.DataFrame, pd.DataFrame]
     many = min(TEN, len(own) // 2)
     if not many:
         raise NoDataError(
-            f"task {task} has one combination with enough runs; best and worst need two: run bns sweep sweeps/khepera-small.yaml"
+            f"task {task} has one combination with enough runs; best and worst need two: run bns sweep khepera-small"
         )
     return own.head(many), own.tail(many)
 

@@ -35,7 +35,7 @@ def draw(store: Results) -> list[FigureResult]:
     table = pd.DataFrame([in_words(row) for row in rows.to_dict("records")])
     shows = (
         f"Runs of a reading less those of the default reading on the same seeds, means over pairs with 95 % bootstrap intervals "
-        f"over pairs (from {FEWEST_SEEDS} pairs on). Shares are of evaluations in which the fittest meets all goals; late: "
+        f"over pairs (from {FEWEST_SEEDS} pairs on). Percentages are of evaluations in which the fittest meets all goals; late: "
         f"the last {1 - LATE:.0%} of a run. n = {len(pairs)} pairs."
     )
     return [
@@ -71,7 +71,7 @@ def compared(store: Results) -> tuple[pd.DataFrame, pd.DataFrame]:
     on = [*_CELL, "seed"]
     pairs = runs[~default].merge(runs.loc[default, [*on, *MEASURES]], on=on, suffixes=("", "_default"))
     if pairs.empty:
-        raise NoDataError("no run of a reading has one of the default reading beside it; run bns sweep sweeps/readings.yaml")
+        raise NoDataError("no run of a reading has a counterpart of the default reading; run bns sweep readings")
     rows = [_row(key, own) for key, own in pairs.groupby([*_READING, *_CELL])]
     return pairs, pd.DataFrame(rows)
 

@@ -19,7 +19,7 @@ from bns.store.archive.kept import rounded_evals
 from bns.store.archive.read import archives, connect_archives
 from bns.sweep.expand.grid import parse_sweep
 
-BEGIN = "make sweep-khepera BUDGET=10m"
+BEGIN = "bns sweep khepera-small --budget 10m"
 OF_RUNS = ("runs", "evals", "paths", "generations", "probes")
 """Tables whose rows belong to a run."""
 PUBLISHED = Path("published") / "study.parquet"

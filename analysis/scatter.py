@@ -41,7 +41,7 @@ def combinations(store: Results, chosen: Selection) -> tuple[pd.DataFrame, int]:
     if rows.empty:
         raise NoDataError(
             f"no combination has {least} finished runs yet (the most is {found.runs.max()}); "
-            f"run {BEGIN}, which goes on where it stopped"
+            f"run {BEGIN}, which continues where it stopped"
         )
     return rows, len(found) - len(rows)
 

@@ -33,7 +33,7 @@ def draw(store: Results) -> list[FigureResult]:
     if not found:
         raise NoDataError(
             "no robot with finished runs has a static simulator that holds its verification patterns; "
-            "run make sweep-snake, or: bns run --robot snake"
+            "run bns sweep snake, or: bns run --robot snake"
         )
     return [_draw(simulator) for simulator in found]
 

@@ -32,8 +32,8 @@ def _draw(robot: str, path: Path) -> FigureResult:
     tracks = tracks_of(path)
     data = errors(robot, tracks)
     kinds = (
-        ("position_m", 100.0, "where the middle is", "cm"),
-        ("heading_rad", 180 / np.pi, "where it faces", "degrees"),
+        ("position_m", 100.0, "position of the middle", "cm"),
+        ("heading_rad", 180 / np.pi, "heading", "degrees"),
         ("gap_m", 100.0, "how far apart\nthe markers are", "cm"),
     )
     figure, axes = panels(len(kinds), 3.3)
@@ -54,12 +54,13 @@ def _draw(robot: str, path: Path) -> FigureResult:
     said = f"{len(tracks)} random controllers, {int(tracks.stable.sum())} stable cycles of {len(tracks.stable)}"
     note(figure, f"{said}; root mean square; bars: 95 %, by controller. Cycles are predicted from where the markers were seen.")
     shows = (
-        f"Errors of the static simulator of the {robot} on {said}, driven in the physics world and learned from by nothing: over "
-        "one cycle, over the change to the next, over three cycles and the changes between them, over all stable cycles that a "
-        "controller began with. changes: the change of posture moves the markers; rigid: the markers are on one body."
+        f"Errors of the static simulator of the {robot} on {said}, driven in the physics world, from which no network has "
+        "learned: over one cycle, over the change to the next, over three cycles and the changes between them, over all stable "
+        "cycles that a controller began with. changes: the change of posture moves the markers; rigid: the markers are on one "
+        "body."
     )
     see = "The gain of an option is what it takes off the first of each group."
-    title = f"What options of the simulator buy, {robot}"
+    title = f"What options of the simulator gain, {robot}"
     return FigureResult(f"{NAME}-{robot}", title, figure, shows, len(tracks), (), see=see, data=data)
 
 

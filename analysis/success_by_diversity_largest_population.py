@@ -29,7 +29,7 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     for ax in axes:
         ax.set_ylim(-2, 102)
     what = (
-        f"Share of runs whose fittest controller {criterion(store, chosen)} at the last evaluation, against the mean "
+        f"Fraction of runs whose fittest controller {criterion(store, chosen)} at the last evaluation, against the mean "
         f"diversity of their populations of {largest} then, by {TITLES[COLOUR]}; bars are 95 % Wilson intervals ({INDEPENDENCE})"
     )
     return described(

@@ -71,7 +71,7 @@ def _draw(path: Path) -> FigureResult:
     note(figure, f"Path of the middle between the markers. Of {of}, {counts}. {SOURCE}")
     shows = (
         f"{len(trials)} controllers evolved apart on the static simulator, with noise, for {task_title(robot, task)}; "
-        "dashed: its prediction without noise, solid: three drives of each in the physics world. No trial is left out."
+        "dashed: its prediction without noise, solid: three drives of each in the physics world. All trials are shown."
     )
     title = f"Trajectory trials, {task_title(robot, task)}"
     return FigureResult(f"{NAME}-{robot}-{task}", title, figure, shows, len(trials), (), see=SOURCE, data=table, table=listed)

@@ -56,7 +56,7 @@ class TrialFileError(BnsError):
         return cls(f"{error} {_STANDS}")
 
 
-_STANDS = "The robot stands; evaluations noted before that are in the journal. When there is room again, resume with --resume."
+_STANDS = "The robot stands still; earlier evaluations are in the journal. Free some space, then continue with --resume."
 
 
 class ClusterError(BnsError):

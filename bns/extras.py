@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from typing import Any
 
 from bns.errors import BnsError
 
@@ -55,3 +56,29 @@ def require(name: str, *libraries: str) -> None:
     with extra(name):
         for library in libraries:
             import_module(library)
+
+
+def deferred(name: str, module: str) -> Any:
+    """The ``module`` of a library of the extra ``name``, imported when it is first used.
+
+    For modules that are also imported where their library is not needed: the diagnosis of wheels knows of robots on joints.
+
+    Raises:
+        MissingExtraError: at the first use, if the library is not installed.
+    """
+    return _Deferred(name, module)
+
+
+class _Deferred:
+    """Stands for a module; what was asked of it once is kept."""
+
+    def __init__(self, name: str, module: str) -> None:
+        self._name, self._module = name, module
+
+    def __getattr__(self, attribute: str) -> Any:
+        if attribute.startswith("__"):
+            raise AttributeError(attribute)
+        with extra(self._name):
+            value = getattr(import_module(self._module), attribute)
+        setattr(self, attribute, value)
+        return value

@@ -55,7 +55,7 @@ def trial_table(trial: int, commands: ArrayLike, poses: ArrayLike) -> pd.DataFra
 def check_table_name(path: Path) -> None:
     """ModelError unless a table can be written there."""
     if path.suffix not in {".csv", ".parquet"}:
-        raise ModelError(f"Measurements cannot be written to {path}; let the name end in .csv or .parquet.")
+        raise ModelError(f"Measurements cannot be written to {path}; the name must end in .csv or .parquet.")
     if not path.parent.is_dir():
         raise ModelError(f"There is no folder {path.parent} to write {path.name} into; make it first.")
 

@@ -62,12 +62,12 @@ class RunSpec:
     (section 4.5). Shares are fractions of the population, 0..1.
     """
 
-    robot: str = _field("khepera", "robot; options of its simulator are added to the name: snake+changes+rigid")
-    task: str = _field("circle", "goal task of that robot")
+    robot: str = _field("khepera", "robot, with options of its simulator behind its name (snake+changes+rigid)")
+    task: str = _field("circle", "goal task of the robot")
     world: str = _field(
         "substitute",
-        "what answers a controller, or a model file (.yaml) that physics drives; one that changes at evaluation 50: "
-        "'physics>worn.yaml@50'",
+        "world that stands for the robot, or a model file (.yaml) for the physics world; 'physics>worn.yaml@50' changes at "
+        "evaluation 50",
         choices=("substitute", "physics", "robot"),
         or_file=(".yaml", ".yml"),
         parts=WORLDS,
@@ -75,34 +75,33 @@ class RunSpec:
     )
     seed: int = _field(0, "seed of this run", low=0, high=2**32 - 1)
     root_seed: int = _field(0, "seed of the whole study", low=0, high=2**32 - 1)
-    population_size: int = _field(400, "controllers in the population", low=1, high=1_000_000)
-    tournament_size: float = _field(0.5, "tournament for parents, share of the population", low=0.0, high=1.0)
+    population_size: int = _field(400, "number of controllers in the population", low=1, high=1_000_000)
+    tournament_size: float = _field(0.5, "tournament size for parents, as a fraction of the population", low=0.0, high=1.0)
     mutation_rate: float = _field(0.1, "probability that a component of a command mutates", low=0.0, high=1.0)
     real_world_selection_size: float = _field(
-        0.7, "tournament for the controller that drives in the world, share of the population", low=0.0, high=1.0
+        0.7, "tournament size for the controller that is driven, as a fraction of the population", low=0.0, high=1.0
     )
-    evaluations: int = _field(100, "controllers driven in the world", low=1, high=65_535)
-    generations_per_evaluation: int = _field(20, "generations evolved after each evaluation", low=0, high=100_000)
+    evaluations: int = _field(100, "number of controllers driven in the world", low=1, high=65_535)
+    generations_per_evaluation: int = _field(20, "number of generations after each evaluation", low=0, high=100_000)
     training_iterations_per_evaluation: int = _field(
-        1000, "Rprop iterations after each evaluation", low=0, high=10_000_000
+        1000, "number of Rprop iterations after each evaluation", low=0, high=10_000_000
     )
-    training_algorithm: str = _field("rprop+", "weight update", choices=("rprop+", "irprop-"))
+    training_algorithm: str = _field("rprop+", "training rule", choices=("rprop+", "irprop-"))
     min_commands: int = _field(4, "shortest command list that crossover may make", low=1, high=10_000)
     max_commands: int = _field(100, "longest command list that crossover may make", low=1, high=10_000)
     record: str = _field(
         "evals",
-        "what is kept: one row an evaluation, or paths too, or with generations and probes, which are driven for it",
+        "tables to store: one row per evaluation; also paths; or also generations and probes (extra drives)",
         choices=("evals", "paths", "full"),
     )
     approach: str = _field(
         "bns",
-        "what learns from the drives and picks the next one; its options (docs/approaches.md) follow its name: "
-        "bns+margin=0.03+ensemble=3",
+        "method that learns from drives and picks the next one, with its options (bns+margin=0.03+ensemble=3)",
         parts=APPROACHES,
         later=True,
     )
     overhead_s: int = _field(
-        30, "seconds of robot time that an evaluation takes beside driving: putting the robot back, starting it",
+        30, "robot time in seconds that each evaluation takes beside driving: putting the robot back, starting it",
         low=0, high=86_400, later=True,
     )  # fmt: skip
 

@@ -92,7 +92,7 @@ def test_measurements_are_named_first_and_the_old_spelling_warns(capsys):
     assert capsys.readouterr().err == ""
     for old in (["motor-lag", "turn-slip", "--data", "log.csv"], ["--data=log.csv", "motor-lag", "turn-slip"]):
         assert _parser().parse_args(["add", *old, *end]) == now
-        assert "old spelling, gone in the next release; write bns add log.csv EFFECT" in capsys.readouterr().err
+        assert "old spelling, not accepted by the next release; write bns add log.csv EFFECT" in capsys.readouterr().err
     assert (now.data, now.effects) == (Path("log.csv"), ["motor-lag", "turn-slip"])
 
 

@@ -24,9 +24,9 @@ def test_without_a_driver(what, tmp_path, bns):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--jobs", "2"], "--device cuda is the GPU of this machine, and --jobs shares runs out"),
-        (["--executor", "dask"], "--device cuda is the GPU of this machine, and --executor dask shares runs out"),
-        (["--dry-run"], "--dry-run knows the pace of cores, not of a GPU"),
+        (["--jobs", "2"], "--device cuda is the GPU of this machine, and --jobs distributes runs over cores"),
+        (["--executor", "dask"], "--device cuda is the GPU of this machine, and --executor dask distributes runs over cores"),
+        (["--dry-run"], "--dry-run knows the speed of cores, not of a GPU"),
     ],
 )
 def test_options_that_do_not_go_together(options, message, tmp_path, capsys):
@@ -92,3 +92,13 @@ def test_peak_is_that_of_the_attributes():
 
     assert peak_of(H200).flops == pytest.approx(66.9e12, rel=1e-3)
     assert peak_of(H200).bytes_s == pytest.approx(4.9e12, rel=1e-2)
+
+
+@pytest.mark.parametrize(("device", "notes"), [("cpu", 0), ("cuda", 1)])
+def test_a_run_on_a_gpu_says_once_that_this_is_experimental(device, notes, monkeypatch, capsys):
+    from bns.cli.commands import run
+    from bns.cli.main import main
+
+    monkeypatch.setattr(run, "run_by_hand", lambda *_given, **_named: "done")
+    assert main(["run", "--device", device]) == 0
+    assert capsys.readouterr().err.count("--device cuda is experimental") == notes

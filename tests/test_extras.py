@@ -6,8 +6,10 @@ import sys
 import pytest
 
 from bns.errors import BnsError
+from bns.examples import FOLDER
 from bns.extras import LIBRARIES, MissingExtraError, extra
 
+LOG = str(FOLDER / "khepera-log.csv")
 POSIX = ("fcntl", "termios", "pty", "resource", "grp", "pwd", "tty")
 BLOCKED = """
 import sys
@@ -106,6 +108,55 @@ def test_the_core_needs_no_extra(tmp_path):
     snake = ["run", "--robot", "snake", *quick, "--results", str(tmp_path)]
     done = carried_out(BLOCKED.format(blocked=everything, commands=[arguments, snake]))
     assert done.returncode == 0, done.stderr
+
+
+AWAY = """
+import sys
+
+class Away:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {blocked!r}:
+            raise ModuleNotFoundError("No module named " + name, name=name)
+
+sys.meta_path.insert(0, Away())
+from bns.cli.main import main
+for arguments in {commands!r}:
+    if code := main(arguments):
+        sys.exit(code)
+"""
+DIAGNOSIS = {
+    "compare": [],
+    "diagnose": [],
+    "propose": ["--minutes", "1", "-o", "next.csv"],
+    "report": ["--minutes", "1", "-o", "report.html"],
+}
+
+
+def of_the_sample_log(command, model="khepera"):
+    return [command, LOG, "--model", model, *DIAGNOSIS[command]]
+
+
+def without_extras(tmp_path, monkeypatch, *commands):
+    monkeypatch.chdir(tmp_path)
+    everything = {library for libraries in LIBRARIES.values() for library in libraries}
+    return carried_out(AWAY.format(blocked=everything, commands=[list(command) for command in commands]))
+
+
+def test_a_comparison_needs_no_extra_and_that_of_a_body_names_it(tmp_path, monkeypatch):
+    done = without_extras(tmp_path, monkeypatch, of_the_sample_log("compare"), of_the_sample_log("compare", "snake"))
+    assert "error of predictions" in done.stdout
+    assert done.returncode == 2
+    assert "pip install 'bns[snake]'" in done.stderr
+
+
+@pytest.mark.slow
+def test_a_diagnosis_needs_no_extra(tmp_path, monkeypatch):
+    """All that the first minutes ask of an installation without extras."""
+    add = ["add", LOG, "motor-lag", "--model", "khepera", "-o", "extended.yaml"]
+    done = without_extras(tmp_path, monkeypatch, *map(of_the_sample_log, ("diagnose", "propose", "report")), add)
+    assert done.returncode == 0, done.stderr
+    assert "Missing from the model: motor-lag" in done.stdout
+    assert {"next.csv", "report.html", "extended.yaml"} <= {path.name for path in tmp_path.iterdir()}
 
 
 def test_only_a_library_of_that_extra_is_explained():

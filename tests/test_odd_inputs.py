@@ -41,7 +41,7 @@ def test_trial_without_a_pose_is_left_out_and_listed(tmp_path, capsys):
     path = log_of(tmp_path, rows("a", 60, x=lambda n: "") + rows("b", 60) + rows("c", 60))
     measured = load_measured(path)
     assert measured.tracks.names == ("b", "c")
-    assert [finding.trial for finding in measured.findings if "left out" in finding.text] == ["a"]
+    assert [finding.trial for finding in measured.findings if "excluded" in finding.text] == ["a"]
     assert main(["compare", str(path), "--model", "khepera"]) == 0
 
 
@@ -52,7 +52,7 @@ def test_trials_that_are_too_short_for_the_horizon_are_compared(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (rows("a", 9, t=lambda n: n / 10 if n < 8 else 1e308), "Row 8: t_s is 1e[+]308; nothing that was measured"),
+        (rows("a", 9, t=lambda n: n / 10 if n < 8 else 1e308), "Row 8: t_s is 1e[+]308; no measurement"),
         (rows("a", 9, t=lambda n: n / 10 if n < 8 else 1e12), "Trial a lasts 1e[+]12 s"),
         (rows("a", 9, x=lambda n: "here"), "Row 0: x_m is 'here'"),
         (rows("a", 9, x=lambda n: ""), "no tracked pose"),
@@ -103,7 +103,7 @@ def test_rows_by_trial_are_those_of_a_group():
 
 
 def test_robot_is_refused_where_no_column_names_any(tmp_path):
-    with pytest.raises(DataError, match="no column robot to choose 'x' by"):
+    with pytest.raises(DataError, match="no column robot, so 'x' cannot be chosen"):
         load_measured(log_of(tmp_path, rows("a", 9)), robot="x")
 
 

@@ -29,8 +29,9 @@ def test_commands_are_understood(command):
 
 
 def test_sweep_example_is_a_sweep():
-    [example] = [block for kind, block in BLOCKS if kind == "yaml"]
-    assert parse_sweep(example, Path("README.md")).total == 30 * (5 * 2 + 1)
+    page = (ROOT / "docs" / "sweeps.md").read_text()
+    example = re.findall(r"```yaml\n(name:.*?)```", page, re.DOTALL)[0]
+    assert parse_sweep(example, Path("sweeps.md")).total == 30 * (5 * 2 + 1)
 
 
 def test_python_examples_run(tmp_path, monkeypatch):

@@ -121,7 +121,7 @@ def add(
     given = [effect.name for effect, _ in chosen]
     twice = next((name for name in given if given.count(name) > 1), None)
     if twice is not None:
-        raise ModelError(f"{twice} is given {given.count(twice)} times; a model has each effect once: leave the others out.")
+        raise ModelError(f"{twice} is given {given.count(twice)} times; a model can have each effect only once.")
     return added(ready, chosen, per_trial, progress=progress)
 
 

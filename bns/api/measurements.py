@@ -243,7 +243,7 @@ def _read(log: Log, more: tuple[str | PathLike[str], ...], robot: str | None, ma
     if isinstance(log, Measurements):
         if more or robot or mapping:
             raise DataError(
-                "These measurements are read already; give the files themselves to choose a robot or a mapping."
+                "These measurements have already been read; give the files to choose a robot or a mapping."
             )
         return log.measured
     if isinstance(log, pd.DataFrame):
@@ -258,7 +258,7 @@ def _read(log: Log, more: tuple[str | PathLike[str], ...], robot: str | None, ma
     if mapping is None:
         return load_measured(files[0], robot, files[1:])
     if len(files) > 1:
-        raise DataError("A mapping is of one file; lay FILE.import.yaml beside each of several.")
+        raise DataError("A mapping belongs to one file; with several, put FILE.import.yaml beside each.")
     return measured_table(_mapped(read_table(files[0]), mapping, files[0].parent), files[0], robot=robot)
 
 

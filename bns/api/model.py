@@ -138,7 +138,7 @@ def _of_file(path: str) -> JointedModel:
 def checked_target(path: Path) -> Path:
     """ModelError unless a model can be written there."""
     if path.suffix not in {".yaml", ".yml"}:
-        raise ModelError(f"A model cannot be written to {path}; let the name end in .yaml.")
+        raise ModelError(f"A model cannot be written to {path}; the name must end in .yaml.")
     if not path.absolute().parent.is_dir():
         raise ModelError(f"There is no folder {path.parent} to write {path.name} into; make it first.")
     return path

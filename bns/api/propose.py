@@ -157,8 +157,8 @@ def _limits(
         return arena_of(tracks, arena, start), bounds_of(tracks, model, speeds)
     if (arena, start, speeds) != (None, None, None):
         raise DataError(
-            f"arena, start and speeds are for wheels, and {model.name} is a body on joints: an experiment repeats cycles "
-            "that it drove. Leave out --arena, --start and --speeds."
+            f"arena, start and speeds are for wheels, and {model.name} is a body on joints: its experiment repeats cycles "
+            "that were driven. Leave out --arena, --start and --speeds."
         )
     return None, None
 

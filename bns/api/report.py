@@ -41,7 +41,7 @@ class ReportResult(Shown):
         """Verdict, and where the page is."""
         size = f"{self.bytes / 1e6:.1f} MB"
         return (
-            f"verdict: {self.verdict}\nwritten to {self.path} ({size}): one file, to be opened in a browser or mailed"
+            f"verdict: {self.verdict}\nwritten to {self.path} ({size}): one file; open it in a browser or mail it"
         )
 
     def __fspath__(self) -> str:

@@ -260,7 +260,7 @@ def check_gpu(spec: RunSpec, measurements: Path | None) -> None:
     from bns.cuda.support import check_supported  # noqa: PLC0415
 
     if measurements is not None:
-        raise SpecError("a GPU does not tell what was driven; leave out --measurements or --device.")
+        raise SpecError("with a GPU, --measurements is not available; leave out --measurements or --device.")
     check_supported([spec])
     device_name()
 
@@ -282,15 +282,15 @@ def check_renderable(spec: RunSpec, world: World, path: Path) -> None:
 def _text(r: RunResult) -> str:
     evals, spec = r.result.tables["evals"], r.spec
     names = [f"success_{cm}cm" for cm in RADII_CM]
-    within = [f"within {cm} cm " for cm in RADII_CM]
+    within = [f"within {cm} cm: " for cm in RADII_CM]
     if evals[names[0]][0] is None:
         names, within = ["success"], [""]
     reached = [text + _first(evals[name], evals["evaluation"]) for text, name in zip(within, names, strict=True)]
     return "\n".join(
         [
             f"run {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {spec.evaluations} evaluations in {r.wall_s:.1f} s",
-            "all goals reached by the fittest controller: " + "; ".join(reached),
-            f"fitness of the fittest at the end: {evals['fitness_simulation'][-1]:.3f} in simulation, "
+            "the fittest controller reaches all goals: " + "; ".join(reached),
+            f"its fitness at the end: {evals['fitness_simulation'][-1]:.3f} in simulation, "
             f"{evals['fitness_world'][-1]:.3f} in the world ({spec.world})",
             *(f"{kind}: {path}" for kind, path in r.files.items()),
         ]
@@ -298,4 +298,6 @@ def _text(r: RunResult) -> str:
 
 
 def _first(success: Any, evaluation: Any) -> str:
-    return f"first at evaluation {evaluation[success][0]}, {success.mean():.0%} of them" if success.any() else "never"
+    if not success.any():
+        return "never"
+    return f"first at evaluation {evaluation[success][0]}, in {success.mean():.0%} of the evaluations"

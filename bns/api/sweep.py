@@ -248,7 +248,7 @@ def _parsed(tree: dict[str, Any]) -> Described:
         return parse_sweep(text, where)
     except yaml.YAMLError as fault:
         raise SpecError(
-            f"A sweep is made of numbers, texts and lists, and this holds something else: {fault}."
+            f"A sweep consists of numbers, texts and lists; something else was given: {fault}."
         ) from fault
     except SpecError as fault:
         raise SpecError(re.sub(rf"^{_WHERE}:\d+: ", "", str(fault))) from None

@@ -192,7 +192,7 @@ def _replayed(
 ) -> RunResult:
     """A trial again from its journal, which knows its robot and spec: nothing else is driven."""
     if commands is not None or rig is not None or emulated:
-        raise HardwareError("replay is a trial from its journal, without a robot; give no commands, rig or emulated with it.")
+        raise HardwareError("replay runs a trial from its journal, without a robot; give no commands, rig or emulated.")
     kept = replayed(Path(journal), Path(results))
     return RunResult(kept.spec, kept.result, kept.wall_s, {})
 
@@ -201,7 +201,7 @@ def trial_spec(robot: str, task: str | None = None, *, record: str = "paths", **
     """The spec of a trial; the task is the first of the robot's study where none is given. SpecError as for a run."""
     if record == "full":
         raise SpecError(
-            "record is 'full'; a robot drives no probes and no fittest of a generation: take evals or paths."
+            "record is 'full', but a robot drives no probes and no fittest of a generation; use evals or paths."
         )
     named = task or default_task(load_robot(robot).name)
     return spec_of({**parameters, "robot": robot, "task": named, "world": "robot", "record": record})
@@ -225,7 +225,7 @@ def trial_setup(
     if rig is None and not emulated:
         raise HardwareError(
             "a real robot needs --rig FILE, which names its port, tracker and surface (docs/trials.md shows one); "
-            "without a robot at hand, say --emulated (in Python rig=FILE, emulated=True)."
+            "without a robot, use --emulated (in Python rig=FILE, emulated=True)."
         )
     if speed is not None and not speed > 0.0:
         raise HardwareError(f"--speed is {speed:g}; it must be above 0.")

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import panel as pn
+from panel.io.resources import parse_template
 from panel.theme.base import Inherit
 from panel.theme.bootstrap import Bootstrap
 
 from bns.app.parts import CSS
+from bns.app.sliders import NAMES
 
 ICON = (
     "data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 8 8'><circle cx='4' cy='4' r='3' "
@@ -37,6 +39,14 @@ class Lean(Bootstrap):
         return modifiers, of_children
 
 
+_PAGE = """{% extends "bootstrap/bootstrap.html" %}
+{% block postamble %}{{ super() }}<script>SCRIPT</script>{% endblock %}"""
+
+
 def template(title: str) -> Any:
     """An empty page, all of whose files come from this machine."""
-    return pn.template.BootstrapTemplate(title=title, header_background="#23395d", favicon=ICON, raw_css=[CSS], design=Lean)
+    made: Any = pn.template.BootstrapTemplate(
+        title=title, header_background="#23395d", favicon=ICON, raw_css=[CSS], design=Lean, busy_indicator=None
+    )
+    made.template = parse_template(_PAGE.replace("SCRIPT", NAMES))
+    return made

@@ -13,6 +13,14 @@ from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.report.tables import ahead
 from bns.physics.effect import Effect
 
+VELOCITIES = {
+    "forward_m_s": "forward velocity (m/s)",
+    "sideways_m_s": "velocity to the left (m/s)",
+    "yaw_rad_s": "turn rate (rad/s)",
+    "share_of_motion": "the whole motion (fraction)",
+    "east_m_s": "velocity east (m/s)",
+    "north_m_s": "velocity north (m/s)",
+}
 BADGE = '<span class="bns-badge">{}</span>'
 
 
@@ -30,6 +38,11 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = 
         f'<div class="bns-scroll" tabindex="0"><table class="bns-table" id="{escape(identifier)}">{title}'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )
+
+
+def velocity(channel: str) -> str:
+    """What a curve is added to, in words, with the unit."""
+    return VELOCITIES.get(channel, channel)
 
 
 def error_list(e: HorizonErrors) -> str:

@@ -6,10 +6,11 @@ from html import escape
 from typing import Any
 
 import panel as pn
+from panel.io.state import set_curdoc
 
 from bns.app.design import template
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, html
+from bns.app.parts import WIDE, html, on_change
 from bns.app.screens.data import DataScreen
 from bns.app.screens.effects import EffectsScreen
 from bns.app.screens.model import ModelScreen
@@ -54,33 +55,62 @@ class Screens:
             button_style="outline",
             **WIDE,
         )
-        self._chosen.param.watch(lambda event: self._enter(event.new), "value")
+        on_change(self._chosen, lambda: self._enter(self._chosen.value))
         self._shown = pn.Column(**WIDE)
         self.view = pn.Column(self._chosen, self._said, self._shown, **WIDE)
+        self._making = ""
+        self._document = pn.state.curdoc
         pn.state.onload(lambda: self._loaded(name))
         pn.state.on_session_destroyed(lambda _context: self._jobs.end())
+        self._document.add_next_tick_callback(self._make_first)
 
     def _loaded(self, name: str) -> None:
         pn.state.location.update_query(tab=name)
-        self._enter(self._chosen.value)
+        self._jobs.begin()
+
+    def _make_first(self) -> None:
+        """The screen that is shown first is made beside the page, while the browser still reads its files."""
+        self._making = name = self._chosen.value
+
+        def made() -> Any:
+            with set_curdoc(self._document):
+                return self._made(name)
+
+        def shown(screen: Any) -> None:
+            self._making = ""
+            self._add(name, screen)
+
+        self._jobs.run("drawing the page", made, shown, self._say)
 
     def _enter(self, name: str) -> None:
-        first = name not in self._screens
-        if first:
-            self._screens[name] = SCREENS[name](self._tab, self._jobs)
         self._tab.screen = name
-        screen = self._screens[name]
-        # drawn before the browser gets it: what changes afterwards could overtake it
+        if name == self._making:
+            return
+        if name not in self._screens:
+            self._add(name, self._made(name))
+            return
+        self._screens[name].enter()
+        self._show()
+
+    def _made(self, name: str) -> Any:
+        """Drawn before the browser gets it: what changes afterwards could overtake it."""
+        screen = SCREENS[name](self._tab, self._jobs)
         screen.enter()
-        if first:
-            self._shown.append(screen.view)
-        # hidden, not taken out: what is on its way to a screen must still find it there
-        for other, one in self._screens.items():
-            one.view.visible = other == name
+        return screen
+
+    def _add(self, name: str, screen: Any) -> None:
+        self._screens[name] = screen
+        self._shown.append(screen.view)
+        self._show()
+
+    def _show(self) -> None:
+        """Hidden, not taken out: what is on its way to a screen must still find it there."""
+        for name, screen in self._screens.items():
+            screen.view.visible = name == self._chosen.value
 
     def _changed(self, by: object) -> None:
-        screen = self._screens[self._chosen.value]
-        if screen is not by:
+        screen = self._screens.get(self._chosen.value)
+        if screen is not None and screen is not by:
             screen.enter()
 
     def _say(self, text: str) -> None:

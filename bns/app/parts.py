@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from html import escape
 from importlib import resources
 from typing import Any
@@ -29,10 +30,32 @@ def heading(text: str) -> Any:
     return html(f"<h2 style='font-size:17px;margin:4px 0'>{text}</h2>")
 
 
+def together() -> AbstractContextManager[None]:
+    """What is changed inside goes to the browser in one message, in the order in which it was changed.
+
+    Else what Panel changes (layouts, texts) goes at once, and what is changed of a picture only at the end: one could name a part
+    that the browser gets with the other, later.
+    """
+    if not pn.state.loaded:  # the browser gets the page as a whole; what is held back until then, Panel drops
+        return nullcontext()
+    held: AbstractContextManager[None] = pn.io.hold()
+    return held
+
+
+def on_change(widget: Any, act: Callable[[], object], what: str = "value") -> None:
+    """``act`` whenever the user, or the page itself, changes something of a widget."""
+
+    def changed(_event: Any) -> None:
+        with together():
+            act()
+
+    widget.param.watch(changed, what)
+
+
 def button(name: str, clicked: Callable[[], object], kind: str = "default", **more: Any) -> Any:
     """A button that does something."""
     made = pn.widgets.Button(name=name, button_type=kind, width=None, **more)
-    made.on_click(lambda _event: clicked())
+    on_change(made, clicked, "clicks")
     return made
 
 

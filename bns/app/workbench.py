@@ -20,14 +20,14 @@ from bns.api.model import Given, Model
 from bns.app.switches import Switches, Term
 from bns.diagnose.adding import Memory, does_nothing
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.clocks.trial_clock_test import steps_of
 from bns.diagnose.estimate.cross_validation import AS_GIVEN
+from bns.diagnose.estimate.fit_set import Tried
 from bns.diagnose.estimate.plausibility import implausible
-from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.problem import given_steps
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import laid_paths
-from bns.diagnose.predict.paired_errors import PairedErrors, judged_windows, paired_errors
+from bns.diagnose.predict.paired_errors import PairedErrors, PairedWindows, judged_windows
 from bns.diagnose.values import numbers_of
 from bns.errors import ModelError
 from bns.physics.effect import Effect
@@ -70,7 +70,8 @@ class Workbench:
         predictor = self.ready.predictor
         timed = None if predictor.tracks.timed or self.of_networks else predictor.tracks  # no clock where nothing has a time
         self.catalogue: dict[str, Effect] = {} if self.of_networks else listed(self.ready.model, None, timed)
-        self._memory: Memory = {}
+        # a body is simulated near the models asked for last: what was tried from another place may read otherwise
+        self._memory = Memory(tried=Tried() if self.on_wheels else None)
         self._fitted: dict[Any, Shown] = {}
         self._formulas: dict[Any, Effect] = {}
 
@@ -95,12 +96,18 @@ class Workbench:
         predictor = self.ready.predictor
         return tuple(h for h in predictor.horizons if len(predictor.windows(h)[0]))
 
+    @property
+    def _windows(self) -> PairedWindows:
+        if self._memory.windows is None:
+            self._memory.windows = PairedWindows(self.ready.predictor)
+        return self._memory.windows
+
     @cached_property
     def as_given(self) -> Shown:
         """The model as it was handed in."""
         predictor, model = self.ready.predictor, self.ready.model
-        steps = steps_of(predictor, problem_for(predictor, model).pose_filter, model)
-        errors = paired_errors(predictor, [(AS_GIVEN, steps)])
+        steps = given_steps(predictor, model)
+        errors = self._windows.errors([(AS_GIVEN, steps)])
         return Shown(Switches(), model, errors, (steps,), {}, {}, ())
 
     def shown(self, switches: Switches) -> Shown:
@@ -138,7 +145,7 @@ class Workbench:
         model = _guessed(Model(fitted.model.with_values(values)), {effect for (effect, _), _ in switches.by_hand})
         predictor = self.ready.predictor
         steps = (*fitted.steps, predictor.steps(model))
-        errors = paired_errors(predictor, list(zip([*fitted.names, BY_HAND], steps, strict=True)))
+        errors = self._windows.errors(list(zip([*fitted.names, BY_HAND], steps, strict=True)))
         return replace(fitted, switches=switches, model=model, errors=errors, steps=steps)
 
     @property

@@ -32,5 +32,5 @@ def check_networked(spec: RunSpec) -> None:
         raise SpecError(f"the approach {spec.approach} has no networks to write; leave --save-snn out.")
     if parsed_options(spec.approach, kind.options).get("model", NO_MODEL) != NO_MODEL:
         raise SpecError(
-            f"the approach {spec.approach} has networks that know only what its model gets wrong; leave --save-snn out."
+            f"the approach {spec.approach} has networks that learn only the error of its model; leave --save-snn out."
         )

@@ -51,10 +51,10 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         "margin": Option(0.0, 0.0, 1.0, "m by which goals become narrower in evolution, all around"),
         "ensemble": Option(1, 1, 100, "networks for each displacement"),
         "use": Choice("mean", USES, "what evolution works on where networks are several"),
-        "informed": Option(0.0, 0.0, 1.0, "share of the population, fittest first, of which the most informative is driven"),
+        "informed": Option(0.0, 0.0, 1.0, "fraction of the population, fittest first, of which the most informative is driven"),
         "model": Choice(NO_MODEL, MODELS, "physics whose errors the networks learn", (".yaml", ".yml")),
         "window": Option(0, 0, 100_000, "latest drives that networks learn from; 0: all"),
-        "restart": Option(0.0, 0.0, 1000.0, "times the usual error at which a drive is a surprise; 0: nothing is"),
+        "restart": Option(0.0, 0.0, 1000.0, "multiple of the usual error from which a drive counts as a surprise; 0: never"),
     }
 
     def __init__(self, setting: Setting, trainer: Learner, arcs: Arcs | None = None) -> None:

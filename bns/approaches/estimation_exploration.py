@@ -43,7 +43,7 @@ class EstimationExploration(Physical):
 
     effects = CATALOGUE
     options: ClassVar[Options] = {
-        "tests": Option(0.3, 0.0, 1.0, "share of the evaluations that are tests"),
+        "tests": Option(0.3, 0.0, 1.0, "fraction of the evaluations that are tests"),
         "commands": Option(10, 1, 1000, "commands in a test"),
         "candidates": Option(40, 1, 100_000, "random tests of which one is driven; 1: tests are random"),
         "models": Option(12, 2, 10_000, "models in their population"),

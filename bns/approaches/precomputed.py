@@ -32,7 +32,7 @@ class Precomputed(NeuroSimulation):
     """Random drives, one training, evolution on networks that stay."""
 
     options: ClassVar[Options] = {
-        "data": Option(0.5, 0.0, 1.0, "share of the evaluations whose commands are random"),
+        "data": Option(0.5, 0.0, 1.0, "fraction of the evaluations whose commands are random"),
         "commands": Option(10, 1, 1000, "commands in each of these"),
         "iterations": Option(20_000, 1, 10_000_000, "Rprop iterations of the one training"),
     }

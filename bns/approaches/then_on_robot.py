@@ -28,8 +28,8 @@ class ThenOnRobot(Precomputed):
 
     options: ClassVar[Options] = {
         **Precomputed.options,
-        "data": Option(0.3, 0.0, 1.0, "share of the evaluations whose commands are random"),
-        "population": Option(10, 2, 10_000, "controllers that go on evolving on the robot"),
+        "data": Option(0.3, 0.0, 1.0, "fraction of the evaluations whose commands are random"),
+        "population": Option(10, 2, 10_000, "number of controllers that continue to evolve on the robot"),
     }
     on_robot: RobotEvolution | None = None
 

@@ -69,7 +69,7 @@ class Transferability(Physical):
 
     options: ClassVar[Options] = {
         "tolerated": Option(0.5, 0.0, 100.0, "expected gap of a controller that may be called the fittest, in radii of a goal"),
-        "every": Option(3, 1, 100_000, "each so many drives one is of the fittest, the others of the least known behaviour"),
+        "every": Option(3, 1, 100_000, "one in this many drives is of the fittest, the others of the least known behaviour"),
     }
 
     def __init__(self, setting: Setting, robot: TwoWheeled, space: ModelSpace) -> None:

@@ -21,7 +21,7 @@ from bns.cli.commands import simulators as simulating
 from bns.cli.commands import sweep as sweeping
 from bns.cli.compiling import say_if_compiling
 from bns.cli.options.option_types import add_spec_options, duration, positive
-from bns.cli.options.sweep_options import DEVICES
+from bns.cli.options.sweep_options import DEVICES, say_if_experimental
 from bns.cli.options.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.cli.parser import SHELLS, Completion, Parser, add_results, add_trust, take_trust
 from bns.cli.streams import usable_streams
@@ -76,11 +76,21 @@ def _show_warning(message: Warning | str, *_place: object, **_more: object) -> N
     print(f"bns: warning: {message}", file=sys.stderr)
 
 
+ABOUT = (
+    "Compare a robot log with a model: name the physical effect that the model lacks, add it, and see the error fall. Evolve "
+    "controllers with Bootstrapped Neuro-Simulation, sweep its parameters, and try them on a robot."
+)
+BEGIN = "Begin with: bns example my-first. Options of a command: bns COMMAND --help."
+
+
 def _parser() -> Parser:
-    parser = Parser(prog="bns", description="Bootstrapped Neuro-Simulation: runs, sweeps and their results.")
+    parser = Parser(prog="bns", description=ABOUT, epilog=BEGIN)
     parser.add_argument("--version", action="version", version=f"bns {__version__}")
     parser.add_argument(
-        "--print-completion", choices=SHELLS, action=Completion, help="print what completes this command line in a shell"
+        "--print-completion",
+        choices=SHELLS,
+        action=Completion,
+        help="print a script that completes commands and options in this shell",
     )
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     parser.set_defaults(command=_help_of(parser))
@@ -90,15 +100,15 @@ def _parser() -> Parser:
         added.set_defaults(command=function)
         return added
 
+    listing.add_commands(command)
+    measuring.add_commands(command)
+    reporting.add_commands(command)
+    exploring.add_commands(command)
     _add_single_runs(command)
     sweeping.add_commands(command)
     looking.add_commands(command)
-    measuring.add_commands(command)
-    reporting.add_commands(command)
     simulating.add_commands(command)
-    exploring.add_commands(command)
     calibrating.add_commands(command)
-    listing.add_commands(command)
     return parser
 
 
@@ -114,20 +124,23 @@ def _add_single_runs(command: measuring.Adder) -> None:
     one = command("run", run, "carry out one run and draw its path")
     add_spec_options(one)
     one.add_argument(
-        "--measurements", type=Path, metavar="FILE", help="also write what was driven as a table (.csv, .parquet)"
+        "--measurements",
+        type=Path,
+        metavar="FILE",
+        help="also write commands and poses of all drives as a table (.csv, .parquet)",
     )
     add_trust(one)
     one.add_argument("--save-snn", type=Path, metavar="FILE", help="also write the run's networks as safetensors")
-    one.add_argument("--device", choices=DEVICES, default="cpu", help="what computes: cpu (default), or a GPU: cuda")
+    one.add_argument("--device", choices=DEVICES, default="cpu", help="cpu (default), or cuda for a GPU (experimental)")
     one.add_argument(
         "--render",
         type=Path,
         metavar="FILE",
-        help="show the fittest controller move, where the world can: .mp4 or .png",
+        help="film or picture of the fittest controller, if the world can draw it (.mp4, .png)",
     )
     add_results(one)
     add_spec_options(
-        taken := command("trial", trial, "carry out a run on a robot, or on its emulator"), without=("world",)
+        taken := command("trial", trial, "carry out a run on a robot or on its emulator"), without=("world",)
     )
     add_trial_options(taken, positive)
     add_looking_options(
@@ -136,12 +149,12 @@ def _add_single_runs(command: measuring.Adder) -> None:
         positive,
         duration,
     )
-    ill = command("doctor", doctor, "find what is wrong with ports, robot, camera and calibration")
+    ill = command("doctor", doctor, "check ports, robot, camera and calibration, and say what to fix")
     ill.add_argument("--robot", default="khepera")
     ill.add_argument(
-        "--rig", type=Path, metavar="FILE", help="your set-up (YAML): its robot and tracker are asked, too"
+        "--rig", type=Path, metavar="FILE", help="your set-up (YAML); its robot and tracker are checked, too"
     )
-    add_servo_options(command("servos", servos, "set up Dynamixel servos: who answers, their ids, their settings"))
+    add_servo_options(command("servos", servos, "set up Dynamixel servos: which answer, their ids, their settings"))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -156,6 +169,7 @@ def run(options: argparse.Namespace) -> int:
     say_if_compiling(spec)
     kept = options.save_snn, options.render, options.measurements
     print(run_by_hand(spec, options.results, SWEEP_OF_SINGLE_RUNS, *kept, device=options.device))
+    say_if_experimental(options.device)
     return 0
 
 

@@ -32,7 +32,7 @@ class Parser(argparse.ArgumentParser):
                 self._check_option(word.partition("=")[0])
         found, unknown = super().parse_known_args(words, namespace)
         if unknown:
-            self.error(f"{' '.join(unknown)}: nothing is expected there")
+            self.error(f"{' '.join(unknown)}: unexpected argument")
         return found, unknown
 
     def _own(self, words: list[str]) -> Iterable[str]:
@@ -103,7 +103,7 @@ class OldFolder(argparse.Action):
 
 def warn_old(command: str, old: str, new: str) -> None:
     """Say on stderr what to write from the next release on."""
-    print(f"bns: warning: {command} … {old} is an old spelling, gone in the next release; write {new}", file=sys.stderr)
+    print(f"bns: warning: {command} … {old} is an old spelling, not accepted by the next release; write {new}", file=sys.stderr)
 
 
 def data_first(words: list[str]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
@@ -13,16 +13,16 @@ import numpy as np
 import yaml
 
 from bns.diagnose.data.load import Measured
-from bns.diagnose.estimate.clocks.trial_clock_test import steps_of, with_trial_clocks
+from bns.diagnose.estimate.clocks.trial_clock_test import with_trial_clocks
 from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.fit_set import Tried, fit_set
 from bns.diagnose.estimate.plausibility import implausible
-from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.problem import given_steps, problem_for
 from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor, Steps
-from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
+from bns.diagnose.predict.paired_errors import PairedErrors, PairedWindows
 from bns.errors import ModelError
 from bns.physics.effect import Effect
 from bns.physics.effects import effect_in_file
@@ -50,8 +50,17 @@ class ExtendedModel:
         return tuple(m.name for m in next(iter(self.errors.horizons.values())).models)
 
 
-Memory = dict[tuple[str, bool, frozenset[Effect]], tuple[Judged, Fit]]
-"""Fits by what they are of: the model as given, whether clocks are each trial's own, the effects added."""
+@dataclass
+class Memory:
+    """What earlier calls with the same predictor and model worked out, and these would work out again.
+
+    ``fits`` by what they are of: the model as given, whether clocks are each trial's own, the effects added. ``tried``: what was
+    tried on the way to them; None where each call is to try for itself. ``windows``: those that all models are judged on.
+    """
+
+    fits: dict[tuple[str, bool, frozenset[Effect]], tuple[Judged, Fit]] = field(default_factory=dict)
+    tried: Tried | None = None
+    windows: PairedWindows | None = None
 
 
 def effect_from(
@@ -90,18 +99,18 @@ def add_effects(
     for effect, _ in effects:
         if any(a.effect.name == effect.name for a in model.effects):
             raise ModelError(
-                f"The model {model.name} has {effect.name} already; it is refitted whenever something is added."
+                f"The model {model.name} already has {effect.name}; it is fitted again whenever an effect is added."
             )
     effects = [(fitting(effect, model, predictor.tracks), written) for effect, written in effects]
-    memory = {} if memory is None else memory
-    judged, tried = [], Tried()
+    memory = Memory() if memory is None else memory
+    judged, tried = [], memory.tried or Tried()
     for k, (effect, _) in enumerate(effects):  # the k-th fit is of k effects, and takes about k times as long
         told(k * (k + 1) / (len(effects) * (len(effects) + 1)), f"fitting with {effect.name}")
         judged.append(_judged(predictor, model, effects[: k + 1], per_trial, memory, tried))
-    first = steps_of(predictor, problem_for(predictor, model).pose_filter, model)
-    steps = (first, *(one.held_out(predictor) for one, _ in judged))
+    steps = (given_steps(predictor, model), *(one.held_out(predictor) for one, _ in judged))
     names = (AS_GIVEN, *(effect.name for effect, _ in effects))
-    errors, fit = paired_errors(predictor, list(zip(names, steps, strict=True))), judged[-1][1]
+    windows, fit = memory.windows or PairedWindows(predictor), judged[-1][1]
+    errors = windows.errors(list(zip(names, steps, strict=True)))
     warnings = tuple(warnings_on(fit, effects, errors))
     return ExtendedModel(fit, _documented(fit, model, measured, errors), errors, warnings, steps)
 
@@ -116,11 +125,11 @@ def _judged(
 ) -> tuple[Judged, Fit]:
     """The model with these effects, fitted and predicted on trials held out; from ``memory`` where the set is known there."""
     key = (model.canonical_json(), per_trial, frozenset(effect for effect, _ in effects))
-    if key not in memory:
+    if key not in memory.fits:
         problem, fit = _step(predictor, model, effects, per_trial, tried)
         steps = held_out_steps(predictor, problem.pose_filter, fit.model)
-        memory[key] = Judged("", fit.model, problem.pose_filter, steps), fit
-    return memory[key]
+        memory.fits[key] = Judged("", fit.model, problem.pose_filter, steps), fit
+    return memory.fits[key]
 
 
 def _step(
@@ -150,16 +159,16 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
         if number.effect not in added:
             continue
         if value in {p.low, p.high} and value != p.neutral:
-            yield f"{number.effect}: {p.name} is at its bound, {value:g} {p.unit}: the data ask for more than the model allows."
+            yield f"{number.effect}: {p.name} is at its bound, {value:g} {p.unit}: the data require more than the model allows."
     for name in sorted(added):
         why = implausible(fit, name, bounds=False)
         if why:
-            yield f"{name} fits best, and implausibly: {why}."
+            yield f"{name} fits best with an implausible value: {why}."
         elif does_nothing(fit, name):
-            yield f"{name} does nothing that these data show: its 95 % interval includes the value at which it changes nothing."
+            yield f"{name} has no visible effect in these data: its 95 % interval includes the neutral value (no effect)."
     for before, after in pairwise(next(iter(errors.horizons.values())).models):
         if not errors.between(before.name, after.name):
-            yield f"with {after.name} the error on trials held out does not fall."
+            yield f"with {after.name}, the error on held-out trials does not fall."
 
 
 def does_nothing(fit: Fit, name: str) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
 
 MOST_EFFECTS = DEFAULTS.select.most_effects
+LEAST_FALL = DEFAULTS.select.least_fall
 NOTABLE = DEFAULTS.verdict.notable
 CHANCE = DEFAULTS.residuals.chance
 
@@ -30,6 +33,7 @@ def notes_on(
     hint: Candidate | None,
     longer: Sequence[tuple[str, ...]] = (),
     withdrawn: Sequence[str] = (),
+    negligible: Mapping[str, Mapping[str, Mapping[str, Any]]] = MappingProxyType({}),
     imitating: Sequence[str] = (),
     terms: Sequence[str] = (),
     with_terms: PairedErrors | None = None,
@@ -37,36 +41,45 @@ def notes_on(
     """All notes, one sentence or two each.
 
     ``longer``: explanations with one effect more that fit as well; ``withdrawn``: effects with which the error does not fall;
-    ``imitating``: those that earn too little beside flexible terms; ``terms``: these in words;
-    ``with_terms``: the held-out errors without and with them.
+    ``negligible``: those that matter to no prediction, with their numbers; ``imitating``: those that earn too little beside
+    flexible terms; ``terms``: these in words; ``with_terms``: the held-out errors without and with them.
     """
     for name, why in selection.implausible.items():
-        yield f"{name} fits best, and implausibly: {why}. No other set predicts as well: check it by an independent measurement."
+        yield (
+            f"{name} fits best, but with an implausible value: {why}. No other set predicts as "
+            "well; check it by an independent measurement."
+        )
     if len(selection.accepted) >= MOST_EFFECTS:
-        yield f"The search ends at {MOST_EFFECTS} effects; there may be more."
+        yield f"The search ends at {MOST_EFFECTS} effects; more may be missing."
     if imitating:
         yield (
-            f"{' and '.join(imitating)} would lower the error, but only by imitating what no listed effect explains: beside a "
-            "flexible term for that, too little is left to explain."
+            f"{' and '.join(imitating)} would lower the error, but only by imitating something that no listed effect explains: "
+            "beside a flexible term for that, too little gain is left."
         )
     if withdrawn:
         yield (
-            f"{' with '.join(withdrawn)} would fit better by likelihood, but predictions of trials held out get no better "
-            "(root mean square of the same windows): not presented as an explanation."
+            f"{' with '.join(withdrawn)} would raise the likelihood, but not improve predictions of held-out trials "
+            "(root mean square on the same windows). So it is not presented as an explanation."
+        )
+    for name, numbers in negligible.items():
+        said = ", ".join(f"{key} = {number['value']:.3g} {number['unit']}" for key, number in numbers.items())
+        yield (
+            f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "
+            "more, so it is not named. It may be an artefact of the log, such as rounded time stamps."
         )
     yield from _on_effects(selection, tracks)
     for names in longer:
-        yield f"{' with '.join(names)} would explain as much, with one effect more."
+        yield f"{' with '.join(names)} would explain as much, with one more effect."
     yield from _on_rest(rest, tracks)
     if formula is not None and not formula.signal and formula.paired_comparison.p_value < CHANCE:
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
-        yield f"A candidate for it: {formula.on} + {formula.term} with {values}."
-    yield from (f"What no effect explains looks like this: {words}." for words in terms)
+        yield f"A candidate term: {formula.on} + {formula.term} with {values}."
+    yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
     if terms and with_terms is not None and not with_terms.falls:
         yield _no_lower(with_terms)
     if hint is not None:
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
-        yield f"{hint.name} may be missing, but {len(tracks)} trials do not settle it; about {more} more would."
+        yield f"{hint.name} may be missing, but {len(tracks)} trials are too few to decide; about {more} more would decide."
     for c in selection.steps[0].ranking:
         if c.rejected_because and c.paired_comparison.elpd_diff > NOTABLE * float(selection.nominal.losses.mean()):
             yield f"{c.name} was not considered: {c.rejected_because}."
@@ -75,22 +88,25 @@ def notes_on(
 def on_worst(both: WithoutWorst) -> str:
     """What becomes of a verdict with and without trials that are unlike the rest."""
     those = f"{'trial' if len(both.trials) == 1 else 'trials'} {', '.join(both.trials)}"
-    begun = f"Unlike all others as a whole: {those}. They count nothing in what is fitted, and are part of the errors shown"
+    begun = f"Unlike all others as a whole: {those}. They do not count in the fits, but are part of the errors shown"
     if both.same:
-        return f"{begun}; the verdict is the same with them. Look what happened there; `--without` leaves them out."
+        return f"{begun}; the verdict is the same with them. Check what happened there; `--without` excludes them."
     verdict, effects = both.with_them
     said = f"{verdict} ({', '.join(effects)})" if effects else verdict
-    return f"{begun}; with them the verdict would be {said}. Look what happened there; `--without` leaves them out."
+    return f"{begun}; with them the verdict would be {said}. Check what happened there; `--without` excludes them."
 
 
 def _no_lower(with_terms: PairedErrors) -> str:
     """What to do with a term with which the error does not fall at all horizons."""
     if not with_terms.rose_at:
-        return "Predictions of trials held out get no better with that for certain: it describes, and need not be added."
+        return (
+            "Adding it does not clearly improve predictions of held-out trials: it describes the robot, but is not needed in the "
+            "model."
+        )
     rose, fell = (" and ".join(IN_WORDS.get(h, h) for h in names) for names in (with_terms.rose_at, with_terms.fell_at))
     though = f", though it falls over {fell}" if fell else ""
     return (
-        f"With that the error of trials held out rises over {rose}{though}: it describes the robot, and must not be added to a "
+        f"With it, the error on held-out trials rises over {rose}{though}. It describes the robot, but do not add it to a "
         "model that has to predict that far."
     )
 
@@ -100,7 +116,7 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
     known = known_effects(selection)
     for name in sorted(names):
         if known[name].of_measuring:
-            yield f"{name} is a fault of the measuring, not of the robot."
+            yield f"{name} is an error of the measurement, not of the robot."
     chain = sorted((known[name] for name in names), key=lambda effect: (effect.place, effect.name))
     logged = {*tracks.extra, *(("session_s",) if tracks.start_known else ())}
     yield from (effect.caveat for effect in chain if effect.caveat and not logged.intersection(effect.explained_by))
@@ -109,8 +125,8 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
     if per_trial_effect is not None:
         own = np.array(per_trial_effect.trial_values)
         yield (
-            f"{per_trial_effect.effect.name} has a value of its own in every trial, {own.min():+.3f} to {own.max():+.3f} s; "
-            "trials held out are judged with the clock that other poses of the same trial ask for. "
+            f"{per_trial_effect.effect.name} has a separate value in each trial, {own.min():+.3f} to {own.max():+.3f} s; "
+            "held-out trials are judged with the clock fitted to other poses of the same trial. "
             "A delay common to all trials cannot be told from the clocks."
         )
 
@@ -125,12 +141,12 @@ def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
         r = rest.autocorrelation
         after = f"{r.lag} frames later" if r.scale == "within" else "in the next command"
         yield (
-            f"What is not foreseen in the direction {r.direction} repeats itself {after} (correlation "
-            f"{r.correlation:+.2f}): something with a rhythm or a drift of its own that no logged variable shows."
+            f"The unexplained motion in the direction {r.direction} repeats itself {after} (correlation "
+            f"{r.correlation:+.2f}): something oscillates or drifts that no logged variable shows."
         )
     if rest.outliers:
         worst = ", ".join(f"trial {o.trial} at {o.t_s:.2f} s" for o in rest.outliers[:3])
         yield (
-            f"{len(rest.outliers)} of {len(tracks)} trials have moments over {FAR:g} times as far off as most are "
-            f"({worst}): see what happened there and then."
+            f"{len(rest.outliers)} of {len(tracks)} trials have moments with more than {FAR:g} times the usual error "
+            f"({worst}): check what happened there."
         )

@@ -177,10 +177,17 @@ def _curves(
     return [_binned(name, way, at[name], rate, errors.trial, rng) for name in names for way, rate in rates.items()]
 
 
+def _edges(values: Array) -> Array:
+    """Of bins of as many values each; where values nearly repeat, neighbours that are both far narrower than usual are joined."""
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    narrow = np.diff(edges) < np.ptp(values) / BINS**2
+    return edges[np.concatenate([[True], ~(narrow[:-1] & narrow[1:]), [True]])] if len(edges) > 2 else edges
+
+
 def _binned(
     name: str, way: str, values: Array, rate: Array, trial: NDArray[np.int64], rng: np.random.Generator
 ) -> Curve:
-    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    edges = _edges(values)
     place: NDArray[np.intp] = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     bins, trials = max(len(edges) - 1, 1), int(trial.max()) + 1
     sums, counts = np.zeros((trials, bins)), np.zeros((trials, bins))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ from bns.diagnose.residuals.words import in_words
 from bns.diagnose.residuals.worst_trials import WithoutWorst, standing_out
 from bns.diagnose.select.equivalents import equivalent_pairs
 from bns.diagnose.select.known_effects import known_effects
+from bns.diagnose.select.negligible import LEAST_FALL, negligible
 from bns.diagnose.select.result import Candidate, SelectionResult, certainly_lower
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
 from bns.diagnose.settings import DEFAULTS
@@ -61,6 +62,8 @@ class Diagnosis:
     terms: tuple[Formula, ...] = ()
     """What no effect explains, as terms that can be added one after the other; their fit has the effects and all of them."""
     terms_in_words: tuple[str, ...] = ()
+    negligible: Mapping[str, dict[str, dict[str, Any]]] = field(default_factory=dict)
+    """Effects that are certain but change no error by as much as `least_fall`, with their numbers; not among the accepted."""
     imitating: tuple[str, ...] = ()
     """Effects that a search without the terms accepts, and that earn too little beside them."""
     errors: PairedErrors | None = None
@@ -106,6 +109,7 @@ class Diagnosis:
             "effects": list(self.effects),
             "implausible": selection.implausible if selection else {},
             "parameters": self.numbers,
+            "negligible": dict(self.negligible),
             "imitating": list(self.imitating),
             "ties": ties_of(selection) if selection else [],
             "explanations": [list(selection.accepted), *map(list, selection.competing_models)] if selection else [],
@@ -250,15 +254,20 @@ def _diagnosed(
             withdrawn, selection = selection.accepted, selection.withdrawn()
             errors = errors_before_and_after(selection, model)
         dependence, rest = _left(selection)
-    terms = found.terms if found else ()
+    with_terms = _errors_with_terms(selection, model, found) if found and found.terms else None
+    terms = found.terms if found and with_terms and (rest.any or _matters(with_terms)) else ()
+    whole, tiny = selection, () if terms else _negligible(selection)
+    if tiny:
+        selection = refitted(selection.lacking(tiny), predictor, model)
+        errors = errors_before_and_after(selection, model)
     # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
     guesses = rest.residual_dependence or (tuple(dependence[:1]) if rest.outliers else ())
-    formula = terms[0] if terms else best_formula(selection.problem, selection.fit, guesses) if guesses else None
+    formula = terms[0] if terms else best_formula(whole.problem, whole.fit, guesses) if guesses else None
     hint = _hint(selection, len(predictor.tracks))
     left = rest.any or bool(terms)
     verdict = _verdict(selection, left, hint)
     words = tuple(in_words(term, predictor) for term in terms)
-    with_terms = _errors_with_terms(selection, model, found) if found and terms else None
+    with_terms = with_terms if terms else None
     tick("longer explanations")
     tried = {c.name for step in selection.steps for c in step.ranking}
     others = [
@@ -275,12 +284,19 @@ def _diagnosed(
         formula,
         terms,
         words,
+        small := {name: numbers for name, numbers in numbers_of(whole.fit).items() if name in tiny},
         imitating,
         errors,
         with_terms,
-        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, imitating, words, with_terms)),
+        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, small, imitating, words, with_terms)),
         calibration=calibrated(predictor, model, barred),
     )
+
+
+def _negligible(selection: SelectionResult) -> tuple[str, ...]:
+    """As `negligible`; not asked where a fit is costly, or trials have clocks of their own."""
+    costly = selection.problem.predictor.screening is not None
+    return () if costly or selection.fit.model.per_trial_effect is not None else negligible(selection)
 
 
 def _established(selection: SelectionResult, predictor: Predictor, rest: Unexplained) -> Established | None:
@@ -300,6 +316,16 @@ def _established(selection: SelectionResult, predictor: Predictor, rest: Unexpla
         # the effects predict better than what they are said to imitate: it is the terms that imitate
         return replace(established(predictor, selection.fit.model, {}), names=selection.accepted)
     return found
+
+
+def _matters(errors: PairedErrors) -> bool:
+    """Do the terms certainly lower the error at one horizon, by as much as is asked of an effect (`least_fall`)?"""
+    for at in errors.horizons.values():
+        before = at.models[-2]
+        change = at.change_between(before.name, WITH_TERMS)
+        if change.fell and -change.change_m >= LEAST_FALL * before.rms_m:
+            return True
+    return False
 
 
 def _errors_with_terms(selection: SelectionResult, given: Model, found: Established) -> PairedErrors:
@@ -326,14 +352,14 @@ def too_little(tracks: Tracks, fewest: int) -> str:
     frames = np.diff(tracks.first)
     if np.median(frames) < 2:
         return (
-            "Most trials have a single tracked pose; a displacement needs two: log the pose before and after commands."
+            "Most trials have only one tracked pose; a displacement needs two: log the pose before and after commands."
         )
     on_wheels = tracks.duration_s.shape[1] > 0
     if on_wheels and not ((np.abs(tracks.left_m_s) + np.abs(tracks.right_m_s)) * tracks.duration_s).any():
-        return "The robot was never told to move; give it commands of different speeds."
+        return "The robot was never commanded to move; drive it with commands of different speeds."
     ends = [tracks.pose[a:b, :2] for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
     if max(float(np.ptp(p, axis=0).max()) for p in ends if len(p)) < 5e-3:
-        return "The robot never moved by more than 5 mm, whatever it was told: is it tracked, are its motors on?"
+        return "The robot never moved by more than 5 mm, whatever the command: is it tracked, and are its motors on?"
     return ""
 
 

@@ -99,7 +99,7 @@ class Agreement:
         self.suspects = way_m > _SUSPECT_M
         if way_m > max(_FROZEN_WAY_M, _FROZEN_S * max(abs(speed) for speed in self._orders[-1][1:])):
             raise TrialPausedError(
-                f"the robot was ordered to drive {100 * way_m:.0f} cm and the picture shows it where it was: the camera hangs or "
+                f"the robot was commanded to drive {100 * way_m:.0f} cm, but the picture shows no motion: the camera hangs or "
                 "shows another scene, or the robot is held. Look at it: bns track"
             )
         self._seen.append(_Seen(sight.t_s, sight.pose))

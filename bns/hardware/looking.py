@@ -60,7 +60,7 @@ def coloured(rig: Rig, clock: Clock) -> tuple[str, bytes]:
     finally:
         camera.close()
     if frame is None:
-        raise HardwareError("the camera is gone; plug it in again.")
+        raise HardwareError("the camera is disconnected; plug it in again.")
     find = detector(settings)
     good, coded = cv2.imencode(".png", drawn(frame.picture, find))
     assert good
@@ -102,7 +102,7 @@ def views(camera: StreamCamera, board: Board, count: int, clock: Clock, say: Cal
     while len(kept) < count:
         frame = camera.newest()
         if frame is None:
-            raise HardwareError("the camera is gone; plug it in again.")
+            raise HardwareError("the camera is disconnected; plug it in again.")
         found = corners(frame.picture, board)
         if found is not None:
             middle = found[1].reshape(-1, 2).mean(axis=0)

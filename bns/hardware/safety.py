@@ -107,7 +107,7 @@ class Watch:
         late_s, self._looked_s = now_s - self._looked_s, now_s
         if late_s > self._limits.late_s:
             raise TrialPausedError(
-                f"nobody looked at the robot for {late_s:.1f} s: the computer is too busy, or the robot answers too slowly. "
+                f"the program did not check the robot for {late_s:.1f} s: the computer is too busy, or the robot is too slow. "
                 "End other programs, bring the robot nearer, or allow more late_s in the rig."
             )
         return now_s

@@ -16,10 +16,10 @@ import numpy as np
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, Parameter
-from bns.physics.formula_check import checked_formula
+from bns.physics.formula_check import AGO, checked_formula
 from bns.physics.order import FORMULAS
 from bns.physics.signals import CREEP_M_S, Array, Body
-from bns.physics.wheels.scans import carried_on, first_order, reversed_since, trailing
+from bns.physics.wheels.scans import averaged, carried_on, first_order, reversed_since, trailing
 
 SHARE, WHEELS, LEFT, RIGHT = "share", "wheels", "left", "right"
 ON: Mapping[str, str] = {
@@ -59,6 +59,8 @@ OF_A_WHEEL: Mapping[str, str] = {
     "lately100": "the same over the last 100 s",
 }
 """Further names in a term on `WHEELS`, `LEFT` or `RIGHT`."""
+PAST: Mapping[str, str] = {AGO: "ago(0.1, 0.2): mean speed of this wheel from 0.1 to 0.2 s ago, m/s"}
+"""A function in such a term: its arguments are times in seconds, the smaller first."""
 RECENT_S = 0.15
 NEVER_M = 1e3
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
@@ -95,6 +97,8 @@ def formula_effect(
     if on not in ON:
         raise ModelError(f"formula {name}: " + unknown_name("velocity to add to (on)", on, ON))
     code = _parsed(name, term)
+    if AGO in code.called and on not in WHICH_WHEELS:
+        raise ModelError(f"formula {name}: {AGO}(...) is of one wheel; it needs on: {', '.join(WHICH_WHEELS)}, not {on}.")
     known = set(VARIABLES) | (set(OF_A_WHEEL) if on in WHICH_WHEELS else set())
     logged, unknown = _sorted(name, code.names - known, set(columns), None if numbers is None else set(numbers))
     if not unknown:
@@ -120,7 +124,8 @@ def formula_effect(
 def _is_linear(code: Compiled, numbers: Sequence[str]) -> bool:
     """Whether a term is a sum of its numbers times something else each: one step of least squares finds these from nothing."""
     rng = np.random.default_rng(0)
-    rest = {n: rng.uniform(0.1, 0.9, 16) for n in sorted(code.names - set(numbers))}
+    rest: dict[str, Any] = {n: rng.uniform(0.1, 0.9, 16) for n in sorted(code.names - set(numbers))}
+    rest[AGO] = lambda from_s, to_s: np.linspace(from_s, to_s, 16)
 
     def value(at: Array) -> Array:
         with np.errstate(all="ignore"):
@@ -168,9 +173,10 @@ class Compiled:
 
     def __init__(self, name: str, term: str) -> None:
         self._made_of = name, term
-        tree = checked_formula(f"formula {name}", term, FUNCTIONS)
-        called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
-        self.names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - called
+        tree = checked_formula(f"formula {name}", term, (*FUNCTIONS, *PAST))
+        calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+        self.called = {function.id for function in calls if isinstance(function, ast.Name)}
+        self.names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - self.called
         self.code = compile(tree, name, "eval")
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -250,8 +256,8 @@ def _values(body: Body, code: Compiled) -> dict[str, Any]:
     return values
 
 
-def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Array]:
-    """`OF_A_WHEEL` of the wheel with this speed; only what the term names."""
+def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Any]:
+    """`OF_A_WHEEL` and `PAST` of the wheel with this speed; only what the term names."""
     made: dict[str, Callable[[], Array]] = {
         "u": lambda: speed,
         "since": lambda: since_reversal(speed, _step_s(body)),
@@ -259,7 +265,11 @@ def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Array]:
         "lately10": lambda: lately(body, speed, 10.0),
         "lately100": lambda: lately(body, speed, 100.0),
     }
-    return {name: make() for name, make in made.items() if name in code.code.co_names}
+    def ago(from_s: float, to_s: float) -> Array:
+        return averaged(speed, _step_s(body), float(from_s), float(to_s))
+
+    past = {AGO: ago} if AGO in code.called else {}
+    return {**past, **{name: make() for name, make in made.items() if name in code.code.co_names}}
 
 
 def lately(body: Body, speed: Array, fade_s: float) -> Array:

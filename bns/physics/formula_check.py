@@ -14,7 +14,9 @@ LONGEST, MOST_PIECES, DEEPEST = 2_000, 600, 60
 """Characters; numbers, names, operators and calls; levels of one within the other."""
 LARGEST = 1e12
 """The largest number, also of those that follow from others."""
-_ARGUMENTS: Mapping[str, int] = {"min": 2, "max": 2}
+AGO, LONGEST_AGO_S = "ago", 60.0
+"""The function of a wheel's past speeds, and how far back it reaches: its two arguments are numbers."""
+_ARGUMENTS: Mapping[str, int] = {"min": 2, "max": 2, AGO: 2}
 _OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -76,7 +78,11 @@ class _Check:
         if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
             return self._of(node, _OPERATORS[type(node.op)], [node.left, node.right])
         if isinstance(node, ast.Call):
-            return self._of(node, _FUNCTIONS[self._called(node)], node.args)
+            called = self._called(node)
+            if called == AGO:
+                self._past(node)
+                return None
+            return self._of(node, _FUNCTIONS[called], node.args)
         raise ModelError(
             f"{self._where}: {_short(ast.unparse(node))} is not allowed; use + - * / **, numbers, names and "
             f"{', '.join(self._functions)}."
@@ -92,6 +98,14 @@ class _Check:
                 f"{self._where}: {_short(ast.unparse(node))} has {given} arguments; {node.func.id} takes {wanted}."
             )
         return node.func.id
+
+    def _past(self, node: ast.Call) -> None:
+        times = [self.value(argument) for argument in node.args]
+        if None in times or not 0.0 <= float(times[0] or 0.0) < float(times[1] or 0.0) <= LONGEST_AGO_S:
+            raise ModelError(
+                f"{self._where}: {_short(ast.unparse(node))} cannot be used: the arguments of {AGO} are two times in seconds, "
+                f"0 to {LONGEST_AGO_S:g}, the smaller first: {AGO}(0.1, 0.2)."
+            )
 
     def _of(self, node: ast.AST, function: Callable[..., Any], arguments: list[ast.expr]) -> float | None:
         values = [self.value(argument) for argument in arguments]

@@ -45,13 +45,13 @@ def summed_up(summary: Summary, results: Path) -> str:
     elif summary.stopped_by == "ranking":
         text += "; the rest cannot change the ranking"
     elif summary.stopped_by:
-        text += f"; stopped: {_WHY[summary.stopped_by]}; the same command goes on from here"
+        text += f"; stopped: {_WHY[summary.stopped_by]}; the same command continues from here"
     return text
 
 
 def status_table(rows: Sequence[SweepRow]) -> str:
     """One line a sweep and task."""
-    head = ("sweep", "task", "done", "of", "failed", "quarantined", "other", "mean s a run", "last run began (UTC)")
+    head = ("sweep", "task", "done", "of", "failed", "quarantined", "other", "mean s per run", "last run began (UTC)")
     lines = [head] + [
         (
             row.sweep,

@@ -77,7 +77,7 @@ class TerminalOperator:
     def accept(self, summary: str, spans_s: Spans) -> Decision:
         """Ask what to do."""
         words = {"": "next", "r": "repeat", "s": "skip"}
-        asked = f"{summary}\nEnter: keep it; discard it and r: drive it again; s: go on with the next; p: pause"
+        asked = f"{summary}\nEnter: keep it; discard it and r: drive it again; s: continue with the next; p: pause"
         if not spans_s:
             return Decision(self._answer(f"{asked}: ", words))
         answer = self._answer(f"{asked}; u: keep it, some cycles were unstable: ", words | {"u": "unstable"})

@@ -37,7 +37,7 @@ def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
     """Lines for the terminal; `what` drove: a robot, or its emulator."""
     evals = result.run.tables["evals"]
     numbers = evals["evaluation"]
-    firsts = [f"within {cm} cm {_first(evals[f'evaluated_success_{cm}cm'], numbers)}" for cm in RADII_CM]
+    firsts = [f"within {cm} cm: {_first(evals[f'evaluated_success_{cm}cm'], numbers)}" for cm in RADII_CM]
     if evals[f"evaluated_success_{RADII_CM[0]}cm"][0] is None:  # goals are regions
         firsts = [_first(evals["evaluated_success"], numbers)]
     driven_min = float(np.sum(evals["driven_ms"])) / 60_000.0
@@ -62,7 +62,7 @@ def _repeats(successes: Sequence[bool]) -> list[str]:
 
 def _stops(seconds: Sequence[float]) -> str:
     if not seconds:
-        return "nothing was driven in this session"
+        return "no drive in this session"
     most = f"{_ms(float(np.median(seconds)))} at the median, {_ms(max(seconds))} at most"
     return f"stops: {len(seconds)} confirmed, {most}"
 
@@ -74,4 +74,4 @@ def _ms(seconds: float) -> str:
 def _first(success: np.ndarray, numbers: np.ndarray) -> str:
     if not success.any():
         return "never"
-    return f"first at evaluation {int(numbers[np.argmax(success)])}, {success.mean():.0%} of them"
+    return f"first at evaluation {int(numbers[np.argmax(success)])}, in {success.mean():.0%} of the evaluations"

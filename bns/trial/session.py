@@ -134,7 +134,7 @@ def _guard(rig: Rig, module: PlatformModule, journal: Path | None, stack: ExitSt
 def _let_go(guard: Guard) -> None:
     """Say goodbye; say so where it has to go on."""
     if not guard.close():
-        print(f"the guard of the port (process {guard.process}) goes on trying to stop the robot", file=sys.stderr)
+        print(f"the guard of the port (process {guard.process}) keeps trying to stop the robot", file=sys.stderr)
 
 
 def carry_out(spec: RunSpec, how: TrialSetup, results: Path, on_evaluation: Progress = lambda _row: None) -> KeptTrial:
@@ -203,7 +203,7 @@ def _looped(
 
         result = run(spec, tell, world, background)
     if "evals" not in result.tables:
-        raise TrialPausedError(f"all {spec.evaluations} evaluations were skipped: there is nothing to keep")
+        raise TrialPausedError(f"all {spec.evaluations} evaluations were skipped: there is no result")
     wall_s = (datetime.now(UTC) - started).total_seconds()
     shares = background.waited_share, background.worked_share
     return TrialResult(result, driver.stops_s, driver.ends, *shares, background.rounds, started, wall_s)

@@ -104,7 +104,7 @@ def no_runs_yet(results):
 def test_an_empty_store_says_what_to_run(tmp_path, capsys, make):
     make(tmp_path / "results")
     assert main(["--results", str(tmp_path / "results")]) == 2
-    assert "make sweep-khepera BUDGET=10m" in capsys.readouterr().err
+    assert "bns sweep khepera-small" in capsys.readouterr().err
     with pytest.raises(StoreError, match="no runs in"):
         Results(tmp_path / "results")
 
@@ -117,7 +117,7 @@ def test_a_figure_without_data_is_skipped_with_one_line(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == len(figures()) + 1
     assert any(
-        line.startswith("success-by-mutation (figures 4.7 and 5.23) skipped: 2 runs failed and none finished; run make")
+        line.startswith("success-by-mutation (figures 4.7 and 5.23) skipped: 2 runs failed and none finished; run bns sweep")
         for line in lines
     )
     assert not list((tmp_path / "figures").glob("*.png"))

@@ -268,13 +268,13 @@ def test_a_store_of_one_combination_or_of_failures_alone_says_what_would_feed_a_
 def test_why_there_is_nothing_to_compare_is_said(tmp_path, module):
     one, single = RunSpec(seed=0, evaluations=4), RunSpec(seed=1, evaluations=4)
     written(tmp_path / "bad", "bad", [failed(spec) for spec in (one, single)])  # one rate, so no comparison either
-    with pytest.raises(NoDataError, match=r"^2 runs failed and none finished; run make sweep-khepera"):
+    with pytest.raises(NoDataError, match=r"^2 runs failed and none finished; run bns sweep khepera-small"):
         module.draw(Results(tmp_path / "bad"))
     written(tmp_path / "one", "one", [record(one)])
-    with pytest.raises(NoDataError, match=r"^no sweep compares .* \(1 finished run\); run make"):
+    with pytest.raises(NoDataError, match=r"^no sweep compares .* \(1 finished run\); run bns sweep"):
         module.draw(Results(tmp_path / "one"))
     written(tmp_path / "one", "more", [failed(single)])
-    with pytest.raises(NoDataError, match=r"\(1 finished run, 1 failed\); run make"):
+    with pytest.raises(NoDataError, match=r"\(1 finished run, 1 failed\); run bns sweep"):
         module.draw(Results(tmp_path / "one"))
 
 

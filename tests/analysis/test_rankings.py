@@ -109,7 +109,7 @@ def test_who_cannot_be_told_from_the_best_is_corrected_for_many_comparisons(tmp_
     written(tmp_path, "grid", [*rated(0.1, seeds=10, good=10), *runs])
     drawn = best_combinations.draw(Results(tmp_path))[0]
     # Fisher's test of 10 of 10 against 5 of 10 gives 0.033: below 0.05 alone, not among seven.
-    assert "7 of the 7 others cannot be told from it" in drawn.see
+    assert "7 of the 7 others cannot be distinguished from it" in drawn.see
     assert any("bns sweep sweeps/grid.yaml --confirm-top 10" in text for text in drawn.missing)
 
 

@@ -111,7 +111,7 @@ def test_variants_of_real_logs_are_refused_or_read_alike(tmp_path):
         (table.assign(t_s=table["t_s"] * 1e9), "nanoseconds"),
         (table.assign(t_s=table["t_s"] * 1e6), "microseconds"),
         (table.assign(x_m=table["x_m"] * 1000, y_m=table["y_m"] * 1000), "millimetres"),
-        (table.assign(left_m_s=table["right_m_s"], right_m_s=table["left_m_s"]), "turns against the wheels"),
+        (table.assign(left_m_s=table["right_m_s"], right_m_s=table["left_m_s"]), "turns opposite to the wheels"),
     ):
         with pytest.raises(DataError, match=words):
             checked(applied(wrong, {"columns": {}}))

@@ -50,7 +50,7 @@ def test_few_pairs_have_no_interval_and_none_are_named(tmp_path):
     _, rows = readings.compared(paired(tmp_path / "few", 4, 4))
     assert np.isnan(rows.commands_low[0])
     written(tmp_path / "alone", "readings", [with_evals(RunSpec(seed=1, evaluations=4))])
-    with pytest.raises(NoDataError, match="no run of a reading has one of the default reading beside it"):
+    with pytest.raises(NoDataError, match="no run of a reading has a counterpart of the default reading"):
         readings.compared(Results(tmp_path / "alone"))
 
 

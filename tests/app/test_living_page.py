@@ -134,3 +134,59 @@ def test_everything_is_reached_and_done_with_the_keyboard(visit):
         tab_to(page, something)
     page.keyboard.press("Enter")  # Undo
     page.get_by_role("rowheader", name="by hand").wait_for(state="detached")
+
+
+UNNAMED = re.compile(r"- (slider|checkbox|button|combobox|listbox|textbox|spinbutton|radio|link)(?! \")[^\n]*")
+
+
+def test_a_screen_reader_can_name_everything(visit):
+    page = visit(LOG).open()
+    page.get_by_role("checkbox", name="motor-lag:").check()
+    error_of(page, "+ motor-lag")
+    slider = page.get_by_role("slider", name="tau_s, s", exact=True)
+    slider.wait_for()
+    page.get_by_label("tau_s (s), by hand").wait_for()
+    slider.focus()
+    before = slider.get_attribute("aria-valuetext")
+    page.keyboard.press("ArrowRight")
+    error_of(page, "by hand")
+    assert slider.get_attribute("aria-valuetext") != before
+    for screen, sign in (
+        ("Data", "#bns-log"),
+        ("Model", "#bns-model"),
+        ("Where it fails", "#bns-compared"),
+        ("Effects", "#bns-errors"),
+        ("Next", "#bns-saved"),
+    ):
+        go(page, screen, sign)
+        settled(page)
+        if screen in {"Where it fails", "Effects"}:
+            assert page.get_by_role("slider", name="Time in the trial (s)").filter(visible=True).count() == 1
+        unnamed = [found.group() for found in UNNAMED.finditer(page.locator("body").aria_snapshot())]
+        assert unnamed == [], screen
+
+
+def test_what_one_change_brings_comes_in_one_message(visit):
+    """In several, a picture could get data that name a part which the browser does not have yet."""
+    visited = visit(LOG)
+    page, came = visited.browser.new_page(), []
+
+    def keep(frame):
+        came.append(frame)
+
+    page.on("websocket", lambda socket: socket.on("framereceived", keep))
+    page.goto(visited.address)
+    page.get_by_role("checkbox", name="motor-lag:").check()
+    error_of(page, "+ motor-lag")
+    slider = page.get_by_role("slider", name="tau_s, s", exact=True)
+    slider.wait_for()
+    settled(page)
+    slider.focus()
+    came.clear()
+    page.keyboard.press("ArrowRight")
+    error_of(page, "by hand")
+    settled(page)
+    changes = [frame for frame in came if isinstance(frame, str) and '"events"' in frame]
+    assert len(changes) == 1
+    assert "by hand" in changes[0]
+    assert not page.locator("script[src*='mathjax']").count()  # 2 MB that nobody would use

@@ -10,6 +10,7 @@ import bns
 from bns.cli.main import main
 from bns.diagnose.data import tracker_faults
 from bns.diagnose.data.tracks import MOST_FRAMES, tracks_of
+from bns.diagnose.predict import paired_errors
 from tests.app.test_screens import AtOnce
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
@@ -19,6 +20,7 @@ from bns.app.figures.paths import LogFigure
 from bns.app.screens.effects import EffectsScreen
 from bns.app.screens.where import WhereScreen
 from bns.app.tab import Tab
+from bns.app.workbench import Workbench
 
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
 
@@ -54,6 +56,17 @@ def test_numbers_of_many_poses_are_those_of_the_command_line(many, capsys):
     assert f"<td>{1e3 * said['1s']['position_m']:.2f}</td>" in effects._errors.object
     used = len(tab.bench.ready.predictor.tracks.t_s)
     assert f"{used} of {len(tab.log.measured.tracks.t_s)} poses are used" in effects._errors.object
+
+
+def test_what_does_not_depend_on_the_model_is_worked_out_once(many):
+    """Of thousands of trials the bootstrap's draws take longer than all else of the first picture."""
+    bench = Workbench(str(many), bns.Model(NOMINAL))
+    paired_errors._drawn.cache_clear()
+    assert bench.as_given
+    trials = len(bench.ready.predictor.tracks)
+    assert paired_errors._drawn.cache_info().misses == 1
+    drawn = np.random.default_rng(paired_errors._SEED).multinomial(trials, np.full(trials, 1 / trials), size=paired_errors.DRAWS)
+    assert np.array_equal(paired_errors._drawn(trials), drawn)
 
 
 def test_paths_of_a_million_poses_are_drawn_thinned():

@@ -1,11 +1,15 @@
 """Screens without a browser: what they show of terms, of effects while a diagnosis works, of the snake and of networks."""
 
 import json
+import re
 
 import pytest
 
 import bns
 from bns.cli.main import main
+from bns.diagnose.report.variables import LABELS
+from bns.diagnose.residuals.along_variables import CHANNELS, WORLD
+from bns.examples import FOLDER
 from tests.diagnose.test_established import warming
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 from tests.hidden_snake.worlds import Hidden, World, driven
@@ -13,7 +17,8 @@ from tests.hidden_snake.worlds import Hidden, World, driven
 pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
 
 from bns.app.explore import tabs_of
-from bns.app.html import found_errors
+from bns.app.html import found_errors, velocity
+from bns.app.jobs import Jobs
 from bns.app.log.part import Part
 from bns.app.screens.data import DataScreen
 from bns.app.screens.effects import EffectsScreen
@@ -24,6 +29,9 @@ from bns.app.session import opened, session_yaml
 from bns.app.tab import Tab
 
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+
+
+LOG = FOLDER / "khepera-log.csv"
 
 
 class AtOnce:
@@ -87,6 +95,55 @@ def test_what_effects_earn_alone_stands_beside_them_while_the_diagnosis_works():
     gain = f"{told['turn-slip']['elpd_diff']:+.3f}"
     assert f"alone, so far: {gain}" in screen._effects["turn-slip"]._text.object
     assert "alone" not in screen._effects["motor-lag"]._text.object
+
+
+def test_velocities_stand_in_words_with_units():
+    for channel in (*CHANNELS, *WORLD):
+        assert re.search(r" \(.+\)$", velocity(channel)), channel
+    tab = Tab()
+    tab.open(LOG, "log.csv")
+    said = entered(WhereScreen, tab)._explained.object
+    assert "forward velocity (m/s)" in said
+    for name in (*CHANNELS, *WORLD, *LABELS):
+        if "_" in name:
+            assert name not in said
+
+
+def test_trials_have_the_names_of_the_log_in_the_picture_of_all_trials():
+    tab = Tab()
+    tab.open(LOG, "log.csv")
+    screen = entered(WhereScreen, tab)
+    names = [str(name) for name in tab.log.trials["trial"]]
+    assert screen._pictures.trial.xaxis[0].major_label_overrides == dict(enumerate(names))
+
+
+class Ticks:
+    """A document whose next tick comes when the test says so."""
+
+    def __init__(self):
+        self.asked = []
+
+    def add_next_tick_callback(self, act):
+        self.asked.append(act)
+
+    def tick(self):
+        due, self.asked = self.asked, []
+        for act in due:
+            act()
+
+
+def test_nothing_is_shown_before_the_browser_has_the_page():
+    document, said, done = Ticks(), [], []
+    jobs = Jobs(document, said.append, lambda _by: None)
+    jobs.run("first", lambda: 1, done.append, done.append)
+    jobs.run("second", lambda: 2, done.append, done.append)
+    jobs._pool.shutdown(wait=True)
+    document.tick()
+    assert (said, done) == ([], [])
+    jobs.begin()
+    document.tick()
+    assert done == [1, 2]
+    assert said == ["first", "second", ""]
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 """What the page shows without a browser: the numbers are those of the command line, and every change has a way back."""
 
+import importlib
 import json
 import time
 
@@ -16,6 +17,7 @@ from bns.app.tab import Tab, Tabs, mapping_of
 from bns.app.workbench import BY_HAND, Workbench
 from bns.cli.main import main
 from bns.diagnose.data.mapping import load_mapping
+from bns.diagnose.predict.paired_errors import paired_errors
 from bns.errors import DataError
 from bns.examples import FOLDER
 from tests.app.numbers import rows_of
@@ -66,6 +68,38 @@ def test_a_number_moved_by_hand_is_judged_like_the_saved_model_and_nothing_is_fi
     began = time.process_time()
     bench.shown(BOTH.moved("motor-lag", "tau_s", 0.11))
     assert time.process_time() - began < 0.3
+
+
+def counted(monkeypatch, path, name):
+    """Calls of a function so far."""
+    module, calls = importlib.import_module(path), []
+    whole = getattr(module, name)
+    monkeypatch.setattr(module, name, lambda *arguments: calls.append(arguments) or whole(*arguments))
+    return calls
+
+
+def test_noise_is_estimated_once_for_the_model_as_given_and_not_to_judge_it(monkeypatch):
+    fresh, calls = Workbench(LOG, "khepera"), counted(monkeypatch, "bns.diagnose.estimate.problem", "estimate_noise")
+    assert fresh.as_given
+    assert calls == []
+    first = fresh.shown(Switches().switched("motor-lag", True))
+    of_first = len(calls)
+    second = fresh.shown(Switches().switched("turn-slip", True))
+    assert len(calls) - of_first == of_first - 1
+    for shown, name in ((first, "motor-lag"), (second, "turn-slip")):  # what is remembered changes no number
+        alone = bns.add(LOG, name, "khepera").to_json()
+        assert shown.errors.as_json() == alone["error"]
+        assert shown.numbers == alone["parameters"]
+
+
+def test_only_the_moved_model_is_judged_again(bench, monkeypatch):
+    bench.shown(BOTH.moved("motor-lag", "tau_s", 0.12))
+    calls = counted(monkeypatch, "bns.diagnose.predict.paired_errors", "errors_of")
+    moved = bench.shown(BOTH.moved("motor-lag", "tau_s", 0.13))
+    predictor = bench.ready.predictor
+    assert len(calls) == len(predictor.horizons)
+    afresh = paired_errors(predictor, list(zip(moved.names, moved.steps, strict=True)))
+    assert moved.errors.as_json() == afresh.as_json()
 
 
 def test_a_fit_that_is_there_is_not_made_again(bench):

@@ -119,5 +119,5 @@ def test_a_model_that_cannot_be_is_refused(approach, changes, said):
 
 def test_networks_that_say_half_of_it_are_not_kept():
     check_networked(RunSpec(approach="bns+ensemble=3"))
-    with pytest.raises(SpecError, match="networks that know only what its model gets wrong; leave --save-snn out"):
+    with pytest.raises(SpecError, match="networks that learn only the error of its model; leave --save-snn out"):
         check_networked(RunSpec(approach="bns+model=khepera"))

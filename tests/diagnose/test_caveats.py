@@ -11,9 +11,9 @@ from bns.diagnose.predict.paired_errors import Change, PairedErrors
 @pytest.mark.parametrize(
     ("rose", "fell", "said"),
     [
-        ((), (), "need not be added"),
+        ((), (), "is not needed in the model"),
         (("trial",), ("command", "1s"), "rises over the whole trial, though it falls over one command and 1 second"),
-        (("5s", "trial"), (), "rises over 5 seconds and the whole trial: it describes the robot, and must not be added"),
+        (("5s", "trial"), (), "rises over 5 seconds and the whole trial. It describes the robot, but do not add it"),
     ],
 )
 def test_a_term_with_which_an_error_rises_must_not_be_added(rose, fell, said):

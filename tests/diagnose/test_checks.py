@@ -73,7 +73,7 @@ def test_gaps_repeats_and_losses_are_listed(table):
     odd.loc[5:8, "x_m"] = np.nan
     usable, findings = checked(odd)
     texts = [f.text for f in findings if f.trial == "0"]
-    assert any("repeats an earlier one; row left out" in text for text in texts)
+    assert any("repeats an earlier one; the row is excluded" in text for text in texts)
     assert any("no row for 0.84 s" in text for text in texts)
     assert any("4 poses lost" in text for text in texts)
     assert len(usable) == len(odd) - 1
@@ -115,7 +115,7 @@ def test_tracks_hold_commands_as_they_were_in_force(table):
 @pytest.mark.parametrize("gone", [0, 1, 2])
 def test_a_trial_without_a_tracked_pose_is_left_out_and_said_to_be(table, gone):
     usable, findings = checked(table.assign(x_m=table.x_m.where(table.trial != gone)))
-    assert [f.trial for f in findings if "the trial is left out" in f.text] == [str(gone)]
+    assert [f.trial for f in findings if "the trial is excluded" in f.text] == [str(gone)]
     assert len(tracks_of(usable)) == 2
     assert gone not in set(usable.trial)
 

@@ -43,7 +43,7 @@ def test_clocks_and_what_they_hide_are_found(predictor):
         LATE_S.std(ddof=1), rel=0.1
     )
     assert answer["error"]["1s"]["after"] < 0.5 * answer["error"]["1s"]["before"]
-    assert any("a value of its own in every trial" in note for note in answer["notes"])
+    assert any("a separate value in each trial" in note for note in answer["notes"])
 
 
 def test_one_clock_for_all_is_not_called_many():

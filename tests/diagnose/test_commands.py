@@ -50,7 +50,7 @@ def test_added_effects_lower_the_error_and_the_model_comes_back(data, tmp_path, 
     assert errors["turn-slip"]["command"] < errors["as given"]["command"]
     assert model.effects[0].basis == "fitted"
     assert main(["add", "turn-slip", "--model", str(new), "--data", str(data), "-o", str(tmp_path / "x.yaml")]) == 2
-    assert "has turn-slip already" in capsys.readouterr().err
+    assert "already has turn-slip" in capsys.readouterr().err
 
 
 def test_a_formula_is_added_and_comes_back(data, tmp_path):
@@ -156,8 +156,8 @@ def test_a_table_that_could_not_be_written_is_refused_before_the_run(tmp_path, c
     ("change", "message"),
     [
         (lambda t: t.groupby("trial").head(1), "No trial has two tracked poses"),
-        (lambda t: t.assign(x_m=0.1, y_m=0.1, heading_rad=0.0), "hardly moves although it is told to"),
-        (lambda t: t.assign(robot="snake"), "are of the robot snake, the model khepera is of khepera"),
+        (lambda t: t.assign(x_m=0.1, y_m=0.1, heading_rad=0.0), "hardly moves although it is commanded to"),
+        (lambda t: t.assign(robot="snake"), "are of the robot snake, but the model khepera is of khepera"),
     ],
 )
 def test_comparisons_that_make_no_sense_are_refused(tmp_path, change, message, capsys):

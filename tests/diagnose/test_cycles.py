@@ -137,7 +137,7 @@ def test_an_error_along_one_input_is_found_there():
         (lambda t: t.assign(yellow_x_m="here"), "Row 0: yellow_x_m is 'here'"),
         (lambda t: t.assign(t_s=t.t_s.where(t.index != 3)), "Row 3: t_s is empty"),
         (lambda t: t.assign(green_x_m=np.nan), "no row with both markers"),
-        (lambda t: t.iloc[::2], "no whole cycle"),
+        (lambda t: t.iloc[::2], "no complete cycle"),
         (lambda t: t[:0], "have no rows"),
     ],
 )
@@ -155,8 +155,8 @@ def test_what_is_left_out_is_named():
     assert len(cycles) == TRIALS * CYCLES - 2
     said = [f"{f.trial} {f.row} {f.text}" for f in findings]
     assert said[0] == "0 2 cycle 2: a marker lost at its begin or end; left out"
-    assert said[1] == "1 8 cycle 1: nobody says whether it was stable; left out"
-    assert re.match(r"1 12 cycle 3: the markers are \+\d+ cm further apart", said[2])
+    assert said[1] == "1 8 cycle 1: it is not known whether it was stable; left out"
+    assert re.match(r"1 12 cycle 3: the distance of the markers changes by \+\d+ cm", said[2])
 
 
 @pytest.mark.slow

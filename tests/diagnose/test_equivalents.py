@@ -46,4 +46,4 @@ def test_a_diagnosis_says_so_in_a_note():
     table = measured(hidden(camera_scale={"factor": 0.95}), trials=16, seed=5)
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
     assert found.effects == ("camera-scale",)
-    assert any("would explain as much, with one effect more" in note and "wheelbase" in note for note in found.notes)
+    assert any("would explain as much, with one more effect" in note and "wheelbase" in note for note in found.notes)

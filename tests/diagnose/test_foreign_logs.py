@@ -178,9 +178,9 @@ def test_gaps_cut_a_log_where_nothing_was_written():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"trials": {"standing_s": 100}}, "fewer than two trials. It stands for 4.* at most.*lasting_s cuts anywhere"),
+        ({"trials": {"standing_s": 100}}, "fewer than two trials. The robot stands for 4.* at most.*lasting_s cuts anywhere"),
         ({"wheelbase_m": None}, "add wheelbase_m: METRES"),
-        ({"also": []}, "once it has left_m_s, right_m_s"),
+        ({"also": []}, "cut into trials, a log needs left_m_s, right_m_s"),
     ],
 )
 def test_what_does_not_fit_a_log_is_said(bag, tmp_path, change, message):
@@ -252,7 +252,7 @@ def test_a_log_without_a_mapping_is_answered_with_a_draft(bag, capsys):
     (folder / "odom.csv.import.yaml").unlink()
     assert main(["import", str(folder / "odom.csv"), "-o", str(folder / "m.csv")]) == 2
     said = capsys.readouterr().err
-    assert "to be checked line by line" in said
+    assert "check it line by line" in said
     assert "unit: quaternion" in said
     assert not (folder / "m.csv").exists()
 

@@ -35,7 +35,7 @@ def test_a_set_with_which_the_held_out_error_does_not_fall_is_withdrawn(monkeypa
     found = found_with(monkeypatch, predictor, "yaw-bias")
     assert (found.verdict, found.effects) == ("none", ())
     assert found.model.values_of("yaw-bias") == {} if found.model.effects else found.model == NOMINAL.arranged()
-    assert any("yaw-bias would fit better by likelihood" in note for note in found.notes)
+    assert any("yaw-bias would raise the likelihood" in note for note in found.notes)
     assert all(error["after"] == error["before"] for error in found.as_json()["error"].values())
 
 
@@ -59,7 +59,7 @@ def test_a_skid_steer_that_turns_as_if_it_were_wider_is_shown_so(factor, plausib
     assert number["low"] < factor < number["high"]
     assert "wheels stand closer together or further apart" in headline(found)
     assert set(said["implausible"]) == (set() if plausible else {"wheelbase"})
-    assert any(note.startswith("wheelbase fits best, and implausibly") for note in found.notes) is not plausible
+    assert any(note.startswith("wheelbase fits best, but with an implausible") for note in found.notes) is not plausible
     for error in said["error"].values():
         assert error["change_high"] < 0
         assert error["after"] < 0.2 * error["before"]

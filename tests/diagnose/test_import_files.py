@@ -92,11 +92,11 @@ def test_a_recording_without_commands_says_what_would_serve(tmp_path, log, capsy
     bag = bags.write_bag(tmp_path, log.iloc[:200], {"/mocap": bags.pose_stamped}, "mcap")
     assert main(["import", str(bag), "-o", str(tmp_path / "m.csv")]) == 2
     said = capsys.readouterr().err
-    assert "No column tells what the robot was commanded. What would serve" in said
+    assert "No column holds the commands. Suitable are" in said
     assert "/cmd_vel" in said
     assert "/mocap.pose.position.x" in said
     assert not (tmp_path / "m.csv").exists()
-    with pytest.raises(DataError, match=r"commanded. What would serve"):
+    with pytest.raises(DataError, match=r"holds the commands. Suitable are"):
         import_log([bag], guessed(read_table(bag)).mapping)
 
 
@@ -147,7 +147,7 @@ def test_two_files_of_a_lab_are_joined_by_time(tmp_path, table, log, capsys):
 def test_a_file_that_the_mapping_does_not_know_is_refused(tmp_path, log):
     first, second = lab_files(tmp_path, log)
     (tmp_path / "Odometry.dat.import.yaml").write_text(guessed(read_table(first)).text)
-    with pytest.raises(DataError, match=r"takes nothing from .*groundtruth.txt; add it under also"):
+    with pytest.raises(DataError, match=r"uses nothing from .*groundtruth.txt; add it under also"):
         import_log([first, second])
 
 
@@ -215,5 +215,5 @@ def test_a_log_without_poses_and_commands_says_both():
     path = SHARED / "servo_logs.csv.gz"
     if not path.is_file():
         pytest.skip(f"no {path}")
-    with pytest.raises(DataError, match=r"(?s)commanded. What would serve.*No column tells x_m, y_m, heading_rad"):
+    with pytest.raises(DataError, match=r"(?s)holds the commands. Suitable are.*No column holds x_m, y_m, heading_rad"):
         import_log([path])

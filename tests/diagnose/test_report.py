@@ -98,7 +98,7 @@ def test_every_verdict_has_a_page_that_needs_nothing_else(page_of, verdict):
     [
         ("none", "Nothing is missing"),
         ("effects", "turning costs forward speed"),
-        ("tie", "a part of every wheel's speed is lost to friction, or that"),
+        ("tie", "a part of every wheel's speed is lost to friction, or "),
         ("unlisted", "none of the known effects"),
         ("insufficient-data", "do not suffice"),
     ],
@@ -120,10 +120,10 @@ def test_a_trial_that_begins_at_a_mistaken_marker_is_shown_last():
 
 def test_the_first_screen_has_the_effects_size_and_its_uncertainty_with_units(page_of):
     told = first_screen(page_of("effects"))
-    size, low, high = re.search(r"turn-slip\s+([0-9.]+) s/rad.*?certainty ([0-9.]+) to ([0-9.]+) s/rad", told, re.S).groups()
+    size, low, high = re.search(r"turn-slip\s+([0-9.]+) s/rad.*?interval ([0-9.]+) to ([0-9.]+) s/rad", told, re.S).groups()
     assert float(low) < float(size) < float(high)
     assert float(low) < 0.12 < float(high)
-    assert re.search(r"predictions a \w+ ahead are [0-9.]+ mm off instead of [0-9.]+ mm", told)
+    assert re.search(r"predictions a \w+ ahead have an error of [0-9.]+ mm instead of [0-9.]+ mm", told)
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; apt-get install chromium")
@@ -135,7 +135,7 @@ def test_a_browser_shows_it_without_an_error_and_the_slider_moves(page_of, tmp_p
     assert "CONSOLE" not in done.stderr
     found = json.loads(html.unescape(re.search(r"<title>(.*?)</title>", done.stdout)[1]))
     assert (found["broken"], found["wide"], found["lost"]) == (0, False, 0)
-    assert found["first"].startswith("0.0 s: model as given 0 mm off")
+    assert found["first"].startswith("error at 0.0 s: model as given 0 mm")
     assert len({found["first"], found["last"], found["other"]}) == 3
     assert found["rows"] > 3
     assert found["lines"] == (4 if verdict == "effects" else 3)  # the scale, and one a path
@@ -169,7 +169,7 @@ def test_single_poses_have_a_page_that_says_what_is_wrong(tmp_path):
     table = measured(NOMINAL, trials=12, ends_only=True)
     write_measurements(table.groupby("trial").head(1), data)
     assert main(["report", str(data), "--model", "khepera", "-o", str(out)]) == 0
-    assert "single tracked pose" in first_screen(out)
+    assert "only one tracked pose" in first_screen(out)
 
 
 @pytest.mark.parametrize(

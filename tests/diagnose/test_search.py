@@ -52,7 +52,7 @@ def test_a_late_command_ties_with_a_late_clock():
 def test_an_early_clock_is_no_late_command():
     answer = diagnosed(hidden(clock_offset={"offset_s": -0.08})).as_json()
     assert (answer["verdict"], answer["effects"]) == ("effects", ["clock-offset"])
-    assert "clock-offset is a fault of the measuring, not of the robot." in answer["notes"]
+    assert "clock-offset is an error of the measurement, not of the robot." in answer["notes"]
 
 
 def test_what_no_list_holds_is_called_so_and_a_formula_offered():
@@ -78,8 +78,8 @@ def test_a_model_that_has_the_effect_already_lacks_nothing():
     [
         (lambda t: t[t.trial == 0], r"^1 trials: whatever"),
         (lambda t: t[t.trial < 10], r"^10 trials: .* 11 trials are the least"),
-        (lambda t: t.groupby("trial").head(1), "single tracked pose"),
-        (lambda t: t.assign(left_m_s=0.0, right_m_s=0.0), "never told to move"),
+        (lambda t: t.groupby("trial").head(1), "only one tracked pose"),
+        (lambda t: t.assign(left_m_s=0.0, right_m_s=0.0), "never commanded to move"),
         (lambda t: t.assign(x_m=0.1, y_m=0.2), "never moved by more than 5 mm"),
     ],
 )

@@ -106,7 +106,7 @@ def test_a_diagnosis_says_where_to_look():
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
     assert found.verdict == "unlisted"
     assert {o["trial"] for o in found.as_json()["outliers"]} == {"1", "8", "9", "15"}
-    assert any(note.startswith("4 of 20 trials have moments over 6 times") for note in found.notes)
+    assert any(note.startswith("4 of 20 trials have moments with more than 6 times") for note in found.notes)
 
 
 def largest(table):

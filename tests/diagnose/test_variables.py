@@ -1,5 +1,9 @@
 """What a person reads where formulas have bare names."""
 
+import numpy as np
+import pytest
+
+from bns.diagnose.comparison import BINS, _binned
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.variables import LABELS, label
@@ -23,3 +27,15 @@ def test_no_two_variables_read_alike():
 
 def test_a_logged_column_keeps_its_own_name():
     assert label("battery_v") == "battery_v"
+
+
+def test_values_that_nearly_repeat_share_a_bin_of_a_curve():
+    rng = np.random.default_rng(0)
+    fading = np.concatenate([1e-6 * rng.random(300), rng.uniform(0.01, 0.1, 60)])
+    curve = _binned("left_change_m_s", "forward", fading, np.ones(360), np.arange(360) % 12, rng)
+    assert np.diff(curve.centre).min() > np.ptp(fading) / BINS**2
+    assert len(curve.centre) >= 2
+    even = _binned("speed_m_s", "forward", np.linspace(0, 1, 360), np.ones(360), np.arange(360) % 12, rng)
+    assert len(even.centre) == BINS
+    alike = _binned("speed_m_s", "forward", np.full(360, 0.2), np.ones(360), np.arange(360) % 12, rng)
+    assert alike.centre == pytest.approx([0.2])

@@ -21,5 +21,6 @@ def written(
     rows = [(room, sizes[room], killed[room] + len(survivors[room]), killed[room]) for room in sizes]
     rows.append(("all", *(sum(column) for column in zip(*(row[1:] for row in rows), strict=True))))
     table = [f"| {room} | {size} | {tried} | {found} | {found / max(tried, 1):.0%} |" for room, size, tried, found in rows]
-    listed = [f"- {room}: {text}" for room, texts in survivors.items() for text in texts]
-    return HEAD.format(seed=options.seed, minutes=options.minutes) + "\n".join([*table, "", "## Survivors", "", *listed]) + "\n"
+    listed = [f"{room}: {text}" for room, texts in survivors.items() for text in texts]
+    page = [*table, "", "## Survivors", "", "```text", *listed, "```"]
+    return HEAD.format(seed=options.seed, minutes=options.minutes) + "\n".join(page) + "\n"

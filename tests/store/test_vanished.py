@@ -10,8 +10,8 @@ from bns.store.disk.journal import journals
 
 from .synthetic import failed, record, records, specs
 
-GONE = "is gone: the results were deleted or moved while they were being written"
-NEXT = "Run the sweep again: it does what is missing"
+GONE = "is missing: the results were deleted or moved while they were being written"
+NEXT = "Run the sweep again: it carries out the missing runs"
 
 
 def delete(results):

@@ -116,8 +116,8 @@ def _used_in_words(tracks: Tracks, predictor: JointedPredictor) -> str:
     what = "stretches" if predictor.near == "stretch" else f"{predictor.near}s"
     more = f"{unstable} were not stable, and " if unstable else ""
     return (
-        f"{used} of {used + wild + unstable + aside} {what} are compared; {more}{wild} nobody can foresee: a little luck moves "
-        f"the robot far in them{f'; {aside} are left aside, evenly chosen, for speed' if aside else ''}"
+        f"{used} of {used + wild + unstable + aside} {what} are compared; {more}{wild} cannot be predicted: a small "
+        f"disturbance moves the robot far in them{f'; {aside} are excluded, evenly spaced, for speed' if aside else ''}"
     )
 
 

@@ -52,7 +52,7 @@ class WindowFigures:
         self._noise: list[Span] = []
         self.time = self._scatter("Over time", "time in the trial (s)", "t_s")
         self.along = self._scatter("Along a variable", "", "along")
-        self.trial = self._scatter("By trial", "trial, by number from 0", "number")
+        self.trial = self._scatter("By trial", "trial", "number")
         self.floor = blank("On the floor: the larger, the worse", *EAST_NORTH, tools=SELECTING, **FLOOR)
         self._dots(self.floor, "x_m", "y_m", "size")
         self.all = (self.time, self.along, self.trial, self.floor)
@@ -83,5 +83,7 @@ class WindowFigures:
         self.source.data = {**columns, "along": table[variable].to_numpy(), "size": size}
         self.along.xaxis.axis_label = label(variable)
         self.along.title.text = f"Along {label(variable)}"
+        named = dict(zip(columns["number"].tolist(), map(str, columns["trial"]), strict=True))
+        self.trial.xaxis.major_label_overrides = named  # as the lists name them, whatever the log counts from
         for span in self._noise:
             span.location = 1e3 * noise_floor_m if np.isfinite(noise_floor_m) else 0

@@ -42,7 +42,8 @@ class PathFigure:
         self.figure.title.text = title
         for source, poses in zip(self._lines, (measured, predicted), strict=True):
             shown = drawable(poses)
-            source.data = {"x": shown[:, 0], "y": shown[:, 1]}
+            if not (np.array_equal(source.data["x"], shown[:, 0]) and np.array_equal(source.data["y"], shown[:, 1])):
+                source.data = {"x": shown[:, 0], "y": shown[:, 1]}  # what is drawn already is not sent again
         self._times, self._poses = t_s, (measured, predicted)
 
     def at(self, t_s: float) -> None:
@@ -51,7 +52,9 @@ class PathFigure:
             return
         frame = int(np.searchsorted(self._times, t_s).clip(max=len(self._times) - 1))
         places = [poses[frame] for poses in self._poses]
-        self._dots.data = {"x": [p[0] for p in places], "y": [p[1] for p in places], "color": [BLUE, RED]}
+        data = {"x": [float(p[0]) for p in places], "y": [float(p[1]) for p in places], "color": [BLUE, RED]}
+        if dict(self._dots.data) != data:
+            self._dots.data = data
 
 
 def paths_of(tracks: Tracks) -> list[tuple[str, str, Array]]:

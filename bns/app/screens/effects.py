@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import panel as pn
@@ -11,10 +10,11 @@ from bns.app.figures.errors import LadderFigure
 from bns.app.figures.paths import PathFigure
 from bns.app.html import error_list, message, note
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, offer, row
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, offer, on_change, row
 from bns.app.screens.diagnosis import DiagnosisPart
 from bns.app.screens.one_effect import OneEffect
 from bns.app.screens.snapshots import SnapshotsPart
+from bns.app.sliders import Slider
 from bns.app.switches import Switches, Term
 from bns.app.tab import Tab
 from bns.app.workbench import Shown
@@ -49,7 +49,7 @@ class EffectsScreen:
         self._after = PathFigure("now", self._before)
         self._horizon = pn.widgets.Select(name="Error how far ahead", options={ahead("1s"): "1s"}, width=160)
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
-        self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
+        self._time = Slider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
         self._diagnosis = DiagnosisPart(tab, self._learned, self._switch_to)
         self._snapshots = SnapshotsPart(tab, jobs, self._go_to, lambda: str(self._horizon.value))
         self._name = pn.widgets.TextInput(name="Name", value="mine", width=110)
@@ -61,6 +61,7 @@ class EffectsScreen:
         self._watch()
         self.view = self._laid_out()
         self._bench: object = None
+        self._listing: object = None
 
     def enter(self) -> None:
         """Drawn again: another log or model brings other effects."""
@@ -76,8 +77,7 @@ class EffectsScreen:
             return
         if bench is not self._bench:
             self._bench = bench
-            self._effects.clear()
-            self._list_effects()
+            self._effects, self._switches.objects = {}, []
             self._formula.visible = bench.on_wheels
             names = list(bench.ready.predictor.tracks.names)
             offer(self._trial, dict(zip(names, range(len(names)), strict=True)))
@@ -99,6 +99,20 @@ class EffectsScreen:
             return
         text = f"fitting {', '.join(state.on)}" if state.on else "judging the model as given"
         self._jobs.run(text, lambda: bench.shown(state), self._show_if_current, self._failed)
+
+    def _list_late(self) -> None:
+        """The list of effects has many parts: the pictures come before it."""
+        if self._effects or self._listing is self._bench:
+            return
+        self._listing = bench = self._bench
+
+        def listed(made: tuple[dict[str, OneEffect], list[Any]]) -> None:
+            if bench is self._bench and not self._effects:
+                self._lay_switches(made)
+                self._refresh_effects()
+                self._sync_switches(self._tab.now)
+
+        self._jobs.run("listing the effects", self._groups, listed, self._problem.show)
 
     def move(self, effect: str, parameter: str, value: float) -> None:
         """A number was moved by hand."""
@@ -133,6 +147,7 @@ class EffectsScreen:
 
     def _failed(self, text: str) -> None:
         self._problem.show(text)
+        self._list_late()
         self._go_back()
 
     def _show(self, shown: Shown) -> None:
@@ -145,6 +160,7 @@ class EffectsScreen:
         self._show_paths()
         self._refresh_effects()
         self._sync_switches(self._tab.now)
+        self._list_late()
 
     def _show_horizon(self) -> None:
         if self._shown is not None:
@@ -172,27 +188,35 @@ class EffectsScreen:
             picture.at(min(self._time.value, self._time.end))
 
     def _list_effects(self) -> None:
+        self._lay_switches(self._groups())
+
+    def _lay_switches(self, made: tuple[dict[str, OneEffect], list[Any]]) -> None:
+        self._effects, self._switches.objects = made
+
+    def _groups(self) -> tuple[dict[str, OneEffect], list[Any]]:
+        """All effects, and their switches by what they are about; those that are there already stay the same."""
         bench = self._tab.bench
         assert bench is not None
         mine = {t.name: t for t in self._tab.now.terms}
         found = {t.name: t for t in self._diagnosis.terms if t.name not in mine}
         terms = {name: bench.term(t) for name, t in {**mine, **found}.items()}
         named = {name: e for name, e in {**bench.catalogue, **terms}.items() if name not in found}
+        effects = dict(self._effects)
         for name, effect in {**bench.catalogue, **terms}.items():
-            if name not in self._effects or self._effects[name].effect is not effect:
+            if name not in effects or effects[name].effect is not effect:
                 words = self._diagnosis.term_in_words(name)
                 said = f"{name}: add this term: {words}" if words else ""
-                self._effects[name] = OneEffect(effect, self.switch, self.move, said)
+                effects[name] = OneEffect(effect, self.switch, self.move, said)
         groups: list[Any] = []
         if found:
-            groups += [heading("What no effect explains"), *(self._effects[name].view for name in found)]
+            groups += [heading("What no effect explains"), *(effects[name].view for name in found)]
         for stage, title in GROUPS.items():
-            inside = [self._effects[n].view for n, e in named.items() if e.stage == stage]
+            inside = [effects[n].view for n, e in named.items() if e.stage == stage]
             if inside:
                 groups += [heading(title), *inside]
         present = ", ".join(a.effect.name for a in bench.ready.model.effects)
         there = [html(f"<p>In the model already: {present}.</p>")] if present else []
-        self._switches.objects = [*there, *groups]
+        return effects, [*there, *groups]
 
     def _refresh_effects(self) -> None:
         if self._shown is not None:
@@ -203,7 +227,7 @@ class EffectsScreen:
 
     def _learned(self) -> None:
         """The diagnosis knows more: what effects earn, and terms of its own."""
-        if self._tab.bench is not None and self._diagnosis.terms:
+        if self._effects and self._diagnosis.terms:
             self._list_effects()
         self._refresh_effects()
 
@@ -223,7 +247,7 @@ class EffectsScreen:
         self._after_walk()
 
     def _after_walk(self) -> None:
-        if self._tab.now.terms or self._diagnosis.terms:
+        if self._effects and (self._tab.now.terms or self._diagnosis.terms):
             self._list_effects()
         self.update()
 
@@ -261,8 +285,8 @@ class EffectsScreen:
             (self._time, self._show_time),
             (self._on, self._check_term),
         ):
-            _on_change(widget, "value", act)
-        _on_change(self._term, "value_input", self._check_term)
+            on_change(widget, act)
+        on_change(self._term, self._check_term, "value_input")
 
     def _laid_out(self) -> Any:
         variables = "; ".join(f"{name}: {text}" for name, text in VARIABLES.items())
@@ -287,7 +311,3 @@ class EffectsScreen:
         )
         self._body = pn.Column(self._diagnosis.view, beside(left, right, least=330, first=right), **WIDE)
         return pn.Column(self._problem.view, self._body, **WIDE)
-
-
-def _on_change(widget: Any, what: str, act: Callable[[], object]) -> None:
-    widget.param.watch(lambda _event: act(), what)

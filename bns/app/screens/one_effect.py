@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import panel as pn
 
 from bns.app.html import effect_text
-from bns.app.parts import WIDE, html
+from bns.app.parts import WIDE, html, on_change
+from bns.app.sliders import NumberSlider
 from bns.app.workbench import Shown
 from bns.physics.effect import Effect, Parameter
 
 _STEPS = 400
 _WRAPPED = "label { white-space: normal; overflow-wrap: anywhere; }"
+
+
+class _Box(pn.widgets.CheckBoxGroup):
+    """One click is one change: nothing is waited for."""
+
+    _debounce: ClassVar[int] = 1
 
 
 class OneEffect:
@@ -30,12 +37,10 @@ class OneEffect:
         self.effect, self._move, self._quiet = effect, move, False
         said = said or f"{effect.name}: {effect.in_words}"
         # a group of one: Bokeh's single checkbox has no label that a screen reader or a click would find
-        self._box = pn.widgets.CheckBoxGroup(
-            options={said: effect.name}, margin=(6, 8, 0, 8), stylesheets=[_WRAPPED], **WIDE
-        )
-        self._box.param.watch(lambda event: None if self._quiet else switch(effect.name, bool(event.new)), "value")
+        self._box = _Box(options={said: effect.name}, margin=(6, 8, 0, 8), stylesheets=[_WRAPPED], **WIDE)
+        on_change(self._box, lambda: None if self._quiet else switch(effect.name, bool(self._box.value)))
         self._text = html(effect_text(effect, (), {}, ""), margin=(0, 8, 4, 30))
-        self._sliders: dict[str, Any] = {}
+        self._sliders: dict[str, NumberSlider] = {}
         self.view = pn.Column(self._box, self._text, **WIDE)
 
     def set_on(self, on: bool) -> None:
@@ -59,32 +64,19 @@ class OneEffect:
             return
         if not self._sliders:
             self._sliders = {p.name: self._slider(p, values[p.name]) for p in self.effect.parameters}
-            self.view.objects = [self._box, self._text, *self._sliders.values()]
-        self._quiet = True
+            self.view.objects = [self._box, self._text, *(slider.view for slider in self._sliders.values())]
         for parameter, slider in self._sliders.items():
-            slider.start, slider.end = min(slider.start, values[parameter]), max(slider.end, values[parameter])
-            if slider.value != values[parameter]:
-                slider.value = values[parameter]
-        self._quiet = False
+            slider.show(values[parameter])
 
-    def _slider(self, p: Parameter, value: float) -> Any:
-        low, high = (v for v in p.plausible)
+    def _slider(self, p: Parameter, value: float) -> NumberSlider:
+        low, high = p.plausible
         start, end = (float(v) for v in (min(low, value), max(high, value)) if np.isfinite(v))
-        made = pn.widgets.EditableFloatSlider(
-            name=f"{p.name} ({p.unit}), by hand",
-            start=start,
-            end=end,
-            step=(end - start) / _STEPS,
-            value=value,
-            fixed_start=p.low,
-            fixed_end=p.high,
-            format="0.00000",
-            margin=(0, 8, 4, 30),
-            **WIDE,
+        return NumberSlider(
+            f"{p.name} ({p.unit}), by hand",
+            f"{p.name}, {p.unit}",
+            value,
+            (start, end),
+            _STEPS,
+            (p.low, p.high),
+            lambda moved: self._move(self.effect.name, p.name, moved),
         )
-        made.param.watch(lambda event: self._moved(p.name, event.new), "value")
-        return made
-
-    def _moved(self, parameter: str, value: float) -> None:
-        if not self._quiet and value is not None:
-            self._move(self.effect.name, parameter, float(value))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pandas as pd
@@ -11,9 +10,10 @@ import panel as pn
 from bns.api.compare import CompareResult
 from bns.app.figures.errors import WindowFigures
 from bns.app.figures.paths import PathFigure
-from bns.app.html import mm, note, table
+from bns.app.html import mm, note, table, velocity
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, offer, row
+from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, offer, on_change, row
+from bns.app.sliders import Slider
 from bns.app.tab import Tab
 from bns.app.workbench import Shown, Workbench
 from bns.diagnose.report.tables import ahead
@@ -33,7 +33,7 @@ class WhereScreen:
         self._variable = pn.widgets.Select(name="Along", options={label("time_in_trial_s"): "time_in_trial_s"}, width=260)
         self._worst = pn.widgets.Select(name="Worst moments", options=[], size=6, width=320)
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
-        self._time = pn.widgets.FloatSlider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
+        self._time = Slider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
         self._errors, self._explained, self._brushed = html(), html(), html()
         self._shown: Shown | None = None
         self._windows = pd.DataFrame()
@@ -47,7 +47,7 @@ class WhereScreen:
             (self._time, self._show_time),
             (self._worst, self._go_to),
         ):
-            _on_change(widget, act)
+            on_change(widget, act)
         self._pictures.source.selected.on_change("indices", lambda _attr, _old, new: self._say_brushed(new))
         self.view = self._laid_out()
 
@@ -100,10 +100,10 @@ class WhereScreen:
         caption = f"Position error of the model {self._which.value}, nothing held out"
         self._errors.object = table(columns, rows, caption, "bns-compared") + note(self._bench.thinned if self._bench else "")
         explained = [
-            [label(p.variable), p.channel, f"{p.share:.2%}", f"{p.paired_comparison.p_value:.2g}"]
+            [label(p.variable), velocity(p.channel), f"{p.share:.2%}", f"{p.paired_comparison.p_value:.2g}"]
             for p in comparison.residual_dependence[:8]
         ]
-        columns = ["variable", "velocity", "share of loss", "p"]
+        columns = ["variable", "added to", "share of loss", "p"]
         self._explained.object = table(columns, explained, "What a free curve along each variable would explain")
         best = [p.variable for p in comparison.residual_dependence if p.variable in self._variable.values]
         if best and self._to_choose:
@@ -176,7 +176,3 @@ class WhereScreen:
             path,
             **WIDE,
         )
-
-
-def _on_change(widget: Any, act: Callable[[], object]) -> None:
-    widget.param.watch(lambda _event: act(), "value")

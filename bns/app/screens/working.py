@@ -10,7 +10,7 @@ import panel as pn
 
 from bns.app.background import Background
 from bns.app.html import message
-from bns.app.parts import button, html, row
+from bns.app.parts import button, html, row, together
 
 T = TypeVar("T")
 EVERY_MS = 500
@@ -38,7 +38,7 @@ class Working(Generic[T]):
     def enter(self) -> None:
         """As the work stands: not begun, going on, or done."""
         if self._work().at_work and self._clock is None:
-            self._clock = pn.state.add_periodic_callback(self._look, period=EVERY_MS)
+            self._clock = pn.state.add_periodic_callback(self._look_again, period=EVERY_MS)
         self._look()
 
     def _start(self, begin: Callable[[], None]) -> None:
@@ -48,6 +48,10 @@ class Working(Generic[T]):
     def _end(self) -> None:
         self._work().stop()
         self._look()
+
+    def _look_again(self) -> None:
+        with together():
+            self._look()
 
     def _look(self) -> None:
         work = self._work()

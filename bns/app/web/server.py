@@ -21,6 +21,7 @@ from bns.errors import BnsError
 
 LARGEST_UPLOAD = 1 << 29
 """Bytes of one message of the browser: a log of a million poses as text is about 100 MB."""
+_SCRIPTS = ("bokeh", "bokeh-widgets", "bokeh-tables")  # the last because Panel's own script asks for it
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -39,6 +40,7 @@ class PageServer:
         self.port = int(self._server.port)
         http = self._server._http  # Bokeh has no public way to stand before its handlers
         application: Any = http.request_callback
+        application.resources = _only_needed(application.resources)
         application.websocket_origins.update(f"{name}:{self.port}" for name in (LOOPBACK, "localhost"))
         http.request_callback = Guard(application, self.port, self.token)
 
@@ -83,6 +85,17 @@ class PageServer:
         """End `serve`, from any thread."""
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._loop.stop)
+
+
+def _only_needed(resources: Callable[..., Any]) -> Callable[..., Any]:
+    """Without Bokeh's scripts for formulas and graphics cards: 2 MB that a browser would read and never use."""
+
+    def needed(*arguments: Any, **more: Any) -> Any:
+        made = resources(*arguments, **more)
+        made.components = [name for name in made.components if name in _SCRIPTS]
+        return made
+
+    return needed
 
 
 def _check_free(port: int) -> None:

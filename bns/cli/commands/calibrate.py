@@ -10,11 +10,16 @@ from pathlib import Path
 def add_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     """The one command, with its options."""
     fitting = command("calibrate-body", calibrate_body, "fit the snake's body to the dissertation's statistics of random cycles")
-    fitting.add_argument("--recipe", type=Path, metavar="FILE", help="ranges and targets (default: as shipped)")
-    fitting.add_argument("--model", type=Path, metavar="FILE", help="parameters to begin with (default: as shipped)")
-    fitting.add_argument("--seed", type=int, default=0, help="decides on the random cycles (default: 0)")
-    fitting.add_argument("--jobs", type=int, metavar="N", help="processes that drive (default: one a core)")
-    fitting.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the parameters with their new values")
+    fitting.add_argument("--recipe", type=Path, metavar="FILE", help="ranges and targets (default: those of the package)")
+    fitting.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="start values of the parameters (default: those of the package)",
+    )
+    fitting.add_argument("--seed", type=int, default=0, help="seed of the random cycles (default: 0)")
+    fitting.add_argument("--jobs", type=int, metavar="N", help="processes that simulate drives (default: one per core)")
+    fitting.add_argument("-o", "--output", type=Path, metavar="FILE", help="file to write: the fitted parameters")
 
 
 def calibrate_body(options: argparse.Namespace) -> int:

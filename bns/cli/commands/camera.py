@@ -111,7 +111,7 @@ def _filmed(options: argparse.Namespace, board: Board) -> Calibration:
             input(_ON_START if number == 0 else _ELSEWHERE)
             frame = camera.newest()
             if frame is None:
-                raise HardwareError("the camera is gone; plug it in again.")
+                raise HardwareError("the camera is disconnected; plug it in again.")
             floors.append(frame.picture)
         return calibrate(kept, floors, board, options.camera, {name: camera.picture[name] for name in asked})
     finally:

@@ -33,7 +33,7 @@ def add_commands(command: Adder) -> None:
         type=Path,
         nargs="+",
         metavar="LOG",
-        help="a .csv, .tsv, .dat, .txt, .parquet or .tuple file, a recording of ROS (.bag, .mcap, .db3 or its folder); further "
+        help="a .csv, .tsv, .dat, .txt, .parquet or .tuple file, or a ROS recording (.bag, .mcap, .db3 or its folder); further "
         "files are joined with the first by time",
     )
     read.add_argument(
@@ -42,37 +42,38 @@ def add_commands(command: Adder) -> None:
     read.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="table to write (.csv or .parquet)"
     )
-    held = command("compare", compare, "compare a model with measurements: how far off it is, and where")
+    held = command("compare", compare, "show how large the errors of a model are, and where they occur")
     found = command(
-        "diagnose", diagnose, "which physical effect a model lacks, how sure that is, and what else it could be"
+        "diagnose", diagnose, "name the physical effect that a model lacks, with its certainty and its alternatives"
     )
-    more = command("add", add, "add effects to a model, fit it to measurements, and show the error before and after")
+    more = command("add", add, "add effects to a model, fit them to measurements, and show the error before and after")
     more.rewrite = data_first
     more.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
     more.add_argument(
-        "effects", nargs="+", metavar="EFFECT", help="names of effects, Python files, or one name with --term"
+        "effects", nargs="+", metavar="EFFECT", help="names of effects or Python files; with --term, a name for the formula"
     )
     more.add_argument("--term", metavar="FORMULA", help="a formula instead of a listed effect: 'k * v * abs(w)'")
     more.add_argument(
         "--on",
         default="v",
         metavar="VELOCITY",
-        help="what the formula is added to: v, w, s, east, north, share, wheels, left, right (docs/formulas.md)",
+        help="velocity that the formula is added to: v (forward), w (turn rate), s (sideways), east, north, "
+        "share (factor of all), wheels, left, right (default: v)",
     )
     more.add_argument(
         "--per-trial",
         action="store_true",
-        help="every trial has a value of its own (clock-offset: clocks that are set again each time)",
+        help="fit a separate value for each trial (for clock-offset: clocks that are set again each time)",
     )
-    more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="the extended model")
-    more.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="file to write: the extended model")
+    more.add_argument("--json", action="store_true", help="print one JSON object")
     for one in (held, found):
         one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
-        one.add_argument("--json", action="store_true", help="one JSON object on stdout")
-        one.add_argument("--findings", action="store_true", help="list everything odd in the data")
+        one.add_argument("--json", action="store_true", help="print one JSON object")
+        one.add_argument("--findings", action="store_true", help="list all irregularities in the data, not only the first")
     for one in (held, found, more):
         add_model_options(one)
-        one.add_argument("--figures", type=Path, metavar="DIR", help="also draw figures into this folder")
+        one.add_argument("--figures", type=Path, metavar="DIR", help="also write figures into this folder")
     add_effect_options(found)
     add_fresh(held)
     for one in (held, more):
@@ -85,34 +86,34 @@ def add_model_options(parser: argparse.ArgumentParser) -> None:
         "--model",
         required=True,
         metavar="M",
-        help="khepera, differential-drive, snake, a YAML file, an MJCF file (.xml); for compare also networks (.safetensors, "
+        help="khepera, differential-drive, snake, a YAML file or an MJCF file (.xml); compare also takes networks (.safetensors, "
         "snake-networks, snake+changes)",
     )
     parser.add_argument(
-        "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"
+        "--wheelbase", type=float, metavar="METRES", help="distance between the wheels, for differential-drive"
     )
-    parser.add_argument("--robot", metavar="NAME", help="which robot, where a column robot names several")
+    parser.add_argument("--robot", metavar="NAME", help="robot to use, if the column robot names several")
     parser.add_argument(
         "--more",
         action="append",
         default=[],
         type=Path,
         metavar="FILE",
-        help="further measurements, taken together with these",
+        help="further measurements to use together with these (may be repeated)",
     )
     parser.add_argument(
         "--without",
         action="append",
         default=[],
         metavar="TRIAL",
-        help="a trial that takes no part, by its name in the data; may be repeated",
+        help="name of a trial to exclude (may be repeated)",
     )
 
 
 def add_fresh(parser: argparse.ArgumentParser) -> None:
     """Whether an answer from before may be shown."""
     parser.add_argument(
-        "--fresh", action="store_true", help="work it out again, even where the same was asked before"
+        "--fresh", action="store_true", help="compute the answer again instead of taking it from the cache"
     )
 
 
@@ -123,17 +124,17 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE.py",
-        help="an effect of your own to try beside the listed ones",
+        help="Python file with an effect of your own, tried beside the listed ones (may be repeated)",
     )
     parser.add_argument(
         "--without-effect",
         action="append",
         default=[],
         metavar="NAME",
-        help="a listed effect that is not to be tried, say because it was measured apart",
+        help="listed effect to exclude, for example because you measured it separately (may be repeated)",
     )
     parser.add_argument(
-        "--settings", type=Path, metavar="FILE.yaml", help="thresholds that differ from the default (docs/settings.md)"
+        "--settings", type=Path, metavar="FILE.yaml", help="file with thresholds that differ from the defaults"
     )
     add_fresh(parser)
     add_trust(parser)
@@ -172,7 +173,7 @@ def compare(options: argparse.Namespace) -> int:
         seen = held_against(log, model, fresh=options.fresh, progress=tick)
     if seen.of_networks and seen.causes is None:
         print(
-            "bns: these networks come without their training patterns, so why they are wrong is not said",
+            "bns: these networks come without their training patterns, so the causes of their errors cannot be given",
             file=sys.stderr,
         )
     print(json.dumps(seen.to_json()) if options.json else seen.summary())
@@ -235,7 +236,7 @@ def add(options: argparse.Namespace) -> int:
     result.model.save(options.output)
     print(json.dumps(result.to_json()) if options.json else result.summary())
     if not options.json:
-        print(f"written to {options.output}; the model before is as it was ({options.model})")
+        print(f"written to {options.output}; the old model is unchanged ({options.model})")
     _drawn(options, lambda folder: error_by_step_figure(result.extended, folder / "ladder"))
     return 0
 

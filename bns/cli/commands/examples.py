@@ -11,11 +11,11 @@ from bns.cli.options.option_types import as_json
 def add_commands(command: Adder) -> None:
     """The parsers of these commands."""
     listed = command("effects", effects, "list the physical effects that a model can lack")
-    listed.add_argument("--json", action="store_true", help="a list of JSON objects on stdout, one an effect")
-    what = "copy files to begin with into a new folder: a sample log, a sweep and a script, or a robot of one's own"
+    listed.add_argument("--json", action="store_true", help="print a list of JSON objects, one per effect")
+    what = "copy sample files into a new folder: a log, a sweep, notebooks and a script; with robot: a package for your own robot"
     begun = command("example", example, what)
     begun.add_argument(
-        "words", nargs="+", metavar="[robot] DIR", help="a folder that is new or empty; after robot: for a package of your own"
+        "words", nargs="+", metavar="[robot] DIR", help="a new or empty folder; robot DIR writes a package for your own robot"
     )
 
 

@@ -13,25 +13,25 @@ LARGEST_PORT = 65_535
 
 def add_commands(command: Adder) -> None:
     """The parser of this command."""
-    page = command("explore", explore, "a page in the browser: switch effects on and watch the error fall")
+    page = command("explore", explore, "open an interactive page in the browser: switch effects on and watch the error fall")
     page.add_argument(
         "data",
         type=Path,
         nargs="*",
         metavar="DATA",
-        help="measurements, a saved session, or a folder of results; without any: sample logs",
+        help="measurements, a saved session, or a folder of results (default: the page offers sample logs)",
     )
     page.add_argument(
         "--model",
         default="khepera",
         metavar="M",
-        help="khepera (default), differential-drive, snake, a YAML file; snake-networks or a run's networks",
+        help="khepera (default), differential-drive, snake, a YAML file, snake-networks, or the networks of a run",
     )
     page.add_argument(
-        "--wheelbase", type=float, metavar="METRES", help="distance of the wheels, for differential-drive"
+        "--wheelbase", type=float, metavar="METRES", help="distance between the wheels, for differential-drive"
     )
-    page.add_argument("--port", type=_port, default=0, metavar="N", help="of 127.0.0.1 (default: any that is free)")
-    page.add_argument("--no-browser", action="store_true", help="only print the address")
+    page.add_argument("--port", type=_port, default=0, metavar="N", help="port on 127.0.0.1 (default: a free one)")
+    page.add_argument("--no-browser", action="store_true", help="print the address without opening a browser")
 
 
 def explore(options: argparse.Namespace) -> int:

@@ -13,11 +13,18 @@ from bns.cli.commands.diagnose import Adder, add_effect_options, add_model_optio
 
 def add_commands(command: Adder) -> None:
     """The parsers of these commands; ``command`` makes one of a name, a function and a text."""
-    next_one = command("propose", propose, "the next experiment: commands that tell rival explanations apart")
-    next_one.add_argument("-o", "--output", type=Path, metavar="FILE.csv", help="trial file for bns trial --commands")
-    next_one.add_argument("--json", action="store_true", help="one JSON object on stdout")
-    page = command("report", report, "one HTML page for people: what is missing, how sure that is, what to do next")
-    page.add_argument("-o", "--output", type=Path, metavar="FILE.html", default=Path("report.html"), help="the page")
+    next_one = command("propose", propose, "plan the next experiment: commands that tell rival explanations apart")
+    next_one.add_argument("-o", "--output", type=Path, metavar="FILE.csv", help="file to write, for bns trial --commands")
+    next_one.add_argument("--json", action="store_true", help="print one JSON object")
+    page = command("report", report, "write one HTML page: what is missing, how certain that is, what to do next")
+    page.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE.html",
+        default=Path("report.html"),
+        help="file to write (default: report.html)",
+    )
     for one in (next_one, page):
         one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
         add_experiment_options(one)
@@ -27,12 +34,18 @@ def add_commands(command: Adder) -> None:
 
 def add_experiment_options(parser: argparse.ArgumentParser) -> None:
     """How long, where and how fast."""
-    parser.add_argument("--minutes", type=float, default=10.0, metavar="N", help="of driving (default: 10)")
-    parser.add_argument("--arena", metavar="WxH", help="where the robot may be, metres (default: where it was seen)")
+    parser.add_argument("--minutes", type=float, default=10.0, metavar="N", help="minutes of driving to plan (default: 10)")
+    parser.add_argument("--arena", metavar="WxH", help="size of the arena in metres (default: where the robot was seen)")
     parser.add_argument(
-        "--start", metavar="X,Y,DEG", help="where each trial starts: metres, degrees from east (--start=0,0,90)"
+        "--start",
+        metavar="X,Y,DEG",
+        help="start of each trial: metres, metres, degrees counter-clockwise from east (--start=0,0,90)",
     )
-    parser.add_argument("--speeds", metavar="LOW,HIGH", help="of a wheel, m/s (default: the robot's, and those seen)")
+    parser.add_argument(
+        "--speeds",
+        metavar="LOW,HIGH",
+        help="lowest and highest wheel speed in m/s (default: the robot's bounds and the speeds in the data)",
+    )
 
 
 def propose(options: argparse.Namespace) -> int:

@@ -14,25 +14,28 @@ from bns.cli.parser import add_results
 
 def add_commands(command: Adder) -> None:
     """The parsers of these commands."""
-    far = command("status", status, "how far the sweeps in a store are")
+    far = command("status", status, "show the progress of the sweeps in a results folder")
     ask = command("query", query, "answer an SQL query over evals, runs, specs, paths, generations, probes (DuckDB)")
     ask.add_argument("sql", metavar="SELECT ...")
-    ask.add_argument("--csv", action="store_true", help="comma-separated values, a header first")
-    ask.add_argument("--no-header", action="store_true", help="with --csv: bare rows")
+    ask.add_argument("--csv", action="store_true", help="print comma-separated values with a header")
+    ask.add_argument("--no-header", action="store_true", help="with --csv: no header")
     for one in (far, ask):
-        one.add_argument("--json", action="store_true", help="a list of JSON objects on stdout, one a row")
+        one.add_argument("--json", action="store_true", help="print a list of JSON objects, one per row")
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
-    keep = command("archive", archive, "write what figures and findings need of all runs into one small file")
+    keep = command("archive", archive, "write the data that figures and findings need into one small file")
     keep.add_argument("results", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="folder of all results")
     keep.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.parquet", help="file to write")
-    keep.add_argument("--sweep", action="append", metavar="NAME", help="keep this sweep (again for more); default: all")
-    drawn = command("figures", figures, "draw whatever the results allow onto one page, DIR/figures/index.html")
+    keep.add_argument("--sweep", action="append", metavar="NAME", help="keep this sweep (may be repeated; default: all)")
+    drawn = command("figures", figures, "draw all figures that the results allow, on one page: DIR/figures/index.html")
     drawn.add_argument(
-        "--from", dest="archive", metavar="FILE", help="draw from what bns archive wrote; published: DIR/published/study.parquet"
+        "--from",
+        dest="archive",
+        metavar="FILE",
+        help="draw from a file that bns archive wrote; published: DIR/published/study.parquet",
     )
-    drawn.add_argument("--only", metavar="NAME", help="one figure: success-by-mutation, …")
+    drawn.add_argument("--only", metavar="NAME", help="draw only this figure, for example success-by-mutation")
     look = command("watch", watch, "redraw the page of figures whenever runs finish, until Ctrl-C")
-    look.add_argument("--every", type=interval, default=10.0, metavar="TIME", help="look again after 10s, 1m, ... (10s)")
+    look.add_argument("--every", type=interval, default=10.0, metavar="TIME", help="time between two checks (default: 10s)")
     for one in (far, ask, small):
         add_results(one)
     for one in (drawn, look):

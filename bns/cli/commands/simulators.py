@@ -14,15 +14,15 @@ from bns.cli.parser import add_results
 def add_commands(command: Adder) -> None:
     """The parsers of these commands."""
     planned = command(
-        "validate", validate, "evolve controllers on the static simulator, drive each three times in physics"
+        "validate", validate, "evolve controllers on the static simulator and drive each three times in the physics world"
     )
     planned.add_argument("--robot", default="snake")
-    planned.add_argument("--task", help="(default: the last of that robot's study)")
+    planned.add_argument("--task", help="goal task (default: the last task of that robot's study)")
     add_results(planned)
-    ready = command("precompute", precompute, "train the static simulator of a robot and write it")
+    ready = command("precompute", precompute, "train the static simulator of a robot and write it to a file")
     ready.add_argument("--robot", default="khepera")
-    ready.add_argument("-o", "--output", type=Path, metavar="FILE", help="where (default: into the package)")
-    ready.add_argument("--jobs", type=positive, metavar="N", help="processes that drive (default: one a core)")
+    ready.add_argument("-o", "--output", type=Path, metavar="FILE", help="file to write (default: inside the package)")
+    ready.add_argument("--jobs", type=positive, metavar="N", help="processes that simulate drives (default: one per core)")
 
 
 def validate(options: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from bns.cli.commands.diagnose import Adder
 from bns.cli.compiling import say_if_compiling
 from bns.cli.options.option_types import as_json, duration, positive
-from bns.cli.options.sweep_options import add_cluster_options, backend_name, request_of
+from bns.cli.options.sweep_options import add_cluster_options, backend_name, request_of, say_if_experimental
 from bns.cli.parser import add_results, add_trust
 from bns.errors import SpecError
 from bns.spec import RunSpec
@@ -20,14 +20,14 @@ _FILES = "sweep files (YAML), or names of those that come with bns: khepera, sna
 
 def add_commands(command: Adder) -> None:
     """The parsers of these commands."""
-    many = command("sweep", sweep, "carry out the runs of sweep files; what is done already is skipped")
+    many = command("sweep", sweep, "carry out the runs of sweep files; finished runs are skipped")
     many.add_argument("files", nargs="+", metavar="FILE", help=f"{_FILES}; taken in this order")
-    many.add_argument("--jobs", type=positive, metavar="N", help="worker processes a machine (default: one a core)")
+    many.add_argument("--jobs", type=positive, metavar="N", help="worker processes per machine (default: one per core)")
     many.add_argument(
-        "--budget", type=duration, metavar="TIME", help="stop in time: 90s, 10m, 1h30m (shared by all files)"
+        "--budget", type=duration, metavar="TIME", help="stop after this time: 90s, 10m, 1h30m (shared by all files)"
     )
     add_cluster_options(many, positive, duration)
-    many.add_argument("--retry-failed", action="store_true", help="do failed and quarantined runs again")
+    many.add_argument("--retry-failed", action="store_true", help="repeat failed and quarantined runs")
     many.add_argument(
         "--confirm-top",
         type=positive,
@@ -37,16 +37,16 @@ def add_commands(command: Adder) -> None:
     many.add_argument(
         "--until",
         choices=("ranking",),
-        help="stop when the ten best combinations of each task are known: those that cannot be among them are not run on",
+        help="stop when the ten best combinations of each task are known; others get no further runs",
     )
     many.add_argument(
-        "--dry-run", action="store_true", help="say what would be done, how long and how large it would be"
+        "--dry-run", action="store_true", help="only say how many runs there are, how long they take and how much disk they need"
     )
     costs = command(
-        "plan", plan, "what sweeps would cost on a laptop, a server and a cluster, from this machine's pace"
+        "plan", plan, "estimate what sweeps cost on a laptop, a server and a cluster, from the speed of this machine"
     )
     costs.add_argument("files", nargs="+", metavar="FILE", help=_FILES)
-    costs.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    costs.add_argument("--json", action="store_true", help="print one JSON object")
     for one in (many, costs):
         add_results(one)
         add_trust(one)
@@ -91,6 +91,7 @@ def sweep(options: argparse.Namespace) -> int:
             failed += summary.new_failed
             if summary.stopped_by in {"interrupt", "terminated"}:
                 return INTERRUPTED if summary.stopped_by == "interrupt" else TERMINATED
+    say_if_experimental(options.device)
     return 1 if failed else 0
 
 

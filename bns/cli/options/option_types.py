@@ -48,8 +48,8 @@ def add_spec_options(parser: argparse.ArgumentParser, without: tuple[str, ...] =
             "--" + name.replace("_", "-"),
             type=_of_parameter(name),
             default=None if name == "task" else field.default,
-            metavar={int: "N", float: "SHARE", str: "NAME"}[field_type(name)],
-            help=f"{text} (default: {'the first of that robot' if name == 'task' else field.default})",
+            metavar={int: "N", float: "FRACTION", str: "NAME"}[field_type(name)],
+            help=f"{text} (default: {'the first of the robot' if name == 'task' else field.default})",
         )
 
 

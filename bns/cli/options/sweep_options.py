@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -22,28 +23,37 @@ def add_cluster_options(
     parser: argparse.ArgumentParser, positive: Callable[[str], int], duration: Callable[[str], float]
 ) -> None:
     """Add them; ``positive`` and ``duration`` read whole numbers and times."""
-    parser.add_argument("--device", choices=DEVICES, default="cpu", help="what computes: cpu (default), or a GPU: cuda")
-    group = parser.add_argument_group("more than one machine", "from laptop to cluster: docs/cluster.md")
+    parser.add_argument("--device", choices=DEVICES, default="cpu", help="cpu (default), or cuda for a GPU (experimental)")
+    group = parser.add_argument_group("more than one machine", "see the page From laptop to cluster of the documentation")
     add = group.add_argument
     add(
         "--shard",
         type=_shard,
         metavar="K/N",
-        help="only the K-th of N shares: one command a machine, one folder for all",
+        help="only the K-th of N parts of the sweep: one command per machine, one results folder for all",
     )
     add("--executor", metavar="NAME", help=f"{_ON_CPU} (default), dask or slurm")
-    add("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler (default: one of this machine's own)")
+    add("--scheduler", metavar="tcp://HOST:PORT", help="address of a Dask scheduler (default: start one on this machine)")
     add("--shards", type=positive, metavar="N", help="jobs of the SLURM array (default: 16)")
     add(
         "--time-limit",
         type=duration,
         default=_TIME_LIMIT_S,
         metavar="TIME",
-        help="time of each SLURM job (default: 4h)",
+        help="time limit of each SLURM job (default: 4h)",
     )
     add("--slurm", type=_named, action="append", default=[], metavar="NAME=VALUE", help="option of sbatch (repeatable)")
-    add("--try-locally", action="store_true", help="let the jobs of SLURM run on this machine")
-    add("--wait", action="store_true", help="stay until the jobs of SLURM are done")
+    add("--try-locally", action="store_true", help="run the SLURM jobs on this machine, as a test")
+    add("--wait", action="store_true", help="wait until the SLURM jobs are done")
+
+
+def say_if_experimental(device: str) -> None:
+    """A line on stderr after work on a GPU."""
+    if device != "cpu":
+        print(
+            f"bns: note: --device {device} is experimental; before you rely on its results, compare some of them with the CPU's",
+            file=sys.stderr,
+        )
 
 
 def backend_name(options: argparse.Namespace) -> str:
@@ -53,7 +63,7 @@ def backend_name(options: argparse.Namespace) -> str:
     if options.executor not in {None, options.device} or options.jobs is not None:
         given = "--jobs" if options.jobs is not None else f"--executor {options.executor}"
         raise SpecError(
-            f"--device {options.device} is the GPU of this machine, and {given} shares runs out among cores. Leave one of them "
+            f"--device {options.device} is the GPU of this machine, and {given} distributes runs over cores. Leave one of them "
             "out; several machines with a GPU each take --shard K/N."
         )
     return str(options.device)

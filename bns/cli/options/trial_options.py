@@ -16,10 +16,16 @@ def add_trial_options(parser: argparse.ArgumentParser, positive: Convert) -> Non
     switch = {"action": "store_true"}
     parser.add_argument("--rig", type=Path, metavar="FILE", help="ports, tracker and surface of your set-up (YAML)")
     parser.add_argument("--emulated", **switch, help="drive the emulator of the robot: the same drivers, no hardware")  # type: ignore[arg-type]
-    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="of the emulator's clock (default: 1)")
-    parser.add_argument("--faults", type=Path, metavar="FILE", help="what the emulator shall do wrong (YAML)")
+    parser.add_argument(
+        "--speed",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="speed of the emulated clock, in multiples of real time (default: 1)",
+    )
+    parser.add_argument("--faults", type=Path, metavar="FILE", help="planned faults of the emulator (YAML)")
     parser.add_argument("--yes", **switch, help="run unattended: answer yes to every prompt")  # type: ignore[arg-type]
-    parser.add_argument("--resume", **switch, help="go on from the last evaluation driven")  # type: ignore[arg-type]
+    parser.add_argument("--resume", **switch, help="continue after the last evaluation that was driven")  # type: ignore[arg-type]
     parser.add_argument(
         "--replay", type=Path, metavar="JOURNAL", help="run a trial again from its journal, without a robot"
     )
@@ -29,22 +35,28 @@ def add_trial_options(parser: argparse.ArgumentParser, positive: Convert) -> Non
         type=positive,
         default=50,
         metavar="N",
-        help="of training and evolution while one controller drives",
+        help="largest number of rounds of training and evolution during one drive (default: 50)",
     )
     parser.add_argument(
         "--until-success",
         type=positive,
         metavar="N",
-        help="end when N driven controllers in a row have reached all goals",
+        help="stop when N controllers in succession have reached all goals",
     )
     parser.add_argument(
         "--repeats",
         type=positive,
         metavar="N",
-        help="drive the final controller N times, its evaluation included (default: snake 3, khepera 1)",
+        help="drive the final controller N times in all, including its evaluation (default: snake 3, khepera 1)",
     )
-    parser.add_argument("--no-figures", **switch, help="draw none of the trial's figures when it is done")  # type: ignore[arg-type]
-    parser.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="folder of all results")
+    parser.add_argument("--no-figures", **switch, help="do not draw the trial's figures at the end")  # type: ignore[arg-type]
+    parser.add_argument(
+        "--results",
+        type=Path,
+        default=Path("results"),
+        metavar="DIR",
+        help="folder of all results (default: results)",
+    )
 
 
 def add_looking_options(
@@ -53,15 +65,15 @@ def add_looking_options(
     """Of `bns calibrate` and `bns track`."""
     source = calibrating.add_mutually_exclusive_group(required=True)
     source.add_argument("--camera", metavar="SOURCE", help="number, device file or address of the camera")
-    source.add_argument("--frames", type=Path, metavar="DIR", help="pictures of the board taken before")
+    source.add_argument("--frames", type=Path, metavar="DIR", help="folder with pictures of the board that were taken earlier")
     source.add_argument(
-        "--print-board", type=Path, metavar="FILE", help="write the board to be printed (PNG), true to size"
+        "--print-board", type=Path, metavar="FILE", help="write the board as a PNG file, to be printed without scaling"
     )
     source.add_argument(
-        "--wii", action="store_true", help="find how the Wii remote of --rig hangs: mirror, orientation, place, view"
+        "--wii", action="store_true", help="calibrate the Wii remote of --rig: mirror image, orientation, position, field of view"
     )
     source.add_argument(
-        "--delay", action="store_true", help="have the robot of --rig move to and fro, and find how late its tracker is"
+        "--delay", action="store_true", help="move the robot of --rig to and fro, and measure the delay of its tracker"
     )
     source.add_argument(
         "--colours",
@@ -74,31 +86,34 @@ def add_looking_options(
             f"--{name}", type=int, nargs=2, metavar=("LOW", "HIGH"), help="hues to try with --colours, 0 to 179"
         )
     calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii, --delay and --colours")
-    calibrating.add_argument("--robot", default="khepera", help="for --delay and --colours (default: khepera)")
-    calibrating.add_argument("--emulated", action="store_true", help="with --delay or --colours: the emulated rig")
+    calibrating.add_argument("--robot", default="khepera", help="robot, for --delay and --colours (default: khepera)")
+    calibrating.add_argument("--emulated", action="store_true", help="use the emulated rig, with --delay or --colours")
     calibrating.add_argument(
         "--floor",
         type=Path,
         nargs="+",
         default=[],
         metavar="FILE",
-        help="pictures of the board flat on the floor: on the start first, then elsewhere (default: the last of --frames)",
+        help="pictures of the board flat on the floor: first on the start, then elsewhere (default: the last of --frames)",
     )
     calibrating.add_argument(
-        "--places", type=positive, default=3, metavar="N", help="places on the floor to lay the board on (default: 3)"
+        "--places", type=positive, default=3, metavar="N", help="number of places on the floor for the board (default: 3)"
     )
-    calibrating.add_argument("--measured-mm", type=float, metavar="MM", help="width of the whole printed board, as measured")
-    calibrating.add_argument("--size", metavar="WxH", help="of the camera's pictures (default: 1280x720, or what it has)")
+    calibrating.add_argument("--measured-mm", type=float, metavar="MM", help="measured width of the whole printed board, in mm")
+    calibrating.add_argument("--size", metavar="WxH", help="size of the camera's pictures (default: 1280x720 if available)")
     for name in ("exposure", "focus", "white-balance"):
         calibrating.add_argument(
-            f"--{name}", type=float, metavar="N", help="fix it, as the camera's driver counts (v4l2-ctl -L)"
+            f"--{name}",
+            type=float,
+            metavar="N",
+            help="fixed value, in units of the camera's driver (v4l2-ctl -L lists the range)",
         )
-    calibrating.add_argument("--square-mm", type=float, default=68.0, help="side of a printed square (default: 68, A3)")
-    calibrating.add_argument("--views", type=positive, default=15, help="views to take (default: 15)")
+    calibrating.add_argument("--square-mm", type=float, default=68.0, help="side of a printed square in mm (default: 68, for A3)")
+    calibrating.add_argument("--views", type=positive, default=15, help="number of views to take (default: 15)")
     calibrating.add_argument("-o", "--output", type=Path, default=Path("camera.json"), metavar="FILE")
     tracking.add_argument("--robot", default="khepera")
     tracking.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML)")
-    tracking.add_argument("--emulated", action="store_true", help="look at the emulated rig")
+    tracking.add_argument("--emulated", action="store_true", help="use the emulated rig")
     tracking.add_argument(
         "--seconds", type=duration, default=5.0, metavar="TIME", help="how long to look (default: 5s)"
     )
@@ -107,11 +122,11 @@ def add_looking_options(
 
 def add_servo_options(parser: argparse.ArgumentParser) -> None:
     """Of `bns servos`: `scan`, `set-id` and `check`, each at a port."""
-    parts = parser.add_subparsers(title="what to do", metavar="scan|set-id|check", required=True)
+    parts = parser.add_subparsers(title="actions", metavar="scan|set-id|check", required=True)
 
     def part(name: str, text: str) -> argparse.ArgumentParser:
         added = parts.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
-        added.add_argument("--port", required=True, metavar="DEVICE", help="the bus adapter, as /dev/ttyUSB0")
+        added.add_argument("--port", required=True, metavar="DEVICE", help="port of the bus adapter, for example /dev/ttyUSB0")
         added.add_argument(
             "--protocol", type=int, choices=(1, 2), help="1: AX-12, 2: XL430 and XM430 (default: both, which takes longer)"
         )
@@ -119,11 +134,11 @@ def add_servo_options(parser: argparse.ArgumentParser) -> None:
         return added
 
     part("scan", "list the servos that answer").add_argument(
-        "--all-bauds", action="store_true", help="at all rates that a servo can be set to (minutes)"
+        "--all-bauds", action="store_true", help="try all rates that a servo can be set to (takes minutes)"
     )
-    new = part("set-id", "give the one servo that is connected a number")
-    new.add_argument("id", type=int, metavar="ID", help="its new number, 0 to 252")
-    new.add_argument("--from", type=int, dest="old", metavar="ID", help="its present number, where several are connected")
-    part("check", "say what of the servos' settings is not as a drive needs it").add_argument(
-        "--fix", "--mend", dest="mend", action="store_true", help="write the settings that a drive needs first"
+    new = part("set-id", "set the id of the one servo that is connected")
+    new.add_argument("id", type=int, metavar="ID", help="new id, 0 to 252")
+    new.add_argument("--from", type=int, dest="old", metavar="ID", help="present id, if several servos are connected")
+    part("check", "list settings of the servos that do not suit a drive").add_argument(
+        "--fix", "--mend", dest="mend", action="store_true", help="first write the settings that a drive needs"
     )

@@ -103,7 +103,7 @@ def _looked_through(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> 
     _gaps_and_losses(trial, good[own_rows(good)], findings)
     if _tracked(good).any():
         return good
-    findings.append(Finding(trial, int(rows.index[0]), "no pose was tracked in it; the trial is left out"))
+    findings.append(Finding(trial, int(rows.index[0]), "no pose was tracked; the trial is excluded"))
     return good.iloc[:0]
 
 
@@ -132,13 +132,13 @@ def to_numbers(table: pd.DataFrame, columns: Sequence[str]) -> None:
         wrong = wrong[(table[name].iloc[wrong].astype(str).str.lower() != "nan").to_numpy()] if len(wrong) else wrong
         if len(wrong):
             row = int(wrong[0])
-            raise DataError(f"Row {row}: {name} is {table[name].iloc[row]!r}; it must be a number, or empty.")
+            raise DataError(f"Row {row}: {name} is {table[name].iloc[row]!r}; it must be a number or empty.")
         if np.isinf(values).any():
             row = int(np.flatnonzero(np.isinf(values))[0])
             raise DataError(f"Row {row}: {name} is infinite; leave it empty where nothing was measured.")
         if (values.abs() > _LARGEST).any():
             row = int(np.flatnonzero(values.abs() > _LARGEST)[0])
-            raise DataError(f"Row {row}: {name} is {values.iloc[row]:g}; nothing that was measured is that large.")
+            raise DataError(f"Row {row}: {name} is {values.iloc[row]:g}; no measurement is that large.")
         table[name] = values.astype(float)
     if table["t_s"].isna().any():
         row = int(np.flatnonzero(table["t_s"].isna())[0])
@@ -152,7 +152,7 @@ def _held(table: pd.DataFrame, findings: list[Finding]) -> None:
         row = int(np.flatnonzero(again)[0])
         text = (
             f"{again.mean():.0%} of all poses repeat the one before while the robot is told to move, the first here: is the "
-            "tracker slower than the log? `repeated_poses: lost` in the mapping of `bns import` takes them out"
+            "tracker slower than the log? `repeated_poses: lost` in the mapping of `bns import` marks them as lost"
         )
         findings.append(Finding(str(table["trial"].iloc[row]), row, text))
 
@@ -184,11 +184,11 @@ def forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> 
     good[1:] = t[1:] > latest[:-1]
     for i in map(int, np.flatnonzero(~good)):
         what = "repeats" if t[i] == latest[i - 1] else "lies before"
-        findings.append(Finding(trial, int(rows.index[i]), f"time {t[i]:g} s {what} an earlier one; row left out"))
+        findings.append(Finding(trial, int(rows.index[i]), f"time {t[i]:g} s {what} an earlier one; the row is excluded"))
     if (~good).mean() > 0.5 and len(t) > 4:
         raise DataError(
-            f"Trial {trial}: time runs backwards or stands still in {(~good).sum()} of {len(t)} rows. Sort the rows by time; "
-            "give every trial its own name if several were written together."
+            f"Trial {trial}: time runs backwards or repeats in {(~good).sum()} of {len(t)} rows. Sort the rows by time; "
+            "give each trial its own name if several were written together."
         )
     return rows[good]
 
@@ -208,7 +208,7 @@ def _without_jumps(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> p
         if not len(bad):
             break
         findings += [
-            Finding(trial, int(row), "the tracked pose jumps away and back; pose taken as lost") for row in bad
+            Finding(trial, int(row), "the tracked pose jumps away and back; it counts as lost") for row in bad
         ]
         out = out.copy()
         out.loc[bad, list(POSE)] = np.nan
@@ -305,9 +305,9 @@ def _units(table: pd.DataFrame) -> None:
     untold = without_commands(table)
     if untold > 0.5 and ratio > _UNTOLD_RATIO:
         raise DataError(
-            f"In {untold:.0%} of the rows with a pose no command is in force, yet the robot goes {ratio:.1f} times as far as "
-            "commanded. Have commands rows of their own? `hold_commands_s: .inf` in the mapping of `bns import` keeps each until "
-            "the next."
+            f"In {untold:.0%} of the rows with a pose no command is in force, but the robot goes {ratio:.1f} times as far as "
+            "commanded. Are the commands in separate rows? `hold_commands_s: .inf` in the mapping of `bns import` keeps "
+            "each until the next."
         )
     if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
         raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
@@ -319,7 +319,7 @@ def _units(table: pd.DataFrame) -> None:
                 f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {unit}; they must be metres."
             )
     if _turns_as_degrees(table):
-        raise DataError("Headings turn far more than the wheels can make them: heading_rad looks like degrees.")
+        raise DataError("Headings change far more than the wheels can turn the robot: heading_rad looks like degrees.")
     if len(ways) and np.abs(ways[:, 2]).sum() > 0.3:
         told, seen = ways[
             np.abs(ways[:, 2]) <= np.median(np.abs(ways[ways[:, 2] != 0, 2])), 2:
@@ -327,7 +327,7 @@ def _units(table: pd.DataFrame) -> None:
         same = float(told @ seen / np.sqrt((told @ told) * (seen @ seen) + 1e-300))
         if same < -0.5:
             raise DataError(
-                "The robot turns against the wheels: heading_rad must run counter-clockwise, "
+                "The robot turns opposite to the wheels: heading_rad must run counter-clockwise, "
                 "or left_m_s and right_m_s are exchanged."
             )
 

@@ -58,7 +58,7 @@ def import_log(files: Sequence[Path], mapping: Mapping[str, Any] | None = None) 
     missing = [path for path in others if path.name not in named and str(path) not in named]
     if missing:
         raise DataError(
-            f"The mapping of {first} takes nothing from {missing[0]}; add it under also: (docs/logs.md), or leave the file out."
+            f"The mapping of {first} uses nothing from {missing[0]}; add it under also:, or leave the file out."
         )
     with naming(first):
         try:
@@ -88,7 +88,7 @@ def _proposed(first: Path, table: pd.DataFrame, others: Sequence[Path]) -> str:
     return (
         f"There is no mapping beside {first}. {'; '.join(columns)}. Write {first.name}.import.yaml, or give such a file with "
         f"--map; docs/logs.md has all that may stand in it.{several} "
-        f"A beginning, guessed from the names, to be checked line by line:\n\n{guess.text}"
+        f"A proposal, guessed from the names; check it line by line:\n\n{guess.text}"
     )
 
 

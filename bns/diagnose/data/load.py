@@ -110,12 +110,12 @@ def _jump_findings(tracks: Tracks, usable: pd.DataFrame, found: NDArray[np.bool_
         moved = float(np.hypot(*(tracks.pose[frame] - tracks.pose[frame - 1])[:2]))
         trial = tracks.names[tracks.trial[frame]]
         if tracks.relative:
-            text = f"the sensor's motion, {1e3 * moved:.0f} mm, is one that no drive leads to: it is left out"
+            text = f"the sensor's motion of {1e3 * moved:.0f} mm is impossible for a drive; it is excluded"
             yield Finding(trial, int(rows[frame]), text)
             continue
         text = (
             f"the tracked pose jumps by {1e3 * moved:.0f} mm at {tracks.own_s[frame]:.2f} s and stays there: another marker was "
-            "taken for the robot's, or somebody moved it; nothing is judged by the poses that follow in this trial"
+            "mistaken for the robot's, or somebody moved it; later poses of this trial are not used"
         )
         yield Finding(trial, int(rows[frame]), text)
 
@@ -154,7 +154,7 @@ def _kept(table: pd.DataFrame) -> pd.DataFrame:
         return table
     kept = ~(pd.to_numeric(table[DISCARDED], errors="coerce") > 0)
     if not kept.any():
-        raise DataError(f"All drives are marked as {DISCARDED}; there is nothing to judge by. Drive again.")
+        raise DataError(f"All drives are marked as {DISCARDED}; no measurements are left. Drive again.")
     return table[kept]
 
 
@@ -162,7 +162,7 @@ def _of_one_robot(table: pd.DataFrame, robot: str | None) -> pd.DataFrame:
     if "robot" not in table.columns:
         if robot is not None:
             raise DataError(
-                f"There is no column robot to choose {robot!r} by; leave out --robot, or name the robot of each row."
+                f"There is no column robot, so {robot!r} cannot be chosen; leave out --robot, or add the column."
             )
         return table
     names = sorted(str(name) for name in table["robot"].dropna().unique())

@@ -18,13 +18,13 @@ def merged(table: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
     """
     keys = ["trial", "t_s"] if "trial" in table.columns else ["t_s"]
     if ("trial" in other.columns) != ("trial" in table.columns):
-        raise DataError("Of the tables that the mapping joins only some have trials; give all an entry trial, or none.")
+        raise DataError("Only some of the tables that the mapping joins have trials; give all of them an entry trial, or none.")
     both = sorted((set(table.columns) & set(other.columns)) - set(keys))
     if both:
         raise DataError(f"The mapping takes {', '.join(both)} from two tables; leave all but one of them out.")
     rows = pd.concat([table, other], ignore_index=True)
     if rows["t_s"].isna().any():
-        raise DataError("Tables can be joined only where every row has its time: t_s is empty in some.")
+        raise DataError("Tables can be joined only if every row has a time; t_s is empty in some.")
     order = {name: number for number, name in enumerate(pd.unique(table["trial"]))} if "trial" in keys else {}
     began = rows["trial"].map(order) if order else pd.Series(0, index=rows.index)
     rows = rows.assign(began_=began).sort_values(["began_", "t_s"], kind="stable").drop(columns="began_")
@@ -66,16 +66,16 @@ def wheels_from_body(table: pd.DataFrame, wheelbase_m: float | None) -> pd.DataF
         return table
     if len(there) == 1:
         other = FORWARD if there[0] == TURN else TURN
-        raise DataError(f"The mapping has {there[0]} but not {other}; both make the wheels' speeds.")
+        raise DataError(f"The mapping has {there[0]} but not {other}; the wheel speeds need both.")
     twice = [name for name in COMMANDS if name in table.columns]
     if twice:
         raise DataError(
-            f"The mapping gives {' and '.join(twice)} and speeds of the body; leave out what was not commanded."
+            f"The mapping gives {' and '.join(twice)} and speeds of the body; leave out the ones that were not commanded."
         )
     if wheelbase_m is None:
         raise DataError(
-            f"Speeds of the wheels follow from {FORWARD} and {TURN} with the distance of the wheels that the robot's own "
-            "controller reckons with: add wheelbase_m: METRES to the mapping."
+            f"Wheel speeds follow from {FORWARD} and {TURN} with the wheelbase that the robot's own controller assumes: "
+            "add wheelbase_m: METRES to the mapping."
         )
     apart = table[TURN] * float(wheelbase_m) / 2
     return table.drop(columns=there).assign(left_m_s=table[FORWARD] - apart, right_m_s=table[FORWARD] + apart)

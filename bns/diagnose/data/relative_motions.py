@@ -31,8 +31,8 @@ def relative_motions(table: pd.DataFrame) -> pd.DataFrame:
     missing = [name for name in wanted if name not in rows.columns]
     if missing:
         raise DataError(
-            f"Relative motions need entries for {', '.join(wanted)} (or {' and '.join(WAYS)}, the ways of the wheels, instead "
-            f"of their speeds); the mapping lacks {', '.join(missing)}."
+            f"Relative motions need entries for {', '.join(wanted)} (or {' and '.join(WAYS)}, the distances of the wheels, "
+            f"instead of their speeds); the mapping lacks {', '.join(missing)}."
         )
     good = np.isfinite(rows[wanted].to_numpy(dtype=float)).all(axis=1) & (rows[DURATION] > 0).to_numpy()
     if not good.any():

@@ -25,16 +25,16 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
     """
     missing = [name for name in ("t_s", *COMMANDS) if name not in table.columns]
     if missing:
-        raise DataError(f"A log can be cut into trials once it has {', '.join(missing)}; add entries for them.")
+        raise DataError(f"To be cut into trials, a log needs {', '.join(missing)}; add entries for them.")
     if "trial" in table.columns:
         raise DataError(
-            "The log has a column trial already; leave out trials from the mapping, or name the column otherwise."
+            "The log has a column trial already; leave trials out of the mapping, or rename the column."
         )
     t = table["t_s"].to_numpy(dtype=float)
     if not (np.diff(t) >= 0).all():
         row = int(np.flatnonzero(~(np.diff(t) >= 0))[0]) + 1
         raise DataError(
-            f"Row {row}: t_s runs backwards or is empty; a log that is cut into trials must be in the order of time."
+            f"Row {row}: t_s runs backwards or is empty; a log that is cut into trials must be sorted by time."
         )
     trial = _CUTS[by](table, t, seconds)
     if trial.max() < 1:
@@ -65,7 +65,7 @@ def _with_run_up(table: pd.DataFrame, t: NDArray[np.float64]) -> pd.DataFrame:
 def _hint(table: pd.DataFrame, t: NDArray[np.float64]) -> str:
     longest = max((t[b] - t[a] for a, b in _stands(table, t, 0.0)), default=0.0)
     gap = np.diff(t).max(initial=0.0)
-    return f"It stands for {longest:.2f} s at most, and its longest gap is {gap:.2f} s; lasting_s cuts anywhere."
+    return f"The robot stands for {longest:.2f} s at most, and the longest gap is {gap:.2f} s; lasting_s cuts anywhere."
 
 
 def _stands(table: pd.DataFrame, t: NDArray[np.float64], seconds: float) -> list[tuple[int, int]]:

@@ -61,7 +61,7 @@ def bounds_of(tracks: Tracks, model: Model, speeds: tuple[float, float] | None =
     former. DataError for what is no range."""
     lasting = tracks.duration_s > 0
     if not lasting.any():
-        raise DataError("No command of these measurements lasts any time; log poses before and after commands.")
+        raise DataError("No command in these measurements has a duration; log poses before and after commands.")
     commanded = np.concatenate([tracks.left_m_s[lasting], tracks.right_m_s[lasting]])
     low, high = float(commanded.min()), float(commanded.max())
     short, long = (float(v) for v in np.quantile(tracks.duration_s[lasting], [0.02, 0.98]))

@@ -149,7 +149,7 @@ def propose(
     if len(competing_models) < 2:
         why = "; ".join(d.notes) or "no effect comes near to explaining anything"
         raise DataError(
-            f"There are no two explanations that an experiment could tell apart (verdict {d.verdict}): {why}"
+            f"No two explanations are left that an experiment could tell apart (verdict {d.verdict}): {why}"
         )
     planner = _planner(d, competing_models, arena, bounds, minutes, tick)
     rng = np.random.default_rng(seed)

@@ -26,10 +26,14 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
             continue
         value, (low, high) = float(fit.values[index]), fit.interval(index)
         if bounds and _stopped(p, value):
-            return f"{p.name} is at its bound, {value:g} {p.unit}"
+            return f"{p.name} is at its bound, {value:g}{_unit(p)}"
         if np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
-            return f"{p.name} = {value:g} {p.unit} is outside of what is plausible, {p.plausible[0]:g} to {p.plausible[1]:g}"
+            return f"{p.name} = {value:g}{_unit(p)} is outside of the plausible range, {p.plausible[0]:g} to {p.plausible[1]:g}"
     return ""
+
+
+def _unit(p: Parameter) -> str:
+    return "" if p.unit == "1" else f" {p.unit}"
 
 
 def _stopped(p: Parameter, value: float) -> bool:

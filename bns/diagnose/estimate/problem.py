@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.clocks.trial_clock_test import steps_of
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import estimate_noise, filter_for
 from bns.diagnose.estimate.stretch_noise import estimate_stretch_noise, stretch_filter
@@ -31,6 +32,14 @@ def settled_problem(predictor: Predictor, model: Model, start: Array | None = No
         problem = problem_for(predictor, fit.model, problem.pose_filter.noise)
         fit = problem.fit(fit.model)
     return problem, fit
+
+
+def given_steps(predictor: Predictor, model: Model) -> Steps:
+    """What a model predicts as it is. Only clocks of its trials' own need a filter, whose noise takes long to estimate."""
+    if model.per_trial_effect is not None:
+        return steps_of(predictor, problem_for(predictor, model).pose_filter, model)
+    predictor.anchor(model)
+    return predictor.steps(model)
 
 
 def problem_with_noise(predictor: Predictor, steps: Steps, noise: Array) -> Problem:

@@ -30,7 +30,7 @@ def check_named_robot(robot: str, model: Model) -> None:
     name = model.name.removesuffix("-world")
     if robot and robot != name and {robot, name} <= set(robot_names()):
         raise DataError(
-            f"The measurements are of the robot {robot}, the model {model.name} is of {name}; give a model of {robot}."
+            f"The measurements are of the robot {robot}, but the model {model.name} is of {name}; give a model of {robot}."
         )
 
 
@@ -53,7 +53,7 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
         explained = np.abs(seen - ratio * predicted)[clear].sum() < _EXPLAINED * np.abs(seen - predicted)[clear].sum()
         if explained and (ratio > _FACTOR or 0 < ratio < 1 / _FACTOR):
             raise DataError(
-                f"The robot turns {ratio:.2f} times as far as a model with a wheelbase of {model.wheelbase_m:g} m says. "
+                f"The robot turns {ratio:.2f} times as far as a model with a wheelbase of {model.wheelbase_m:g} m predicts. "
                 f"Is this its model? A wheelbase of {model.wheelbase_m / ratio:.3g} m would fit: "
                 f"--wheelbase {model.wheelbase_m / ratio:.3g}."
             )
@@ -64,7 +64,7 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
         ratio = float(np.median(went / (way[end] - way[start])[straight]))
         if ratio < 0.03:
             raise DataError(
-                "The robot hardly moves although it is told to: is it tracked, are its motors on, are these its commands?"
+                "The robot hardly moves although it is commanded to: is it tracked, are its motors on, are these its commands?"
             )
         if ratio > 3 or ratio < 1 / 3:
             raise DataError(

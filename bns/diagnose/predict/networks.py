@@ -37,7 +37,7 @@ class NetworkPredictor(WheelPredictor):
         nodes = _command_ends(tracks)
         super().__init__(_only_frames(tracks, nodes >= 0))
         if len(self.tracks.t_s) < 2 * len(self.tracks):
-            raise DataError("Networks predict whole commands, and no pose was tracked near the ends of commands.")
+            raise DataError("Networks predict whole commands, but no pose was tracked near the ends of commands.")
         self._bare = Model(wheelbase_m=1.0)
         self.node = nodes[nodes >= 0]
         """How many commands had ended at each frame, (frames,)."""

@@ -6,8 +6,11 @@ counted. The change from one model to the next is paired by trial: a bootstrap d
 
 from __future__ import annotations
 
+import threading
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -24,6 +27,8 @@ from bns.diagnose.settings import DEFAULTS
 DRAWS = DEFAULTS.predict.interval_draws
 FEWEST_TRIALS = DEFAULTS.predict.interval_fewest_trials
 _SEED = DEFAULTS.predict.interval_seed
+_LATELY = 12
+"""Models whose errors are remembered, per horizon."""
 
 
 @dataclass(frozen=True)
@@ -134,14 +139,44 @@ class PairedErrors:
         return {h: _horizon_json(e) for h, e in self.horizons.items()}
 
 
-def paired_errors(predictor: Predictor, models: Sequence[tuple[str, Steps]]) -> PairedErrors:
-    """Judge what several models predict, in their order, on the same windows.
+class PairedWindows:
+    """The windows of some tracks on which models are judged, and what does not depend on the models: worked out once.
 
     ``predictor`` holds all poses of the tracks; each model's steps are of its frames.
     """
-    noise = _noise_of(predictor)
-    horizons = {h: _at_horizon(predictor, h, models, noise) for h in predictor.horizons}
-    return PairedErrors(horizons, noise, len(predictor.tracks))
+
+    def __init__(self, predictor: Predictor) -> None:
+        self._predictor, self._noise = predictor, _noise_of(predictor)
+        self._horizons = {h: _Windows.of(predictor, h, self._noise) for h in predictor.horizons}
+        self._lately: OrderedDict[tuple[str, int], tuple[Steps, _Judged]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def errors(self, models: Sequence[tuple[str, Steps]]) -> PairedErrors:
+        """Judge what several models predict, in their order."""
+        horizons = {
+            h: windows.errors([(name, self._judged(h, steps)) for name, steps in models])
+            for h, windows in self._horizons.items()
+        }
+        return PairedErrors(horizons, self._noise, len(self._predictor.tracks))
+
+    def _judged(self, horizon: str, steps: Steps) -> _Judged:
+        """The same steps are asked for again and again: those of the models before the last one."""
+        key = horizon, id(steps)
+        with self._lock:
+            known = self._lately.get(key)
+        if known is not None:
+            return known[1]
+        judged = self._horizons[horizon].judged(steps)
+        with self._lock:
+            self._lately[key] = steps, judged  # the steps are kept, and so their id is theirs alone
+            while len(self._lately) > _LATELY * len(self._horizons):
+                self._lately.popitem(last=False)
+        return judged
+
+
+def paired_errors(predictor: Predictor, models: Sequence[tuple[str, Steps]]) -> PairedErrors:
+    """Judge what several models predict, in their order, on the same windows: as `PairedWindows`."""
+    return PairedWindows(predictor).errors(models)
 
 
 def judged_windows(predictor: Predictor, steps: Steps, horizon: str) -> Errors:
@@ -161,38 +196,69 @@ def _noise_of(predictor: Predictor) -> TrackingNoise | None:
     return tracking_noise(predictor.tracks)
 
 
-def _at_horizon(
-    predictor: Predictor,
-    horizon: str,
-    models: Sequence[tuple[str, Steps]],
-    noise: TrackingNoise | None,
-) -> HorizonErrors:
-    tracks, trials = predictor.tracks, len(predictor.tracks)
-    start, end = predictor.windows(horizon)
-    kept = ~spans_jump(tracks, start, end)
-    errors = [(name, errors_of(predictor, steps, horizon)) for name, steps in models]
-    of_trial = tracks.trial[start[kept]]
-    squares: list[Array] = [
-        np.bincount(of_trial, e.position_m[kept] ** 2, minlength=trials).astype(np.float64) for _, e in errors
-    ]
-    counts = np.bincount(of_trial, minlength=trials)
-    draws = _Draws.over(counts)
-    summaries = tuple(
-        ModelError(
-            name,
-            _rms(e.position_m[kept]),
-            *draws.interval(draws.rms(square)),
-            _median(e.position_m[kept]),
-            _rms(e.heading_rad[kept]),
-        )
-        for (name, e), square in zip(errors, squares, strict=True)
-    )
-    changes = tuple(_change(a, b, draws) for a, b in pairwise(squares))
-    total = _change(squares[0], squares[-1], draws) if len(squares) > 1 else None
-    pose = tracks.pose
-    distance = np.hypot(*(pose[end[kept], :2] - pose[start[kept], :2]).T)
-    floor = noise.error_m(distance) if noise is not None else float("nan")
-    return HorizonErrors(horizon, int(kept.sum()), int((~kept).sum()), summaries, changes, total, floor)
+@dataclass(frozen=True)
+class _Judged:
+    """One model over the windows of a horizon: sums of squares by trial (trials,), the root mean square of every bootstrap sample
+    (draws,), and its numbers under no name."""
+
+    squares: Array
+    drawn: Array
+    summary: ModelError
+
+
+@dataclass(frozen=True)
+class _Windows:
+    """What is judged at a horizon: the windows that are ``kept``, the trial of each, how trials are drawn, the noise's share."""
+
+    predictor: Predictor
+    horizon: str
+    kept: NDArray[np.bool_]
+    of_trial: NDArray[np.int64]
+    draws: _Draws
+    floor_m: float
+
+    @classmethod
+    def of(cls, predictor: Predictor, horizon: str, noise: TrackingNoise | None) -> _Windows:
+        tracks = predictor.tracks
+        start, end = predictor.windows(horizon)
+        kept = ~spans_jump(tracks, start, end)
+        of_trial = tracks.trial[start[kept]]
+        draws = _Draws.over(np.bincount(of_trial, minlength=len(tracks)))
+        distance = np.hypot(*(tracks.pose[end[kept], :2] - tracks.pose[start[kept], :2]).T)
+        floor = noise.error_m(distance) if noise is not None else float("nan")
+        return cls(predictor, horizon, kept, of_trial, draws, floor)
+
+    def judged(self, steps: Steps) -> _Judged:
+        """What a model predicts."""
+        e = errors_of(self.predictor, steps, self.horizon)
+        position_m, trials = e.position_m[self.kept], len(self.predictor.tracks)
+        squares = np.bincount(self.of_trial, position_m**2, minlength=trials).astype(np.float64)
+        drawn = self.draws.rms(squares)
+        low, high = self.draws.interval(drawn)
+        summary = ModelError("", _rms(position_m), low, high, _median(position_m), _rms(e.heading_rad[self.kept]))
+        return _Judged(squares, drawn, summary)
+
+    def errors(self, models: Sequence[tuple[str, _Judged]]) -> HorizonErrors:
+        """Several models and the changes between them."""
+        summaries = tuple(replace(one.summary, name=name) for name, one in models)
+        judged = [one for _, one in models]
+        changes = tuple(self._change(a, b) for a, b in pairwise(judged))
+        total = self._change(judged[0], judged[-1]) if len(judged) > 1 else None
+        kept = int(self.kept.sum())
+        return HorizonErrors(self.horizon, kept, len(self.kept) - kept, summaries, changes, total, self.floor_m)
+
+    def _change(self, before: _Judged, after: _Judged) -> Change:
+        windows = self.draws.windows.sum()
+        if not windows:
+            return _UNKNOWN
+        change = float(np.sqrt(after.squares.sum() / windows) - np.sqrt(before.squares.sum() / windows))
+        return Change(change, *self.draws.interval(after.drawn - before.drawn))
+
+
+@lru_cache(maxsize=4)
+def _drawn(trials: int) -> Array:
+    """How often each of so many trials was drawn, (draws, trials): the same at every horizon that all of them have windows of."""
+    return np.random.default_rng(_SEED).multinomial(trials, np.full(trials, 1 / trials), size=DRAWS).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -201,15 +267,14 @@ class _Draws:
 
     used: NDArray[np.bool_]
     windows: Array
-    drawn: NDArray[np.int64] | None
+    drawn: Array | None
 
     @classmethod
     def over(cls, counts: NDArray[np.int64]) -> _Draws:
         used = counts > 0
         n = int(used.sum())
         enough = n >= FEWEST_TRIALS
-        drawn = np.random.default_rng(_SEED).multinomial(n, np.full(n, 1 / n), size=DRAWS) if enough else None
-        return cls(used, counts[used].astype(float), drawn)
+        return cls(used, counts[used].astype(float), _drawn(n) if enough else None)
 
     def rms(self, squares: Array) -> Array:
         """Root mean square of every sample, (draws,); ``squares`` (trials,): sums of squares. Empty where trials are few."""
@@ -223,15 +288,6 @@ class _Draws:
         """The middle 95 %; NaN of nothing."""
         low, high = np.quantile(values, [0.025, 0.975]) if len(values) else (np.nan, np.nan)
         return float(low), float(high)
-
-
-def _change(before: Array, after: Array, draws: _Draws) -> Change:
-    """``before``, ``after`` (trials,): sums of squares."""
-    windows = draws.windows.sum()
-    if not windows:
-        return _UNKNOWN
-    change = float(np.sqrt(after.sum() / windows) - np.sqrt(before.sum() / windows))
-    return Change(change, *draws.interval(draws.rms(after) - draws.rms(before)))
 
 
 def _rms(values: Array) -> float:

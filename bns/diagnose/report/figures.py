@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from bns.diagnose.comparison import Comparison, Curve
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.report.text import ahead
-from bns.diagnose.report.variables import label
+from bns.diagnose.report.variables import label as in_words
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, save, style
 
 
@@ -23,7 +24,7 @@ def comparison_figure(c: Comparison, path: Path) -> Path:
     """Residuals along the variables that explain most, one row a variable, with 95 % bands."""
     variables = list(dict.fromkeys(curve.variable for curve in c.curves))[:5]
     ways = list(dict.fromkeys(curve.direction for curve in c.curves))
-    figure = Figure(figsize=(PAGE_IN, 1.7 * max(len(variables), 1) + 0.5))
+    figure = Figure(figsize=(PAGE_IN, 1.8 * max(len(variables), 1) + 0.5))
     axes = figure.subplots(max(len(variables), 1), max(len(ways), 1), squeeze=False)
     for curve in c.curves:
         if curve.variable in variables:
@@ -55,15 +56,15 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.fill_between(curve.centre, curve.low, curve.high, alpha=0.3, color=OKABE_ITO[0], linewidth=0)
     axes.plot(curve.centre, curve.mean, color=OKABE_ITO[0], marker="o")
-    axes.set_xlabel(label(curve.variable))
+    axes.set_xlabel(textwrap.fill(in_words(curve.variable), 30))
 
 
 @style()
-def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12) -> Path:
-    """The error before and after (where effects are named), and what each effect earns when it is added alone."""
+def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12, errors: bool = True) -> Path:
+    """The error before and after (with ``errors``, where effects are named), and the gain of each effect that is added alone."""
     assert d.selection is not None
     rows = min(sum(bool(np.isfinite(c.paired_comparison.elpd_diff)) for c in d.selection.steps[0].ranking), most)
-    falls = d.errors if d.effects else None
+    falls = d.errors if d.effects and errors else None
     figure = Figure(figsize=(PAGE_IN * (1.25 if falls else 0.75), max(0.24 * rows + 1.2, 2.8)))
     if falls:
         left, right = figure.subplots(1, 2, width_ratios=(2, 3))
@@ -83,17 +84,21 @@ def ranking_axes(axes: Axes, d: Diagnosis, most: int = 12) -> None:
     selected = {*d.effects}
     for row, c in enumerate(shown):
         colour = OKABE_ITO[2] if c.name in selected else GREY if c.rejected_because else OKABE_ITO[0]
-        axes.errorbar(
-            c.paired_comparison.elpd_diff, row, xerr=1.96 * c.paired_comparison.dse, fmt="o", color=colour, capsize=2
-        )
+        label = _ACCEPTED if c.name in selected else _REJECTED if c.rejected_because else _OTHERS
+        gain, se = c.paired_comparison.elpd_diff, c.paired_comparison.dse
+        axes.errorbar(gain, row, xerr=1.96 * se, fmt="o", color=colour, capsize=2, label=label)
     axes.axvline(step.decoy_threshold, color=OKABE_ITO[1], linestyle="--", label="best decoy")
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     axes.set_yticks(range(len(shown)), [c.name for c in shown])
     axes.set_xscale("symlog", linthresh=1.0)
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_xlabel("gain in log-likelihood a trial, on trials held out")
-    axes.set_title(f"verdict: {d.verdict}" + (f" ({', '.join(d.effects)})" if d.effects else ""))
-    axes.legend(loc="upper left")
+    axes.set_xlabel("gain on held-out trials (log-likelihood per trial)")
+    axes.set_title("Each effect added alone (bars: 95 %)")
+    handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    axes.legend(handles.values(), handles, loc="upper left", handlelength=1, framealpha=0.9)
+
+
+_ACCEPTED, _OTHERS, _REJECTED = "accepted", "not accepted", "not considered"
 
 
 @style()
@@ -113,11 +118,12 @@ def error_by_step_axes(axes: Axes, m: ExtendedModel) -> None:
 def errors_axes(axes: Axes, errors: PairedErrors, names: Sequence[str]) -> None:
     """Root mean square error of models judged on the same windows: one line a horizon, the tracking noise dotted."""
     horizons = [e for e in errors.horizons.values() if e.windows]
-    for colour, marker, e in zip(OKABE_ITO, "os^D", horizons, strict=False):
+    beside = 0.05 * (np.arange(len(horizons)) - (len(horizons) - 1) / 2)  # so that their bars can be told apart
+    for x, colour, marker, e in zip(beside, OKABE_ITO, "os^D", horizons, strict=False):
         values = [1e3 * one.rms_m for one in e.models]
         ends = np.array([[1e3 * (one.rms_m - one.low_m), 1e3 * (one.high_m - one.rms_m)] for one in e.models]).T
         axes.errorbar(
-            range(len(values)),
+            np.arange(len(values)) + x,
             values,
             yerr=np.nan_to_num(ends).clip(min=0),
             marker=marker,

@@ -16,10 +16,10 @@ from bns.diagnose.settings import DEFAULTS
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, note, save, style
 
 _CAUSES = {
-    "thin data": "thin data: the run has driven too little there",
-    "unlearned": "not learned, though the inputs tell it",
+    "thin data": "thin data: the run drove too few such commands",
+    "unlearned": "not learned, although the inputs determine it",
     "unknowable": "the inputs cannot know",
-    "scatter": "scatter: tracking noise, motors, what nothing here explains",
+    "scatter": "scatter: tracking noise, motors, and anything unexplained",
 }
 _VARIABLES = {
     **LABELS,
@@ -45,7 +45,7 @@ def _lines(why: NetworkErrors) -> Iterator[str]:
     if not why.share:
         yield (
             f"  Among them are {commands - outside} commands; from fewer than {FEWEST}, or from fewer than {FEWEST_TRIALS} "
-            "trials, nothing is said. Bring measurements of commands such as the run has driven."
+            "trials, no cause is given. Use measurements of commands like those of the run."
         )
         return
     if outside:
@@ -60,8 +60,8 @@ def _lines(why: NetworkErrors) -> Iterator[str]:
         )
     if why.missing_inputs:
         yield "  More evaluations will not reduce that; `bns diagnose` says which effect it may be."
-    yield f"\n  {'cause':66}{'share of squared error':>24}"
-    yield from (f"  {_CAUSES[name]:66}{share:24.1%}" for name, share in why.share.items())
+    yield f"\n  {'cause':66}{'fraction of squared error':>26}"
+    yield from (f"  {_CAUSES[name]:66}{share:26.1%}" for name, share in why.share.items())
 
 
 @style()
@@ -88,7 +88,7 @@ def _draw_distance(ax: Axes, why: NetworkErrors) -> None:
     ax.set_yscale("log")
     ax.set_xlabel("distance to the training patterns")
     ax.set_ylabel("error of a command")
-    ax.set_title("(a) is the data thin?")
+    ax.set_title("(a) are the data thin?")
     ax.legend(loc="lower right", frameon=True, framealpha=0.9, markerscale=3, handlelength=1)
 
 
@@ -122,7 +122,7 @@ def _binned(ax: Axes, values: Array, errors: Array, colour: str, marker: str, la
 
 
 def _draw_shares(ax: Axes, why: NetworkErrors) -> None:
-    ax.set_title("(c) share of error²")
+    ax.set_title("(c) fraction of squared error")
     names = list(why.share)[::-1]
     ax.barh(range(len(names)), [why.share[n] for n in names], color=[GREY, *OKABE_ITO[2::-1]][: len(names)])
     for row, name in enumerate(names):

@@ -107,12 +107,12 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "paths_text": _paths_text(m, has_after),
         "has_after": has_after,
         "errors": tables.error_table(d, m.comparison),
-        "error_by_step": _drawn(partial(error_by_step_figure, m.extended), "the error ladder") if m.extended else None,
+        "error_by_step": _drawn(partial(error_by_step_figure, m.extended), "error, effect by effect") if m.extended else None,
         "error_by_step_table": tables.error_by_step_table(m.extended) if m.extended else None,
         "comparison": _compared(m.comparison),
         "curves": tables.curves_table(m.comparison) if m.comparison else None,
         "worst": tables.worst_table(m.comparison) if m.comparison else None,
-        "ranking": _drawn(partial(diagnosis_figure, d), "what each effect would explain") if has_found else None,
+        "ranking": _drawn(partial(diagnosis_figure, d, errors=False), "what each effect would explain") if has_found else None,
         "ranking_table": tables.ranking_table(d) if has_found else None,
         "next_lines": proposal_lines(m.proposal) if m.proposal else [m.why_none],
         "plan_picture": _planned(m.proposal),
@@ -122,7 +122,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "exact": tables.exact_table(d) if has_found and d.effects else None,
         "equations": tables.equations_table(d) if d.effects else None,
         "findings": tables.findings_table(m.measured) if m.measured.findings else None,
-        "findings_title": f"{len(m.measured.findings)} oddities found in the data",
+        "findings_title": f"{len(m.measured.findings)} irregularities in the data",
         "origin": f"Data {m.measured.path.name}, SHA-256 {m.measured.digest}…; model {m.model.name}, {m.model.digest}.",
     }
     titles = {"paths": "paths", "errors": "errors", "comparison": "where it fails", "ranking": "every effect"}
@@ -161,15 +161,17 @@ def _competing_models(m: Material) -> list[dict[str, str]]:
 
 def _paths_text(m: Material, has_after: bool) -> str:
     shown, trials = len(m.paths), len(m.measured.tracks)
-    order = "those first in which mending the model changes most" if has_after else "the worst predicted first"
+    order = "those with the largest errors first"
+    if has_after:
+        order = "those first in which the extended model differs most from the given one"
     some = f"{shown} of {trials} trials, {order}" if shown < trials else f"All {trials} trials, {order}"
-    after = " The extended model's numbers come from other trials than those it predicts here." if has_after else ""
+    after = " The extended model predicts each trial with parameters that were fitted to other trials." if has_after else ""
     if isinstance(m.measured.tracks, StretchTracks):
-        begun = f"Predictions start again from the measured pose where each {m.near} begins"
-        return f"{some}. {begun}; those that luck decides are left out.{after}"
+        begun = f"Each {m.near} is predicted from the measured pose at its beginning"
+        return f"{some}. {begun}; those that a small disturbance decides are excluded.{after}"
     return (
-        f"{some}. Predictions start from the first measured pose and know only the commands; even a perfect model's path parts "
-        f"from the measured one in time, since motors vary and the first heading is known only so well.{after}"
+        f"{some}. Predictions start from the first measured pose and use only the commands. Even the path of a perfect model "
+        f"departs from the measured one with time, because motors vary and the first heading is not exact.{after}"
     )
 
 
@@ -182,7 +184,7 @@ def _compared(c: Comparison | None) -> dict[str, Any] | None:
 def _planned(p: Proposal | None) -> dict[str, Any] | None:
     if p is None or not len(p.plan):
         return None
-    return _drawn(partial(plan_figure, p), "the first proposed trials, as each explanation foresees them")
+    return _drawn(partial(plan_figure, p), "the first proposed trials, as each explanation predicts them")
 
 
 def _drawn(draw: Callable[[Path], Path], alt: str) -> dict[str, Any]:

@@ -71,13 +71,13 @@ def headline(d: Diagnosis) -> str:
     said = _all_of(d, d.effects)
     if d.verdict == "tie" and d.selection is not None:
         causes = [_all_of(d, names) for names in (d.selection.accepted, *d.selection.competing_models)]
-        some = [f"that {cause}" for cause in causes[:_CAUSES]] + (["something else"] if len(causes) > _CAUSES else [])
-        return f"The model misses either {', or '.join(some)}. These measurements cannot say which."
+        some = causes[:_CAUSES] + (["something else"] if len(causes) > _CAUSES else [])
+        return f"Missing from the model: either {', or '.join(some)}. These measurements cannot decide which."
     return {
         "none": "Nothing is missing from the model that these measurements could show.",
-        "effects": f"The model misses that {said}.",
-        "unlisted": "Something is missing from the model that is none of the known effects"
-        + (f", beside the fact that {said}." if said else "."),
+        "effects": f"Missing from the model: {said}.",
+        "unlisted": "Something is missing from the model that none of the known effects explains"
+        + (f". Also missing: {said}." if said else "."),
         "insufficient-data": "These measurements do not suffice to say whether anything is missing.",
     }[d.verdict]
 
@@ -95,19 +95,19 @@ def certainty(d: Diagnosis) -> str:
         return d.notes[0] if d.notes else ""
     trials = len(found.problem.predictor.tracks)
     if d.verdict == "none":
-        return f"No known effect earns anything on trials that it was not fitted to ({trials} trials)."
+        return f"No known effect improves the prediction of held-out trials ({trials} trials)."
     if d.verdict == "insufficient-data":
         return (
             next((n for n in d.notes if "more would" in n), "")
-            or f"{trials} trials hint at something, and do not settle it."
+            or f"{trials} trials suggest a missing effect, but are too few to decide."
         )
     if d.verdict == "unlisted":
-        left = next((n for n in d.notes if n.startswith(("Left unexplained", "What is not foreseen"))), "")
-        return f"Over {trials} trials predictions still go wrong in a pattern that is not luck. {left}".strip()
+        left = next((n for n in d.notes if n.startswith(("Left unexplained", "The unexplained motion"))), "")
+        return f"Over {trials} trials, predictions are still wrong in a pattern that chance does not explain. {left}".strip()
     chance = next(c.paired_comparison.p_value for s in found.steps for c in s.ranking if c.name in d.effects)
     better = float((found.problem.fit(without_last(found)).held_out > found.fit.held_out).mean())
     luck = "less than one in ten thousand" if chance < 1e-4 else f"about {chance:.1g}"
     return (
-        f"Judged on trials left out of the fit, {better:.0%} of {trials} trials are predicted better with it; "
-        f"the chance that luck alone does this is {luck}."
+        f"With it, {better:.0%} of {trials} trials are predicted better, each by a fit to other trials. The probability that "
+        f"chance alone gives such a gain is {luck}."
     )

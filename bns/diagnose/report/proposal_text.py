@@ -22,25 +22,25 @@ def model_pair_text(c: ModelPair) -> str:
     if c.indistinguishable:
         other = "; or ".join(c.independent_measurements)
         return f"{pair}: no sequence of commands tells them apart." + (
-            f" Another measurement does: {other}." if other else ""
+            f" Another measurement can: {other}." if other else ""
         )
     if c.already_decided:
-        return f"{pair}: these measurements decide already; {_minutes(c.minutes)} of new ones would do so alone."
-    beside = f" (plain random commands: {c.times_faster:.1f} times as long)" if c.times_faster > 1 else ""
-    return f"{pair}: decided with a chance of {c.power:.0%}; nine in ten would be after {_minutes(c.minutes)}{beside}."
+        return f"{pair}: decided by these measurements already; {_minutes(c.minutes)} of new driving alone would also decide."
+    beside = f" (random commands: {c.times_faster:.1f} times as long)" if c.times_faster > 1 else ""
+    return f"{pair}: decided with a probability of {c.power:.0%}; for 90 % it takes {_minutes(c.minutes)} of driving{beside}."
 
 
 def proposal_lines(p: Proposal) -> list[str]:
     """A sentence a pair, then what the trials are."""
     lines = [model_pair_text(c) for c in p.model_pairs]
     if not len(p.plan):
-        return [*lines, "No trial is proposed: no commands would decide anything."]
+        return [*lines, "No trial is proposed: no commands would decide."]
     a = p.arena
     if a is None or p.bounds is None:
         return [
             *lines,
-            f"{len(p.plan)} trials are proposed, {p.plan.lasting_s.sum() / 60:.1f} min of driving: what was driven before and "
-            "tells most, each driven once more by itself.",
+            f"{len(p.plan)} trials are proposed, {p.plan.lasting_s.sum() / 60:.1f} min of driving: the most "
+            "informative parts of what was driven before, each repeated separately.",
         ]
     return [
         *lines,

@@ -79,7 +79,7 @@ def improvement_text(d: Diagnosis) -> str:
     known = "With it" if d.verdict != "unlisted" else "With the known effects alone"
     noise = f" (tracking noise alone: {_mm(e.noise_floor_m)} mm)" if np.isfinite(e.noise_floor_m) else ""
     before, after = _mm(e.models[0].rms_m), _mm(e.models[-1].rms_m)
-    return f"{known}, predictions {ahead} ahead are {after} mm off instead of {before} mm{noise}."
+    return f"{known}, predictions {ahead} ahead have an error of {after} mm instead of {before} mm{noise}."
 
 
 def error_by_step_table(m: ExtendedModel) -> Table:
@@ -106,7 +106,7 @@ def curves_table(c: Comparison) -> Table:
 def worst_table(c: Comparison) -> Table:
     """The worst moments."""
     rows = [[w.trial, f"{w.t_s:.2f}", _mm(w.position_m), f"{np.degrees(w.heading_rad):+.1f}"] for w in c.worst]
-    return _table(["trial", "time (s)", "position off (mm)", "heading off (°)"], rows)
+    return _table(["trial", "time (s)", "position error (mm)", "heading error (°)"], rows)
 
 
 def ranking_table(d: Diagnosis) -> Table:
@@ -129,7 +129,7 @@ def ranking_table(d: Diagnosis) -> Table:
         )
         rows.append([c.name, *gain, f"{e.p_value:.2g}", "; ".join(values), c.rejected_because])
     return _table(
-        ["effect", "gain per trial", "95 %", "p-value", "fitted parameters (95 %)", "why not considered"], rows
+        ["effect", "gain per trial (log-likelihood)", "95 %", "p-value", "fitted parameters (95 %)", "why not considered"], rows
     )
 
 
@@ -146,7 +146,7 @@ def commands_table(p: Proposal) -> Table:
         return _table(list(table.columns), rows)
     table = table.iloc[:, :4]
     rows = [[int(row[0]), f"{row[1]:.4f}", f"{row[2]:.4f}", f"{row[3]:.2f}"] for row in table.itertuples(index=False)]
-    return _table(["trial", "left (m/s)", "right (m/s)", "for (s)"], rows)
+    return _table(["trial", "left (m/s)", "right (m/s)", "duration (s)"], rows)
 
 
 def exact_table(d: Diagnosis) -> Table:
@@ -157,7 +157,7 @@ def exact_table(d: Diagnosis) -> Table:
         for effect, numbers in d.numbers.items()
         for name, n in numbers.items()
     ]
-    return _table(["effect", "number", "value", "standard error", "95 % from", "to", "unit"], rows)
+    return _table(["effect", "parameter", "value", "standard error", "95 % from", "to", "unit"], rows)
 
 
 def equations_table(d: Diagnosis) -> Table:

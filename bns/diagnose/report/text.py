@@ -20,7 +20,7 @@ from bns.physics.decoys import DECOYS
 _VERDICTS = {
     "none": "Nothing is missing that these measurements could show.",
     "effects": "Missing from the model: {effects}.",
-    "tie": "Missing from the model: {effects}; these measurements cannot tell it from others.",
+    "tie": "Missing from the model: {effects}, or an alternative that these measurements cannot tell from it.",
     "unlisted": "Something is missing that no listed effect explains.",
     "insufficient-data": "These measurements do not suffice for a verdict.",
 }
@@ -32,7 +32,7 @@ def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
     lines = [f"  trial {f.trial}, row {f.row}: {f.text}" for f in findings[:most]]
     if len(findings) > most:
         lines.append(f"  … and {len(findings) - most} more (--findings lists all)")
-    return "\n".join([f"{len(findings)} findings in the data:", *lines]) if findings else "nothing odd in the data"
+    return "\n".join([f"{len(findings)} irregularities in the data:", *lines]) if findings else "no irregularities in the data"
 
 
 def diagnosis_text(d: Diagnosis) -> str:
@@ -44,14 +44,14 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
     yield f"verdict: {d.verdict}"
     yield _VERDICTS[d.verdict].format(effects=" and ".join(d.effects) or "nothing listed")
     if d.selection is not None:
-        yield from (f"It looks like this: {words}." for words in d.terms_in_words)
+        yield from (f"It behaves like this: {words}." for words in d.terms_in_words)
         yield from _numbers(d)
         for group in ties_of(d.selection):
             yield "cannot be told apart: " + ", ".join(group)
         yield from _errors(d.errors_with_terms or d.errors)
         yield from _ranking(d)
     if d.calibration is not None:
-        yield "\nrobot and sensor calibrated together, each number with all others free:"
+        yield "\nrobot and sensor calibrated together, each parameter with all others free:"
         yield from _intervals(numbers_of(d.calibration))
         for side, (value, low, high) in wheel_sizes(d.calibration).items():
             yield f"  {side} wheel: {value:.5g} of the drawing's size (95 %: {low:.5g} to {high:.5g})"
@@ -75,9 +75,14 @@ def _intervals(
     for effect, numbers in values.items():
         for name, n in numbers.items():
             if n["low"] is not None and n["high"] is not None:
-                yield f"  {effect}: {name} = {n['value']:.5g} {n['unit']} (95 %: {n['low']:.5g} to {n['high']:.5g})"
+                yield f"  {effect}: {name} = {n['value']:.5g}{_unit(n)} (95 %: {n['low']:.5g} to {n['high']:.5g})"
         if catalogue and effect in catalogue:
             yield f"    {catalogue[effect].equation}"
+
+
+def _unit(number: Mapping[str, Any]) -> str:
+    """The unit behind a blank; nothing for a bare number."""
+    return "" if number["unit"] == "1" else f" {number['unit']}"
 
 
 def _errors(errors: PairedErrors | None) -> Iterator[str]:
@@ -97,27 +102,28 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
         if not e.windows:
             continue
         for index, m in enumerate(e.models):
-            change = _change(e.changes[index - 1]) if index else ""
+            change, verdict = _change(e.changes[index - 1]) if index else ("", "")
             noise = f"{1e3 * e.noise_floor_m:8.2f}" if np.isfinite(e.noise_floor_m) else f"{'?':>8}"
             ends = f"{noise}{e.windows:9d}" if index == 0 else ""
             error, name = f"{_mm(m.rms_m):>8} ({_mm(m.median_m):>5})", (before_added if index else "") + m.name
-            yield f"  {horizon if index == 0 else '':10}{name:26}{error}{change:>30}{ends}".rstrip()
+            yield f"  {horizon if index == 0 else '':10}{name:26}{error}{change:>30}{ends}{verdict}".rstrip()
     if any(e.left_out for e in errors.horizons.values()):
         left_out = ", ".join(f"{e.left_out} at {h}" for h, e in errors.horizons.items() if e.left_out)
-        yield f"  (left out, since within them the tracker jumps or poses were left out: {left_out})"
+        yield f"  (windows excluded because the tracker jumps within them or poses were left out: {left_out})"
     if errors.noise is None:
-        yield "  (noise: these poses are too far apart in time to show it)"
+        yield "  (noise not known: the poses are too far apart in time)"
     else:
         pose_mm, basis = 1e3 * errors.noise.position_m, errors.noise.basis
         basis = basis if basis.startswith("at ") else f"at {basis}"
-        yield f"  (noise: error of the tracking alone, {pose_mm:.2f} mm a pose, estimated from poses {basis})"
+        yield f"  (noise: error that the tracking alone causes; {pose_mm:.2f} mm per pose, estimated from poses {basis})"
 
 
-def _change(c: Change) -> str:
+def _change(c: Change) -> tuple[str, str]:
+    """The change with its interval, and what stands behind it where the error does not fall."""
     if not np.isfinite(c.low_m):
-        return f"{1e3 * c.change_m:+.2f} (too few trials)"
-    said = "" if c.fell else "  rises" if c.rose else "  undecided"
-    return f"{1e3 * c.change_m:+.2f} ({1e3 * c.low_m:+.2f} to {1e3 * c.high_m:+.2f}){said}"
+        return f"{1e3 * c.change_m:+.2f} (too few trials)", ""
+    verdict = "" if c.fell else "  rises" if c.rose else "  undecided"
+    return f"{1e3 * c.change_m:+.2f} ({1e3 * c.low_m:+.2f} to {1e3 * c.high_m:+.2f})", verdict
 
 
 def _mm(metres: float) -> str:
@@ -126,13 +132,13 @@ def _mm(metres: float) -> str:
 
 def _ranking(d: Diagnosis) -> Iterator[str]:
     assert d.selection is not None
-    yield "\neach effect added alone: gain on trials held out (log-likelihood a trial):"
+    yield "\neach effect added alone: gain on held-out trials (log-likelihood per trial):"
     yield f"  {'effect':20}{'gain':>10}{'± se':>10}{'p':>10}"
     for c in d.selection.steps[0].ranking[:_SHOWN]:
         rejected = f"not considered: {c.rejected_because}" if c.rejected_because else ""
         e = c.paired_comparison
         yield f"  {c.name:20}{e.elpd_diff:10.3f}{e.dse:10.3f}{e.p_value:10.2g}  {rejected}".rstrip()
-    yield f"  (the best of {len(DECOYS)} decoys: {d.selection.steps[0].decoy_threshold:.3f})"
+    yield f"  (gain of the best of {len(DECOYS)} decoys: {d.selection.steps[0].decoy_threshold:.3f})"
 
 
 def comparison_text(c: Comparison) -> str:
@@ -142,7 +148,7 @@ def comparison_text(c: Comparison) -> str:
 
 def _comparison(c: Comparison) -> Iterator[str]:
     yield f"{c.trials} trials, {c.frames} tracked poses, model {c.model}"
-    yield "\nerror of predictions from the measured pose (root mean square):"
+    yield "\nerror of predictions from the measured pose (root mean square; ±: standard error over trials):"
     yield f"  {'horizon':10}{'position mm':>14}{'forward':>10}{'left':>10}{'heading deg':>13}{'noise mm':>10}{'windows':>9}"
     for horizon, e in c.errors.items():
         if e["windows"]:
@@ -151,9 +157,9 @@ def _comparison(c: Comparison) -> Iterator[str]:
                 f"  {horizon:10}{1e3 * e['position_m']:8.2f} ±{1e3 * e['position_se_m']:4.2f}{1e3 * e['forward_m']:10.2f}"
                 f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{noise}{e['windows']:9.0f}"
             )
-    yield "  (noise: what tracking noise alone would show, from the tracks; the drive's own scatter comes on top)"
-    yield "\nwhere it fails: what a free curve along each variable would explain, on trials held out:"
-    yield f"  {'variable':30}{'velocity':16}{'share of loss':>14}{'p':>10}"
+    yield "  (noise: error that tracking noise alone would cause; the scatter of the drive comes on top of it)"
+    yield "\nwhere it fails: fraction of the loss that a free curve along each variable would remove, on held-out trials:"
+    yield f"  {'variable':30}{'velocity':16}{'fraction':>14}{'p':>10}"
     for p in c.residual_dependence[:_SHOWN]:
         yield f"  {p.variable:30}{p.channel:16}{p.share:14.2%}{p.paired_comparison.p_value:10.2g}"
     yield from _scores(c.scores)
@@ -170,7 +176,7 @@ def ahead(horizon: str) -> str:
 
 
 def _scores(scores: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
-    """What each network is worth, where the model is networks of cycles."""
+    """How well each network predicts, where the model is networks of cycles."""
     if scores:
         yield "\nnetworks (displacements: predicted against measured; R² of the regression; mm):"
     for name, s in scores.items():
@@ -188,6 +194,6 @@ def extension_text(m: ExtendedModel) -> str:
     lines = ["position error on held-out trials, mm: root mean square (median), all on the same windows:"]
     lines += error_lines(m.errors, "+ ")
     for effect, numbers in numbers_of(m.fit).items():
-        lines += [f"  {effect}: {name} = {n['value']:.5g} ± {n['se']:.2g} {n['unit']}" for name, n in numbers.items()]
+        lines += [f"  {effect}: {name} = {n['value']:.5g} ± {n['se']:.2g}{_unit(n)}" for name, n in numbers.items()]
     lines += [f"  warning: {text}" for text in m.warnings]
     return "\n".join(lines)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, formula_effect
 
 NAME = "unlisted"
+RESPONSE = "response of each wheel in time"
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 CHANCE = DEFAULTS.residuals.chance
 LEAST = DEFAULTS.residuals.least
@@ -33,6 +35,7 @@ SPEED_KNOTS = DEFAULTS.residuals.speed_knots
 SESSION_KNOTS = DEFAULTS.residuals.session_knots
 TIME_KNOTS = DEFAULTS.residuals.time_knots
 REVERSAL_KNOTS = DEFAULTS.residuals.reversal_knots
+RESPONSE_KNOTS_S = DEFAULTS.residuals.response_knots_s
 SURFACE_KNOTS = DEFAULTS.residuals.surface_knots
 SWING_KNOTS = DEFAULTS.residuals.swing_knots
 FLOOR_SIDE = DEFAULTS.residuals.floor_side
@@ -99,6 +102,7 @@ def _surfaces(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
     if fastest > 0.0 and sharpest > 0.0:
         yield Family(SURFACE, "w", tuple(f"sign(w) * {v} * {w}" for v in speeds for w in turns[1:]))
         yield Family(SURFACE, "v", tuple(f"sign(v) * {v} * {w}" for v in speeds[1:] for w in turns))
+        yield Family(SURFACE, SHARE, tuple(f"{v} * {w}" for v in speeds for w in turns)[1:])
 
 
 def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
@@ -106,6 +110,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     yield Family(
         "changes of speed of each wheel", WHEELS, ("fresh", "max(fresh, 0)", "fresh * abs(fresh)", "fresh * abs(u)")
     )
+    yield Family(RESPONSE, WHEELS, tuple(f"(ago({a:g}, {b:g}) - u)" for a, b in pairwise(RESPONSE_KNOTS_S)))
     if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0:
         ways = [share * wheelbase_m for share in REVERSAL_KNOTS]
         yield Family("way since each wheel reversed", WHEELS, tuple(f"u * {h}" for h in _hats("since", ways)[:-1]))

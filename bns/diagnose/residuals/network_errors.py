@@ -108,8 +108,8 @@ def why_wrong(predictor: NetworkPredictor, seed: int = 0) -> NetworkErrors:
     """
     if predictor.learned_from.shape[1] <= NEIGHBOURS:
         raise DataError(
-            f"The networks come with {predictor.learned_from.shape[1]} training patterns, so where their data are thin cannot be "
-            "said; write networks with: bns run --save-snn FILE."
+            f"The networks come with {predictor.learned_from.shape[1]} training patterns, so it is not known where their data "
+            "are thin; write networks with: bns run --save-snn FILE."
         )
     inputs, commands = _commands(predictor)
     distance, radius = nearness(inputs, predictor.learned_from.T.astype(np.float64))
@@ -153,7 +153,7 @@ def nearness(inputs: Array, patterns: Array) -> tuple[Array, float]:
     neighbours = min(NEIGHBOURS, len(distinct) - 1)
     if neighbours < 1:
         raise DataError(
-            "The networks were trained on one command alone; nothing can be said about where their data are thin."
+            "The networks were trained on one command only, so it is not known where their data are thin."
         )
     own = tree.query(distinct, k=neighbours + 1)[0][:, 1:].mean(axis=1)
     asked = np.reshape(tree.query(inputs, k=neighbours)[0], (len(inputs), neighbours)).mean(axis=1)
@@ -165,7 +165,7 @@ def _commands(predictor: NetworkPredictor) -> tuple[Array, Commands]:
     tracks, robot, node = predictor.tracks, predictor.robot, predictor.node
     end = np.flatnonzero(~tracks.is_first & (node == np.roll(node, 1) + 1))
     if not len(end):
-        raise DataError("No command was tracked at both its ends; log the pose before and after each command.")
+        raise DataError("No command was tracked at both ends; log the pose before and after each command.")
     trial, which = tracks.trial[end], node[end] - 1
     lists = [predictor.commands(i) for i in range(len(tracks))]
     inputs = np.concatenate([robot.inputs(one).T for one in lists]).astype(np.float64)

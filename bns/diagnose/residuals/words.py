@@ -8,6 +8,7 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_KNOTS_S
 from bns.diagnose.residuals.symbolic import Formula
 from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, value_of
 
@@ -35,7 +36,7 @@ _VELOCITIES = {
     "s": "sideways velocity",
     "east": "velocity east",
     "north": "velocity north",
-    "share": "the share of the commanded motion that is driven",
+    "share": "the fraction of the commanded motion that is driven",
     "wheels": "the speed of each wheel",
     "left": "the speed of the left wheel",
     "right": "the speed of the right wheel",
@@ -72,14 +73,14 @@ def _reversal(term: Formula, _: Predictor) -> str:
     way = np.linspace(0.0, 1.0, 10 * _POINTS)
     lost = -float(np.trapezoid(_curve(term, "since", way, u=1.0), way))
     verb = "loses" if lost >= 0 else "gains"
-    return f"a wheel {verb} {1e3 * abs(lost):.3g} mm of its way whenever it changes direction"
+    return f"a wheel {verb} {1e3 * abs(lost):.3g} mm of its distance whenever it changes direction"
 
 
 def _swing(term: Formula, _: Predictor) -> str:
     back, across = _curve(term, "swing", np.array([1.0, 0.5]))
     return (
-        f"{_slower(-back)} while the motion's direction is opposite to that of the last half wheelbase of way, "
-        f"{_slower(-across)} while it is square to it"
+        f"{_slower(-back)} while the direction of motion is opposite to that over the last half wheelbase of distance, "
+        f"{_slower(-across)} while it is perpendicular to it"
     )
 
 
@@ -93,7 +94,7 @@ def _speed(term: Formula, predictor: Predictor) -> str:
         at, got = np.append(at, -fastest), np.append(got, back)
     pairs = ", ".join(f"{a:.3g} m/s gives {b:.3g} m/s" for a, b in zip(at, got, strict=True))
     whose = {LEFT: "the left wheel", RIGHT: "the right wheel"}.get(term.on, "a wheel")
-    return f"{whose}'s speed is not in proportion to its command: {pairs}"
+    return f"{whose}'s speed is not proportional to its command: {pairs}"
 
 
 def _work(term: Formula, _: Predictor) -> str:
@@ -108,13 +109,32 @@ def _steps(term: Formula, _: Predictor) -> str:
     speeds = np.linspace(0.0, 1.0, 100 * _POINTS)
     jumps = np.flatnonzero(np.diff(_curve(term, "u", speeds)) > 0)
     step = float(np.median(np.diff(speeds[jumps]))) if len(jumps) > 1 else float("nan")
-    return f"wheels' speeds come in steps of {step:.3g} m/s"
+    return f"wheel speeds come in steps of {step:.3g} m/s"
 
 
 def _changes(term: Formula, _: Predictor) -> str:
     jump = np.array([0.1])
     rest = float(_curve(term, "fresh", jump, u=0.1)[0] / jump[0])
-    return f"of a fresh change of speed wheels {'lack' if rest < 0 else 'add'} {abs(rest):.0%}, fading within 0.15 s"
+    return f"just after a change of speed, {abs(rest):.0%} of it is {'missing' if rest < 0 else 'added'}, fading within 0.15 s"
+
+
+def _response(term: Formula, _: Predictor) -> str:
+    """From the wheel's speed after a step of its command from 0 to 1."""
+    grid = np.linspace(0.0, 2.0 * RESPONSE_KNOTS_S[-1], 10 * _POINTS)
+
+    def ago(from_s: float, to_s: float) -> Array:
+        return np.clip((grid - from_s) / (to_s - from_s), 0.0, 1.0)
+
+    speed = 1.0 + value_of(term.term, {**term.values, "u": np.ones_like(grid), "ago": ago})
+    end = float(speed[-1])
+    half = float(grid[np.argmax(speed >= end / 2.0)])
+    settled = float(grid[np.max(np.flatnonzero(np.abs(speed - end) > 0.05 * abs(end)), initial=0)])
+    over = float(speed.max()) / end - 1.0
+    beyond = f", goes beyond it by {over:.0%} after {grid[int(speed.argmax())]:.2g} s" if over > 0.02 else ""
+    return (
+        f"after a change of its command a wheel has half of the new speed after {half:.2g} s{beyond}, and stays within 5% of it "
+        f"from {settled:.2g} s on"
+    )
 
 
 def _largest(term: Formula, predictor: Predictor) -> str:
@@ -145,4 +165,5 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("recent work of each wheel", "wheels"): _work,
     ("speed in steps", "wheels"): _steps,
     ("changes of speed of each wheel", "wheels"): _changes,
+    (RESPONSE, "wheels"): _response,
 }

@@ -60,6 +60,12 @@ class SelectionResult:
         problem = problem_for(self.problem.predictor, model, self.problem.pose_filter.noise)
         return replace(self, problem=problem, fit=problem.fit(model), accepted=names, competing_models=())
 
+    def lacking(self, names: tuple[str, ...]) -> SelectionResult:
+        """The result without some of its effects, refitted; of its competing models those that had them all, without them."""
+        kept = self.only(tuple(name for name in self.accepted if name not in names))
+        competing = (tuple(n for n in one if n not in names) for one in self.competing_models if set(names) <= set(one))
+        return replace(kept, competing_models=tuple(competing))
+
     def withdrawn(self) -> SelectionResult:
         """The result without its effects: the model as it was, its numbers refitted."""
         problem = problem_for(self.problem.predictor, self.nominal.model)

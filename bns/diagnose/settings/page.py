@@ -17,11 +17,11 @@ Every threshold of `bns diagnose`, `compare`, `add`, `propose` and `report`, gro
 
 The values are defined in `bns/diagnose/settings`; this page is made from them by `python -m
 bns.diagnose.settings > docs/settings.md`. `--json` and `to_json()` carry all of them under `provenance`, with
-their digest, here `{{digest}}`. Two results with the same digest were made by the same settings.
+their digest, here `{{digest}}`. Two results with the same digest were made with the same settings.
 
 To use other values, write `bns diagnose LOG --model M --settings FILE.yaml` or `bns.diagnose(log, model,
 settings=...)`. The file has a section for each folder (`select:`, below it `min_gain: 0.02`). What differs from the
-default is printed, and stands in the provenance under `settings_changed`.
+default is printed, and is listed in the provenance under `settings_changed`.
 
 Of the {{count}} settings, {{unmeasured}} are marked "{BY_HAND}": no study tried other values of that one alone.
 All of them together are judged on generated worlds ([hidden effects](hidden-effects.md)).

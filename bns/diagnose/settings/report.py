@@ -11,17 +11,21 @@ from bns.diagnose.settings.setting import BY_HAND, setting
 class Report:
     """``report/``: how much of a table, a path or a list is shown."""
 
-    most_trials: int = setting(24, "trials", f"Trials whose paths a page shows at most, to stay small; {BY_HAND}.")
-    most_poses: int = setting(160, "poses", f"Poses of a path at most: more than a screen can show; {BY_HAND}.")
+    most_trials: int = setting(
+        24, "trials", f"Largest number of trials whose paths a page shows, to keep it small; {BY_HAND}."
+    )
+    most_poses: int = setting(
+        160, "poses", f"Largest number of poses of a path: more than a screen can show; {BY_HAND}."
+    )
     strange: float = setting(
         6.0,
         "1",
-        "Trials whose error is so many times the median's come last: their first pose was a mistaken marker, not the model's "
-        f"fault; {BY_HAND}.",
+        "Trials whose error is this many times the median come last: their first pose was a mistaken marker, not an "
+        f"error of the model; {BY_HAND}.",
     )
-    rows: int = setting(8, "rows", f"Rows of a ranking in the text for a terminal; {BY_HAND}.")
-    network_bins: int = setting(8, "bins", f"Bins of a picture of networks' errors; {BY_HAND}.")
-    large: float = setting(1.0, "s or m", "From one second or metre on, numbers are not told in ms or mm.")
-    causes: int = setting(3, "causes", f"Causes that a headline names at most; {BY_HAND}.")
-    frame_s: float = setting(0.1, "s", f"Time between points of a planned path that is drawn; {BY_HAND}.")
+    rows: int = setting(8, "rows", f"Rows of a ranking in the terminal; {BY_HAND}.")
+    network_bins: int = setting(8, "bins", f"Bins of a figure of networks' errors; {BY_HAND}.")
+    large: float = setting(1.0, "s or m", "From one second or one metre on, values are not shown in ms or mm.")
+    causes: int = setting(3, "causes", f"Largest number of causes in a headline; {BY_HAND}.")
+    frame_s: float = setting(0.1, "s", f"Time between the points of a planned path that is drawn; {BY_HAND}.")
     planned_trials: int = setting(3, "trials", f"Proposed trials that a figure shows; {BY_HAND}.")

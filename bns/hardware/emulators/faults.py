@@ -22,7 +22,7 @@ from bns.errors import HardwareError, unknown_name
 from bns.safe_yaml import Lines, read_yaml_file, shown
 
 KINDS: Mapping[str, str] = {
-    "lost-request": "the robot hears nothing of a command",
+    "lost-request": "a command does not reach the robot",
     "lost-reply": "the robot obeys, its answer is lost",
     "corrupt-reply": "a byte of the answer is another one",
     "bus-fault": "the robot's inner bus fails: the command is not carried out and nothing answers",
@@ -33,7 +33,7 @@ KINDS: Mapping[str, str] = {
     "stuck-marker": "the tracker shows an old picture as if it were new",
     "late-tracker": "the tracker's poses are older than their time stamps, by for_s, from at_s on",
     "frozen-picture": "the camera sends one picture again and again; only a clock in its corner goes on",
-    "frozen-scene": "the tracker goes on and shows what was there when this began",
+    "frozen-scene": "the tracker keeps showing the scene of when this began",
     "swapped-markers": "lights change places in the report",
     "reflection": "a light that is no marker appears",
     "silent-servo": "one servo does not answer",

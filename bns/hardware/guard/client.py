@@ -213,7 +213,7 @@ class Guard:
 
     def _restart(self) -> None:
         """The guard was killed: a new one takes the port, and the drive ends."""
-        self._why = "the guard of the robot's port was gone"
+        self._why = "the guard of the robot's port had ended"
         if time.monotonic() - self._tried_s < 1.0:
             return
         self._tried_s = time.monotonic()

@@ -50,7 +50,7 @@ def snake_settings(driver: Mapping[str, Any]) -> SnakeSettings:
         raise HardwareError(f"the bridge's sketch drives AX-12 servos only, and the rig says {table.model}; use wiring: bus.")
     limits = replace(limits_of(table), **{name: _number(name, driver[name]) for name in _LIMITS if name in driver})
     if not 0.0 < limits.torque <= 1.0:
-        raise HardwareError(f"the snake's torque is {limits.torque:g}; it is a share of the servos' highest, above 0 up to 1.")
+        raise HardwareError(f"the snake's torque is {limits.torque:g}; it is a fraction of the servos' highest, above 0 up to 1.")
     if limits.high_v >= table.volts[1] + _REFUSED_V:
         raise HardwareError(f"the snake's high_v is {limits.high_v:g}; the servos' makers allow {table.volts[1]:g} V.")
     return SnakeSettings(

@@ -138,7 +138,7 @@ class WiiTracker:
             except BlockingIOError:
                 return
             except OSError as error:
-                raise HardwareError(f"the Wii remote is gone: {error.strerror}. Change its batteries, pair it again.") from error
+                raise HardwareError(f"the Wii remote is disconnected: {error.strerror}. Check its batteries.") from error
             if not data:
                 return
             self._take(self._rest + data)

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.errors import ModelError, unknown_name
-from bns.extras import extra
+from bns.extras import deferred
 from bns.physics.jointed.plant import Plant, sound
 
-with extra("snake"):
-    import mujoco
+mujoco = deferred("snake", "mujoco")
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.extras import extra
+from bns.extras import deferred
 from bns.physics.jointed.drives import Drive, told_speed_rad_s
 from bns.physics.jointed.mechanism import Machine
 from bns.physics.jointed.plant import Array, Plant, Sighting
 
-with extra("snake"):
-    import mujoco
-    from mujoco import rollout
+mujoco = deferred("snake", "mujoco")
+rollout = deferred("snake", "mujoco.rollout")
 
 SETTLE_S = 0.4
 """How long a body that was put down is left to come to rest."""

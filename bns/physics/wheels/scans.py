@@ -53,6 +53,35 @@ def delayed(target: Array, step_s: Array, delay_s: float) -> Array:
 
 
 @exact
+def averaged(target: Array, step_s: Array, from_s: float, to_s: float) -> Array:
+    """Mean over each step of the target's mean from ``from_s`` to ``to_s`` ago (the smaller first), 0 before the start; exact."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        for end in range(2):
+            sign, ago_s = (1.0, from_s) if end == 0 else (-1.0, to_s)
+            now = way = area = then = 0.0  # when step k began, the way until then, the way's integral; that integral at ``begun``
+            k, begun = 0, -ago_s
+            for i in range(target.shape[1]):
+                h = step_s[row, i]
+                if h == 0.0:
+                    continue
+                ended = begun + h
+                while k < target.shape[1] and now + step_s[row, k] < ended:
+                    area += (way + target[row, k] * step_s[row, k] / 2.0) * step_s[row, k]
+                    way += target[row, k] * step_s[row, k]
+                    now += step_s[row, k]
+                    k += 1
+                at, into = area, ended - now
+                if into > 0.0:
+                    at += way * into
+                    if k < target.shape[1]:
+                        at += target[row, k] * into * into / 2.0
+                mean[row, i] += sign * (at - then) / (h * (to_s - from_s))
+                then, begun = at, ended
+    return mean
+
+
+@exact
 def rate_limited(target: Array, step_s: Array, limit: float) -> Array:
     """Mean over each step of w, which follows the target with |dw/dt| <= limit, from 0; exact."""
     mean = np.zeros_like(target)

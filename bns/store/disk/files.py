@@ -59,7 +59,7 @@ def explained(action: str, path: Path) -> Iterator[None]:
         elif error.errno in _FULL:
             reason, remedy = (
                 "The disk, quota or file size limit is full.",
-                "free some space and repeat the command, which goes on where it stopped.",
+                "free some space and repeat the command, which continues where it stopped.",
             )
         elif error.errno in _LOCKED_OUT:
             reason, remedy = (
@@ -92,8 +92,8 @@ def is_same(path: Path, known: os.stat_result) -> bool:
 def gone(path: Path, lost: str) -> StoreError:
     """The error of a writer under whom ``path`` was taken away; ``lost`` says what was in it."""
     return StoreError(
-        f"{path} is gone: the results were deleted or moved while they were being written. {lost} "
-        "Run the sweep again: it does what is missing. If the folder was moved, move it back first or name its "
+        f"{path} is missing: the results were deleted or moved while they were being written. {lost} "
+        "Run the sweep again: it carries out the missing runs. If the folder was moved, move it back first or name its "
         "new place with --results DIR; and leave it alone while a sweep is running."
     )
 

@@ -65,7 +65,7 @@ def full_snapshot(results: Path) -> Snapshot:
     if found is None or found.is_empty:
         raise StoreError(
             f"there are no results in {results}: {what_is_there(results)}. Make some with: "
-            "bns sweep sweeps/khepera-small.yaml, or: bns run; or name another folder with "
+            "bns sweep khepera-small, or: bns run; or name another folder with "
             "--results DIR."
         )
     return found

@@ -23,7 +23,7 @@ def set_aside_damaged(results: Path, sweep: str) -> list[Path]:
     for file in bad:
         moved.append(set_aside(results, file.path))
         warnings.warn(
-            f"{file.path} is set aside as {moved[-1]}: {file.reason}. The runs that it held are done again.",
+            f"{file.path} is set aside as {moved[-1]}: {file.reason}. Its runs are repeated.",
             StoreWarning,
             stacklevel=4,
         )

@@ -17,7 +17,7 @@ from bns.sweep.runner import Summary, run_sweep
 
 def placement(request: Request) -> Placement:
     """Nothing can be foretold: SpecError."""
-    raise SpecError("--dry-run knows the pace of cores, not of a GPU; leave --device out to count runs and disk space.")
+    raise SpecError("--dry-run knows the speed of cores, not of a GPU; leave --device out to count runs and disk space.")
 
 
 def carry_out(sweep: Sweep, request: Request) -> Summary:

@@ -103,7 +103,7 @@ class DaskLink:
         if time.monotonic() - self._lost_at > self._patience_s:
             raise ClusterError(
                 f"the Dask scheduler at {self.address} has been away for {self._patience_s:.0f} s. What was finished is "
-                "stored; start the scheduler and its workers again and repeat the command, which goes on from here."
+                "stored; start the scheduler and its workers again and repeat the command, which continues from here."
             )
         if self.client.status == "closed":
             self._try_again()

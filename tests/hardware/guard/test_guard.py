@@ -116,7 +116,7 @@ def test_a_robot_stands_when_its_trial_is_there_and_does_nothing(tmp_path, nurse
 @pytest.mark.parametrize(
     ("cause", "link", "why"),
     [
-        ("camera frozen (scene)", "serial", "the picture shows it where it was"),
+        ("camera frozen (scene)", "serial", "the picture shows no motion"),
         ("camera frozen (scene)", "bus", "same picture again and again|the picture shows both markers where they were"),
     ],
 )
@@ -215,7 +215,7 @@ def test_a_guard_that_is_killed_is_replaced_by_one_that_stops_the_robot(tmp_path
         standby.kill()
         standby.wait(HANGS_S)
     until(guard.tripped)
-    assert guard.tripped() == "the guard of the robot's port was gone"
+    assert guard.tripped() == "the guard of the robot's port had ended"
     assert guard.process != first
     assert (guard.process == standby.pid) is not both
     until(lambda: outlive._events(tmp_path))

@@ -46,7 +46,7 @@ def test_out_of_sight_for_too_long_ends_it(clock):
 def test_a_computer_that_is_too_busy_pauses_the_trial(clock):
     watch = Watch(LIMITS, clock, Stopping())
     clock.sleep(1.2)
-    with pytest.raises(TrialPausedError, match=r"nobody looked at the robot for 1\.2 s"):
+    with pytest.raises(TrialPausedError, match=r"the program did not check the robot for 1\.2 s"):
         watch.check(sight(clock))
 
 

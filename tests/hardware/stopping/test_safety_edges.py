@@ -123,7 +123,7 @@ def test_a_look_may_come_as_late_as_the_limit_and_no_later(hands):
     hands.t_s = BEGIN_S + 2.0
     looked.check(None)
     hands.t_s = BEGIN_S + 3.125
-    with pytest.raises(TrialPausedError, match=r"nobody looked at the robot for 1\.1 s"):
+    with pytest.raises(TrialPausedError, match=r"the program did not check the robot for 1\.1 s"):
         looked.check(None)
 
 

@@ -44,7 +44,7 @@ def test_a_trial_runs_again_from_its_journal(tmp_path):
 
 
 def test_what_does_not_go_together_is_named(tmp_path, commands):
-    with pytest.raises(bns.HardwareError, match="replay is a trial from its journal, without a robot"):
+    with pytest.raises(bns.HardwareError, match="replay runs a trial from its journal, without a robot"):
         bns.trial(replay=tmp_path / "journal.jsonl", commands=commands)
     with pytest.raises(bns.HardwareError, match="a real robot needs --rig FILE"):
         bns.trial(commands=commands)

@@ -79,7 +79,7 @@ def checked_cycles(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
                 found.append({"trial": trial, "cycle": number, **row})
     if not found:
         raise DataError(
-            "There is no whole cycle in these measurements: each needs its markers at its begin and at its end."
+            "There is no complete cycle in these measurements: each needs its markers at its beginning and its end."
         )
     return pd.DataFrame(found), findings
 
@@ -127,7 +127,7 @@ def _cycle(trial: str, number: int, rows: pd.DataFrame, findings: list[Finding])
     elif begin[list(MARKERS)].isna().any() or end[list(MARKERS)].isna().any():
         reason = "a marker lost at its begin or end"
     elif said.empty:
-        reason = "nobody says whether it was stable"
+        reason = "it is not known whether it was stable"
     if reason:
         findings.append(Finding(trial, row, f"cycle {number}: {reason}; left out"))
         return None
@@ -138,7 +138,7 @@ def _cycle(trial: str, number: int, rows: pd.DataFrame, findings: list[Finding])
             Finding(
                 trial,
                 row,
-                f"cycle {number}: the markers are {100 * stretched:+.0f} cm further apart at its end; mistaken?",
+                f"cycle {number}: the distance of the markers changes by {100 * stretched:+.0f} cm; was a marker mistaken?",
             )
         )
     inner = rows.iloc[1:-1].dropna(subset=list(MARKERS))

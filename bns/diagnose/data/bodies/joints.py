@@ -56,7 +56,7 @@ def joint_tracks(table: pd.DataFrame) -> tuple[JointTracks, list[Finding]]:
         left_out = left_out_rows(good)
         whole = np.isfinite(seen).all(axis=1) & ~left_out
         if np.isnan(told).any() or whole.sum() < 2:
-            findings.append(Finding(str(trial), int(given.index[0]), "no set points, or hardly seen; the trial is left out"))
+            findings.append(Finding(str(trial), int(given.index[0]), "no set points, or too few poses; the trial is excluded"))
             continue
         t = good["t_s"].to_numpy(float)
         names.append(str(trial))

@@ -189,7 +189,7 @@ def stretches_of_joints(tracks: JointTracks, mechanism: Mechanism, joints: Seque
             told.append(SetPoints(rows[0], rows[1][:, columns], from_s, to_s, tuple(joints)))
             of.append(trial)
     if not told:
-        raise DataError(f"No trial lasts {RUN_UP_S + _LASTS_S:g} s, for a stretch and what came before it; give longer ones.")
+        raise DataError(f"No trial lasts {RUN_UP_S + _LASTS_S:g} s, for a stretch and the time before it; give longer trials.")
     about = {f"{name}{SET}": np.array([s.at_begin[k] for s in told]) for k, name in enumerate(joints[:MOST_ABOUT])}
     return _joined(tracks, np.array(of, dtype=np.int64), points, since, number, times, told, about)
 

@@ -119,25 +119,25 @@ def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[s
     yield from _lacks(entries)
     yield from _placeholders(entries)
     if {FORWARD, TURN} <= set(entries):
-        yield "Fill in METRES, the distance of the wheels that the robot's own controller reckons with."
+        yield "Fill in METRES, the wheelbase that the robot's own controller assumes."
     told = " ".join(words_of(str(entries[n]["from"])) for n in (*COMMANDS, FORWARD, TURN) if n in entries)
     if told and rank(told, truth=False) < 0:
-        yield "The speeds are measured ones, not commands: what motors and controller do to a command (lag, limits) cannot show."
+        yield "The speeds are measured, not commanded: effects of motors and controller (lag, limits) cannot show."
     seen = " ".join(words_of(str(entries[n]["from"])) for n in POSE if n in entries)
     if seen and rank(seen, truth=True) < 0:
-        yield "These poses are the robot's own odometry: they agree with its wheels whatever it does. Use those of a tracker."
+        yield "These poses are the robot's own odometry: they agree with its wheels whatever it does. Use poses of a tracker."
     if any(str(c).startswith("column_") for table in tables.values() for c in table.columns):
-        yield "Columns without a heading are called column_1, column_2, ...; say which is which."
+        yield "Columns without a heading are called column_1, column_2, ...; assign each."
 
 
 def _lacks(entries: Mapping[str, Any]) -> Iterator[str]:
     if "t_s" not in entries and "duration_s" not in entries:
-        yield "No column tells the time; add an entry t_s."
+        yield "No column holds the time; add an entry t_s."
     if not ({*COMMANDS} <= set(entries) or {FORWARD, TURN} <= set(entries) or {"left_m", "right_m"} <= set(entries)):
-        yield f"No column tells what the robot was commanded. What would serve: {_SERVE_COMMANDS}."
+        yield f"No column holds the commands. Suitable are {_SERVE_COMMANDS}."
     gone = [name for name in POSE if name not in entries]
     if gone:
-        yield f"No column tells {', '.join(gone)}. What would serve: {_SERVE_POSE}."
+        yield f"No column holds {', '.join(gone)}. Suitable are {_SERVE_POSE}."
 
 
 def _placeholders(entries: Entries) -> Iterator[str]:
@@ -145,4 +145,4 @@ def _placeholders(entries: Entries) -> Iterator[str]:
     if RADIUS in scales:
         yield f"Fill in {RADIUS}, the radius of the wheels: their speeds are in rad/s."
     if METRES_A_COUNT in scales:
-        yield f"Fill in {METRES_A_COUNT}, the way of a wheel in metres for one count of its encoder."
+        yield f"Fill in {METRES_A_COUNT}, the distance in metres that a wheel drives for one count of its encoder."

@@ -52,7 +52,7 @@
     text(90, 20, `${Math.round(most)} mm`, "start");
     text(78, 122, "0", "end");
     text(580, 138, `${last.toFixed(1)} s`, "end");
-    text(84, 138, "prediction off by, over time", "start");
+    text(84, 138, "position error against time", "start");
     for (const kind of rivals) {
       const d = path(trial.t.map((t, k) => on(t, error(kind, k))));
       make("path", {d, fill: "none", stroke: looks[kind][0], "stroke-dasharray": looks[kind][1], "stroke-width": 2}, course);
@@ -71,8 +71,8 @@
     const [x] = cursor[1](trial.t[k], 0);
     cursor[0].setAttribute("d", `M${x},14V118`);
     const words = {before: "model as given", after: "extended model"};
-    at("now").textContent = `${trial.t[k].toFixed(1)} s: ` + kinds.filter(kind => kind !== "measured")
-      .map(kind => `${words[kind]} ${Math.round(error(kind, k))} mm off`).join(", ");
+    at("now").textContent = `error at ${trial.t[k].toFixed(1)} s: ` + kinds.filter(kind => kind !== "measured")
+      .map(kind => `${words[kind]} ${Math.round(error(kind, k))} mm`).join(", ");
   }
 
   function fillTable() {

@@ -1,0 +1,65 @@
+"""Effects that are certain and matter to no prediction are said, and not named."""
+
+from functools import cache
+
+import pytest
+
+from bns.diagnose import diagnosis
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.starts import listed
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.negligible import negligible
+from bns.diagnose.select.result import SelectionResult
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+TRUTH = {"wheelbase": {"factor": 1.05}, "wheel_mismatch": {"ratio": 1.004}, "clock_offset": {"offset_s": -5e-4}}
+
+
+@cache
+def predictor():
+    table = measured(hidden(**TRUTH), trials=20, seed=7, noise=(1e-3, 4e-3), jitter=0.0)
+    return WheelPredictor(tracks_of(table))
+
+
+@cache
+def selected(*names):
+    """A search that ended in these effects, by whatever steps."""
+    catalogue = listed(NOMINAL, None, predictor().tracks)
+    problem, fit, _ = fit_set(predictor(), NOMINAL, [catalogue[name] for name in names])
+    return SelectionResult(problem, problem.fit(NOMINAL), fit, names, ())
+
+
+def test_half_a_millisecond_is_negligible_and_a_small_mismatch_is_not():
+    assert negligible(selected("wheelbase", "wheel-mismatch", "clock-offset")) == ("clock-offset",)
+    assert negligible(selected("wheelbase", "wheel-mismatch")) == ()
+    assert negligible(selected("clock-offset")) == ()  # alone it is what there is: the error decides (`PairedErrors.falls`)
+
+
+def test_ties_keep_what_is_left_of_them():
+    one = selected("wheelbase", "clock-offset")
+    competing = (("marker-offset", "clock-offset"), ("wheelbase", "command-delay"))
+    kept = SelectionResult(one.problem, one.nominal, one.fit, one.accepted, (), competing).lacking(("clock-offset",))
+    assert kept.accepted == ("wheelbase",)
+    assert kept.competing_models == (("marker-offset",),)
+    assert [a.effect.name for a in kept.fit.model.effects] == ["wheelbase"]
+
+
+@pytest.mark.slow
+def test_a_diagnosis_says_what_is_negligible(monkeypatch):
+    """A stand-in for the judgement: the mismatch is worth naming, and is taken for negligible here."""
+    asked = []
+
+    def judged(selection):
+        asked.append(selection.accepted)
+        return ("wheel-mismatch",)
+
+    monkeypatch.setattr(diagnosis, "negligible", judged)
+    found = diagnose(predictor(), NOMINAL)
+    assert set(asked[0]) >= {"wheelbase", "wheel-mismatch"}
+    assert found.verdict in {"effects", "tie"}
+    assert set(found.effects) == set(asked[0]) - {"wheel-mismatch"}
+    assert found.as_json()["negligible"]["wheel-mismatch"]["ratio"]["value"] == pytest.approx(1.004, abs=2e-3)
+    assert any("wheel-mismatch is certain but negligible (ratio = 1" in note for note in found.notes)
+    assert {a.effect.name for a in found.model.effects} == set(found.effects)

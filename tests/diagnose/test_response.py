@@ -1,0 +1,65 @@
+"""Wheels whose speed controller rings: the response in time is found as a term, described, and predicts well."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.signal import lsim
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.established import established
+from bns.diagnose.residuals.grammar import RESPONSE
+from bns.diagnose.residuals.words import in_words
+from tests.diagnose.worlds import NOMINAL
+
+FREQUENCY, DAMPING = 7.0, 0.25
+DENSE_S, FRAME_S, TRIAL_S = 0.002, 0.04, 8.0
+
+
+def ringing(trials=24, seed=5):
+    """Second-order wheels, w'' = f²(u - w) - 2·z·f·w', solved by scipy; the pose by small arcs; a camera at 25 Hz."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, TRIAL_S, DENSE_S)
+    system = ([FREQUENCY**2], [1.0, 2 * DAMPING * FREQUENCY, FREQUENCY**2])
+    tables = []
+    for trial in range(trials):
+        changes = np.cumsum(rng.integers(10, 50, 20)) * FRAME_S
+        speeds = rng.uniform(-0.2, 0.2, (2, len(changes) + 1)) * (rng.random(len(changes) + 1) > 0.15)
+        told = speeds[:, np.searchsorted(changes, t + 1e-9, side="right")]
+        left, right = (lsim(system, u, t)[1] for u in told)
+        turn = np.cumsum((right - left) / NOMINAL.wheelbase_m * DENSE_S)
+        heading, ahead = rng.uniform(-3, 3) + turn, (left + right) / 2 * DENSE_S
+        pose = np.column_stack([np.cumsum(ahead * np.cos(heading)), np.cumsum(ahead * np.sin(heading)), heading])
+        seen = slice(0, None, round(FRAME_S / DENSE_S))
+        noisy = pose[seen] + rng.normal(size=pose[seen].shape) * [0.001, 0.001, 0.004]
+        columns = {"trial": trial, "t_s": t[seen], "left_m_s": told[0, seen], "right_m_s": told[1, seen]}
+        tables.append(pd.DataFrame(columns | {"x_m": noisy[:, 0], "y_m": noisy[:, 1], "heading_rad": noisy[:, 2]}))
+    return WheelPredictor(tracks_of(pd.concat(tables, ignore_index=True)))
+
+
+def overshoot():
+    """Of a second-order system's step response, in closed form."""
+    return np.exp(-np.pi * DAMPING / np.sqrt(1 - DAMPING**2))
+
+
+def test_a_ringing_controller_is_described():
+    predictor = ringing()
+    found = established(predictor, NOMINAL, {})
+    assert [term.signal for term in found.terms][:1] == [RESPONSE]
+    said = re.search(r"goes beyond it by (\d+)% after ([\d.]+) s", in_words(found.terms[0], predictor))
+    assert float(said.group(1)) == pytest.approx(100 * overshoot(), abs=5)
+    peak_s = np.pi / (FREQUENCY * np.sqrt(1 - DAMPING**2))
+    assert float(said.group(2)) == pytest.approx(peak_s, abs=0.1)
+
+
+@pytest.mark.slow
+def test_with_the_response_the_error_falls_to_the_noise():
+    answer = diagnose(ringing(), NOMINAL).as_json()
+    assert answer["verdict"] == "unlisted"
+    assert answer["effects"] == []
+    for horizon in ("1s", "5s", "trial"):
+        error = answer["error_with_terms"][horizon]
+        assert error["after"] < 1.5 * error["noise_floor"] < error["before"], horizon
