@@ -19,7 +19,8 @@ from bns.hardware.tracking.sight import Sight
 from bns.physics.snake.gait import PARAMETERS, cycle_angles
 from bns.physics.snake.parameters import shipped_parameters
 
-_TICK_S = 0.15
+_TICK_S, _SUSPECTS_S = 0.15, 0.03
+"""Between looks; and while the camera sends a picture again."""
 _STRAIGHTENING_RAD_S = 0.5
 _STILL_M = 0.002
 _FROZEN_RAD, _FROZEN_RAD_LATE = 0.5, 0.65
@@ -71,7 +72,7 @@ class SnakeDrive:
         """Least and greatest distance, by the joints, of the markers in the scene that the picture shows."""
         self._copy, self._turns = SameScene(SAME_M), list[tuple[float, float]]()
         """When the joints were read, and how far they had turned by then."""
-        self._first_s = self._came_s = 0.0
+        self._first_s, self._came_s, self._repeats = 0.0, 0.0, False
         self._copied_s: float | None = None
         """When a picture came that the camera has sent again since, while the joints turned."""
         self._joints_rad: np.ndarray | None = None
@@ -167,7 +168,8 @@ class SnakeDrive:
         self._angles, end_s, looked = target, asked_s + way_rad / speed_rad_s + self._settings.settle_s, False
         while (left_s := end_s - self._clock.now_s()) > 0 or not looked:  # a slow adapter leaves no time, and is looked at too
             newest_s = self._eye.picture_s if self._copied_s is None else self._copied_s
-            self._clock.sleep(self._watch.next_look_s(min(_TICK_S, max(left_s, 0.0)), newest_s))
+            tick_s = _SUSPECTS_S if self._repeats else _TICK_S
+            self._clock.sleep(self._watch.next_look_s(min(tick_s, max(left_s, 0.0)), newest_s))
             self._look()
             looked = True
 
@@ -236,6 +238,7 @@ class SnakeDrive:
         """
         if self._copy.is_another(self._markers.reshape(2, 2)) or not self._eye.wanders:
             self._first_s, self._came_s = filmed_s, self._eye.picture_s or filmed_s
+        self._repeats = filmed_s > self._first_s
         times, turned_rad = np.array(self._turns).T
         delays_s = np.linspace(0.0, self._unknown_s, _DELAYS)
         then_rad, now_rad = (np.interp(t_s - delays_s, times, turned_rad) for t_s in (self._first_s, filmed_s))

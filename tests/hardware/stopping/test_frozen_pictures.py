@@ -297,3 +297,17 @@ def test_an_emulated_robot_is_stopped_when_its_camera_hangs(tmp_path, clock, kin
     stop = next(event for event in events(tmp_path / "journal.jsonl", "stop") if event["t_s"] > at_s)
     assert stop["confirmed"]
     assert stop["t_s"] - stop["seconds"] - at_s < within_s
+
+
+def test_a_camera_that_repeats_itself_is_looked_at_more_often(drive, clock, monkeypatch):
+    on, slept = drive(BETWEEN, chain=Turning, unknown_s=0.2), []
+    on._eye._tracker = pictures = Copied(clock, np.inf)
+    on.straighten()
+    monkeypatch.setattr(clock, "sleep", lambda seconds, sleep=clock.sleep: (slept.append(seconds), sleep(seconds)))
+    little(on)
+    assert max(slept) > 0.1
+    pictures.from_s = clock.now_s()
+    slept.clear()
+    with pytest.raises(TrialPausedError, match="same picture"):
+        on._go_to(np.tile([0.0, -0.2], 6), 0.4, 0.4)
+    assert sum(seconds < 0.05 for seconds in slept) > 3
