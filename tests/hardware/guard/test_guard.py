@@ -156,12 +156,12 @@ def test_a_computer_that_slept_stops_the_robot_first(tmp_path, nursery, link):
 def test_a_trial_that_stood_still_together_with_its_guard_stops_the_robot(tmp_path, nursery):
     seen = outlive.outlived(nursery, "bus", outlive.HELD, tmp_path)
     assert seen.ended == 3
-    assert re.search(r"nobody looked at the robot for \d|no sign of life for \d", seen.said)
+    assert re.search(r"the program did not check the robot for \d|no sign of life for \d", seen.said)
 
 
 def test_a_trial_whose_guard_is_killed_is_paused(tmp_path, nursery):
     seen = outlive.outlived(nursery, "bridge", "the guard is killed", tmp_path)
-    assert (seen.ended, seen.said) == (3, "the guard of the robot's port was gone")
+    assert (seen.ended, seen.said) == (3, "the guard of the robot's port had ended")
 
 
 @pytest.mark.parametrize("link", LINKS)

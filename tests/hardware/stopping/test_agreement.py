@@ -1,6 +1,7 @@
 """The robot is believed, not the picture: poses that do not follow what is driven pause the trial; a poor robot does not."""
 
 import itertools
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -43,7 +44,7 @@ def paused(how, commands, journal):
 def test_a_scene_that_stands_still_under_a_running_clock_pauses_the_trial(tmp_path, robot, tracker):
     commands = FAST if robot == "khepera" else CYCLES
     why, after_s = paused(setup(robot, Fault("frozen-scene", at_s=3.0, for_s=99.0), **tracker), commands, tmp_path / "j.jsonl")
-    assert "where" in why
+    assert re.search("no motion|both markers where they were", why)
     assert "bns track" in why
     assert after_s <= (0.7 if robot == "khepera" else 1.0)
 
