@@ -307,14 +307,14 @@ def _established(selection: SelectionResult, predictor: Predictor, rest: Unexpla
     wheeled = isinstance(predictor, WheelPredictor)
     if not wheeled or selection.fit.model.per_trial_effect is not None or predictor.tracks.relative:
         return None
-    if not rest.any and not left_over(selection.problem, selection.fit):
+    if not rest.any and not left_over(selection.problem, selection.fit, not selection.accepted):
         return None
     known = known_effects(selection)
     found = established(predictor, selection.nominal.model, {name: known[name] for name in selection.accepted})
     lost = set(selection.accepted) - set(found.names)
     if lost and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):
         # the effects predict better than what they are said to imitate: it is the terms that imitate
-        return replace(established(predictor, selection.fit.model, {}), names=selection.accepted)
+        return replace(established(predictor, selection.fit.model, {}, False), names=selection.accepted)
     return found
 
 

@@ -49,7 +49,8 @@ VARIABLES: Mapping[str, str] = {
     "y": "position north, m",
     "heading": "heading, rad",
     "moving": "1 while a wheel turns, else 0",
-    "swing": "how far the motion's direction is from that of the last half wheelbase of way: 0 the same, 1 the opposite",
+    "swing": "difference between the direction of motion and that over the last half wheelbase of distance: 0 the same, "
+    "1 the opposite",
 }
 OF_A_WHEEL: Mapping[str, str] = {
     "u": "speed of this wheel, m/s",

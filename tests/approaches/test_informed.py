@@ -107,5 +107,5 @@ def test_the_snake_is_chosen_for_likewise():
 
 
 def test_a_share_that_cannot_be_is_refused():
-    with pytest.raises(SpecError, match=r"informed is '2'; it must be a number from 0 to 1 \(share of the population"):
+    with pytest.raises(SpecError, match=r"informed is '2'; it must be a number from 0 to 1 \(fraction of the population"):
         RunSpec(approach="bns+informed=2")

@@ -12,7 +12,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import ModelError
 from bns.physics.effects import effect_in_file
-from bns.physics.formula import FUNCTIONS, ON, VARIABLES, formula_effect
+from bns.physics.formula import FUNCTIONS, ON, PAST, VARIABLES, formula_effect
 from bns.physics.model import parse_model
 from tests.diagnose.worlds import NOMINAL, measured
 
@@ -104,5 +104,7 @@ def test_the_names_are_documented():
     page = (Path(__file__).parents[2] / "docs" / "formulas.md").read_text()
     for name in (*VARIABLES, *FUNCTIONS, *ON):
         assert f"`{name}`" in page
+    for name in PAST:
+        assert f"`{name}(" in page
     for text in VARIABLES.values():
         assert text in page

@@ -9,7 +9,9 @@ from scipy.signal import lsim
 
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals import grammar
 from bns.diagnose.residuals.established import established
 from bns.diagnose.residuals.grammar import RESPONSE
 from bns.diagnose.residuals.words import in_words
@@ -53,6 +55,22 @@ def test_a_ringing_controller_is_described():
     assert float(said.group(1)) == pytest.approx(100 * overshoot(), abs=5)
     peak_s = np.pi / (FREQUENCY * np.sqrt(1 - DAMPING**2))
     assert float(said.group(2)) == pytest.approx(peak_s, abs=0.1)
+
+
+def test_a_free_response_is_tried_only_where_no_effect_was_accepted(monkeypatch):
+    """It can imitate lag, delay and limits; these have names, and numbers that can be measured."""
+    asked = []
+    offered = grammar.families
+
+    def families(predictor, wheelbase_m, response=True):
+        asked.append(RESPONSE in {family.signal for family in offered(predictor, wheelbase_m, response)})
+        return []
+
+    monkeypatch.setattr("bns.diagnose.residuals.established.families", families)
+    predictor = ringing(trials=8)
+    established(predictor, NOMINAL, {})
+    established(predictor, NOMINAL, {"motor-lag": listed(NOMINAL, None, predictor.tracks)["motor-lag"]})
+    assert asked == [True, False]
 
 
 @pytest.mark.slow

@@ -20,6 +20,7 @@ NO_SETTINGS = {
     ("data/mapping.py", "UNITS"): "factors between units, by definition",
     ("data/tracking_noise.py", "_NORMAL"): "the median of a standard normal number's size",
     ("estimate/fit.py", "_LATELY"): "the size of a cache: the answers are the same for any",
+    ("predict/paired_errors.py", "_LATELY"): "the size of a cache: the answers are the same for any",
     ("parallel.py", "MOST"): "threads: the answers are the same for any number",
     ("predict/wheels.py", "_KEPT"): "the size of a cache: the answers are the same for any",
     ("report/page.py", "_PIXELS_IN_POINT"): "layout",

@@ -47,7 +47,7 @@ def test_what_is_set_aside_is_run_again(tmp_path, table):
         assert finished(tmp_path, "s") == {}
     with pytest.warns(StoreWarning, match=f"{path.name} is skipped: it is"):
         assert [row.done for row in sweep_status(tmp_path)] == [0]
-    with pytest.warns(StoreWarning, match=rf"{path.name} is set aside as .*set-aside/{table}/.* are done again"):
+    with pytest.warns(StoreWarning, match=rf"{path.name} is set aside as .*set-aside/{table}/.* are repeated"):
         store(tmp_path, full(2))
     assert len(finished(tmp_path, "s")) == 2
     assert not path.exists()

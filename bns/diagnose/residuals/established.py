@@ -71,11 +71,16 @@ class _State:
         return replace(self, problem=problem, fit=problem.fit(fit.model))
 
 
-def established(predictor: Predictor, given: Model, accepted: Mapping[str, Effect]) -> Established:
-    """The search with flexible terms; ``accepted``: the effects that a search without them ended in."""
+def established(
+    predictor: Predictor, given: Model, accepted: Mapping[str, Effect], response: bool | None = None
+) -> Established:
+    """The search with flexible terms; ``accepted``: the effects that a search without them ended in.
+
+    ``response``: is the wheels' free response a candidate; by default where no effect was accepted.
+    """
     problem = problem_for(predictor, given)
     state, left = _State(problem, problem.fit(given)), dict(accepted)
-    grammar = families(predictor, given.wheelbase_m)
+    grammar = families(predictor, given.wheelbase_m, not accepted if response is None else response)
     level = FALSE_ALARM / max(len(left) + len(grammar), 1)
     for _ in range(len(accepted) + TERMS):
         following = _step(predictor, state, left, grammar, level)
@@ -90,9 +95,9 @@ def established(predictor: Predictor, given: Model, accepted: Mapping[str, Effec
     return Established(state.names, terms, state.problem, state.fit)
 
 
-def left_over(problem: Problem, fit: Fit) -> bool:
-    """Is there a family that earns something beside a fitted model?"""
-    return bool(_curves(problem, fit, families(problem.predictor, fit.model.wheelbase_m), ()))
+def left_over(problem: Problem, fit: Fit, response: bool = True) -> bool:
+    """Is there a family that earns something beside a fitted model? ``response``: as `families` takes it."""
+    return bool(_curves(problem, fit, families(problem.predictor, fit.model.wheelbase_m, response), ()))
 
 
 def _step(

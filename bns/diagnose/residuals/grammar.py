@@ -67,8 +67,8 @@ class Earned:
     """Held-out losses (trials,) with it."""
 
 
-def families(predictor: Predictor, wheelbase_m: float) -> list[Family]:
-    """All families that these tracks can speak of."""
+def families(predictor: Predictor, wheelbase_m: float, response: bool = True) -> list[Family]:
+    """All families that these tracks can speak of; `RESPONSE` only where asked for: it can imitate every effect that is late."""
     seen = predictor.variables()
     if "left_m_s" not in seen:
         return []
@@ -84,7 +84,9 @@ def families(predictor: Predictor, wheelbase_m: float) -> list[Family]:
         *_surfaces(seen, wheelbase_m),
         Family("side of the turn", "v", ("v * max(w, 0)", "v * min(w, 0)", "moving * max(w, 0)", "moving * min(w, 0)")),
     ]
-    return [*found, *_of_tracks(predictor, seen, wheelbase_m)] if not predictor.tracks.relative else found
+    if not predictor.tracks.relative:
+        found += [f for f in _of_tracks(predictor, seen, wheelbase_m) if response or f.signal != RESPONSE]
+    return found
 
 
 def _of_speed(fastest_m_s: float, reverses: bool) -> tuple[str, ...]:

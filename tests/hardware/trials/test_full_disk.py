@@ -63,7 +63,7 @@ def test_results_that_cannot_be_stored_leave_a_trial_to_be_gone_on_with(tmp_path
     said = capsys.readouterr().err
     assert str(tmp_path / "journal") in said
     assert "The robot stands" in said
-    assert "resume with --resume" in said
+    assert "continue with --resume" in said
     (tmp_path / "journal").unlink()
     driven = len(list(events(journal_of(tmp_path), "driven")))
     assert main([*asked, "--resume"]) == 0

@@ -154,7 +154,7 @@ def test_the_doctor_asks_the_servos(rigged, clock, tmp_path, wiring):
         ({"wiring": "radio"}, "unknown wiring of the snake 'radio'"),
         ({"ids": [1, 2, 3]}, "give 12 different whole numbers"),
         ({"ids": [1] * 12}, "give 12 different whole numbers"),
-        ({"torque": 2.0}, "torque is 2; it is a share"),
+        ({"torque": 2.0}, "torque is 2; it is a fraction"),
         ({"joint_speed_rad_s": 0}, "joint_speed_rad_s is 0; it must be a number above 0"),
         ({"sped": 1}, "unknown setting 'sped'"),
     ],
