@@ -74,7 +74,7 @@ class Background(Generic[T]):
         except BnsError as fault:
             self.why = str(fault)
         except Exception as fault:
-            self.why = f"This should not have happened: {type(fault).__name__}: {fault}"
+            self.why = f"Internal error: {type(fault).__name__}: {fault}"
             raise
 
     def _tell(self, share: float | None, text: str) -> None:

@@ -60,8 +60,8 @@ def error_list(e: HorizonErrors) -> str:
             ]
         )
     rows.append(["noise of the tracking", mm(e.noise_floor_m), "", "", ""])
-    caption = f"Position error {ahead(e.horizon)} ahead, on {e.windows} windows of trials held out, the same for all"
-    left_out = f" ({e.left_out} left out: within them the tracker jumps, or poses were left out)" if e.left_out else ""
+    caption = f"Position error {ahead(e.horizon)} ahead, on {e.windows} windows of held-out trials, the same for all models"
+    left_out = f" ({e.left_out} excluded: the tracker jumps within them, or poses were excluded)" if e.left_out else ""
     columns = ["model", "error, mm", "95 %", "median, mm", "change, mm (95 %)"]
     return table(columns, rows, caption + left_out, "bns-errors")
 
@@ -76,7 +76,7 @@ def found_errors(errors: PairedErrors | None) -> str:
             change = change_text(e.changes[index - 1]) if index else ""
             rows.append([ahead(horizon) if index == 0 else "", m.name, mm(m.rms_m), mm(m.median_m), change])
     columns = ["ahead", "model", "error, mm", "median, mm", "change, mm (95 %)"]
-    found = table(columns, rows, "Position error on trials held out, all on the same windows", "bns-found")
+    found = table(columns, rows, "Position error on held-out trials, all on the same windows", "bns-found")
     return f"<details><summary>the errors before and after, at every horizon</summary>{found}</details>"
 
 

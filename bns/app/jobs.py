@@ -41,7 +41,7 @@ class Jobs:
                     except BnsError as fault:
                         failed(str(fault))
                     except Exception as fault:
-                        failed(f"This should not have happened: {type(fault).__name__}: {fault}")
+                        failed(f"Internal error: {type(fault).__name__}: {fault}")
                         raise
                     else:
                         done(result)

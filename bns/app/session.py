@@ -67,8 +67,8 @@ def opened(path: Path) -> Tab:
     measured = Measurements(files if mapping is None else files[:1], mapping=mapping)  # a mapping names the others itself
     if measured.sha256 != log.get("sha256"):
         raise DataError(
-            f"{files[0]} is not the log that {path.name} was saved with: its numbers differ. "
-            "Open the log by itself, or find the one that the session names."
+            f"{files[0]} is not the log that {path.name} was saved with: its data differ. "
+            "Open that log alone, or find the one that the session names."
         )
     given = _model(model, path, tab)
     tab.take(given, tuple(str(word) for word in model.get("words") or (_name(given),)))
@@ -105,7 +105,7 @@ def _read(path: Path) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError) as fault:
         raise DataError(f"{path} cannot be read: {fault}.") from fault
     if not isinstance(tree, dict) or "bns_session" not in tree:
-        raise DataError(f"{path} is no session of bns explore; those begin with bns_session: {FORMAT}.")
+        raise DataError(f"{path} is not a session of bns explore; those begin with bns_session: {FORMAT}.")
     if tree["bns_session"] != FORMAT:
         raise DataError(f"{path} is a session of format {tree['bns_session']}; this version reads format {FORMAT}.")
     unknown, missing = set(tree) - _KEYS, _KEYS - {"snapshots"} - set(tree)

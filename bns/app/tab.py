@@ -211,7 +211,7 @@ def mapping_of(text: str) -> dict[str, Any]:
     try:
         rules = yaml.safe_load(text)
     except yaml.YAMLError as fault:
-        raise DataError(f"The mapping is no valid YAML: {fault}. Correct the place it names.") from fault
+        raise DataError(f"The mapping is not valid YAML: {fault}. Correct the place it names.") from fault
     if not isinstance(rules, dict):
         raise DataError("The mapping must have keys such as columns; docs/logs.md has all that may stand in it.")
     return rules

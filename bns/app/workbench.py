@@ -204,14 +204,14 @@ def _badges(result: AddResult, name: str) -> tuple[str, ...]:
     if why:
         return (f"implausible: {why}",)
     if does_nothing(fit, name):
-        return ("does nothing that these data show",)
+        return ("has no visible effect in these data",)
     numbers = [(f.parameter, float(v)) for f, v in zip(fit.free, fit.values, strict=True) if f.effect == name]
     return tuple(f"{p.name} is at its bound" for p, v in numbers if v in {p.low, p.high} and v != p.neutral)
 
 
 def _guessed(model: Model, moved: set[str]) -> Model:
     """The model with the effects whose numbers were moved by hand marked as guesses, without the intervals of the fit."""
-    reason = "moved by hand in bns explore"
+    reason = "set by hand in bns explore"
     effects = tuple(
         replace(a, basis="guess", reason=reason, intervals={}) if a.effect.name in moved else a for a in model.effects
     )

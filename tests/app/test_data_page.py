@@ -75,7 +75,7 @@ def test_what_is_left_out_takes_no_part_in_any_number_and_comes_back(visit, tmp_
     page.locator("#bns-part").filter(has_text=f"{int(less.trials['poses'].sum())} poses").wait_for()
     shown(page, "left-out")
     go(page, "Next", "#bns-commands")
-    page.get_by_role("button", name="Prepare the measurements that took part").click()
+    page.get_by_role("button", name="Prepare the measurements that were used").click()
     saved = save(page, "Save the measurements", tmp_path)
     assert bns.Measurements(saved).sha256 == less.sha256
     names = {}

@@ -64,7 +64,7 @@ def test_a_number_is_moved_and_fitted_again_and_every_change_has_a_way_back(visi
     page.get_by_role("rowheader", name="by hand").wait_for(state="detached")
     page.get_by_role("checkbox", name="turn-slip:").check()
     error_of(page, "+ turn-slip")
-    page.get_by_text("does nothing that these data show", exact=True).first.wait_for()
+    page.get_by_text("has no visible effect in these data", exact=True).first.wait_for()
     page.get_by_role("button", name="Undo").click()
     page.get_by_role("rowheader", name="+ turn-slip").wait_for(state="detached")
     assert not page.get_by_role("checkbox", name="turn-slip:").is_checked()

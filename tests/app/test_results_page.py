@@ -62,7 +62,7 @@ def test_runs_are_filtered_compared_and_driven_again_in_the_browser(results, vis
     page.locator("#bns-run-a").wait_for()
     page.get_by_label("Run B", exact=True).select_option(index=4)
     page.locator("#bns-run-b").wait_for()
-    page.get_by_role("button", name="Drive it again to see its path").first.click()
+    page.get_by_role("button", name="Repeat the run to see its path").first.click()
     figures(page).nth(3).wait_for()  # the path beside the three that are there from the start
     settled(page)
     shown(page, "results")

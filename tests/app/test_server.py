@@ -99,7 +99,7 @@ def test_every_page_has_an_address_of_its_own(page):
 
 
 def test_a_port_that_is_taken_is_named(page):
-    with pytest.raises(BnsError, match=r"Port \d+ of this machine cannot be had .*--port N"):
+    with pytest.raises(BnsError, match=r"Port \d+ of this machine is not available .*--port N"):
         Explorer(tabs_of(None, "khepera"), int(page.address.split(":")[2].split("/")[0]))
 
 

@@ -110,7 +110,7 @@ def test_a_fit_that_is_there_is_not_made_again(bench):
 
 
 def test_badges_say_what_does_nothing_and_what_nobody_believes(bench):
-    assert bench.shown(BOTH).badges == {"motor-lag": (), "turn-slip": ("does nothing that these data show",)}
+    assert bench.shown(BOTH).badges == {"motor-lag": (), "turn-slip": ("has no visible effect in these data",)}
     [badge] = bench.shown(Switches().switched("understeer", True)).badges["understeer"]
     assert badge.startswith("implausible: loss_s_m = ")
 

@@ -53,7 +53,7 @@ class WindowFigures:
         self.time = self._scatter("Over time", "time in the trial (s)", "t_s")
         self.along = self._scatter("Along a variable", "", "along")
         self.trial = self._scatter("By trial", "trial", "number")
-        self.floor = blank("On the floor: the larger, the worse", *EAST_NORTH, tools=SELECTING, **FLOOR)
+        self.floor = blank("On the floor: area grows with the error", *EAST_NORTH, tools=SELECTING, **FLOOR)
         self._dots(self.floor, "x_m", "y_m", "size")
         self.all = (self.time, self.along, self.trial, self.floor)
 

@@ -90,7 +90,7 @@ class ParallelFigure:
         self.figure.xaxis.ticker = FixedTicker(ticks=places)
         self.figure.xaxis.major_label_overrides = dict(enumerate(axes.values()))
         drawn = f"{len(shown)} of {len(rows)} runs drawn" if len(shown) < len(rows) else f"{len(rows)} runs"
-        self.figure.title.text = f"{drawn}, a line each; green: success at the end"
+        self.figure.title.text = f"{drawn}, one line per run; green: success at the end"
 
 
 def _heights(column: pd.Series) -> tuple[np.ndarray, tuple[str, str]]:

@@ -30,7 +30,7 @@ class ColumnsPart:
         self._mapping: Mapped = {"columns": {}}
         self._quiet, self._name, self._folder = False, "log", Path()
         self._problem, self._said, self._remarks, self._save = Problem(), html(), html(), html()
-        self._picture = LogFigure("The first paths, as they would be read", height=300)
+        self._picture = LogFigure("The first paths, as this mapping reads them", height=300)
         self._commanded = pn.widgets.Select(name="Commanded are", options=list(COMMANDED), width=230)
         self._columns = {role: pn.widgets.Select(name=said, options={}, width=230) for role, said in ROLES.items()}
         self._units = {
@@ -100,7 +100,7 @@ class ColumnsPart:
         units = {menu.value for role, menu in self._units.items() if menu.visible}
         counted = roles.COUNTED in units
         self._scale.visible = counted or roles.TURNS in units
-        self._scale.name = "Way of a wheel for one count (m)" if counted else "Radius of the wheels (m)"
+        self._scale.name = "Distance per encoder count (m)" if counted else "Radius of the wheels (m)"
         self._scale.value = roles.wheel_scale(mapping)
         self._wheelbase.visible = told == roles.BODY
         base = mapping.get("wheelbase_m")

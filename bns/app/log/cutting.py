@@ -31,7 +31,7 @@ class CutPart:
         for end in (self._from, self._to):
             end.param.watch(lambda _event: self._picture.keep(self._typed()), "value")
         ends = row(self._trial, self._from, self._to, self._keep, self._whole, align_items="end")
-        self.view = pn.Column(heading("Cut a trial: brush what is kept"), ends, self._place, visible=False, **WIDE)
+        self.view = pn.Column(heading("Cut a trial: brush the part to keep"), ends, self._place, visible=False, **WIDE)
 
     def refresh(self) -> None:
         """The trials of the tab's log."""

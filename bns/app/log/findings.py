@@ -58,9 +58,9 @@ def in_words(finding: Finding) -> str:
 def _about(found: Sequence[Finding]) -> str:
     """What the list is."""
     if not found:
-        return "<p>Nothing odd in the data.</p>"
+        return "<p>No irregularities in the data.</p>"
     more = f" (the first {MOST} of {len(found)})" if len(found) > MOST else ""
     return (
-        f"<p id='bns-findings'>What is odd{more}. Check a line to leave it out: the poses around it take no part then, and "
-        "nothing is judged across them.</p>"
+        f"<p id='bns-findings'>Irregularities{more}. Check a line to exclude the poses around it; no prediction "
+        "window then spans them.</p>"
     )

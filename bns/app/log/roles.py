@@ -52,7 +52,7 @@ RUNNING: Mapping[str, Mapping[str, Any]] = {FROM_X: {}, FROM_NORTH: {"clockwise"
 """How a heading may run -> what its entry says."""
 BY_COLUMN, WHOLE = "by a column", "the log is one trial"
 CUTS = {
-    "standing_s": "wherever the robot stands for (s)",
+    "standing_s": "where the robot stands still for (s)",
     "lasting_s": "into pieces of (s)",
     "gap_s": "where nothing was logged for (s)",
 }

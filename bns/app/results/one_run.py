@@ -26,7 +26,7 @@ class OneRun:
         self._study, self._run_id = study, ""
         self._background: Background[RunResult] = Background()
         self._said, self._picture, self._canvas = html(), GoalFigure(), pn.Column(**WIDE)
-        self._work = Working("Drive it again to see its path", self._begin, lambda: self._background, self._show)
+        self._work = Working("Repeat the run to see its path", self._begin, lambda: self._background, self._show)
         self._letter = letter
         self.view = pn.Column(
             heading(f"Run {letter}"), self._said, self._work.buttons, self._work.said, self._canvas, **WIDE

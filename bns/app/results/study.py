@@ -107,7 +107,7 @@ class Study:
         result = run_spec(spec_of(fields), progress=tell)
         if result.run_id != run_id:
             raise StoreError(
-                f"The run {run_id} is of another engine version; driven again it would be {result.run_id}, with other numbers."
+                f"The run {run_id} is of another engine version; repeated, it would be {result.run_id}, with different results."
             )
         return result
 

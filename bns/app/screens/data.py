@@ -47,7 +47,7 @@ class DataScreen:
         self._findings, self._cut = FindingsPart(tab, self._to_part), CutPart(tab, self._to_part)
         self._left_out = pn.widgets.MultiSelect(name="Trials left out", options=[], size=8, width=200)
         self._leave = button("Leave these out", self._leave_out)
-        self._brushed = button("Leave out what is selected in the picture", self._leave_selected)
+        self._brushed = button("Exclude the selection in the picture", self._leave_selected)
         self._file.param.watch(lambda _event: self._read_uploaded(), "value")
         self._open_log = pn.Column(**WIDE)
         self.view = self._laid_out()
@@ -80,7 +80,7 @@ class DataScreen:
         if used is None or not self._tab.part:
             return ""
         poses = int(used.trials["poses"].sum())
-        return f"<br><span id='bns-part'>{len(used)} trials and {poses} poses of it take part.</span>"
+        return f"<br><span id='bns-part'>{len(used)} trials and {poses} poses of it are used.</span>"
 
     def _open_sample(self) -> None:
         self._read(SAMPLES[self._sample.value])
@@ -209,7 +209,7 @@ class DataScreen:
             self._path,
             button("Open the file", self._open_path),
             html(
-                "<p>Or drop files on the button: logs (.csv, .parquet, recordings of ROS), FILE.import.yaml where one has it, or "
+                "<p>Or drop files on the button: logs (.csv, .parquet, recordings of ROS), its .import.yaml if it has one, or "
                 "a saved session with its log.</p>"
             ),
             self._file,

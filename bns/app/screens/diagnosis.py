@@ -93,7 +93,7 @@ class DiagnosisPart:
     def _show(self, result: DiagnoseResult) -> None:
         self._switch_on.disabled = not (result.effects or result.diagnosis.terms)
         said, sure = escape(headline(result.diagnosis)), escape(certainty(result.diagnosis))
-        words = "".join(f"<br>It looks like this: {escape(each)}." for each in result.diagnosis.terms_in_words)
+        words = "".join(f"<br>It behaves like this: {escape(each)}." for each in result.diagnosis.terms_in_words)
         errors = result.diagnosis.errors_with_terms or result.diagnosis.errors
         sizes = found_numbers(result.to_json()["parameters"])
         then = "" if self._switch_on.disabled else _THEN
@@ -107,4 +107,4 @@ def in_words(entry: Any, when: str) -> str:
         return f"{when}: not considered: {entry['rejected_because']}"
     if pd.isna(entry["elpd_diff"]):
         return ""
-    return f"{when}: {entry['elpd_diff']:+.3f} ± {entry['dse']:.3f} log-likelihood a trial, p = {entry['p_value']:.2g}"
+    return f"{when}: {entry['elpd_diff']:+.3f} ± {entry['dse']:.3f} log-likelihood per trial, p = {entry['p_value']:.2g}"

@@ -294,7 +294,7 @@ class EffectsScreen:
             heading("A formula of your own"),
             row(self._name, self._term, self._on, self._add_term, align_items="end"),
             self._formula_problem.view,
-            html(f"<details><summary>what may stand in it</summary>{variables}</details>"),
+            html(f"<details><summary>names that it may contain</summary>{variables}</details>"),
             **WIDE,
         )
         left = pn.Column(self._switches, self._formula, **WIDE)

@@ -74,7 +74,7 @@ class EvolvePart:
         row_ = evals.iloc[-1]
         rows = [[f"{spec.task}, seed {spec.seed}", spec.evaluations, reached, f"{row_['fitness_error']:.3g}"]]
         columns = ["run", "evaluations", "the fittest controller", "fitness error"]
-        self._said.object = table(columns, rows, "In the model as it is switched now", "bns-evolved")
+        self._said.object = table(columns, rows, "In the model with the present switches", "bns-evolved")
         driven, foreseen = (floor_poses(robot, poses) for poses in (result.result.world_poses, result.result.snn_poses))
         self._picture.fill(f"{task.title}: the fittest controller", task.goals_m, driven, foreseen)
         self._canvas.objects = [drawn(self._picture.figure)]

@@ -105,7 +105,7 @@ class ExperimentPart:
         pairs = result.proposal.model_pairs
         rows = [[f"{p.first} or {p.second}", f"{p.power:.0%}", _minutes(p)] for p in pairs]
         caption = f"{len(result.proposal.plan)} trials"
-        columns = ["which is it?", "chance of a decision", "minutes until nine in ten decide"]
+        columns = ["which is it?", "chance of a decision", "minutes for a probability of 90 %"]
         self._table.object = table(columns, rows, caption, "bns-pairs")
         curves = [(p.power_by_minutes, f"{p.first} / {p.second}") for p in pairs if p.power_by_minutes]
         self._power.fill([c for c, _ in curves], [name for _, name in curves])
@@ -128,7 +128,7 @@ class ExperimentPart:
         tracks = foreseen(p, np.array([number]))
         t_s = tracks[0].t_s
         names = [model.title for model in p.competing_models]
-        title = f"Trial {number}, {p.plan.lasting_s[number]:.0f} s, as each explanation expects it"
+        title = f"Trial {number}, {p.plan.lasting_s[number]:.0f} s, as each explanation predicts it"
         self._picture.trial(title, t_s, [each.pose for each in tracks], names)
         self._frame_s = float(t_s[-1]) / max(len(t_s) - 1, 1)
         self._time.end, self._time.value = len(t_s) - 1, 0

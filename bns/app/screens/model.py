@@ -58,7 +58,7 @@ class ModelScreen:
         suggested = None if used is None else used.suggested_wheelbase_m
         if suggested is not None:
             self._wheelbase.value = round(suggested, 5)
-            self._suggestion.object = f"<p>The log's own turns suggest {suggested:.4g} m.</p>"
+            self._suggestion.object = f"<p>The turns in the log suggest {suggested:.4g} m.</p>"
 
     def _in_words(self) -> str:
         tab = self._tab

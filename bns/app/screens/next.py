@@ -1,4 +1,4 @@
-"""Take it home: the model, the report, the measurements that took part, and the same as commands and as Python."""
+"""Take it home: the model, the report, the measurements that were used, and the same as commands and as Python."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class NextScreen:
         self._tab, self._jobs = tab, jobs
         self._problem, self._report_problem = Problem(), Problem()
         self._make = button("Make the report", self._begin_report)
-        self._prepare = button("Prepare the measurements that took part", self._begin_table)
+        self._prepare = button("Prepare the measurements that were used", self._begin_table)
         self._summary, self._model, self._used, self._report = html(), html(), html(), html()
         self._session = html()
         self._commands, self._python = html(), html()
@@ -70,8 +70,8 @@ class NextScreen:
 
     def _typed(self) -> list[str]:
         tab = self._tab
-        notes = [f"# {USED}: the measurements that took part, saved here"] if not tab.as_it_lies else []
-        notes += ["# numbers moved by hand are in the saved model alone"] if tab.now.by_hand else []
+        notes = [f"# {USED}: the measurements that were used, saved here"] if not tab.as_it_lies else []
+        notes += ["# parameters set by hand are only in the saved model"] if tab.now.by_hand else []
         return [*notes, *commands(tab.data_words if tab.as_it_lies else USED, tab.model_words, tab.now, bool(tab.networks))]
 
     def _fitted(self, shown: Shown) -> None:

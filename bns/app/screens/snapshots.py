@@ -51,7 +51,7 @@ class SnapshotsPart:
         horizon = self._horizon()
         rows = [_row(name, each, horizon) for name, each in shown.items()]
         columns = ["snapshot", "effects", "error, mm", "95 %", "change from the model as given, mm (95 %)"]
-        caption = f"Position error {ahead(horizon)} ahead; all snapshots on the same windows of trials held out"
+        caption = f"Position error {ahead(horizon)} ahead; all snapshots on the same windows of held-out trials"
         self._table.object = table(columns, rows, caption, "bns-snapshots")
 
     def _keep(self) -> None:
@@ -80,6 +80,6 @@ def _row(name: str, shown: Shown, horizon: str) -> list[Any]:
     errors = shown.errors.horizons[horizon]
     last = errors.models[-1]
     added = ", ".join(shown.switches.on) or "none"
-    by_hand = " (numbers moved by hand)" if shown.switches.by_hand else ""
+    by_hand = " (parameters set by hand)" if shown.switches.by_hand else ""
     interval = f"{mm(last.low_m)} to {mm(last.high_m)}"
     return [name, added + by_hand, mm(last.rms_m), interval, change_text(errors.total) if errors.total else ""]

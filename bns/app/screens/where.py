@@ -97,14 +97,14 @@ class WhereScreen:
             if e["windows"]
         ]
         columns = ["after", "error, mm", "± se", "noise, mm", "windows"]
-        caption = f"Position error of the model {self._which.value}, nothing held out"
+        caption = f"Position error of the model {self._which.value}, on all trials"
         self._errors.object = table(columns, rows, caption, "bns-compared") + note(self._bench.thinned if self._bench else "")
         explained = [
             [label(p.variable), velocity(p.channel), f"{p.share:.2%}", f"{p.paired_comparison.p_value:.2g}"]
             for p in comparison.residual_dependence[:8]
         ]
-        columns = ["variable", "added to", "share of loss", "p"]
-        self._explained.object = table(columns, explained, "What a free curve along each variable would explain")
+        columns = ["variable", "added to", "fraction of loss", "p"]
+        self._explained.object = table(columns, explained, "Fraction of the loss that a curve along each variable would remove")
         best = [p.variable for p in comparison.residual_dependence if p.variable in self._variable.values]
         if best and self._to_choose:
             self._to_choose, self._variable.value = False, best[0]

@@ -11,7 +11,7 @@ if (document.getElementById("bns-lost") !== null) return
 const said = document.createElement("p")
 said.id = "bns-lost"
 said.setAttribute("role", "alert")
-said.textContent = "The connection to bns explore is lost. Nothing you click counts until it is back: the page looks for it and "
+said.textContent = "The connection to bns explore is lost. Clicks have no effect until it is back: the page looks for it and "
   + "loads again, as you left it. If bns explore was ended, start it again and open the address that it prints."
 document.body.prepend(said)
 const file = new URL("static/js/bokeh.min.js", location.href.split("?")[0])

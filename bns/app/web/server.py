@@ -106,5 +106,5 @@ def _check_free(port: int) -> None:
             tried.bind((LOOPBACK, port))
         except OSError as fault:
             raise BnsError(
-                f"Port {port} of this machine cannot be had ({fault.strerror}); give another one: --port N."
+                f"Port {port} of this machine is not available ({fault.strerror}); give another one: --port N."
             ) from fault
