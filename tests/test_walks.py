@@ -19,7 +19,7 @@ from tests.typist import Typist
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]  # a page is many commands, and the first of each kind compiles
 DOCS = ROOT / "docs"
 BLOCK = re.compile(r"^([ ]*)```(\w+)\n(.*?)^\1```$", flags=re.S | re.M)
-SET_UP = ("pip ", "python -m venv", ". ")
+SET_UP = ("pip ", "python3 -m venv", "python -m venv", ". ")
 """What the fixture has done already: the environment and the wheel in it."""
 FILES = {"python", "yaml"}
 

@@ -45,7 +45,7 @@ def test_a_full_disk_stops_the_robot_and_the_trial_is_gone_on_with(tmp_path, cap
     journal = journal_of(tmp_path)
     [line] = done.stderr.splitlines()
     assert f"cannot write {journal}: File too large. The robot stands" in line
-    assert "resume with --resume" in line
+    assert "continue with --resume" in line
     assert journal.stat().st_size <= most
     before = past_evaluations(journal)  # whole: every line has its checksum
     assert 1 <= len(before) < 5
