@@ -23,6 +23,8 @@ _TRIALS, _PEAKS = 24, 4
 """So many trials are looked at, and so many of the best ways tried."""
 _SHARES = 0.03, 0.6
 """Starts have shares between these; at 0 a share has no slope that would lead away."""
+_LEAST_REPEATED = 0.1
+"""Of the spectrum at the wave: an estimate below that is luck."""
 _WAVES = 4
 """Cosine and sine for each wheel."""
 
@@ -34,8 +36,11 @@ def apply(wheels: Wheels, left_share: float, right_share: float, turn_m: float) 
         waves = [np.cos(angle) for angle in angles]
     else:
         waves = _waves(wheels, wheels.conditions.seen[..., 2], angles)
+    speeds = wheels.left_m_s, wheels.right_m_s
+    # the mean of a wave over a step of which the wheel turns through a good part
+    means = [wave * np.sinc(speed * wheels.step_s / turn_m) for wave, speed in zip(waves, speeds, strict=True)]
     return wheels.turning(
-        wheels.left_m_s * (1.0 + left_share * waves[0]), wheels.right_m_s * (1.0 + right_share * waves[1])
+        wheels.left_m_s * (1.0 + left_share * means[0]), wheels.right_m_s * (1.0 + right_share * means[1])
     )
 
 
@@ -86,7 +91,7 @@ class _Fitted:
     variance: Array
     left: Array
     independent: Array
-    """As many differences as lags are independent: neighbours overlap."""
+    """As many of the differences count as independent ones, for a wave that does a third of a turn in ``lag``."""
 
 
 def _fitted(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> _Fitted:
@@ -102,10 +107,28 @@ def _fitted(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> _F
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", gram), 1e-30))
     inverse = np.linalg.inv(gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(columns.shape[2]))
     values = (inverse @ (target / scale)[..., None])[..., 0] / scale
-    left = ((off - (design @ values[..., None])[..., 0]) ** 2).sum(axis=1)
-    independent = used.sum(axis=1) / lag
+    rest = off - (design @ values[..., None])[..., 0]
+    left, independent = (rest**2).sum(axis=1), used.sum(axis=1) / _repeated(rest, used, lag)
     spare = np.maximum(independent - columns.shape[2], 1)
     return _Fitted(values, np.einsum("nii->ni", inverse) * (left / spare)[:, None] / scale**2, left, independent)
+
+
+def _repeated(rest: Array, used: NDArray[np.bool_], lag: int) -> float:
+    """By how much neighbours raise the variance of a wave's amplitude: the spectrum of ``rest`` at the wave over the mean one.
+
+    The sum of the autocorrelation times the wave's own, over half a turn: 1.5 where tracking noise is white from pose to pose,
+    2/3 of ``lag`` where the heading wanders.
+    """
+    most = lag + lag // 2
+    size = rest.shape[1] + most
+    product, pairs = (
+        np.fft.irfft((np.abs(np.fft.rfft(x, size)) ** 2).sum(axis=0), size)[: most + 1] for x in (rest, used.astype(float))
+    )
+    covariance = product / np.maximum(pairs, 1.0)
+    if covariance[0] <= 0.0:
+        return float(lag)
+    wave = np.cos(np.arange(1, most + 1) * (2.0 * np.pi / 3.0 / lag))
+    return max(1.0 + 2.0 * float(covariance[1:] @ wave) / float(covariance[0]), _LEAST_REPEATED)
 
 
 def _pairs(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> Array:
