@@ -133,14 +133,6 @@ def flexible_columns(problem: Problem, fit: Fit, variable: str, channel: str, *,
     return _columns(problem, fit, channel, basis, variables.get("heading_rad"))
 
 
-def losses_with_columns(problem: Problem, fit: Fit, columns: Array) -> Array:
-    """Held-out losses (trials,) of a fitted model with these columns beside its own numbers, at the better penalty."""
-    joint = np.concatenate([fit.jacobian, columns], axis=2)
-    equations = problem.normal_equations(joint, fit.whitened)
-    tried = [_held_out_losses(problem, fit, joint, equations, penalty) for penalty in PENALTIES]
-    return min(tried, key=lambda losses: float(losses.sum()))
-
-
 def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array | None) -> Array:
     """Change of the whitened innovations a unit of each basis function, (frames, 3, k)."""
     small = 1e-3 if channel in {"yaw_rad_s", SHARE} else 1e-4
@@ -153,17 +145,17 @@ def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headi
 
 def earned_by_columns(problem: Problem, fit: Fit, columns: Array) -> PairedComparison:
     """What a linear addition (frames, 3, k) to a fitted model earns on trials held out, at the better penalty."""
+    return with_columns(problem, fit, columns)[0]
+
+
+def with_columns(problem: Problem, fit: Fit, columns: Array) -> tuple[PairedComparison, Array]:
+    """As `earned_by_columns`, and the held-out losses (trials,) of the model with them, its own numbers moving along."""
     joint = np.concatenate([fit.jacobian, columns], axis=2)
     equations = problem.normal_equations(joint, fit.whitened)
-    elpd_diff, dse = max(
-        (_gain(problem, fit, joint, equations, penalty) for penalty in PENALTIES), key=lambda pair: pair[0]
-    )
-    return PairedComparison(elpd_diff, dse, chance(equations, fit.jacobian.shape[2]) if elpd_diff > 0 else 1.0)
-
-
-def _gain(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, penalty: float) -> tuple[float, float]:
-    """Held-out gain of a linear addition to a fitted model, each trial judged by a fit to the others."""
-    return paired_elpd_diff(fit.held_out, _held_out_losses(problem, fit, joint, equations, penalty))
+    tried = [_held_out_losses(problem, fit, joint, equations, penalty) for penalty in PENALTIES]
+    elpd_diff, dse = max((paired_elpd_diff(fit.held_out, losses) for losses in tried), key=lambda pair: pair[0])
+    comparison = PairedComparison(elpd_diff, dse, chance(equations, fit.jacobian.shape[2]) if elpd_diff > 0 else 1.0)
+    return comparison, min(tried, key=lambda losses: float(losses.sum()))
 
 
 def _held_out_losses(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, penalty: float) -> Array:

@@ -19,8 +19,9 @@ from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.residuals.along_variables import earned_by_columns, losses_with_columns
+from bns.diagnose.residuals.along_variables import with_columns
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.effect import Effect
 from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, formula_effect
 
 NAME = "unlisted"
@@ -147,9 +148,8 @@ def ranked(problem: Problem, fit: Fit, tried: Sequence[Family]) -> list[Earned]:
     usual = float(fit.losses.mean())
 
     def earned(family: Family) -> Earned:
-        columns = columns_of(problem, fit, family)
-        comparison = earned_by_columns(problem, fit, columns)
-        return Earned(family, comparison, comparison.elpd_diff / usual, losses_with_columns(problem, fit, columns))
+        comparison, losses = with_columns(problem, fit, columns_of(problem, fit, family))
+        return Earned(family, comparison, comparison.elpd_diff / usual, losses)
 
     return sorted(each(earned, list(tried)), key=lambda e: -e.paired_comparison.elpd_diff)
 
@@ -175,8 +175,11 @@ def rounding(problem: Problem, fit: Fit) -> Family:
     root = np.sqrt(weights(fit.whitened))[:, None]
     left = (fit.whitened * root).ravel()
 
+    effect = formula_effect(NAME, "k * (a * round(u / a) - u)", WHEELS)
+    assert [p.name for p in effect.parameters] == ["a", "k"]
+
     def pull(step: float) -> float:
-        column = (columns_of(problem, fit, _rounded(step))[..., 0] * root).ravel()
+        column = (_column(problem, fit, effect, (step, _SMALL)) * root).ravel()
         return float((column @ left) ** 2 / max(float(column @ column), 1e-300))
 
     coarse = fastest / np.linspace(*STEPS_A_RANGE, STEPS)
@@ -199,8 +202,14 @@ def columns_of(problem: Problem, fit: Fit, family: Family) -> Array:
     out = np.empty((*fit.whitened.shape, len(family.functions)))
     for i, function in enumerate(family.functions):
         effect = formula_effect(NAME, f"k * {function}", family.on)
-        out[..., i] = (problem.whitened(fit.model.with_active(effect, (_SMALL,))) - fit.whitened) / _SMALL
+        out[..., i] = _column(problem, fit, effect, (_SMALL,))
     return out
+
+
+def _column(problem: Problem, fit: Fit, effect: Effect, values: tuple[float, ...]) -> Array:
+    """Change of the whitened innovations a unit of an effect's last number, which is `_SMALL`; (frames, 3)."""
+    column: Array = (problem.whitened(fit.model.with_active(effect, values)) - fit.whitened) / _SMALL
+    return column
 
 
 def _hats(signal: str, knots: Sequence[float]) -> list[str]:

@@ -6,7 +6,7 @@ Which pairs might do it is read from the tracks' own sensitivities; those are th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import combinations
 
@@ -57,10 +57,10 @@ def _promising(problem: Problem, fit: Fit, name: str, others: Sequence[Effect]) 
     smooth = [effect for effect in others if _smooth(effect)]
     added = each(lambda e: np.stack(list(_columns(problem, base, whitened, root, e)), axis=1), smooth)
     columns = {effect.name: column for effect, column in zip(smooth, added, strict=True)}
-    left_alone = {n: _left(done, [given, c]) for n, c in columns.items()}
+    spans = _Spans(done, given, columns)
     pairs = []
-    for a, b in combinations([e for e in others if e.name in columns and left_alone[e.name] > ALONE], 2):
-        left = _left(done, [given, columns[a.name], columns[b.name]])
+    for a, b in combinations([e for e in others if e.name in columns and spans.left(e.name) > ALONE], 2):
+        left = spans.left(a.name, b.name)
         if left < LEFT_OVER:
             pairs.append((left, (a, b)))
     return [pair for _, pair in sorted(pairs, key=lambda p: p[0])[:TRIED]]
@@ -79,14 +79,26 @@ def _columns(problem: Problem, base: Model, whitened: Array, root: Array, effect
         yield ((problem.whitened(base.with_active(effect, values)) - whitened) / small * root).ravel()
 
 
-def _left(done: Array, parts: Sequence[Array]) -> float:
-    """Share of the squares of ``done`` that no mixture of the columns explains."""
-    joint = np.concatenate(parts, axis=1)
-    size = np.sqrt((joint * joint).sum(axis=0))
-    joint = joint[:, size > 0] / size[size > 0]
-    curvature, gradient = joint.T @ joint, joint.T @ done
-    explained = float(gradient @ np.linalg.pinv(curvature, rcond=1e-10, hermitian=True) @ gradient)
-    return 1.0 - explained / max(float(done @ done), 1e-300)
+class _Spans:
+    """What mixtures of columns explain of ``done`` (n,): ``given`` (n, k) and those of some effects, (n, k) each."""
+
+    def __init__(self, done: Array, given: Array, columns: Mapping[str, Array]) -> None:
+        parts = {"": given, **columns}
+        ends = np.cumsum([part.shape[1] for part in parts.values()])
+        self._of = {name: np.arange(end - parts[name].shape[1], end) for name, end in zip(parts, ends, strict=True)}
+        joint = np.concatenate(list(parts.values()), axis=1)
+        size = np.sqrt((joint * joint).sum(axis=0))
+        self._moves = size > 0
+        joint /= np.where(self._moves, size, 1.0)
+        self._curvature, self._gradient, self._whole = joint.T @ joint, joint.T @ done, float(done @ done)
+
+    def left(self, *names: str) -> float:
+        """Share of the squares that no mixture of the given columns and of these effects' explains."""
+        used = np.concatenate([self._of[name] for name in ("", *names)])
+        used = used[self._moves[used]]
+        gradient = self._gradient[used]
+        inverse = np.linalg.pinv(self._curvature[np.ix_(used, used)], rcond=1e-10, hermitian=True)
+        return 1.0 - float(gradient @ inverse @ gradient) / max(self._whole, 1e-300)
 
 
 def _fitted(problem: Problem, model: Model, effects: Sequence[Effect]) -> Fit:
