@@ -1,6 +1,7 @@
 """Wheels whose speed controller rings: the response in time is found as a term, described, and predicts well."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -55,6 +56,13 @@ def test_a_ringing_controller_is_described():
     assert float(said.group(1)) == pytest.approx(100 * overshoot(), abs=5)
     peak_s = np.pi / (FREQUENCY * np.sqrt(1 - DAMPING**2))
     assert float(said.group(2)) == pytest.approx(peak_s, abs=0.1)
+
+
+@pytest.mark.parametrize("term", ["k * (ago(0.1, 0.2) - ago(0.4, 0.7))", "-k * ago(0.2, 0.4)"])
+def test_what_is_no_response_to_a_step_is_not_described_as_one(term):
+    """A term that overshoots by more than the step, or ends in the other direction."""
+    term = SimpleNamespace(signal=RESPONSE, on="wheels", term=term, values={"k": 3.0})
+    assert in_words(term, None).endswith("not as the response of a drive to a step does")
 
 
 def test_a_free_response_is_tried_only_where_no_effect_was_accepted(monkeypatch):

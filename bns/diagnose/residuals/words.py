@@ -127,6 +127,11 @@ def _response(term: Formula, _: Predictor) -> str:
 
     speed = 1.0 + value_of(term.term, {**term.values, "u": np.ones_like(grid), "ago": ago})
     end = float(speed[-1])
+    if end <= 0.0 or float(speed.max()) >= 2.0 * end:  # no linear drive without zeros overshoots by a whole step
+        return (
+            f"the speed of each wheel depends on its commands of the last {RESPONSE_KNOTS_S[-1]:g} s, but not as the response of a "
+            "drive to a step does"
+        )
     half = float(grid[np.argmax(speed >= end / 2.0)])
     settled = float(grid[np.max(np.flatnonzero(np.abs(speed - end) > 0.05 * abs(end)), initial=0)])
     over = float(speed.max()) / end - 1.0
