@@ -129,8 +129,8 @@ def _response(term: Formula, _: Predictor) -> str:
     end = float(speed[-1])
     if end <= 0.0 or float(speed.max()) >= 2.0 * end:  # no linear drive without zeros overshoots by a whole step
         return (
-            f"the speed of each wheel depends on its commands of the last {RESPONSE_KNOTS_S[-1]:g} s, but not as the response of a "
-            "drive to a step does"
+            f"the speed of each wheel depends on its commands of the last {RESPONSE_KNOTS_S[-1]:g} s, but not as the response "
+            "of a drive to a step does"
         )
     half = float(grid[np.argmax(speed >= end / 2.0)])
     settled = float(grid[np.max(np.flatnonzero(np.abs(speed - end) > 0.05 * abs(end)), initial=0)])
