@@ -101,7 +101,7 @@ class RunSpec:
         later=True,
     )
     overhead_s: int = _field(
-        30, "robot time in seconds that each evaluation takes beside driving: putting the robot back, starting it",
+        30, "robot time in seconds that each evaluation takes in addition to driving: putting the robot back, starting it",
         low=0, high=86_400, later=True,
     )  # fmt: skip
 

@@ -54,7 +54,7 @@ def notes_on(
     if imitating:
         yield (
             f"{' and '.join(imitating)} would lower the error, but only by imitating something that no listed effect explains: "
-            "beside a flexible term for that, too little gain is left."
+            "together with a flexible term for that, it keeps too little of its gain."
         )
     if withdrawn:
         yield (
@@ -127,7 +127,7 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
         yield (
             f"{per_trial_effect.effect.name} has a separate value in each trial, {own.min():+.3f} to {own.max():+.3f} s; "
             "held-out trials are judged with the clock fitted to other poses of the same trial. "
-            "A delay common to all trials cannot be told from the clocks."
+            "A delay common to all trials cannot be distinguished from the clocks."
         )
 
 

@@ -223,7 +223,7 @@ def _added(name: str, code: Compiled, values: Mapping[str, Any], body: Body) -> 
         ) from fault
     if added.dtype.kind == "c":
         raise ModelError(
-            f"formula {name} is no real number with {numbers}: a root of what is below 0. Write it in another way."
+            f"formula {name} is no real number with {numbers}: the root of a negative number. Rewrite it."
         )
     out: Array = np.broadcast_to(added, body.forward_m_s.shape)
     if not np.isfinite(out).all():

@@ -37,7 +37,7 @@ def add_commands(command: Adder) -> None:
         "files are joined with the first by time",
     )
     read.add_argument(
-        "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml beside the log"
+        "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml next to the log"
     )
     read.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="table to write (.csv or .parquet)"
@@ -124,7 +124,7 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE.py",
-        help="Python file with an effect of your own, tried beside the listed ones (may be repeated)",
+        help="Python file with an effect of your own, tried in addition to the listed ones (may be repeated)",
     )
     parser.add_argument(
         "--without-effect",

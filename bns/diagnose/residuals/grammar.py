@@ -1,7 +1,7 @@
 """A small typed grammar of terms that may stand for what no listed effect explains: signals, a nonlinearity, a memory.
 
 A family is a velocity that is added to and a few functions whose sum, each with a number of its own, is a free curve of one
-signal (a wheel's own speed, its distance since it last changed direction, the time in a trial), a field over the floor, or a short
+signal (a wheel's speed, its distance since it last changed direction, the time in a trial), a field over the floor, or a short
 polynomial of speed and turn. All are written as formulas: whatever a family turns out to be can be added to a model file.
 """
 

@@ -128,7 +128,7 @@ def test_servos_that_fail_pause_the_trial_with_the_robot_stopped(rigged, fault, 
 
 def test_a_limit_in_a_servo_that_cuts_the_gait_is_named(rigged):
     on = rigged(prepare=lambda emulation: emulation.servos[2].put("ccw_angle_limit", 530))
-    with pytest.raises(TrialPausedError, match=r"joint 3 was to go to 2\d° and was only told 5°: widen the angle limits"):
+    with pytest.raises(TrialPausedError, match=r"joint 3 should go to 2\d°, but the command was clipped to 5°: widen"):
         on.platform.drive(np.array([GENTLE], np.float32))
     assert not any(torques(on))
 
