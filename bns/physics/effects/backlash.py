@@ -28,7 +28,7 @@ EFFECT = Effect(
     equation="g' = min(max(g + u·dt, 0), gap), distance driven = u·dt - (g' - g), for each wheel, g = gap at the start",
     residuals="After each reversal of a wheel a fixed distance is missing at any speed; trials without reversals fit.",
     lookalikes=("caster-swing", "command-delay", "dead-zone"),
-    sentence="backlash in the gears stops a wheel briefly whenever it changes direction",
+    sentence="play in the gears stops a wheel briefly whenever it changes direction",
     measurement="hold the motor still, turn the wheel by hand, and measure the play at its rim",
     apply=apply,
     needs="track",
