@@ -66,7 +66,7 @@ class RunSpec:
     task: str = _field("circle", "goal task of the robot")
     world: str = _field(
         "substitute",
-        "world that stands for the robot, or a model file (.yaml) for the physics world; 'physics>worn.yaml@50' changes at "
+        "world used in place of the robot, or a model file (.yaml) for the physics world; 'physics>worn.yaml@50' changes at "
         "evaluation 50",
         choices=("substitute", "physics", "robot"),
         or_file=(".yaml", ".yml"),

@@ -145,7 +145,7 @@ def test_the_doctor_asks_the_servos(rigged, clock, tmp_path, wiring):
     on, said = examined(rigged, clock, tmp_path, wiring=wiring)
     assert f"ok   12 servos answer ({wiring}), 12.0 V or more, 30 °C or less" in said()
     on.emulation.servos[4].put("present_voltage", 80)
-    assert any("servo 5 has 8.0 V, not 9 to 12.5; see to the supply" in found and found.startswith("BAD") for found in said())
+    assert any("servo 5 has 8.0 V, not 9 to 12.5; check the supply" in found and found.startswith("BAD") for found in said())
 
 
 @pytest.mark.parametrize(
