@@ -46,7 +46,7 @@ def test_a_late_command_ties_with_a_late_clock():
     assert answer["verdict"] == "tie"
     assert answer["ties"] == [["clock-offset", "command-delay"]]
     assert sorted(map(tuple, answer["explanations"])) == [("clock-offset",), ("command-delay",)]
-    assert any("look the same from outside" in note for note in answer["notes"])
+    assert any("look the same in a log" in note for note in answer["notes"])
 
 
 def test_an_early_clock_is_no_late_command():
