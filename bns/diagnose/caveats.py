@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from bns.diagnose.data.tracks import Tracks
+from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.residuals.outliers import FAR
-from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.residuals.worst_trials import WithoutWorst
 from bns.diagnose.select.known_effects import known_effects
@@ -26,24 +24,18 @@ CHANCE = DEFAULTS.residuals.chance
 
 
 def notes_on(
-    selection: SelectionResult,
+    found: Outcome,
     tracks: Tracks,
-    rest: Unexplained,
-    formula: Formula | None,
     hint: Candidate | None,
     longer: Sequence[tuple[str, ...]] = (),
-    withdrawn: Sequence[str] = (),
-    negligible: Mapping[str, Mapping[str, Mapping[str, Any]]] = MappingProxyType({}),
-    imitating: Sequence[str] = (),
     terms: Sequence[str] = (),
-    with_terms: PairedErrors | None = None,
 ) -> Iterator[str]:
     """All notes, one sentence or two each.
 
-    ``longer``: explanations with one effect more that fit as well; ``withdrawn``: effects with which the error does not fall;
-    ``negligible``: those that matter to no prediction, with their numbers; ``imitating``: those that earn too little beside
-    flexible terms; ``terms``: these in words; ``with_terms``: the held-out errors without and with them.
+    ``hint``: an effect that more trials might confirm; ``longer``: explanations with one effect more that fit as well;
+    ``terms``: the terms in words.
     """
+    selection = found.selection
     for name, why in selection.implausible.items():
         yield (
             f"{name} fits best, but with an implausible value: {why}. No other set predicts as "
@@ -51,17 +43,17 @@ def notes_on(
         )
     if len(selection.accepted) >= MOST_EFFECTS:
         yield f"The search ends at {MOST_EFFECTS} effects; more may be missing."
-    if imitating:
+    if found.imitating:
         yield (
-            f"{' and '.join(imitating)} would lower the error, but only by imitating something that no listed effect explains: "
-            "together with a flexible term for that, it keeps too little of its gain."
+            f"{' and '.join(found.imitating)} would lower the error, but only by imitating something that no listed effect "
+            "explains: with a flexible term for that in the model, too little gain is left."
         )
-    if withdrawn:
+    if found.withdrawn:
         yield (
-            f"{' with '.join(withdrawn)} would raise the likelihood, but not improve predictions of held-out trials "
+            f"{' with '.join(found.withdrawn)} would raise the likelihood, but not improve predictions of held-out trials "
             "(root mean square on the same windows). So it is not presented as an explanation."
         )
-    for name, numbers in negligible.items():
+    for name, numbers in found.negligible.items():
         said = ", ".join(f"{key} = {number['value']:.3g} {number['unit']}" for key, number in numbers.items())
         yield (
             f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "
@@ -70,7 +62,8 @@ def notes_on(
     yield from _on_effects(selection, tracks)
     for names in longer:
         yield f"{' with '.join(names)} would explain as much, with one more effect."
-    yield from _on_rest(rest, tracks)
+    yield from _on_rest(found.rest, tracks)
+    formula, with_terms = found.formula, found.errors_with_terms
     if formula is not None and not formula.signal and formula.paired_comparison.p_value < CHANCE:
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
         yield f"A candidate term: {formula.on} + {formula.term} with {values}."

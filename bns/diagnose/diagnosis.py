@@ -11,25 +11,21 @@ import numpy as np
 from bns.diagnose.caveats import notes_on, on_worst
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
-from bns.diagnose.estimate.cross_validation import Judged, judged_errors
 from bns.diagnose.estimate.fit import Fit
-from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
+from bns.diagnose.outcome import outcome_of
 from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
-from bns.diagnose.residuals.established import Established, established, left_over
-from bns.diagnose.residuals.symbolic import Formula, best_formula
-from bns.diagnose.residuals.unexplained import Unexplained, unexplained
+from bns.diagnose.residuals.along_variables import ResidualDependence
+from bns.diagnose.residuals.symbolic import Formula
+from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.residuals.words import in_words
 from bns.diagnose.residuals.worst_trials import WithoutWorst, standing_out
 from bns.diagnose.select.equivalents import equivalent_pairs
-from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.negligible import LEAST_FALL, negligible
-from bns.diagnose.select.result import Candidate, SelectionResult, certainly_lower
+from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import before_and_after, dependence_values, numbers_of, ranked_values, ties_of
@@ -40,11 +36,6 @@ VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
 FEW_TRIALS = DEFAULTS.verdict.few_trials
 _HINT = DEFAULTS.verdict.hint
 
-
-WITH_EFFECTS = "with the effects"
-"""The name of the refitted model in tables of errors."""
-WITH_TERMS = "and what is left, too"
-"""Of the model with the terms that describe what no effect explains, as well."""
 
 NOTHING_LEFT = Unexplained((), None, ())
 
@@ -236,110 +227,34 @@ def _diagnosed(
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
-    selection = refitted(_from_better_numbers(search.run(), before), predictor, model)
-    tick("errors on trials held out")
-    errors = errors_before_and_after(selection, model)
-    withdrawn: tuple[str, ...] = ()
-    if selection.accepted and not errors.falls:
-        withdrawn, selection = selection.accepted, selection.withdrawn()
-        errors = errors_before_and_after(selection, model)
-    tick("what is left")
-    dependence, rest = _left(selection)
-    found = _established(selection, predictor, rest)
-    imitating = tuple(name for name in selection.accepted if name not in found.names) if found else ()
-    if imitating and found:
-        selection = refitted(selection.only(found.names), predictor, model)
-        errors = errors_before_and_after(selection, model)
-        if selection.accepted and not errors.falls:
-            withdrawn, selection = selection.accepted, selection.withdrawn()
-            errors = errors_before_and_after(selection, model)
-        dependence, rest = _left(selection)
-    with_terms = _errors_with_terms(selection, model, found) if found and found.terms else None
-    terms = found.terms if found and with_terms and (rest.any or _matters(with_terms)) else ()
-    whole, tiny = selection, () if terms else _negligible(selection)
-    if tiny:
-        selection = refitted(selection.lacking(tiny), predictor, model)
-        errors = errors_before_and_after(selection, model)
-    # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
-    guesses = rest.residual_dependence or (tuple(dependence[:1]) if rest.outliers else ())
-    formula = terms[0] if terms else best_formula(whole.problem, whole.fit, guesses) if guesses else None
-    hint = _hint(selection, len(predictor.tracks))
-    left = rest.any or bool(terms)
-    verdict = _verdict(selection, left, hint)
-    words = tuple(in_words(term, predictor) for term in terms)
-    with_terms = with_terms if terms else None
+    found = outcome_of(_from_better_numbers(search.run(), before), predictor, model, tick)
+    left = found.rest.any or bool(found.terms)
+    words = tuple(in_words(term, predictor) for term in found.terms)
+    hint = _hint(found.selection, len(predictor.tracks))
     tick("longer explanations")
-    tried = {c.name for step in selection.steps for c in step.ranking}
-    others = [
-        effect
-        for name, effect in listed(selection.nominal.model, extra, predictor.tracks, barred).items()
-        if name in tried and name not in selection.accepted
-    ]
-    pairs = [] if left else equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
+    pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
     return Diagnosis(
-        verdict,
-        selection,
-        tuple(dependence[:12]),
-        rest,
-        formula,
-        terms,
-        words,
-        small := {name: numbers for name, numbers in numbers_of(whole.fit).items() if name in tiny},
-        imitating,
-        errors,
-        with_terms,
-        tuple(notes_on(selection, predictor.tracks, rest, formula, hint, pairs, withdrawn, small, imitating, words, with_terms)),
+        verdict=_verdict(found.selection, left, hint),
+        selection=found.selection,
+        residual_dependence=tuple(found.dependence[:12]),
+        rest=found.rest,
+        formula=found.formula,
+        terms=found.terms,
+        terms_in_words=words,
+        negligible=found.negligible,
+        imitating=found.imitating,
+        errors=found.errors,
+        errors_with_terms=found.errors_with_terms,
+        notes=tuple(notes_on(found, predictor.tracks, hint, pairs, words)),
         calibration=calibrated(predictor, model, barred),
     )
 
 
-def _negligible(selection: SelectionResult) -> tuple[str, ...]:
-    """As `negligible`; not asked where a fit is costly, or trials have clocks of their own."""
-    costly = selection.problem.predictor.screening is not None
-    return () if costly or selection.fit.model.per_trial_effect is not None else negligible(selection)
-
-
-def _established(selection: SelectionResult, predictor: Predictor, rest: Unexplained) -> Established | None:
-    """The search with flexible terms, where anything is left; None where nothing is, or trials have clocks of their own.
-
-    Single relative motions are calibrated with all numbers free instead (`calibrated`).
-    """
-    wheeled = isinstance(predictor, WheelPredictor)
-    if not wheeled or selection.fit.model.per_trial_effect is not None or predictor.tracks.relative:
-        return None
-    if not rest.any and not left_over(selection.problem, selection.fit, not selection.accepted):
-        return None
-    known = known_effects(selection)
-    found = established(predictor, selection.nominal.model, {name: known[name] for name in selection.accepted})
-    lost = set(selection.accepted) - set(found.names)
-    if lost and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):
-        # the effects predict better than what they are said to imitate: it is the terms that imitate
-        return replace(established(predictor, selection.fit.model, {}, False), names=selection.accepted)
-    return found
-
-
-def _matters(errors: PairedErrors) -> bool:
-    """Do the terms certainly lower the error at one horizon, by as much as is asked of an effect (`least_fall`)?"""
-    for at in errors.horizons.values():
-        before = at.models[-2]
-        change = at.change_between(before.name, WITH_TERMS)
-        if change.fell and -change.change_m >= LEAST_FALL * before.rms_m:
-            return True
-    return False
-
-
-def _errors_with_terms(selection: SelectionResult, given: Model, found: Established) -> PairedErrors:
-    """Of the model as given, with the effects, and with the terms beside them, on the same windows."""
-    predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
-    after = [Judged(WITH_EFFECTS, selection.fit.model, pose_filter)] if selection.accepted else []
-    after.append(Judged(WITH_TERMS, found.fit.model, found.problem.pose_filter))
-    return judged_errors(predictor, pose_filter, given, after)
-
-
-def _left(selection: SelectionResult) -> tuple[list[ResidualDependence], Unexplained]:
-    """Residuals along every variable, and of all that is left what is too large and too certain to be luck."""
-    dependence = residual_dependence(selection.problem, selection.fit)
-    return dependence, unexplained(selection.problem, selection.fit, dependence)
+def _longer(selection: SelectionResult, effects: Mapping[str, Effect]) -> list[tuple[str, ...]]:
+    """Pairs of effects that explain what one accepted effect explains; of those that the search tried."""
+    tried = {c.name for step in selection.steps for c in step.ranking}
+    others = [effect for name, effect in effects.items() if name in tried and name not in selection.accepted]
+    return equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
 
 
 def too_little(tracks: Tracks, fewest: int) -> str:
@@ -388,20 +303,3 @@ def _hint(selection: SelectionResult, trials: int) -> Candidate | None:
         and c.paired_comparison.elpd_diff > max(step.decoy_threshold, least)
     ]
     return near[0] if near else None
-
-
-def refitted(selection: SelectionResult, predictor: Predictor, given: Model) -> SelectionResult:
-    """The result with the numbers that `fit_set` finds for its effects: those that `bns add` gives for the same names."""
-    chosen = {a.effect.name: a.effect for a in selection.fit.model.effects}
-    if not selection.accepted or selection.fit.model.per_trial_effect is not None:
-        return selection
-    effects = [chosen[name] for name in selection.accepted]
-    problem, fit, _ = fit_set(predictor, given, effects, known=selection.fit.model)
-    return replace(selection, problem=problem, nominal=problem.fit(given), fit=fit)
-
-
-def errors_before_and_after(selection: SelectionResult, given: Model) -> PairedErrors:
-    """Of the model as given, and of the accepted one with its numbers fitted to other trials, on the same windows."""
-    predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
-    after = [Judged(WITH_EFFECTS, selection.fit.model, pose_filter)] if selection.accepted else []
-    return judged_errors(predictor, pose_filter, given, after)

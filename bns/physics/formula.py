@@ -266,6 +266,7 @@ def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Any]:
         "lately10": lambda: lately(body, speed, 10.0),
         "lately100": lambda: lately(body, speed, 100.0),
     }
+
     def ago(from_s: float, to_s: float) -> Array:
         return averaged(speed, _step_s(body), float(from_s), float(to_s))
 

@@ -4,12 +4,13 @@ from functools import cache
 
 import pytest
 
-from bns.diagnose import diagnosis
+from bns.diagnose import outcome
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosis import NOTHING_LEFT, diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.established import Established
 from bns.diagnose.select.negligible import negligible
 from bns.diagnose.select.result import SelectionResult
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -55,7 +56,7 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
         asked.append(selection.accepted)
         return ("wheel-mismatch",)
 
-    monkeypatch.setattr(diagnosis, "negligible", judged)
+    monkeypatch.setattr(outcome, "negligible", judged)
     found = diagnose(predictor(), NOMINAL)
     assert set(asked[0]) >= {"wheelbase", "wheel-mismatch"}
     assert found.verdict in {"effects", "tie"}
@@ -63,3 +64,18 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
     assert found.as_json()["negligible"]["wheel-mismatch"]["ratio"]["value"] == pytest.approx(1.004, abs=2e-3)
     assert any("wheel-mismatch is certain but negligible (ratio = 1" in note for note in found.notes)
     assert {a.effect.name for a in found.model.effects} == set(found.effects)
+
+
+@pytest.mark.parametrize(("matters", "named"), [(True, ("wheelbase",)), (False, ("wheelbase", "wheel-mismatch"))])
+def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named):
+    """Stand-ins for the search with flexible terms and for its judgement: it keeps one effect beside a term."""
+    searched = selected("wheelbase", "wheel-mismatch")
+    found = Established(("wheelbase",), ("a term",), searched.problem, searched.fit)
+    monkeypatch.setattr(outcome, "_established", lambda *_: found)
+    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
+    monkeypatch.setattr(outcome, "_matters", lambda _: matters)
+    monkeypatch.setattr(outcome, "unexplained", lambda *_: NOTHING_LEFT)
+    ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
+    assert ended.selection.accepted == named
+    assert ended.imitating == (("wheel-mismatch",) if matters else ())
+    assert (ended.terms, ended.errors_with_terms) == ((("a term",), "errors") if matters else ((), None))

@@ -132,6 +132,20 @@ def test_where_a_wheel_stood_is_read_from_the_other_half_of_the_trial():
     np.testing.assert_array_equal(again.left_m_s[:, early], turned.left_m_s[:, early])
 
 
+def test_a_wheels_turn_is_found_though_the_wheelbase_and_a_wheels_size_are_wrong():
+    """Such errors of the heading are much larger than the wave, and follow the commands."""
+    rng = np.random.default_rng(3)
+    step = np.full((8, 400), 0.05)
+    left, right = (np.repeat(rng.uniform(-0.1, 0.16, (8, 10)), 40, axis=1) for _ in range(2))
+    way = np.cumsum(right * step, axis=1) - right * step / 2
+    really = 1.05 * right * (1 + 0.1 * np.cos(2 * np.pi * way / 0.13 + rng.uniform(0, 6, (8, 1))))
+    rate = (really - left) / (0.9 * B) * step
+    heading = np.cumsum(rate, axis=1) - rate / 2 + rng.normal(0, 0.004, rate.shape)
+    seen = np.stack([np.zeros_like(heading), np.zeros_like(heading), heading], axis=2)
+    best = starts_from(Wheels(step, left, right, B, Conditions(seen=seen)))[0]
+    assert best == pytest.approx((0.03, 0.1 * 1.05 / 0.9, 0.13), rel=0.15)
+
+
 def test_ranges_grow_with_the_robot():
     gap = effect_named("backlash")
     assert gap.scaled(REFERENCE_WHEELBASE_M) is gap

@@ -76,7 +76,7 @@ def best_start(problem: Problem, base: Fit, effect: Effect) -> StartingPoint:
 
 def _starts(effect: Effect, predictor: Predictor, model: Model) -> Iterator[tuple[float, ...]]:
     if effect.starts_from is not None and isinstance(predictor, WheelPredictor):
-        yield from predictor.starts_of(effect, model.wheelbase_m)
+        yield from predictor.starts_of(effect, model)
         return
     if effect.starts:
         yield from effect.starts

@@ -59,7 +59,7 @@ class WheelPredictor:
         self.way_m = self._since_previous(way)
         self._no_drift = np.zeros((len(tracks.t_s), 2))
         self._of_horizon = lru_cache(partial(windows, tracks))
-        self._starts: dict[tuple[str, float], tuple[tuple[float, ...], ...]] = {}
+        self._starts: dict[tuple[str, float, Chain], tuple[tuple[float, ...], ...]] = {}
         # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
         kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
         self._wheels = lru_cache(kept)(self._turned)
@@ -131,12 +131,16 @@ class WheelPredictor:
         poses.flags.writeable = sums.flags.writeable = False
         return poses, sums
 
-    def starts_of(self, effect: Effect, wheelbase_m: float) -> tuple[tuple[float, ...], ...]:
-        """What the effect's ``starts_from`` makes of these commands and poses, worked out once; its neutral values if nothing."""
-        known = (effect.name, wheelbase_m)
+    def starts_of(self, effect: Effect, model: Model) -> tuple[tuple[float, ...], ...]:
+        """What the effect's ``starts_from`` makes of these poses, and of the wheels as the model turns them; kept.
+
+        Its neutral values if nothing.
+        """
+        chain = _chain(model, ("wheel",))
+        known = effect.name, model.wheelbase_m, chain
         if known not in self._starts and effect.starts_from is not None:
-            grid = self.grid
-            given = Wheels(grid.step_s, grid.left_m_s, grid.right_m_s, wheelbase_m, self.conditions)
+            turned = self._wheels(model.wheelbase_m, chain)
+            given = Wheels(self.grid.step_s, turned.left_m_s, turned.right_m_s, model.wheelbase_m, self.conditions)
             self._starts[known] = effect.starts_from(given) or (tuple(effect.neutral.values()),)
         return self._starts[known]
 

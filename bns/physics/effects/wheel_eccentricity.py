@@ -7,6 +7,8 @@ distance per revolution remain to be fitted. In a simulation the wheels begin at
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import i0e, i1e
@@ -17,8 +19,14 @@ from bns.physics.signals import Array, Wheels
 _RIDGE = 1e-9
 _RANGE, _TURNS = (0.33, 5.0), 72
 """Ways of a turn that are looked at, in wheelbases: 4 % apart, as many as some nine turns in a trial can tell apart."""
-_TRIALS, _PEAKS, _BEND = 24, 2, 3
-"""So many trials are looked at, and so many of the best for each wheel tried; slower errors are a cubic of time."""
+_TRIALS, _PEAKS = 24, 4
+"""So many trials are looked at, and so many of the best ways tried."""
+_SHARES = 0.03, 0.6
+"""Starts have shares between these; at 0 a share has no slope that would lead away."""
+_LEAST_REPEATED = 0.1
+"""Of the spectrum at the wave: an estimate below that is luck."""
+_WAVES = 4
+"""Cosine and sine for each wheel."""
 
 
 def apply(wheels: Wheels, left_share: float, right_share: float, turn_m: float) -> Wheels:
@@ -28,8 +36,11 @@ def apply(wheels: Wheels, left_share: float, right_share: float, turn_m: float) 
         waves = [np.cos(angle) for angle in angles]
     else:
         waves = _waves(wheels, wheels.conditions.seen[..., 2], angles)
+    speeds = wheels.left_m_s, wheels.right_m_s
+    # the mean of a wave over a step of which the wheel turns through a good part
+    means = [wave * np.sinc(speed * wheels.step_s / turn_m) for wave, speed in zip(waves, speeds, strict=True)]
     return wheels.turning(
-        wheels.left_m_s * (1.0 + left_share * waves[0]), wheels.right_m_s * (1.0 + right_share * waves[1])
+        wheels.left_m_s * (1.0 + left_share * means[0]), wheels.right_m_s * (1.0 + right_share * means[1])
     )
 
 
@@ -46,10 +57,8 @@ def _waves(wheels: Wheels, heading: Array, angles: list[Array]) -> list[Array]:
     The wave is multiplied by the expected cosine of its phase's error, I1(k)/I0(k) of a von Mises distribution (Mardia and Jupp,
     Directional Statistics, section 3.5.4): without that, or with more, the fitted share is biased.
     """
-    rates = [-wheels.left_m_s / wheels.wheelbase_m, wheels.right_m_s / wheels.wheelbase_m]
-    parts = [rate * wave for rate, angle in zip(rates, angles, strict=True) for wave in (np.cos(angle), np.sin(angle))]
-    columns = np.stack([_until(part, wheels.step_s) for part in parts], axis=2)
-    off = heading - _until(rates[0] + rates[1], wheels.step_s)
+    columns = _waves_of(wheels, angles)
+    off = heading - _until((wheels.right_m_s - wheels.left_m_s) / wheels.wheelbase_m, wheels.step_s)
     seen, known = np.isfinite(heading), wheels.trial_s
     last = np.where(seen, known, -np.inf).max(axis=1, keepdims=True)
     early = known < last / 2.0
@@ -74,73 +83,110 @@ def _lag(wheels: Wheels, angles: list[Array]) -> int:
     return int(np.clip(round(2.0 * np.pi / 3.0 / usual), 1, max(wheels.step_s.shape[1] // 8, 1)))
 
 
-def _pairs(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> Array:
-    """Cosine and sine part of each wheel's wave, (trials, 4): least squares beside a drift, then of length 1 or less.
+@dataclass(frozen=True)
+class _Fitted:
+    """Least squares of each trial by itself: (trials, k) coefficients and their variance, (trials,) what is left."""
 
-    In differences over ``lag`` steps: a heading that wanders with the motors' scatter does not pass for a wave.
+    values: Array
+    variance: Array
+    left: Array
+    independent: Array
+    """As many of the differences count as independent ones, for a wave that does a third of a turn in ``lag``."""
+
+
+def _fitted(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> _Fitted:
+    """A heading (trials, steps) by ``columns`` (trials, steps, k), in differences over ``lag`` steps.
+
+    So a heading that wanders with the motors' scatter does not pass for a wave.
     """
-    columns, off, used = (
-        columns[:, lag:] - columns[:, :-lag],
-        off[:, lag:] - off[:, :-lag],
-        used[:, lag:] & used[:, :-lag],
-    )
-    off = off * used
-    design = np.concatenate([columns, np.ones_like(off)[..., None]], axis=2) * used[..., None]
-    gram = np.einsum("nki,nkj->nij", design, design)
+    used = used[:, lag:] & used[:, :-lag]
+    design = (columns[:, lag:] - columns[:, :-lag]) * used[..., None]
+    off = (off[:, lag:] - off[:, :-lag]) * used
+    across = design.swapaxes(1, 2)
+    gram, target = across @ design, (across @ off[..., None])[..., 0]
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", gram), 1e-30))
-    gram = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(5)
-    inverse = np.linalg.inv(gram)
-    fitted = np.einsum("nij,nj->ni", inverse, np.einsum("nki,nk->ni", design, off) / scale)
-    left = (off - np.einsum("nki,ni->nk", design, fitted / scale)) * used
-    spare = np.maximum(used.sum(axis=1) / lag - 5, 1)
-    # neighbours overlap: as many differences as lags are independent
-    variance = np.einsum("nii->ni", inverse)[:, :4] * ((left**2).sum(axis=1) / spare)[:, None] / scale[:, :4] ** 2
-    pair = (fitted / scale)[:, :4]
-    length2, unsure = (np.repeat(v[:, ::2] + v[:, 1::2], 2, axis=1) for v in (pair**2, variance))
+    inverse = np.linalg.inv(gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(columns.shape[2]))
+    values = (inverse @ (target / scale)[..., None])[..., 0] / scale
+    rest = off - (design @ values[..., None])[..., 0]
+    left, independent = (rest**2).sum(axis=1), used.sum(axis=1) / _repeated(rest, used, lag)
+    spare = np.maximum(independent - columns.shape[2], 1)
+    return _Fitted(values, np.einsum("nii->ni", inverse) * (left / spare)[:, None] / scale**2, left, independent)
+
+
+def _repeated(rest: Array, used: NDArray[np.bool_], lag: int) -> float:
+    """By how much neighbours raise the variance of a wave's amplitude: the spectrum of ``rest`` at the wave over the mean one.
+
+    The sum of the autocorrelation times the wave's own, over half a turn: 1.5 where tracking noise is white from pose to pose,
+    2/3 of ``lag`` where the heading wanders.
+    """
+    most = lag + lag // 2
+    size = rest.shape[1] + most
+    product, pairs = (
+        np.fft.irfft((np.abs(np.fft.rfft(x, size)) ** 2).sum(axis=0), size)[: most + 1] for x in (rest, used.astype(float))
+    )
+    covariance = product / np.maximum(pairs, 1.0)
+    if covariance[0] <= 0.0:
+        return float(lag)
+    wave = np.cos(np.arange(1, most + 1) * (2.0 * np.pi / 3.0 / lag))
+    return max(1.0 + 2.0 * float(covariance[1:] @ wave) / float(covariance[0]), _LEAST_REPEATED)
+
+
+def _pairs(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> Array:
+    """Cosine and sine part of each wheel's wave, (trials, 4): least squares beside a drift, then of length 1 or less."""
+    steady = np.broadcast_to(np.arange(off.shape[1], dtype=np.float64)[:, None], (*off.shape, 1))
+    fitted = _fitted(np.concatenate([columns, steady], axis=2), off, used, lag)
+    pair = fitted.values[:, :_WAVES]
+    length2, unsure = (
+        np.repeat(v[:, ::2] + v[:, 1::2], 2, axis=1) for v in (pair**2, fitted.variance[:, :_WAVES])
+    )
     known = 2.0 * np.maximum(length2 - unsure, 0.0) / (unsure + 1e-30)  # concentration of the phase's distribution
     out: Array = pair / np.sqrt(length2 + 1e-30) * (i1e(known) / i0e(known))  # the expected cosine of its error
     return out
 
 
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
-    """The ways of a turn that explain most of the heading, of `_TURNS` between a third and five times the wheelbase."""
+    """The ways of a turn that explain most of the heading, of `_TURNS` between a third and five times the wheelbase.
+
+    ``wheels`` turn as the model without this effect has them. The shares are those of the waves fitted to each trial.
+    """
     if wheels.conditions.seen is None:
         return ()
     chosen = np.unique(np.linspace(0, len(wheels.step_s) - 1, min(len(wheels.step_s), _TRIALS)).astype(int))
-    speeds, step_s = (wheels.left_m_s[chosen], wheels.right_m_s[chosen]), wheels.step_s[chosen]
-    heading, known = wheels.conditions.seen[chosen, :, 2], wheels.trial_s[chosen]
-    used = np.isfinite(heading)
-    off = np.where(used, heading - _until((speeds[1] - speeds[0]) / wheels.wheelbase_m, step_s), 0.0)
-    bend = np.stack([known**power for power in range(_BEND + 1)], axis=2) * used[..., None]
+    some = replace(wheels, **{n: getattr(wheels, n)[chosen] for n in ("step_s", "left_m_s", "right_m_s")})
+    heading = wheels.conditions.seen[chosen, :, 2]
     turns = np.geomspace(*_RANGE, _TURNS) * wheels.wheelbase_m
-    out = []
-    for wheel, speed in enumerate(speeds):
-        score = np.array([_explained(_wave_columns(speed, step_s, turn), bend, off) for turn in turns])
-        padded = np.pad(score, 1)
-        peaks = np.flatnonzero((score >= padded[:-2]) & (score >= padded[2:]))
-        best = turns[peaks[np.argsort(-score[peaks])][:_PEAKS]].tolist()
-        out += [(share, 0.0, turn) if wheel == 0 else (0.0, share, turn) for turn in best for share in (0.03, 0.15)]
-    return tuple(out)
+    found = [_explained(some, heading, turn) for turn in turns]
+    score = np.pad([one for one, _ in found], 1)
+    peaks = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] >= score[2:]))
+    best = peaks[np.argsort(-score[1 + peaks])][:_PEAKS]
+    return tuple((*np.clip(found[i][1], *_SHARES).tolist(), float(turns[i])) for i in best)
 
 
-def _wave_columns(speed: Array, step_s: Array, turn_m: float) -> Array:
-    angle = _angle(speed, step_s, turn_m)
-    return np.stack([_until(speed * wave, step_s) for wave in (np.cos(angle), np.sin(angle))], axis=2)
+def _explained(wheels: Wheels, heading: Array, turn_m: float) -> tuple[float, Array]:
+    """Log likelihood that waves of both wheels add, and each wheel's share.
+
+    Whatever makes the speed of a wheel, the wheelbase or the heading's rate wrong is fitted as well, and is no wave.
+    """
+    angles = [_angle(speed, wheels.step_s, turn_m) for speed in (wheels.left_m_s, wheels.right_m_s)]
+    ways = [_until(speed, wheels.step_s) / wheels.wheelbase_m for speed in (wheels.left_m_s, wheels.right_m_s)]
+    used, lag = np.isfinite(heading), _lag(wheels, angles)
+    off = np.where(used, heading - (ways[1] - ways[0]), 0.0)
+    slow = np.stack([*ways, wheels.trial_s], axis=2)
+    columns = np.concatenate([_waves_of(wheels, angles), slow], axis=2)
+    without, fitted = _fitted(slow, off, used, lag), _fitted(columns, off, used, lag)
+    known = fitted.independent > columns.shape[2] + 1
+    if not known.any():
+        return 0.0, np.zeros(2)
+    gain = fitted.independent * np.log((without.left + _RIDGE) / (fitted.left + _RIDGE))
+    square = (fitted.values**2 - fitted.variance)[known, :_WAVES].mean(axis=0)
+    return float(gain[known].sum()) / 2.0, np.sqrt(np.maximum(square[::2] + square[1::2], 0.0))
 
 
-def _explained(columns: Array, bend: Array, off: Array) -> float:
-    """Squares of the heading that columns (trials, steps, k) explain, over those of ``bend`` alone, of all trials."""
-    design = np.concatenate([columns * bend[..., :1], bend], axis=2)
-    gram, target = np.einsum("nki,nkj->nij", design, design), np.einsum("nki,nk->ni", design, off)
-    scale = np.sqrt(np.maximum(np.einsum("nii->ni", gram), 1e-30))
-    gram = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(gram.shape[1])
-    target /= scale
-    k = columns.shape[2]
-    explained = [
-        np.einsum("ni,ni->", t, np.linalg.solve(g, t[..., None])[..., 0])
-        for g, t in ((gram, target), (gram[:, k:, k:], target[:, k:]))
-    ]
-    return float(explained[0] - explained[1])
+def _waves_of(wheels: Wheels, angles: list[Array]) -> Array:
+    """What a share of 1 adds to the heading, (trials, steps, 4): cosine and sine of the left, then of the right wheel."""
+    rates = [-wheels.left_m_s / wheels.wheelbase_m, wheels.right_m_s / wheels.wheelbase_m]
+    parts = [rate * wave for rate, angle in zip(rates, angles, strict=True) for wave in (np.cos(angle), np.sin(angle))]
+    return np.stack([_until(part, wheels.step_s) for part in parts], axis=2)
 
 
 EFFECT = Effect(

@@ -1,0 +1,168 @@
+"""What a search ends in: effects that lower the held-out error, terms for what is left, and neither in place of the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from bns.diagnose.estimate.cross_validation import Judged, judged_errors
+from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.paired_errors import PairedErrors
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
+from bns.diagnose.residuals.established import Established, established, left_over
+from bns.diagnose.residuals.symbolic import Formula, best_formula
+from bns.diagnose.residuals.unexplained import Unexplained, unexplained
+from bns.diagnose.select.known_effects import known_effects
+from bns.diagnose.select.negligible import LEAST_FALL, negligible
+from bns.diagnose.select.result import SelectionResult, certainly_lower
+from bns.diagnose.values import numbers_of
+from bns.physics.model import Model
+
+WITH_EFFECTS = "with the effects"
+"""The name of the refitted model in tables of errors."""
+WITH_TERMS = "and what is left, too"
+"""Of the model with the terms that describe what no effect explains, as well."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Effects of a search, refitted, with the held-out errors of the model as given and with them, and what they leave."""
+
+    selection: SelectionResult
+    errors: PairedErrors
+    withdrawn: tuple[str, ...]
+    """Effects that were accepted and with which the held-out error does not fall; the selection has none then."""
+    dependence: list[ResidualDependence]
+    rest: Unexplained
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What stands in the end; ``negligible`` and ``imitating``: accepted effects that are not in the selection any more."""
+
+    selection: SelectionResult
+    errors: PairedErrors
+    dependence: list[ResidualDependence]
+    rest: Unexplained
+    withdrawn: tuple[str, ...]
+    imitating: tuple[str, ...]
+    negligible: dict[str, dict[str, dict[str, Any]]]
+    terms: tuple[Formula, ...]
+    errors_with_terms: PairedErrors | None
+    formula: Formula | None
+    """The first term; without terms, a formula fitted to the variable along which most is left, where it earns something."""
+
+
+def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, tick: Callable[[str], None]) -> Outcome:
+    """Which of the effects that a search accepted are presented, and with which terms.
+
+    Effects that only imitate what is left give way to its terms, if the terms matter; else the effects stay as they are.
+    """
+    stands = _standing(searched, predictor, given, tick)
+    imitating: tuple[str, ...] = ()
+    terms: tuple[Formula, ...] = ()
+    with_terms: PairedErrors | None = None
+    if found := _established(stands.selection, predictor, stands.rest):
+        lost = tuple(name for name in stands.selection.accepted if name not in found.names)
+        next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
+        errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
+        if errors is None or next_to.rest.any or _matters(errors):
+            stands, imitating, terms, with_terms = next_to, lost, found.terms, errors
+    whole = stands.selection
+    tiny = () if terms else _negligible(whole)
+    selection = refitted(whole.lacking(tiny), predictor, given) if tiny else whole
+    # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
+    guesses = stands.rest.residual_dependence or (tuple(stands.dependence[:1]) if stands.rest.outliers else ())
+    formula = terms[0] if terms else best_formula(whole.problem, whole.fit, guesses) if guesses else None
+    return Outcome(
+        selection,
+        errors_before_and_after(selection, given) if tiny else stands.errors,
+        stands.dependence,
+        stands.rest,
+        stands.withdrawn,
+        imitating,
+        {name: numbers for name, numbers in numbers_of(whole.fit).items() if name in tiny},
+        terms,
+        with_terms,
+        formula,
+    )
+
+
+def refitted(selection: SelectionResult, predictor: Predictor, given: Model) -> SelectionResult:
+    """The result with the numbers that `fit_set` finds for its effects: those that `bns add` gives for the same names."""
+    chosen = {a.effect.name: a.effect for a in selection.fit.model.effects}
+    if not selection.accepted or selection.fit.model.per_trial_effect is not None:
+        return selection
+    effects = [chosen[name] for name in selection.accepted]
+    problem, fit, _ = fit_set(predictor, given, effects, known=selection.fit.model)
+    return replace(selection, problem=problem, nominal=problem.fit(given), fit=fit)
+
+
+def errors_before_and_after(selection: SelectionResult, given: Model) -> PairedErrors:
+    """Of the model as given, and of the accepted one with its numbers fitted to other trials, on the same windows."""
+    predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
+    return judged_errors(predictor, pose_filter, given, _with_effects(selection))
+
+
+def _standing(selection: SelectionResult, predictor: Predictor, given: Model, tick: Callable[[str], None]) -> Standing:
+    """The effects of a selection if the held-out error falls with them; else none."""
+    tick("errors on trials held out")
+    selection = refitted(selection, predictor, given)
+    errors = errors_before_and_after(selection, given)
+    withdrawn: tuple[str, ...] = ()
+    if selection.accepted and not errors.falls:
+        withdrawn, selection = selection.accepted, selection.withdrawn()
+        errors = errors_before_and_after(selection, given)
+    tick("what is left")
+    dependence = residual_dependence(selection.problem, selection.fit)
+    return Standing(selection, errors, withdrawn, dependence, unexplained(selection.problem, selection.fit, dependence))
+
+
+def _negligible(selection: SelectionResult) -> tuple[str, ...]:
+    """As `negligible`; not asked where a fit is costly, or trials have clocks of their own."""
+    costly = selection.problem.predictor.screening is not None
+    return () if costly or selection.fit.model.per_trial_effect is not None else negligible(selection)
+
+
+def _established(selection: SelectionResult, predictor: Predictor, rest: Unexplained) -> Established | None:
+    """The search with flexible terms, where anything is left; None where nothing is, or trials have clocks of their own.
+
+    Single relative motions are calibrated with all numbers free instead (`calibrated`).
+    """
+    wheeled = isinstance(predictor, WheelPredictor)
+    if not wheeled or selection.fit.model.per_trial_effect is not None or predictor.tracks.relative:
+        return None
+    if not rest.any and not left_over(selection.problem, selection.fit, not selection.accepted):
+        return None
+    known = known_effects(selection)
+    found = established(predictor, selection.nominal.model, {name: known[name] for name in selection.accepted})
+    lost = set(selection.accepted) - set(found.names)
+    if lost and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):
+        # the effects predict better than what they are said to imitate: it is the terms that imitate
+        return replace(established(predictor, selection.fit.model, {}, False), names=selection.accepted)
+    return found
+
+
+def _matters(errors: PairedErrors) -> bool:
+    """Do the terms certainly lower the error at one horizon, by as much as is asked of an effect (`least_fall`)?"""
+    for at in errors.horizons.values():
+        before = at.models[-2]
+        change = at.change_between(before.name, WITH_TERMS)
+        if change.fell and -change.change_m >= LEAST_FALL * before.rms_m:
+            return True
+    return False
+
+
+def _errors_with_terms(selection: SelectionResult, given: Model, found: Established) -> PairedErrors:
+    """Of the model as given, with the effects, and with the terms in addition, on the same windows."""
+    predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter
+    after = [*_with_effects(selection), Judged(WITH_TERMS, found.fit.model, found.problem.pose_filter)]
+    return judged_errors(predictor, pose_filter, given, after)
+
+
+def _with_effects(selection: SelectionResult) -> list[Judged]:
+    """The model with the accepted effects, to be judged; nothing where none was accepted."""
+    return [Judged(WITH_EFFECTS, selection.fit.model, selection.problem.pose_filter)] if selection.accepted else []
