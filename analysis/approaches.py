@@ -58,7 +58,7 @@ def _draw(evals: pd.DataFrame) -> FigureResult:
     note(figure, f"{where}; {counted(n, 'run')}, {least} at least of each approach; bands: {INTERVALS}.")
     shows = (
         f"Task {where}, {first.sweep}. (a, b) Fraction of runs whose fittest controller completes the task after so many "
-        f"evaluations, and robot minutes (every drive charged, with the spec's overhead). (c) Share of runs in which {LASTING} "
+        f"evaluations, and robot minutes (all drives counted, with the spec's overhead). (c) Fraction of runs in which {LASTING} "
         f"successes in a row have not begun yet (Kaplan-Meier). n = {n} runs, {least} at least of each approach; {INTERVALS}."
     )
     table = pd.DataFrame(tables)

@@ -122,7 +122,7 @@ def _drawn(store: Results, chosen: Selection, table: pd.DataFrame) -> FigureResu
     if len(waiting):
         see += f"; too few runs yet of {' and '.join(task.partition(', ')[2] for task in waiting.task)}"
     shows = (
-        f"Each finding of the dissertation that a number can be put to, beside the same measure of these results with its 95 % "
+        f"Each finding of the dissertation that has a number, with the same measure of these results and its 95 % "
         f"interval (bootstrap over seeds, or Wilson). Agrees: the interval is within 5, or 20 % of the dissertation's value, of "
         f"it; differs: it lies outside; undecided: neither yet. Orders agree if they hold in 95 % of the bootstrap samples, and "
         f"differ if in 5 %. The dissertation's numbers come from 500 combinations of 30 runs; these from n = {chosen.n:,} runs "

@@ -69,8 +69,8 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     if len(tasks) > 1:
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=len(tasks))
     n, said = int(rows.drop_duplicates("task").runs.sum()), coverage(store, chosen.sweeps, chosen.n)
-    unknown = ("no mark where combinations differ no more than chance makes them",) if rows.variance.isna().any() else ()
-    luck = "in (a) longer downwards by what the widest of many gaps owes to chance"
+    unknown = ("no mark where combinations differ no more than by chance",) if rows.variance.isna().any() else ()
+    luck = "in (a) extended downwards by the width that the largest of several gaps has by chance"
     bars = f"bars in (a) and (b): {BOOTSTRAP.removeprefix('pointwise ')}, {luck}; in (c): 95 % of the splits"
     if (few := rows.seeds.max()) < FEWEST_SEEDS:
         bars = f"no bars, and nothing in (c): {counted(few, 'seed')}, and {FEWEST_SEEDS} are needed"
@@ -78,7 +78,7 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     shows = (
         f"What each parameter does to success (the fittest controller {criterion(store, chosen)}), seeds as the unit. (a) The "
         f"dissertation's measure: the largest gap between the curves of its values. (b) Functional analysis of variance: "
-        f"fraction of the variance between combinations at the last evaluation that it explains by itself, chance taken off. (c) "
+        f"fraction of the variance between combinations at the last evaluation that it explains alone, corrected for chance. (c) "
         f"Permutation: how much of its R² a regression tree loses on seeds it has not seen, when the values are shuffled. "
         f"n = {n:,} runs of {', '.join(chosen.sweeps)}, {rows.seeds.max()} seeds."
     )

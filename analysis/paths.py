@@ -89,7 +89,7 @@ def _draw_task(store: Results, robot: str, task: str, runs: pd.DataFrame) -> Fig
     shows = (
         f"Paths of the fittest controller of each run at its last success, or at its last evaluation if it had "
         f"none ({succeeded} of n = {n} runs of {', '.join(sweeps)} had one), on task {task_title(robot, task)}. Solid: "
-        f"driven, until it ended; dashed: the same commands as its simulator networks saw them; dots: ends of commands; grey: "
+        f"driven, until it ended; dashed: the same commands as its networks predict them; dots: ends of commands; grey: "
         f"goals, {100 * radius_m:g} cm from their middle to their edge, in order."
     )
     if len(numbers) > len(walked):

@@ -34,7 +34,7 @@ def draw(store: Results) -> list[FigureResult]:
     pairs, rows = compared(store)
     table = pd.DataFrame([in_words(row) for row in rows.to_dict("records")])
     shows = (
-        f"Runs of a reading less those of the default reading on the same seeds, means over pairs with 95 % bootstrap intervals "
+        f"Runs of a reading minus those of the default reading on the same seeds, means over pairs with 95 % bootstrap intervals "
         f"over pairs (from {FEWEST_SEEDS} pairs on). Percentages are of evaluations in which the fittest meets all goals; late: "
         f"the last {1 - LATE:.0%} of a run. n = {len(pairs)} pairs."
     )

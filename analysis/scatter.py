@@ -117,7 +117,7 @@ def described(
         "; ".join((f"{counted(len(rows), 'dot')} of {runs} each", *said.sentences, *thinned, f"bars: {intervals}")) + ".",
     )
     shows = (
-        f"{what}; one dot a task and combination of {', '.join(SHORT.values())} ({runs} each, n = {n:,} runs of "
+        f"{what}; one dot per task and combination of {', '.join(SHORT.values())} ({runs} each, n = {n:,} runs of "
         f"{', '.join(chosen.sweeps)})."
     )
     missing = (*said.missing, *thinned, *chosen.left_out)

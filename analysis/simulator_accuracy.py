@@ -64,9 +64,9 @@ def _draw(simulator: StaticSimulator) -> FigureResult:
     n = int(learnable[0].sum())
     note(figure, f"{n} stable cycles of {len(measured)} that took no part in training; each point one cycle. {_said(table)}")
     shows = (
-        f"Displacement in a cycle as the static simulator of the {robot.name} predicts it, against what the physics world "
-        f"did, for n = {n} stable verification cycles. Dashed: prediction is right; solid: regression of predicted on "
-        f"measured. Its R² and slope stand above each panel, the dissertation's in brackets."
+        f"Displacement in a cycle as the static simulator of the {robot.name} predicts it, against that in the physics "
+        f"world, for n = {n} stable verification cycles. Dashed: prediction is right; solid: regression of predicted on "
+        f"measured. Its R² and slope are above each panel, the dissertation's in brackets."
     )
     see = "The dissertation predicted x well (R² 0.84 and 0.75) and y hardly at all (0.17 and 0.05)."
     columns = [f"{kind}_{net}" for kind in ("measured", "predicted") for net in simulator.networks]

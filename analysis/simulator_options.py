@@ -59,7 +59,7 @@ def _draw(robot: str, path: Path) -> FigureResult:
         "cycles that a controller began with. changes: the change of posture moves the markers; rigid: the markers are on one "
         "body."
     )
-    see = "The gain of an option is what it takes off the first of each group."
+    see = "The gain of an option is its difference to the first bar of each group."
     title = f"What options of the simulator gain, {robot}"
     return FigureResult(f"{NAME}-{robot}", title, figure, shows, len(tracks), (), see=see, data=data)
 

@@ -49,7 +49,7 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     said, what = coverage(store, chosen.sweeps, chosen.n), criterion(store, chosen)
     note(figure, "; ".join((f"Success: {what}", *said.sentences, f"bands: {INTERVALS}")) + ".")
     shows = (
-        f"Share of runs in which the fittest controller, driven after this evaluation, {what}, and of those in which it has "
+        f"Fraction of runs in which the fittest controller, driven after this evaluation, {what}, and of those in which it has "
         f"done so after this or an earlier one; all combinations together, n = {chosen.n:,} runs of {', '.join(chosen.sweeps)}; "
         f"bands are 95 % Wilson intervals ({INDEPENDENCE})."
     )

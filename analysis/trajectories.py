@@ -68,9 +68,9 @@ def _draw(path: Path) -> FigureResult:
     drives = table[table.repeat > 0].drop_duplicates(["trial", "repeat"])
     counts = "; ".join(f"{what}: {n}" for what, n in drives.outcome.value_counts().items())
     of = f"{len(drives)} drives of {len(trials)} controllers"
-    note(figure, f"Path of the middle between the markers. Of {of}, {counts}. {SOURCE}")
+    note(figure, f"Path of the midpoint between the markers. Of {of}, {counts}. {SOURCE}")
     shows = (
-        f"{len(trials)} controllers evolved apart on the static simulator, with noise, for {task_title(robot, task)}; "
+        f"{len(trials)} controllers evolved on the static simulator alone, with noise, for {task_title(robot, task)}; "
         "dashed: its prediction without noise, solid: three drives of each in the physics world. All trials are shown."
     )
     title = f"Trajectory trials, {task_title(robot, task)}"

@@ -80,7 +80,7 @@ def _draw(store: Results, robot: str, rows: pd.DataFrame) -> FigureResult:
     not_yet = (f"{never} never {IN_A_ROW} in succession",) if never else ()
     note(figure, "; ".join((*said.sentences, *not_yet, "one mark a trial")) + ".")
     shows = (
-        f"Evaluations until success of each trial of {', '.join(sweeps)} beside the dissertation's trials on robots. First: the "
+        f"Evaluations until success of each trial of {', '.join(sweeps)}, and of the dissertation's trials on robots. First: the "
         f"fittest controller visits all goals. Consistent: in {IN_A_ROW} evaluations in a row (the dissertation judged by eye). "
         f"Minutes: {_pace(robot)}. Driving: the commands of the controllers that were driven until the first success."
     )

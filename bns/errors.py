@@ -7,7 +7,7 @@ from difflib import get_close_matches
 
 
 class BnsError(Exception):
-    """A fault that has an explanation: the command line prints it without a traceback and exits with 2."""
+    """An error with an explanation: the command line prints it without a traceback and exits with 2."""
 
     exit_code = 2
 
@@ -41,7 +41,7 @@ class StopNotConfirmedError(BnsError):
 
 
 class TrialFileError(BnsError):
-    """A file of a trial that cannot be written; the robot stands, confirmed, and the trial can be gone on with."""
+    """A file of a trial that cannot be written; the robot is confirmed to stand still, and the trial can be resumed."""
 
     exit_code = 5
 
@@ -64,7 +64,7 @@ class ClusterError(BnsError):
 
 
 class DeviceError(BnsError):
-    """A GPU that is not there, cannot be used, or failed."""
+    """A GPU that is missing, cannot be used, or failed."""
 
 
 class DataError(BnsError):

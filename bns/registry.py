@@ -101,7 +101,7 @@ class Registry:
         except Exception as fault:
             told = str(fault) if isinstance(fault, BnsError) else f"{type(fault).__name__}: {fault}"
             raise self._error(
-                f"{self.kind} {part.name!r} of {part.origin} cannot be used: {told.rstrip('.')}. Mend or uninstall that package."
+                f"{self.kind} {part.name!r} of {part.origin} cannot be used: {told.rstrip('.')}. Fix or uninstall that package."
             ) from fault
 
     def _checked(self, part: Part, found: Any) -> Any:

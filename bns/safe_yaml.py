@@ -135,7 +135,7 @@ def excess(root: yaml.Node, *, loops: bool = True) -> str:
     except RecursionError:
         return f"line {root.start_mark.line + 1}: nested too deeply: {DEEPEST} levels are allowed."
     except _LoopError as loop:
-        return f"line {loop.line}: an alias stands within what it stands for. Write it out." if loops else ""
+        return f"line {loop.line}: an alias contains itself. Write it out." if loops else ""
     if depth > DEEPEST:
         return f"line {root.start_mark.line + 1}: nested too deeply: {depth} levels, and {DEEPEST} are allowed."
     if nodes > MOST_NODES:

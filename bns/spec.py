@@ -66,7 +66,7 @@ class RunSpec:
     task: str = _field("circle", "goal task of the robot")
     world: str = _field(
         "substitute",
-        "world that stands for the robot, or a model file (.yaml) for the physics world; 'physics>worn.yaml@50' changes at "
+        "world used in place of the robot, or a model file (.yaml) for the physics world; 'physics>worn.yaml@50' changes at "
         "evaluation 50",
         choices=("substitute", "physics", "robot"),
         or_file=(".yaml", ".yml"),
@@ -101,7 +101,7 @@ class RunSpec:
         later=True,
     )
     overhead_s: int = _field(
-        30, "robot time in seconds that each evaluation takes beside driving: putting the robot back, starting it",
+        30, "robot time in seconds that each evaluation takes in addition to driving: putting the robot back, starting it",
         low=0, high=86_400, later=True,
     )  # fmt: skip
 

@@ -16,7 +16,7 @@ STAGE_TEXT = {
     "wheel": "Wheels: commanded speed to wheel speed",
     "body": "Body: wheel speeds to the robot's velocity",
     "world": "World: floor and cable",
-    "clock": "Clock: when a pose was taken",
+    "clock": "Clock: when a pose was measured",
     "measure": "Measurement: what the tracker reports",
 }
 _LIST_HEAD = """\
@@ -26,7 +26,7 @@ Every effect that `bns diagnose` can name, grouped by the stage of the simulatio
 pictures are made from the catalogue when this site is built; `bns effects` prints the same list in a terminal.
 
 Each picture shows one drive of a Khepera III, predicted twice: by the plain model and by the model with the effect.
-The sizes are larger than on a sound robot, so that you can see them.
+The parameters are larger than on a fault-free robot, so that you can see the difference.
 """
 
 _JOINTS_HEAD = """\
@@ -111,7 +111,7 @@ def page(effect: Effect, shown: Demonstration) -> str:
             "",
             "## Look-alikes\n",
             f"These effects leave nearly the same traces: {names}.",
-            *(f"\n**Beside {other}.** {text}" for other, text in effect.beside.items()),
+            *(f"\n**Compared with {other}.** {text}" for other, text in effect.beside.items()),
             "\n## Confirm it on the bench\n",
             _bench(effect),
             "\n## Use it\n",

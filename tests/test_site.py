@@ -139,7 +139,7 @@ def test_the_menu_names_pages_that_exist_once_each():
 
 BANNED = re.compile(
     r"\b(held against|mend(s|ed|ing)?|anew|gone on with|go(es)? on with|nobody is there|foret(ell|ells|old)|the source('s)?|"
-    r"hold a model against|worth)\b",
+    r"hold a model against|worth|heeds?|foresee\w*|afresh|luck)\b",
     re.IGNORECASE,
 )
 """Words that are no plain technical English, or that have a term of their own in the glossary."""
@@ -170,6 +170,18 @@ def test_help_is_plain_english():
         parsers += parser._commands().values()
         text = parser.format_help().replace("--mend", "")
         assert not (found := BANNED.search(text)), f"{parser.prog}: {found}"
+
+
+PRIVATE = re.compile(BANNED.pattern + r"|\b(beside|told|share of|ways? (driven|of)|knows?|nearer together)\b", re.IGNORECASE)
+
+
+def test_effects_are_described_in_plain_english():
+    jointed = [getattr(part, "effect", part) for part in map(JOINT_EFFECTS.load, JOINT_EFFECTS.names())]
+    for effect in (*all_effects().values(), *jointed):
+        said = (effect.sentence, effect.residuals, effect.measurement, effect.caveat, effect.equation, *effect.beside.values())
+        for text in (*said, *(p.text for p in effect.parameters)):
+            assert not PRIVATE.search(text), f"{effect.name}: {text}"
+        assert all(p.text.strip() and p.unit for p in effect.parameters), effect.name
 
 
 def test_choices_name_files_that_exist():

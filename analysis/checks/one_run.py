@@ -11,7 +11,7 @@ from analysis.results import NoDataError, Results, among
 from analysis.selection import Selection
 from analysis.verdicts import Checked, within
 
-NOT_RECORDED = "no run here has its generations and probes (an archive keeps none); run bns sweep prototype"
+NOT_RECORDED = "no stored run has generations and probes (an archive does not keep them); run bns sweep prototype"
 _FEWEST = 6
 """Evaluations that a run must have for thirds of it to be compared."""
 

@@ -43,8 +43,11 @@ class AddResult(Shown):
 
     @property
     def errors(self) -> pd.DataFrame:
-        """Position error on held-out trials (m, root mean square), all on the same windows: a row a step (as given, then each
-        effect added in turn; last the noise of the tracking), a column a horizon. NaN where there are no such windows."""
+        """Position error on held-out trials (m, root mean square), all on the same windows.
+
+        One row per step (model as given, then each effect added in turn; last the tracking noise), one column per horizon.
+        NaN where there are no such windows.
+        """
         horizons = self.extended.errors.horizons
         steps = {
             name: {h: e.models[k].rms_m for h, e in horizons.items()} for k, name in enumerate(self.extended.names)
@@ -54,7 +57,7 @@ class AddResult(Shown):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before using the model: numbers at a bound, effects that do nothing, an error that does not fall."""
+        """Warnings: parameters at a bound, effects without influence, an error that does not fall."""
         return self.extended.warnings
 
     def summary(self) -> str:
@@ -74,7 +77,7 @@ class AddResult(Shown):
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """The error at every step of the way, a line a horizon; dotted: the noise of the tracking."""
+        """The error at every step, one line per horizon; dotted: the tracking noise."""
         return drawn(ax, lambda axes: error_by_step_axes(axes, self.extended), (5.4, 3.0))
 
     def _line(self) -> str:
@@ -99,13 +102,13 @@ def add(
         log: a file, a table, or `bns.Measurements`.
         effects: names of listed effects (`bns.effects`), Python files with an ``EFFECT``, `bns.Effect`, or several of these.
         model: `bns.Model`, or the name or file of one.
-        term: makes the one name given a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w, s, east or north. It may
-            use the log's further columns by name (docs/formulas.md).
-        per_trial: an effect that may differ from trial to trial (clock-offset) has a value of its own in each.
-        progress: told what is being done.
+        term: defines the one name given as a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w, s, east or north.
+            It may use the log's further columns by name (docs/formulas.md).
+        per_trial: an effect that may differ from trial to trial (clock-offset) has a separate value in each.
+        progress: called with the fraction done (None if unknown) and a text.
 
     Raises:
-        ModelError: no such effect or model, or the model has the effect already.
+        ModelError: there is no such effect or model, or the model already has the effect.
         DataError: measurements that cannot be used, or of another robot.
     """
     wanted = [effects] if isinstance(effects, str | PathLike | Effect) else list(effects)

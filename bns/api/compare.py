@@ -34,8 +34,8 @@ PHASES = {"noise": 0.0, "errors": 0.3, "what explains them": 0.5, "curves": 0.9}
 class CompareResult(Shown):
     """How far predictions are off, and where.
 
-    ``comparison`` holds everything as found; ``causes`` says why a run's networks are wrong, None for a model and for networks
-    that came without their training patterns.
+    ``comparison`` holds the complete result. ``causes`` says why the networks of a run are wrong; it is None for a model, and
+    for networks without their training patterns.
     """
 
     log: Measurements
@@ -46,7 +46,7 @@ class CompareResult(Shown):
 
     @property
     def errors(self) -> pd.DataFrame:
-        """A row a horizon: position_m, forward_m, left_m (m), heading_rad (rad), root mean square, position_se_m, windows (how
+        """One row per horizon: position_m, forward_m, left_m (m), heading_rad (rad), root mean square; position_se_m; windows
         many), noise_floor_m (what tracking noise alone would show; NaN where the poses cannot tell)."""
         table = pd.DataFrame(self.comparison.errors).T
         table["noise_floor_m"] = pd.Series({h: self.comparison.noise_floor_m(h) for h in self.comparison.errors})
@@ -54,7 +54,7 @@ class CompareResult(Shown):
 
     @property
     def residual_dependence(self) -> pd.DataFrame:
-        """What a free curve along each variable would explain: variable, velocity, share (of the loss), p_value."""
+        """What a free curve along each variable would explain: variable, velocity, share (fraction of the loss), p_value."""
         return pd.DataFrame(
             self.comparison.as_json()["residual_dependence"], columns=["variable", "velocity", "share", "p_value"]
         )
@@ -105,8 +105,8 @@ def compare(
     Args:
         log: a file, a table, or `bns.Measurements`.
         model: `bns.Model`, the name or file of one, networks (.safetensors), or a robot's static simulator (``snake``).
-        fresh: work it out again even where the same was asked before (`bns.api.common.cache`).
-        progress: told the share that is done (0 to 1) and what is being done.
+        fresh: compute the answer again instead of taking it from the cache (docs/python.md).
+        progress: called with the fraction done (0 to 1) and a text.
 
     Raises:
         DataError: measurements that cannot be used, or of another robot.

@@ -45,7 +45,7 @@ RANKING = ("rank", "elpd_diff", "dse", "p_value", "rejected_because")
 
 @dataclass(frozen=True, repr=False)
 class DiagnoseResult(Shown):
-    """A verdict and what it rests on; ``diagnosis`` holds everything as found, ``ready`` what it was found from."""
+    """A verdict and its evidence. ``diagnosis`` holds the complete result, ``ready`` the data and the model behind it."""
 
     ready: Prepared
     diagnosis: Diagnosis
@@ -63,30 +63,30 @@ class DiagnoseResult(Shown):
 
     @property
     def model(self) -> Model:
-        """The model refitted with these effects; the model as it was where there was too little to fit.
+        """The model refitted with these effects; the unchanged model if there were too few data to fit.
 
-        Where terms describe what is left, `parameters` are fitted beside these and stand in `model_with_terms`.
+        If terms describe the remaining structure, `parameters` are fitted together with them; see `model_with_terms`.
         """
         fitted = self.diagnosis.model
         return self.ready.model if fitted is None else Model(fitted)
 
     @property
     def model_with_terms(self) -> Model | None:
-        """The model with the effects and the terms that describe what no effect explains; None where there are none."""
+        """The model with the effects and the terms that describe what no effect explains; None if there are none."""
         fitted = self.diagnosis.model_with_terms
         return None if fitted is None else Model(fitted)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What should be known beside the verdict, a sentence or two each."""
+        """Further remarks on the verdict, a sentence or two each."""
         return self.diagnosis.notes
 
     @property
     def ranking(self) -> pd.DataFrame:
-        """What each effect earns when added alone, the best first: a row an effect, by its name.
+        """Gain of each effect when added alone, the best first: one row per effect, indexed by name.
 
-        rank (from 0), elpd_diff (log-likelihood a trial, on trials held out, above the model without it), dse (its standard
-        error), p_value, rejected_because (why it is not considered; "" if it is), and the fitted numbers, {name: value, SI}.
+        Columns: rank (from 0), elpd_diff (gain in log-likelihood per held-out trial), dse (its standard error), p_value,
+        rejected_because (why it is not considered; "" if it is), and values (fitted parameters, {name: value in SI units}).
         """
         ranked = self.diagnosis.as_json()["ranking"]
         rows = [
@@ -105,7 +105,7 @@ class DiagnoseResult(Shown):
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """The numbers of the accepted effects: effect, parameter, value, se, low, high (95 % interval), unit, at_bound."""
+        """Parameters of the accepted effects: effect, parameter, value, se, low, high (95 % interval), unit, at_bound."""
         listed = self.diagnosis.as_json()["parameters"]
         rows = [
             {"effect": e, "parameter": p, **number} for e, numbers in listed.items() for p, number in numbers.items()
@@ -114,7 +114,7 @@ class DiagnoseResult(Shown):
 
     @property
     def errors(self) -> pd.DataFrame:
-        """Position error (m) on held-out trials, before and after on the same windows: a row a horizon.
+        """Position error (m) on held-out trials, before and after on the same windows: one row per horizon.
 
         Columns before, after (root mean square), median_before, median_after, change, change_low, change_high (95 %, paired
         by trial), noise_floor (of the tracking), windows, windows_left_out.
@@ -126,11 +126,11 @@ class DiagnoseResult(Shown):
         return changes_text(self.settings) + diagnosis_text(self.diagnosis)
 
     def to_json(self) -> dict[str, Any]:
-        """One object of plain values, the same that `bns diagnose --json` prints."""
+        """One object of plain values, as `bns diagnose --json` prints it."""
         return {**self.diagnosis.as_json(), "provenance": provenance(self.ready.model, self.ready.log.sha256, self.settings)}
 
     def plot(self, ax: Axes | None = None, most: int = 12) -> Axes:
-        """What each effect earns on trials held out, with 95 % intervals. DataError where there was too little to search."""
+        """Gain of each effect on held-out trials, with 95 % intervals. DataError if there were too few data for a search."""
         if self.diagnosis.selection is None:
             raise DataError(f"Nothing was ranked: {'; '.join(self.notes)}")
         return drawn(ax, lambda axes: ranking_axes(axes, self.diagnosis, most), (5.4, 3.8))
@@ -142,7 +142,7 @@ class DiagnoseResult(Shown):
         return proposed(self, **limits)
 
     def report(self, path: str | PathLike[str] = "report.html", **limits: Any) -> ReportResult:
-        """The page, as `bns.report` gives it, without diagnosing again."""
+        """The report, as `bns.report` writes it, without diagnosing again."""
         from bns.api.report import reported  # noqa: PLC0415  # it builds on this module
 
         return reported(self, path, **limits)
@@ -172,20 +172,20 @@ def diagnose(
     """Find what a model lacks.
 
     Args:
-        log: a file, a table, or `bns.Measurements`; eleven trials are the fewest that say anything.
+        log: a file, a table, or `bns.Measurements`; at least eleven trials.
         model: `bns.Model`, or the name or file of one.
-        also: effects of your own, tried beside the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
-        without_effects: names of listed effects that are not to be tried.
-        settings: thresholds that differ from the default (docs/settings.md): a mapping of room -> name -> value, a YAML file of
-            one, or `bns.diagnose.settings.Settings`. What differs is in the summary and the provenance.
-        fresh: work it out again even where the same was asked before (`bns.api.common.cache`).
-        progress: told the share that is done (0 to 1, an estimate that never falls) and what is being looked at.
-        alone: told what an effect earns by itself as soon as it is known, as an entry of ``ranking`` in the JSON. It is called
-            from several threads; a later search (without trials that stand out) may correct it.
+        also: effects of your own, tried in addition to the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
+        without_effects: names of listed effects to exclude.
+        settings: thresholds that differ from the default (docs/settings.md): a mapping of section -> name -> value, a YAML
+            file of one, or `bns.diagnose.settings.Settings`. Changed settings are listed in the summary and in the provenance.
+        fresh: compute the answer again instead of taking it from the cache (docs/python.md).
+        progress: called with the fraction done (0 to 1, an estimate that never falls) and a text.
+        alone: called with the gain of each effect alone as soon as it is known, as an entry of ``ranking`` in the JSON. It is
+            called from several threads; a later search (without outlying trials) may correct the values.
 
     Raises:
         DataError: measurements that cannot be used, or of another robot.
-        ModelError: no such model, or an effect's file that cannot be used.
+        ModelError: there is no such model, or the file of an effect cannot be used.
     """
     chosen = settings_of(settings)
     with in_force(chosen):

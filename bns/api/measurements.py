@@ -45,9 +45,9 @@ class Measurements(Shown):
     counter-clockwise from x); or the cycles and markers of a snake.
 
     Args:
-        robot: whose rows, where a column ``robot`` names several.
-        mapping: how other columns and units are to be read: a dictionary or the path of a mapping file (docs/logs.md). A file
-            with FILE.import.yaml beside it needs none.
+        robot: the robot whose rows are used, if a column ``robot`` names several.
+        mapping: how other columns and units are read: a dictionary or the path of a mapping file (docs/logs.md). A file
+            with FILE.import.yaml next to it needs none.
 
     Raises:
         DataError: what cannot be used; the message says what to do.
@@ -60,12 +60,12 @@ class Measurements(Shown):
 
     @property
     def frame(self) -> pd.DataFrame:
-        """A copy of the table: a row a tracked pose, in SI units; rows that the checks leave out included."""
+        """A copy of the table: one row per tracked pose, in SI units; rows that the checks leave out included."""
         return self._measured.table.copy()
 
     @cached_property
     def trials(self) -> pd.DataFrame:
-        """A row a trial, in order: trial (its name), poses and, on wheels, commands (how many of each), duration_s (s)."""
+        """One row per trial, in order: trial (its name), poses and, on wheels, commands (how many of each), duration_s (s)."""
         tracks = self._measured.tracks
         table = pd.DataFrame({"trial": tracks.names, "poses": np.diff(tracks.first)})
         if not isinstance(tracks, CycleTracks):
@@ -76,12 +76,12 @@ class Measurements(Shown):
 
     @property
     def findings(self) -> pd.DataFrame:
-        """What was odd: trial, row (of the table, from 0), text (what, and what was done about it)."""
+        """Irregularities: trial, row (of the table, from 0), text (what it is, and what was done about it)."""
         return pd.DataFrame([vars(each) for each in self._measured.findings], columns=["trial", "row", "text"])
 
     @property
     def robot(self) -> str:
-        """What a column ``robot`` says; "" where there is none."""
+        """The value of the column ``robot``; "" if there is none."""
         return self._measured.robot
 
     @property
@@ -124,7 +124,7 @@ class Measurements(Shown):
         return self._without(np.isin(np.arange(count), chosen))
 
     def cut(self, kept: Mapping[str, tuple[float, float]]) -> Measurements:
-        """The same measurements with less of some trials: of each named one what lies from one time (s, of the trial) to another.
+        """The same measurements with some trials cut: of each named trial, the part from one time (s, of the trial) to another.
 
         What was commanded before stays known, so that the robot is in motion where a trial begins in motion. DataError if there
         is no such trial, or nothing of it is left.
@@ -205,7 +205,7 @@ class Measurements(Shown):
         return len(self._measured.tracks)
 
     def summary(self) -> str:
-        """How much there is, and what is odd about it."""
+        """The amount of data, and the irregularities."""
         return f"{self._line()}\n{findings_text(self._measured.findings)}"
 
     def _line(self) -> str:
@@ -213,7 +213,7 @@ class Measurements(Shown):
         return f"{self.name}, {len(self)} trials, {poses} poses, {odd} finding{'' if odd == 1 else 's'}"
 
     def plot_paths(self, ax: Axes | None = None, trials: Iterable[int] | None = None) -> Axes:
-        """Where the robot went, a line a trial, m; ``trials``: which, by their number from 0 (default: all)."""
+        """Where the robot went, one line per trial, m; ``trials``: which, by their number from 0 (default: all)."""
         tracks = self._measured.tracks
         chosen = range(len(tracks)) if trials is None else trials
 
@@ -258,7 +258,7 @@ def _read(log: Log, more: tuple[str | PathLike[str], ...], robot: str | None, ma
     if mapping is None:
         return load_measured(files[0], robot, files[1:])
     if len(files) > 1:
-        raise DataError("A mapping belongs to one file; with several, put FILE.import.yaml beside each.")
+        raise DataError("A mapping belongs to one file; with several, put FILE.import.yaml next to each.")
     return measured_table(_mapped(read_table(files[0]), mapping, files[0].parent), files[0], robot=robot)
 
 

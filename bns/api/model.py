@@ -25,11 +25,11 @@ class Model(physics.Model):
     """A robot with the effects that are switched on: a differential drive, or a body on joints.
 
     ``Model("snake")`` is the snake in MuJoCo, ``Model("robot.xml", sites=["head"])`` any MJCF file with position servos and
-    tracked sites (`BodyModel`). ``Model("khepera")`` is a drive of the package, ``Model("mine.yaml")`` one of a file,
+    tracked sites (`BodyModel`). ``Model("khepera")`` is a model that comes with bns, ``Model("mine.yaml")`` one from a file,
     ``Model(wheelbase_m=0.2)`` (or ``Model("differential-drive", wheelbase_m=0.2)``) a plain drive. Fields given by name replace
-    those of the model: wheelbase_m (m), dt_s (s), jitter_relative (share of the commanded speed), noise_position_m (m),
+    those of the model: wheelbase_m (m), dt_s (s), jitter_relative (fraction of the commanded speed), noise_position_m (m),
     noise_heading_rad (rad).
-    A model never changes; `with_effect`, `without` and the like give another.
+    Models are immutable: `with_effect`, `without` and the like return a new one.
 
     Raises:
         ModelError: there is no such model, or a number is out of bounds; the message says what is allowed.
@@ -69,7 +69,7 @@ class Model(physics.Model):
         return hashlib.sha256(self.canonical_json().encode()).hexdigest()
 
     def summary(self) -> str:
-        """The numbers, one effect a line."""
+        """The numbers, one effect per line."""
         lines = [f"model {self.name}: {self.base}, wheelbase {self.wheelbase_m:g} m"]
         for active in self.effects:
             units = {p.name: p.unit for p in active.effect.parameters}
@@ -110,7 +110,7 @@ class BodyModel(Model, JointedModel):
         JointedModel.__init__(self, **{**{name: getattr(body, name) for name in own}, **fields})
 
     def summary(self) -> str:
-        """The body, then one effect a line."""
+        """The body, then one effect per line."""
         effects, joints = super().summary().split("\n")[1:], len(machine(self.mechanism).joints)
         head = f"model {self.name}: {self.base}, {joints} joints, tracked: {', '.join(self.mechanism.sites)}"
         return "\n".join([head, *effects])

@@ -39,31 +39,31 @@ PHASES = {"competing models": 0.0, "random trials": 0.15, "random commands, for 
 
 @dataclass(frozen=True, repr=False)
 class ProposeResult(Shown):
-    """An experiment; ``proposal`` holds everything as worked out, ``diagnosis`` what it is to decide about."""
+    """An experiment. ``proposal`` holds the complete result, ``diagnosis`` the diagnosis that it is based on."""
 
     diagnosis: DiagnoseResult
     proposal: Proposal
 
     @cached_property
     def commands(self) -> pd.DataFrame:
-        """The trial file, a row a command: trial, left_m_s, right_m_s (m/s), duration_s (s), start_x_m, start_y_m (m),
+        """The trial file, one row per command: trial, left_m_s, right_m_s (m/s), duration_s (s), start_x_m, start_y_m (m),
         start_heading_rad (rad). Empty where no commands would decide anything."""
         return self.proposal.commands()
 
     @property
     def model_pairs(self) -> pd.DataFrame:
-        """A row a pair of explanations: first, second, power (chance of a decision), minutes (until nine in ten decide),
+        """One row per pair of explanations: first, second, power (probability of a decision), minutes (for one of 90 %),
         times_faster (than plain random commands), indistinguishable (no commands tell them apart), already_decided (so far),
         independent_measurements."""
         return pd.DataFrame([vars(pair) for pair in self.proposal.model_pairs])
 
     @property
     def power(self) -> float:
-        """Chance that every pair is decided that commands can decide."""
+        """Probability that all pairs that commands can decide are decided."""
         return self.proposal.power
 
     def summary(self, written: str = "") -> str:
-        """What stands against what, and what the experiment would decide; ``written``: the file that the commands are in."""
+        """The explanations that are compared, and what the experiment would decide; ``written``: the file with the commands."""
         return proposal_text(self.proposal, written)
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
@@ -80,7 +80,7 @@ class ProposeResult(Shown):
         return {**self.proposal.as_json(), "provenance": provenance(ready.model, ready.log.sha256, self.diagnosis.settings)}
 
     def plot(self, ax: Axes | None = None, trial: int = 0) -> Axes:
-        """One proposed trial (by its number from 0) in the arena, as each explanation foresees it. DataError if there is none."""
+        """One proposed trial (by its number from 0) in the arena, as each explanation predicts it. DataError if there is none."""
         if not 0 <= trial < len(self.proposal.plan):
             raise DataError(f"There is no trial {trial}; {len(self.proposal.plan)} are proposed.")
         return drawn(ax, lambda axes: trial_axes(axes, self.proposal, trial))
@@ -113,9 +113,9 @@ def propose(
             by default where it was seen.
         start: x_m, y_m (m) and heading_rad (rad, counter-clockwise from x) of the start of every trial; by default as before.
         speeds: lowest and highest of a wheel (m/s); by default the robot's own and those seen.
-        also: effects of your own, tried beside the listed ones.
-        fresh: work out the diagnosis again even where the same was asked before.
-        progress: told the share that is done (0 to 1) and what is being worked out.
+        also: effects of your own, tried in addition to the listed ones.
+        fresh: compute the diagnosis again instead of taking it from the cache.
+        progress: called with the fraction done (0 to 1) and a text.
 
     Raises:
         DataError: as `bns.diagnose`; limits that make no sense; or there are no two explanations to tell apart.

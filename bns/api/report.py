@@ -26,7 +26,7 @@ PHASES = {"where the model fails": 0.0, "the error, step by step": 0.1, "the nex
 
 @dataclass(frozen=True, repr=False)
 class ReportResult(Shown):
-    """The page that was written; goes wherever a path does (``open(report)``)."""
+    """The page that was written; can be used as a path (``open(report)``)."""
 
     path: Path
     diagnosis: DiagnoseResult

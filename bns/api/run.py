@@ -61,7 +61,7 @@ class Parameters(TypedDict, total=False):
 class RunResult(Shown):
     """A run.
 
-    ``result`` holds its arrays as they left the loop; ``files`` what was written, by its kind (path, moving picture).
+    ``result`` holds the arrays of the loop; ``files`` the files that were written, by kind (path, film).
     """
 
     spec: RunSpec
@@ -97,11 +97,11 @@ class RunResult(Shown):
         return bool(self.result.tables["evals"]["success"][-1])
 
     def summary(self) -> str:
-        """When the goals were reached first, and how fit the fittest is."""
+        """When the goals were first reached, and the fitness of the fittest controller."""
         return _text(self)
 
     def save_networks(self, path: _Path) -> Path:
-        """Write the final networks with what they learned from (.safetensors); `bns.compare` takes them as a model."""
+        """Write the final networks with their training patterns (.safetensors); `bns.compare` takes them as a model."""
         target = Path(path)
         check_networked(self.spec)
         check_writable(target)
@@ -111,7 +111,7 @@ class RunResult(Shown):
         return target
 
     def render(self, path: _Path) -> Path:
-        """Show the fittest controller move (.mp4 or .png), where the world can. ModelError where it cannot."""
+        """Film or draw the fittest controller (.mp4 or .png). ModelError if the world cannot draw it."""
         robot, task = load_robot(self.spec.robot), load_task(self.spec.robot, self.spec.task)
         world = build_world(self.spec.world, robot)
         check_renderable(self.spec, world, Path(path))
@@ -120,7 +120,7 @@ class RunResult(Shown):
         return Path(path)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """The path of the fittest controller: as the robot drove it (solid) and as its networks saw it (dashed), cm."""
+        """The path of the fittest controller: as the robot drove it (solid) and as its networks predict it (dashed), cm."""
         robot, task = load_robot(self.spec.robot), load_task(self.spec.robot, self.spec.task)
         return drawn(
             ax, lambda axes: path_axes(axes, self.spec, task, robot, self.result), (COLUMN_IN, COLUMN_IN + 0.4)
@@ -144,7 +144,7 @@ def run(
     on_evaluation: Callable[[Row], None] | None = None,
     **parameters: Unpack[Parameters],
 ) -> RunResult:
-    """Carry out one run. The same arguments give the same numbers anywhere.
+    """Carry out one run. The same arguments give the same numbers on every machine with the same kind of processor.
 
     Args:
         robot: khepera or snake; options of a robot follow its name (snake+changes).
@@ -154,14 +154,14 @@ def run(
         keep: the folder of results in which the run is stored and its path is drawn; by default nothing is written.
         measurements: also write what was driven, as a table (.csv, .parquet).
         device: cpu, or cuda for a GPU.
-        progress: told the share that is done and the evaluation.
+        progress: called with the fraction done and the evaluation.
         on_evaluation: called with each evaluation's row.
         **parameters: all else, such as mutation_rate=0.2, evaluations=50 (`Parameters`).
 
     Raises:
-        SpecError: a parameter that there is none of, or whose value is not allowed.
+        SpecError: an unknown parameter, or a value that is not allowed.
         ModelError: a model or table that cannot be used.
-        StoreError: the run cannot be stored beside what is there.
+        StoreError: the run cannot be stored in that folder.
         DeviceError: there is no such GPU.
     """
     given = {"robot": robot, "task": task or default_task(load_robot(robot).name), "world": str(world), "seed": seed}

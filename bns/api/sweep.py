@@ -37,7 +37,7 @@ _WHERE = "of the sweep"
 
 @dataclass(frozen=True, repr=False)
 class SweepResult(Shown):
-    """Where a sweep stands after `Sweep.run`. ``counts``: total, done, failed, quarantined, new, new_failed, stopped_by."""
+    """The state of a sweep after `Sweep.run`. ``counts``: total, done, failed, quarantined, new, new_failed, stopped_by."""
 
     counts: Summary
     results: Path
@@ -46,12 +46,12 @@ class SweepResult(Shown):
 
     @property
     def done(self) -> int:
-        """Runs that went well, those of earlier calls included."""
+        """Number of successful runs, those of earlier calls included."""
         return self.counts.done
 
     @property
     def finished(self) -> bool:
-        """Has every run a result, good or bad, or can the others not change the ranking that was asked for?"""
+        """Whether every run has a result, good or bad, or the missing ones cannot change the requested ranking."""
         return self.counts.remaining == 0 or self.counts.stopped_by == DECIDED
 
     def load(self, table: str = "evals") -> pd.DataFrame:
@@ -61,7 +61,7 @@ class SweepResult(Shown):
         return load(self.results, table, where={"sweep": self.counts.sweep})
 
     def summary(self) -> str:
-        """Where the sweep stands, and how to go on."""
+        """The state of the sweep, and how to continue."""
         ranking = "" if self.ranking is None else f"{self.ranking.in_words()}\n"
         return ranking + summed_up(self.counts, self.results)
 
@@ -94,8 +94,8 @@ class Sweep(Shown):
         name: under which the store keeps the runs; letters, digits, - and _.
         robot: khepera or snake, with options (snake+changes).
         grid: parameter -> its values; the product of all.
-        zip: parameter -> its values, taken in step; multiplied with the grid.
-        sample: combinations drawn from ranges, multiplied with the grid: ``{"lhs": 40, "ranges": {"mutation_rate": [0.02,
+        zip: parameter -> its values, first with first, second with second; combined with the grid.
+        sample: combinations drawn from ranges, combined with the grid: ``{"lhs": 40, "ranges": {"mutation_rate": [0.02,
             0.3]}}``; in place of lhs: sobol, random.
         fixed: parameter -> the one value.
         exclude: combinations of the product with all these values are left out.
@@ -146,7 +146,7 @@ class Sweep(Shown):
 
     @property
     def combinations(self) -> pd.DataFrame:
-        """A row a combination, a column a parameter that is given."""
+        """One row per combination, one column per parameter that is given."""
         return pd.DataFrame(list(self._described.combos))
 
     @property
@@ -176,22 +176,22 @@ class Sweep(Shown):
         retry_failed: bool = False,
         progress: Progress | None = None,
     ) -> SweepResult:
-        """Carry out what has no result yet; what is done is skipped, so an interrupted sweep goes on where it stopped.
+        """Carry out the runs that have no result yet, so that an interrupted sweep continues where it stopped.
 
         Args:
             results: folder of all results.
-            jobs: worker processes (default: one a core).
+            jobs: worker processes (default: one per core).
             device: cpu, or cuda for the GPU of this machine.
             executor: joblib (default), dask or slurm; ``scheduler``: address of a Dask scheduler.
-            shard: (k, n): only the k-th (from 1) of n shares.
-            budget_s: stop in time, seconds.
+            shard: (k, n): only the k-th (from 1) of n parts.
+            budget_s: stop after this time, s.
             until: "ranking": stop when the ten best combinations of each task are known; ``.ranking`` holds them.
-            retry_failed: do failed and quarantined runs again.
-            progress: told the share that is done.
+            retry_failed: repeat failed and quarantined runs.
+            progress: called with the fraction done and a text.
 
         Raises:
             StoreError: the results cannot be written, or another process writes this sweep.
-            SpecError: options that do not go together. ClusterError, DeviceError: machines that are not there.
+            SpecError: options that exclude each other. ClusterError, DeviceError: machines that cannot be used.
         """
         told = progress or silent
         share = None if shard is None else Shard.parse(f"{shard[0]}/{shard[1]}")
@@ -218,7 +218,7 @@ class Sweep(Shown):
         return SweepPlan(forecast(self._described, Path(results), place.workers), place)
 
     def status(self, results: _Path = "results") -> pd.DataFrame:
-        """A row a task: sweep, task, done, failed, quarantined, total, remaining, mean_wall_s (s), last (when a run began)."""
+        """One row per task: sweep, task, done, failed, quarantined, total, remaining, mean_wall_s (s), last (start of a run)."""
         rows = [row for row in sweep_status(Path(results)) if row.sweep == self.name]
         fields = [field.name for field in dataclasses.fields(SweepRow)]
         table = pd.DataFrame([dataclasses.asdict(row) for row in rows], columns=fields)
@@ -226,7 +226,7 @@ class Sweep(Shown):
         return table
 
     def confirmation(self, results: _Path, top: int) -> Sweep | None:
-        """The ``top`` best combinations of each task on as many fresh seeds; None while runs of this sweep are to do."""
+        """The ``top`` best combinations of each task on as many fresh seeds; None while runs of this sweep are missing."""
         more = confirmation(self._described, Path(results), top)
         return None if more is None else Sweep._of(more)
 

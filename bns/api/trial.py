@@ -44,7 +44,7 @@ class _Driven(Shown):
 
 @dataclass(frozen=True, repr=False)
 class TrialResult(_Driven):
-    """A trial that is in the store. ``folder`` holds its journal and measurements, ``driven`` how the robot did."""
+    """A stored trial. ``folder`` holds its journal and measurements, ``driven`` the summary of its drives and stops."""
 
     run: RunResult
     folder: Path
@@ -52,7 +52,7 @@ class TrialResult(_Driven):
     text: str
 
     def summary(self) -> str:
-        """When the goals were reached first, how the robot did, where everything is."""
+        """When the goals were first reached, drives and stops of the robot, and where the files are."""
         return self.text
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -155,7 +155,7 @@ def trial(
         until_success: end when so many driven controllers in a row have reached all goals.
         repeats: how often the final controller is driven (default: as the robot's study has it); kept in repeats.csv.
         figures: also draw the trial's page of figures.
-        progress: told the share that is done and the evaluation.
+        progress: called with the fraction done and the evaluation.
         on_evaluation: called with each evaluation's row.
         **parameters: all else, as for `bns.run`.
 

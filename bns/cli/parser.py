@@ -131,11 +131,11 @@ def add_results(parser: argparse.ArgumentParser, *, once_positional: bool = Fals
 def add_trust(parser: argparse.ArgumentParser, *, also: bool = False) -> None:
     """``--trust``, and ``also`` ``--also``: which Python files that a model names may run."""
     parser.add_argument(
-        "--trust", action="store_true", help="let the Python files run that a model names: they are programs"
+        "--trust", action="store_true", help="run the Python files that a model names (they are programs)"
     )
     if also:
         parser.add_argument(
-            "--also", action="append", default=[], metavar="FILE.py", help="a Python file that the model names and that may run"
+            "--also", action="append", default=[], metavar="FILE.py", help="Python file that the model names and that bns may run"
         )
 
 

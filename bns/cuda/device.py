@@ -61,7 +61,7 @@ def _module() -> Any:
 
 def _tried(cuda: Any) -> str:
     if importlib.import_module("bns.cuda.probe").doubled(4) != [0, 2, 4, 6]:
-        raise DeviceError(f"--device cuda: the GPU does not double small numbers rightly; have it repaired, {_ELSE}.")
+        raise DeviceError(f"--device cuda: the GPU computes wrong results (twice 1, 2 and 3); have it repaired, {_ELSE}.")
     name = getattr(cuda.current_context().device, "name", "simulated GPU")
     return name.decode() if isinstance(name, bytes) else str(name)
 
@@ -81,8 +81,8 @@ def faults() -> Iterator[None]:
             raise OutOfDeviceMemoryError(_first_line(error)) from error
         if type(error).__module__.startswith(("numba.cuda", "numba_cuda", "cuda.")):
             raise DeviceError(
-                f"the GPU failed: {_first_line(error)}. What was finished is stored. See nvidia-smi whether it is there; then "
-                "repeat the command, which goes on from here."
+                f"the GPU failed: {_first_line(error)}. What was finished is stored. Check with nvidia-smi that it is there; "
+                "then repeat the command, which continues from here."
             ) from error
         raise
 
@@ -90,8 +90,8 @@ def faults() -> Iterator[None]:
 def full(error: BaseException) -> DeviceError:
     """Not even the smallest run fits into the GPU's memory."""
     return DeviceError(
-        f"--device cuda: the GPU's memory is full ({_first_line(error)}). nvidia-smi shows who holds it; wait until they "
-        f"leave it, choose another GPU with CUDA_VISIBLE_DEVICES, {_ELSE}."
+        f"--device cuda: the GPU's memory is full ({_first_line(error)}). nvidia-smi lists the programs that use it; wait "
+        f"until they end, choose another GPU with CUDA_VISIBLE_DEVICES, {_ELSE}."
     )
 
 

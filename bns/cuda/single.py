@@ -27,5 +27,5 @@ def run(spec: RunSpec, progress: Progress | None = None) -> RunResult:
     except OutOfDeviceMemoryError as error:
         raise DeviceError(
             f"this run does not fit into the GPU's memory now ({error}). Set a smaller --max-commands or --population-size, "
-            "wait for others to leave it, or leave --device out."
+            "wait until other programs release it, or leave --device out."
         ) from error

@@ -120,7 +120,7 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
         yield (
             f"{per_trial_effect.effect.name} has a separate value in each trial, {own.min():+.3f} to {own.max():+.3f} s; "
             "held-out trials are judged with the clock fitted to other poses of the same trial. "
-            "A delay common to all trials cannot be told from the clocks."
+            "A delay common to all trials cannot be distinguished from the clocks."
         )
 
 

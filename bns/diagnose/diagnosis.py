@@ -261,8 +261,8 @@ def too_little(tracks: Tracks, fewest: int) -> str:
     """Why nothing can be concluded from these tracks, of which there must be so many; "" if something may."""
     if len(tracks) < fewest:
         return (
-            f"{len(tracks)} trials: whatever they show could be luck. {fewest} trials are the least, "
-            "20 or more find what is large, 60 what is small."
+            f"{len(tracks)} trial{'' if len(tracks) == 1 else 's'}: anything they show could be due to chance. At least {fewest} "
+            "trials are needed; 20 or more reveal large effects, 60 small ones."
         )
     frames = np.diff(tracks.first)
     if np.median(frames) < 2:

@@ -88,7 +88,7 @@ class Agreement:
         self._wheels_off = self._wheels_off + 1 if off else 0
         if self._wheels_off > 1:
             left, right = (f"{is_m_s:.3f} m/s for {asked:.3f}" for asked, is_m_s in pairs)
-            raise TrialPausedError(f"the wheels do not turn as ordered (left {left}, right {right}); is one blocked?")
+            raise TrialPausedError(f"the wheels do not turn as commanded (left {left}, right {right}); is one blocked?")
 
     def seen(self, sight: Sight) -> None:
         """A pose; TrialPausedError if it has not followed the orders for too long."""
@@ -118,10 +118,10 @@ class Agreement:
         expected, way_m, turn_rad = self._driven(first, last.t_s)
         off_m = float(np.hypot(*(expected[:2] - last.pose[:2])))
         if off_m > _OFF_M + _SHARE * way_m:
-            return f"the robot is seen {100 * off_m:.0f} cm from where its orders lead in {last.t_s - first.t_s:.1f} s"
+            return f"the robot is seen {100 * off_m:.0f} cm from where its commands lead in {last.t_s - first.t_s:.1f} s"
         off_rad = abs(math.remainder(expected[2] - last.pose[2], 2.0 * math.pi))
         if off_rad > _OFF_RAD + max(_SHARE * turn_rad, _WHEELS_APART * way_m / self._wheelbase_m):
-            return f"the robot is seen turned {math.degrees(off_rad):.0f}° from where its orders lead"
+            return f"the robot is seen turned {math.degrees(off_rad):.0f}° from where its commands lead"
         return ""
 
     def _spans(self, from_s: float, to_s: float) -> list[tuple[float, float, float]]:

@@ -126,7 +126,7 @@ class ServoBus:
         """What of a servo's settings is not as a drive needs it."""
         number, table, name = servo.number, servo.table, name_of(servo.protocol, servo.model)
         usable = table is not None and servo.baud == BAUD
-        replace_it = f"replace it; of use are {', '.join(TABLES)}"
+        replace_it = f"replace it; suitable are {', '.join(TABLES)}"
         at_rate = f"bns servos set-id {number} --from {number} --port {self.port}"
         try_next = "" if usable else at_rate if table else replace_it
         yield Finding(usable, f"servo {number} is a {name} at {servo.baud} baud", try_next)
@@ -134,7 +134,7 @@ class ServoBus:
             return
         mend = f"bns servos check --fix --port {self.port}"
         if alarm := self._alarm(servo, table):
-            yield Finding(False, f"servo {number}: alarm: {alarm}", "see what holds or heats it; then switch it off and on")
+            yield Finding(False, f"servo {number}: alarm: {alarm}", "find out what blocks or heats it; then switch it off and on")
         for what, wanted in table.wanted.items():
             if not what.endswith("angle_limit"):
                 value = self.read(servo, what)

@@ -26,9 +26,9 @@ REFERENCE_WHEELBASE_M = 0.0884
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of an effect, in SI units. At ``neutral`` the effect changes nothing.
+    """A parameter of an effect, in SI units. At ``neutral`` the effect changes nothing.
 
-    Outside ``low..high`` the model is refused; ``plausible`` is what a sound robot may show.
+    A value outside ``low..high`` is refused; ``plausible`` is the range of a robot without a defect.
     """
 
     name: str
@@ -39,27 +39,27 @@ class Parameter:
     neutral: float
     text: str
     column: str = ""
-    """The column of measurements this number goes with: known only where that was logged (battery_v)."""
+    """A column of the measurements that the parameter needs (battery_v): it is fitted only if that was logged."""
     instead_of: str = ""
-    """It stands back where this column was logged."""
+    """A column of the measurements: if it was logged, another parameter is fitted in place of this one."""
     size_power: float = 0.0
-    """What is plausible, and where a fit begins, grows with this power of the wheelbase: 1 for lengths and speeds."""
+    """The plausible range and the start values grow with this power of the wheelbase: 1 for lengths and speeds."""
     floor_share: float = 0.0
-    """A length that is no more than this share of the diagonal of where the robot was seen; 0: as large as it likes."""
+    """Upper bound of a length, as a fraction of the diagonal of the area where the robot was seen; 0: no such bound."""
     reached: tuple[float, ...] = ()
-    """Bounds that robots do reach, so that a fit may end there: the strength of a servo that is silent."""
+    """Bounds at which a fit may end, because real robots reach them: the strength of a servo without torque."""
     resolution: float = 0.0
-    """A change that shows and is still small; 0: a thousandth of the plausible range."""
+    """A small change that is still visible in data; 0: a thousandth of the plausible range."""
 
     def within(self, diagonal_m: float) -> Parameter:
-        """The number held to its `floor_share` of a floor."""
+        """The parameter, bounded to its `floor_share` of a floor with this diagonal."""
         if not self.floor_share:
             return self
         high = max(self.floor_share * diagonal_m, 4.0 * self.low)
         return replace(self, high=high, plausible=(min(self.plausible[0], high / 2.0), high))
 
     def scaled(self, ratio: float) -> Parameter:
-        """The number of a robot whose wheelbase is ``ratio`` times that of the reference; held within its bounds."""
+        """The parameter for a robot whose wheelbase is ``ratio`` times that of the reference; its bounds stay."""
         factor = ratio**self.size_power
         if factor == 1.0:
             return self
@@ -69,7 +69,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """One file of `bns.physics.effects`, or one object that a package announces in the group ``bns.effects``.
+    """One physical effect: a file of `bns.physics.effects`, or an object that a package announces as ``bns.effects``.
 
     ``apply(signal, **values)`` returns the stage's signal (`Wheels`, `Body`, `Flow`, `Stamps`, `View`) with the effect
     added; its keywords are the parameters' names. ``residuals`` says how measurements depart from a model
@@ -84,27 +84,27 @@ class Effect:
     lookalikes: tuple[str, ...]
     apply: Callable[..., Any] = field(repr=False)
     sentence: str = ""
-    """What happens, in everyday words, to stand after "the model misses that"; may be empty, as may all that follow."""
+    """What happens, as a clause after "Missing from the model:"; may be empty, like all fields below."""
     measurement: str = ""
-    """What else could be measured that sees this effect alone."""
+    """A measurement on the bench that shows this effect alone."""
     beside: Mapping[str, str] = field(default_factory=dict, hash=False)
-    """Another effect -> how to tell the two apart, where a verdict names both."""
+    """Name of another effect -> how to tell the two apart, if a verdict names both."""
     explained_by: tuple[str, ...] = ()
-    """Columns of measurements of which one should be logged where a verdict names the effect..."""
+    """Columns of measurements; one of them should be logged if a verdict names the effect."""
     caveat: str = ""
-    """...and what to beware of where none was."""
+    """The warning that is given if none of them was logged."""
     after: str = OTHERS
-    """Its place in the chain, unless `bns.physics.order.ORDER` lists it: right after this entry of that tuple."""
+    """Its place in the order of effects, unless `bns.physics.order.ORDER` lists it: right after this entry."""
     starts: tuple[tuple[float, ...], ...] = ()
-    """Values from which a fit may begin; empty where any few values along each number do."""
+    """Start values of a fit; empty if a few values along each parameter are enough."""
     starts_from: Callable[[Wheels], tuple[tuple[float, ...], ...]] | None = field(default=None, repr=False)
-    """Instead of ``starts``: from commands and tracked poses (`Conditions.seen`), for what sits somewhere or has a rhythm."""
+    """Instead of ``starts``: from commands and tracked poses (`Conditions.seen`), for effects with a place or a period."""
     needs: str = ""
     """One of `NEEDS`."""
     needs_place: bool = False
-    """Does what it does depend on where the robot is (`Body.place`, or the place in a `View`)?"""
+    """Whether it depends on the position of the robot (`Body.place`, or the place in a `View`)."""
     per_trial_allowed: bool = False
-    """May its one number have another value in every trial? Only effects of the stage ``clock`` may."""
+    """Whether its one parameter may have another value in each trial. Only effects of the stage ``clock`` may."""
 
     def __post_init__(self) -> None:
         for kind, given, valid in (
@@ -116,7 +116,7 @@ class Effect:
                 raise ModelError(f"effect {self.name}: {unknown_name(kind, given, valid)}")
 
     def scaled(self, wheelbase_m: float) -> Effect:
-        """The effect with ranges and starts for a robot of this size; itself where nothing depends on it."""
+        """The effect with ranges and start values for a robot with this wheelbase, m."""
         ratio = wheelbase_m / REFERENCE_WHEELBASE_M
         if ratio == 1.0 or not any(p.size_power for p in self.parameters):
             return self
@@ -128,14 +128,14 @@ class Effect:
         )
 
     def within(self, diagonal_m: float) -> Effect:
-        """The effect on a floor of this size; itself where nothing depends on it."""
+        """The effect with ranges for a floor with this diagonal, m."""
         if not any(p.floor_share for p in self.parameters):
             return self
         return replace(self, parameters=tuple(p.within(diagonal_m) for p in self.parameters))
 
     @property
     def in_words(self) -> str:
-        """Its sentence; its name where nobody wrote one."""
+        """Its sentence; without one, its name."""
         return self.sentence or f"the effect “{self.name}”"
 
     @property

@@ -54,9 +54,9 @@ VARIABLES: Mapping[str, str] = {
 }
 OF_A_WHEEL: Mapping[str, str] = {
     "u": "speed of this wheel, m/s",
-    "since": "way of this wheel since it last changed direction, m; 1000 before",
-    "fresh": "speed of this wheel less its mean over the last 0.15 s (fading exponentially), m/s",
-    "lately10": "way of this wheel over the last 10 s (fading exponentially), m; carried on from trial to trial",
+    "since": "distance of this wheel since it last changed direction, m (1000 before the first change)",
+    "fresh": "speed of this wheel minus its mean over the last 0.15 s (exponential decay), m/s",
+    "lately10": "distance of this wheel over the last 10 s (exponential decay), m; carries over from trial to trial",
     "lately100": "the same over the last 100 s",
 }
 """Further names in a term on `WHEELS`, `LEFT` or `RIGHT`."""
@@ -223,7 +223,7 @@ def _added(name: str, code: Compiled, values: Mapping[str, Any], body: Body) -> 
         ) from fault
     if added.dtype.kind == "c":
         raise ModelError(
-            f"formula {name} is no real number with {numbers}: a root of what is below 0. Write it in another way."
+            f"formula {name} is no real number with {numbers}: the root of a negative number. Rewrite it."
         )
     out: Array = np.broadcast_to(added, body.forward_m_s.shape)
     if not np.isfinite(out).all():

@@ -26,7 +26,7 @@ def scripts() -> Path:
     root = shipped_root("analysis")
     if root is None:
         raise BnsError(
-            f"the figures' scripts did not come with this package (there is no folder analysis in or beside {PACKAGE}). "
+            f"the figures' scripts did not come with this package (there is no folder analysis in or next to {PACKAGE}). "
             "Reinstall bns, from a wheel or a whole checkout: pip install --force-reinstall bns"
         )
     return root

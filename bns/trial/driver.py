@@ -244,4 +244,4 @@ class TrialDriver:
         off_rad = abs(math.remainder(pose[2] - self.start[2], 2.0 * math.pi))
         if off_rad > self._rig.placed_within_rad:
             return f"The robot is turned by {math.degrees(off_rad):.0f}° from its start"
-        return "The drive came to nothing" if void else None
+        return "The drive gave no result" if void else None

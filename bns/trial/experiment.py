@@ -145,6 +145,6 @@ def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int
     )
     if not same:
         raise HardwareError(
-            f"{journal} drove other commands than the file holds now; rename the file to begin with it afresh."
+            f"{journal} drove other commands than the file holds now; rename the file to start a new experiment with it."
         )
     return len(past)

@@ -65,11 +65,11 @@ class TrialFolder:
         """The evaluations it holds. HardwareError if it was begun and is not to be resumed, or the reverse."""
         if self.journal.exists() and not resume:
             raise HardwareError(
-                f"this trial was begun before, in {self.path}. Go on with --resume, or begin another with --seed "
-                f"{self.spec.seed + 1}; to do this one afresh, move its folder away."
+                f"this trial was started before, in {self.path}. Continue it with --resume, or start another with --seed "
+                f"{self.spec.seed + 1}; to repeat this one from the start, move its folder away."
             )
         if resume and not self.journal.exists():
-            raise HardwareError(f"there is nothing to resume: no journal in {self.path}. Begin without --resume.")
+            raise HardwareError(f"there is nothing to resume: no journal in {self.path}. Start without --resume.")
         return past_evaluations(self.journal) if resume else []
 
 

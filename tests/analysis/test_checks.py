@@ -183,7 +183,7 @@ def test_what_single_runs_show_over_time(tmp_path):
     for check in ("world_is_mostly_below", "probes_settle", "simulators_change_less"):
         assert [checked(tmp_path / name, check).verdict for name in ("holds", "fails")] == ["agrees", "differs"], check
     store_of(tmp_path / "plain", lambda *_: {})
-    with pytest.raises(NoDataError, match="no run here has its generations and probes"):
+    with pytest.raises(NoDataError, match="no stored run has generations and probes"):
         checked(tmp_path / "plain", "world_is_mostly_below")
 
 

@@ -63,7 +63,7 @@ def test_an_effect_that_keeps_little_of_its_gain_beside_the_term_is_out():
     predictor = predictor_of(hidden(backlash={"gap_m": 0.005}), speeds=BOTH_WAYS, commands=8, trials=30)
     found = stands(predictor, "motor-lag")
     assert found.names == ()
-    assert found.terms[0].signal == "way since each wheel reversed"
+    assert found.terms[0].signal == "distance since each wheel reversed"
     lost_mm = float(re.fullmatch(r"a wheel loses ([\d.]+) mm .*", in_words(found.terms[0], predictor)).group(1))
     assert lost_mm == pytest.approx(5.0, rel=0.15)
 

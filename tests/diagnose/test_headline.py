@@ -57,7 +57,7 @@ def test_a_skid_steer_that_turns_as_if_it_were_wider_is_shown_so(factor, plausib
     said = found.as_json()
     number = said["parameters"]["wheelbase"]["factor"]
     assert number["low"] < factor < number["high"]
-    assert "wheels stand closer together or further apart" in headline(found)
+    assert "the effective wheelbase differs from that of the model" in headline(found)
     assert set(said["implausible"]) == (set() if plausible else {"wheelbase"})
     assert any(note.startswith("wheelbase fits best, but with an implausible") for note in found.notes) is not plausible
     for error in said["error"].values():

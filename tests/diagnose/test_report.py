@@ -98,7 +98,7 @@ def test_every_verdict_has_a_page_that_needs_nothing_else(page_of, verdict):
     [
         ("none", "Nothing is missing"),
         ("effects", "turning costs forward speed"),
-        ("tie", "a part of every wheel's speed is lost to friction, or "),
+        ("tie", "every wheel loses a constant part of its speed to friction, or "),
         ("unlisted", "none of the known effects"),
         ("insufficient-data", "do not suffice"),
     ],

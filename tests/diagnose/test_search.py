@@ -46,7 +46,7 @@ def test_a_late_command_ties_with_a_late_clock():
     assert answer["verdict"] == "tie"
     assert answer["ties"] == [["clock-offset", "command-delay"]]
     assert sorted(map(tuple, answer["explanations"])) == [("clock-offset",), ("command-delay",)]
-    assert any("look the same from outside" in note for note in answer["notes"])
+    assert any("look the same in a log" in note for note in answer["notes"])
 
 
 def test_an_early_clock_is_no_late_command():
@@ -76,8 +76,8 @@ def test_a_model_that_has_the_effect_already_lacks_nothing():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda t: t[t.trial == 0], r"^1 trials: whatever"),
-        (lambda t: t[t.trial < 10], r"^10 trials: .* 11 trials are the least"),
+        (lambda t: t[t.trial == 0], r"^1 trial: anything"),
+        (lambda t: t[t.trial < 10], r"^10 trials: .* At least 11 trials are needed"),
         (lambda t: t.groupby("trial").head(1), "only one tracked pose"),
         (lambda t: t.assign(left_m_s=0.0, right_m_s=0.0), "never commanded to move"),
         (lambda t: t.assign(x_m=0.1, y_m=0.2), "never moved by more than 5 mm"),

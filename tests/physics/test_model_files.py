@@ -158,7 +158,7 @@ def test_formulas_that_fail_with_their_numbers_say_so(term):
         (f"{HEAD}dt_s: !!python/object/apply:os.system [true]\n", 3, "could not determine a constructor"),
         ("[" * 5000, 1, "nested too deeply"),
         (f"{HEAD}effects: {'[' * 30}{']' * 30}\n", None, "nested too deeply: 3. levels"),
-        (f"{HEAD}effects: &a [*a]\n", 3, "an alias stands within"),
+        (f"{HEAD}effects: &a [*a]\n", 3, "an alias contains itself"),
         ("3", None, "must be a mapping"),
         ("", None, "must be a mapping"),
         ("\x00", None, "special characters are not allowed"),

@@ -68,7 +68,7 @@ def test_two_parts_of_one_name_are_refused_naming_both(effects):
     ("parts", "modules", "said"),
     [
         ({"gone": "gone:EFFECT"}, {}, r"effect 'gone' of the package p 1\.0 .*ModuleNotFoundError: No module named 'gone'"),
-        ({"gone": "broken"}, {"broken": "1 / 0"}, r"package p 1\.0 .*ZeroDivisionError: division by zero\. Mend or uninstall"),
+        ({"gone": "broken"}, {"broken": "1 / 0"}, r"package p 1\.0 .*ZeroDivisionError: division by zero\. Fix or uninstall"),
         ({"gone": "broken"}, {"broken": "EFFECT = 3"}, r"package p 1\.0 .*it lacks name, stage, apply; docs/extending\.md"),
         ({"breeze": "wind_part"}, {"wind_part": WIND}, r"package p 1\.0 .*it calls itself 'wind'; the entry point must have"),
     ],

@@ -67,7 +67,7 @@ def test_fold_at_the_end_does_not_pass_over_it(tmp_path, take):
 def test_results_that_go_after_a_fold_are_missed(tmp_path, take, more):
     results, runs = tmp_path / "results", records(3)
     with (  # noqa: PT012
-        pytest.raises(StoreError, match=f"{GONE}. What was stored before went with it. {NEXT}"),
+        pytest.raises(StoreError, match=f"{GONE}. The results stored before are gone with it. {NEXT}"),
         Writer(results, "s", fold_at=2) as writer,
     ):
         for run in runs[:2]:

@@ -37,7 +37,7 @@ def add_commands(command: Adder) -> None:
         "files are joined with the first by time",
     )
     read.add_argument(
-        "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml beside the log"
+        "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml next to the log"
     )
     read.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="table to write (.csv or .parquet)"
@@ -48,7 +48,7 @@ def add_commands(command: Adder) -> None:
     )
     more = command("add", add, "add effects to a model, fit them to measurements, and show the error before and after")
     more.rewrite = data_first
-    more.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
+    more.add_argument("data", type=Path, metavar="DATA", help="log: .csv, .parquet, or any file with a mapping")
     more.add_argument(
         "effects", nargs="+", metavar="EFFECT", help="names of effects or Python files; with --term, a name for the formula"
     )
@@ -68,7 +68,7 @@ def add_commands(command: Adder) -> None:
     more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="file to write: the extended model")
     more.add_argument("--json", action="store_true", help="print one JSON object")
     for one in (held, found):
-        one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
+        one.add_argument("data", type=Path, metavar="DATA", help="log: .csv, .parquet, or any file with a mapping")
         one.add_argument("--json", action="store_true", help="print one JSON object")
         one.add_argument("--findings", action="store_true", help="list all irregularities in the data, not only the first")
     for one in (held, found, more):
@@ -124,7 +124,7 @@ def add_effect_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE.py",
-        help="Python file with an effect of your own, tried beside the listed ones (may be repeated)",
+        help="Python file with an effect of your own, tried in addition to the listed ones (may be repeated)",
     )
     parser.add_argument(
         "--without-effect",

@@ -26,7 +26,7 @@ def add_commands(command: Adder) -> None:
         help="file to write (default: report.html)",
     )
     for one in (next_one, page):
-        one.add_argument("data", type=Path, metavar="DATA", help="measurements (.csv or .parquet)")
+        one.add_argument("data", type=Path, metavar="DATA", help="log: .csv, .parquet, or any file with a mapping")
         add_experiment_options(one)
         add_model_options(one)
         add_effect_options(one)

@@ -26,7 +26,7 @@ def scan(bus: ServoBus, options: argparse.Namespace) -> int:
         found.append(servo)
         print(servo, flush=True)
     more = "" if options.all_bauds else " (1 Mbaud and new ones; --all-bauds tries others)"
-    print(f"{len(found)} ids answer{more}" if found else f"no servo answers{more}; is the supply on, the cable right?")
+    print(f"{len(found)} ids answer{more}" if found else f"no servo answers{more}; is the supply on, is the cable connected?")
     return 0 if found and all(servo.model for servo in found) else 2
 
 

@@ -49,7 +49,7 @@ def add_spec_options(parser: argparse.ArgumentParser, without: tuple[str, ...] =
             type=_of_parameter(name),
             default=None if name == "task" else field.default,
             metavar={int: "N", float: "FRACTION", str: "NAME"}[field_type(name)],
-            help=f"{text} (default: {'the first of the robot' if name == 'task' else field.default})",
+            help=f"{text} (default: {'the first task of the robot' if name == 'task' else field.default})",
         )
 
 

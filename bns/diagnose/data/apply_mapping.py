@@ -33,7 +33,7 @@ def applied(
         out = named_topics(out)
     for other in mapping.get("also", []):
         if folder is None or read is None:
-            raise DataError(f"The mapping takes columns from {other['file']}, too; give the log as a file beside it.")
+            raise DataError(f"The mapping takes columns from {other['file']}, too; give the log as a file in the same folder.")
         with _of_file(other["file"]):
             out = merged(out, _renamed(read(folder / other["file"]), other["columns"], others=False))
     if mapping.get("relative"):

@@ -151,8 +151,8 @@ def _held(table: pd.DataFrame, findings: list[Finding]) -> None:
     if again.mean() > _HELD:
         row = int(np.flatnonzero(again)[0])
         text = (
-            f"{again.mean():.0%} of all poses repeat the one before while the robot is told to move, the first here: is the "
-            "tracker slower than the log? `repeated_poses: lost` in the mapping of `bns import` marks them as lost"
+            f"{again.mean():.0%} of all poses repeat the one before while the robot is commanded to move, the first here: is "
+            "the tracker slower than the log? `repeated_poses: lost` in the mapping of `bns import` marks them as lost"
         )
         findings.append(Finding(str(table["trial"].iloc[row]), row, text))
 

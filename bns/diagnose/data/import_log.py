@@ -86,8 +86,8 @@ def _proposed(first: Path, table: pd.DataFrame, others: Sequence[Path]) -> str:
     columns += [f"{name} has the columns {', '.join(map(str, one.columns))}" for name, one in tables.items()]
     several = f" It joins {len(files)} files by time." if len(files := [first, *others]) > 1 else ""
     return (
-        f"There is no mapping beside {first}. {'; '.join(columns)}. Write {first.name}.import.yaml, or give such a file with "
-        f"--map; docs/logs.md has all that may stand in it.{several} "
+        f"There is no mapping next to {first}. {'; '.join(columns)}. Write {first.name}.import.yaml, or give such a file with "
+        f"--map; docs/logs.md lists all possible entries.{several} "
         f"A proposal, guessed from the names; check it line by line:\n\n{guess.text}"
     )
 

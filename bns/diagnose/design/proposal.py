@@ -147,7 +147,7 @@ def propose(
     tick("competing models")
     competing_models = competing_models_of(d)
     if len(competing_models) < 2:
-        why = "; ".join(d.notes) or "no effect comes near to explaining anything"
+        why = "; ".join(d.notes) or "no effect explains a notable part"
         raise DataError(
             f"No two explanations are left that an experiment could tell apart (verdict {d.verdict}): {why}"
         )

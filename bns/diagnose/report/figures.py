@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison, Curve
@@ -30,10 +31,16 @@ def comparison_figure(c: Comparison, path: Path) -> Path:
         if curve.variable in variables:
             _draw_curve(axes[variables.index(curve.variable)][ways.index(curve.direction)], curve)
     for column, way in enumerate(ways):
-        axes[0][column].set_title(way)
+        axes[0][column].set_title(_axis(way))
     trials = f"{c.trials} trials; bands: 95 %, bootstrap over trials"
     figure.suptitle(f"Measured − predicted by {c.model}, {ahead(c.near)} ahead ({trials})")
     return save(figure, path)[0]
+
+
+def _axis(direction: str) -> str:
+    """Name and unit of an error in one direction: "forward error (mm/s)" of "forward, mm/s"."""
+    name, _, unit = direction.partition(", ")
+    return f"{name} error ({unit})" if unit else name
 
 
 def curves_of(c: Comparison, variable: str | None = None, direction: str | None = None) -> list[Curve]:
@@ -48,7 +55,7 @@ def curves_of(c: Comparison, variable: str | None = None, direction: str | None 
 def curve_axes(axes: Axes, curve: Curve, c: Comparison) -> None:
     """One curve of a comparison on axes of its own."""
     _draw_curve(axes, curve)
-    axes.set_ylabel(curve.direction)
+    axes.set_ylabel(_axis(curve.direction))
     axes.set_title(f"Measured − predicted by {c.model}, {ahead(c.near)} ahead")
 
 
@@ -137,6 +144,13 @@ def errors_axes(axes: Axes, errors: PairedErrors, names: Sequence[str]) -> None:
     axes.set_xlim(-0.3, len(names) - 0.7)
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(_minor_labels(*axes.get_ylim()))
     axes.set_ylabel("position error on held-out trials (mm, RMS)")
     axes.legend(title="horizon (dotted: tracking noise)", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _minor_labels(low: float, high: float) -> FuncFormatter:
+    """Labels between the powers of ten of a logarithmic axis: as many digits as fit without overlap."""
+    decades = np.log10(high / low)
+    digits = "25" if decades > 1.0 else "2357" if decades > 0.5 else "23456789"
+    return FuncFormatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in digits else "")

@@ -25,7 +25,7 @@ _SHOWN = DEFAULTS.report.planned_trials
 
 @style()
 def plan_figure(p: Proposal, path: Path) -> Path:
-    """One panel a trial: the arena, the start, and where each explanation says that the robot goes."""
+    """One panel per trial: the start, the path that each explanation predicts, the arena unless paths are much smaller."""
     if isinstance(p.plan, Repeats):
         return _repeats_figure(p, p.plan, path)
     shown = min(_SHOWN, len(p.plan))
@@ -103,3 +103,13 @@ def _draw_trial(axis: Axes, p: Proposal, seen: list[Tracks], trial: int) -> None
         axis.plot(*pose[-1], "o", color=look["color"])
     axis.plot(100 * a.start[0], 100 * a.start[1], "k^")
     axis.set(aspect="equal", xlabel="x, east (cm)", ylabel="y, north (cm)")
+    _zoom(axis, 100 * np.concatenate([t.pose[t.first[trial] : t.first[trial + 1], :2] for t in seen]), max(size))
+
+
+def _zoom(axis: Axes, places: NDArray[np.float64], arena: float) -> None:
+    """A square around short paths, which would be a dot in a large arena."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    half = 0.7 * float((high - low).max())
+    if 0.0 < 2.0 * half < 0.6 * arena:
+        middle = (low + high) / 2.0
+        axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))

@@ -157,7 +157,7 @@ def _comparison(c: Comparison) -> Iterator[str]:
                 f"  {horizon:10}{1e3 * e['position_m']:8.2f} ±{1e3 * e['position_se_m']:4.2f}{1e3 * e['forward_m']:10.2f}"
                 f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{noise}{e['windows']:9.0f}"
             )
-    yield "  (noise: error that tracking noise alone would cause; the scatter of the drive comes on top of it)"
+    yield "  (noise: error that tracking noise alone would cause; the scatter of the drive is not included)"
     yield "\nwhere it fails: fraction of the loss that a free curve along each variable would remove, on held-out trials:"
     yield f"  {'variable':30}{'velocity':16}{'fraction':>14}{'p':>10}"
     for p in c.residual_dependence[:_SHOWN]:

@@ -17,7 +17,7 @@ LABELS = {
     "right_change_m_s": "recent change of the right wheel's command (m/s)",
     "left_reversed": "left wheel recently reversed (-1 to 1)",
     "right_reversed": "right wheel recently reversed (-1 to 1)",
-    "just_started": "trial just started (1, fading to 0)",
+    "just_started": "trial just started (1, decaying to 0)",
     "x_m": "position x (m)",
     "y_m": "position y (m)",
     "heading_rad": "heading (rad)",

@@ -1,7 +1,7 @@
 """A small typed grammar of terms that may stand for what no listed effect explains: signals, a nonlinearity, a memory.
 
 A family is a velocity that is added to and a few functions whose sum, each with a number of its own, is a free curve of one
-signal (a wheel's own speed, its way since it last changed direction, the time in a trial), a field over the floor, or a short
+signal (a wheel's speed, its distance since it last changed direction, the time in a trial), a field over the floor, or a short
 polynomial of speed and turn. All are written as formulas: whatever a family turns out to be can be added to a model file.
 """
 
@@ -116,7 +116,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     yield Family(RESPONSE, WHEELS, tuple(f"(ago({a:g}, {b:g}) - u)" for a, b in pairwise(RESPONSE_KNOTS_S)))
     if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0:
         ways = [share * wheelbase_m for share in REVERSAL_KNOTS]
-        yield Family("way since each wheel reversed", WHEELS, tuple(f"u * {h}" for h in _hats("since", ways)[:-1]))
+        yield Family("distance since each wheel reversed", WHEELS, tuple(f"u * {h}" for h in _hats("since", ways)[:-1]))
     yield Family("recent work of each wheel", WHEELS, ("u * lately10", "u * lately100"))
     yield Family("direction of motion", SHARE, tuple(_hats("swing", SWING_KNOTS)[1:]))
     longest = float(seen["time_in_trial_s"].max())

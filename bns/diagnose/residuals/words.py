@@ -162,7 +162,7 @@ def _largest(term: Formula, predictor: Predictor) -> str:
 _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("time in the trial", "share"): _time_in_trial,
     ("time of the session", "share"): _session,
-    ("way since each wheel reversed", "wheels"): _reversal,
+    ("distance since each wheel reversed", "wheels"): _reversal,
     ("direction of motion", "share"): _swing,
     ("speed of each wheel", "wheels"): _speed,
     ("speed of the left wheel", "left"): _speed,

@@ -10,7 +10,7 @@ from bns.diagnose.settings.setting import BY_HAND, setting
 
 @dataclass(frozen=True)
 class Data:
-    """``data/``: checks of tables, trials out of one log, tracks, tracker faults, the noise of the tracking."""
+    """``data/``: checks of tables, division of a log into trials, tracks, tracker faults, tracking noise."""
 
     held_share: float = setting(
         0.2,
@@ -61,7 +61,7 @@ class Data:
     finer_units: tuple[tuple[float, str], ...] = setting(
         ((1e6, "nanoseconds"), (3e3, "microseconds"), (0.0, "milliseconds")),
         "s, unit",
-        "A step between rows above each of these numbers of seconds means that times are in the unit beside it: "
+        "A step between rows above each of these numbers of seconds means that times are in the unit next to it: "
         "rows are 0.01 to 1 s apart, and the units differ by factors of a thousand.",
     )
     untold_ratio: float = setting(
@@ -78,7 +78,7 @@ class Data:
     guess_units: tuple[tuple[float, str], ...] = setting(
         ((1e6, "ns"), (3e3, "us"), (3.0, "ms")),
         "number, unit",
-        "A typical time step in a file above each of these numbers means that times are in the unit beside it: rows "
+        "A typical time step in a file above each of these numbers means that times are in the unit next to it: rows "
         "are 0.01 to 1 s apart, and the units differ by factors of a thousand.",
     )
     guess_degrees: float = setting(

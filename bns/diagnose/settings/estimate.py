@@ -11,7 +11,7 @@ _NOISE_UNITS = "m, rad, drive (3)"
 
 @dataclass(frozen=True)
 class Estimate:
-    """``estimate/``: how numbers are fitted, and whether a model is better than another on trials held out."""
+    """``estimate/``: how parameters are fitted, and whether a model predicts held-out trials better than another."""
 
     folds: int = setting(
         5, "folds", f"Each fifth of the trials is predicted from the other four, a usual number of folds; {BY_HAND}."

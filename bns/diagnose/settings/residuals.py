@@ -9,7 +9,7 @@ from bns.diagnose.settings.setting import BY_HAND, setting
 
 @dataclass(frozen=True)
 class Residuals:
-    """``residuals/``: curves and fields, repetition along time, moments that stand out, formulas, errors of networks."""
+    """``residuals/``: curves and fields, autocorrelation, moments that stand out, formulas, errors of networks."""
 
     knots: int = setting(
         5, "quantiles", f"Knots of a free curve, at evenly spaced quantiles of the variable; {BY_HAND}."
@@ -75,13 +75,13 @@ class Residuals:
     clip: float = setting(
         4.0,
         "standard deviations",
-        f"Whitened residuals are clipped here, so that one mistaken marker decides nothing; {BY_HAND}.",
+        f"Whitened residuals are clipped here, so that one mistaken marker does not decide; {BY_HAND}.",
     )
     flexible_terms: int = setting(
         3,
         "terms",
-        "Largest number of flexible terms beside the effects: each has about ten parameters, together half as many "
-        "as there are trials.",
+        "Largest number of flexible terms in addition to the effects: each has about ten parameters, together half "
+        "as many as there are trials.",
     )
     clearly_better: float = setting(
         0.0015,
@@ -92,15 +92,15 @@ class Residuals:
     kept_share: float = setting(
         0.2,
         "1",
-        "Beside flexible terms, an accepted effect must keep this fraction of its gain without them: motor-lag kept "
-        "8 % beside the term for play in gears, which it had imitated.",
+        "Together with flexible terms, an accepted effect must keep this fraction of its gain without them: "
+        "motor-lag kept 8 % when the term for backlash, which it had imitated, was added.",
     )
     kept_share_of_term: float = setting(
         0.1,
         "1",
-        "Beside all accepted effects, a term must keep this fraction of the gain that it had when it was added. The "
-        "least that a right term kept is 25 % (play in gears beside the lag that imitates it); a term that two "
-        "effects explain kept nothing.",
+        "Together with all accepted effects, a term must keep this fraction of the gain that it had when it was "
+        "added. The least that a right term kept is 25 % (backlash, with the lag that imitates it); a term that "
+        "two effects explain kept nothing.",
     )
     large: float = setting(
         0.02,
@@ -153,8 +153,8 @@ class Residuals:
     response_knots_s: tuple[float, ...] = setting(
         (0.0, 0.04, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0, 1.35, 1.8, 2.5),
         "s",
-        "Bends of a wheel's free response to a change of its command, closer where it is fresh: motors answer within tenths of a "
-        f"second, what rings or winds up settles within two; {BY_HAND}.",
+        "Knots of a wheel's free response to a change of its command, denser just after the change: motors respond within "
+        f"tenths of a second; oscillation and integral wind-up settle within two seconds; {BY_HAND}.",
     )
     surface_knots: tuple[tuple[float, ...], tuple[float, ...]] = setting(
         ((0.0, 0.4, 1.0), (0.0, 0.3, 0.6, 1.0)),

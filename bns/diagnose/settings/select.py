@@ -9,7 +9,7 @@ from bns.diagnose.settings.setting import BY_HAND, setting
 
 @dataclass(frozen=True)
 class Select:
-    """``select/``: which effects are accepted, what they cannot be told from, and longer explanations that do the same."""
+    """``select/``: which effects are accepted, what they cannot be told apart from, and explanations with more effects."""
 
     false_alarm: float = setting(
         0.05,
@@ -27,19 +27,19 @@ class Select:
         "1",
         "Of several effects, one that lowers the held-out error (root mean square, median, heading) by less than this fraction "
         "at every horizon is not named. Of 114 generated worlds with one hidden effect the weakest lowered it by 15 %; a clock "
-        "offset that only stood for half a step of another simulator's integration by 1 %.",
+        "offset that only compensated for half a time step of another simulator, by 1 %.",
     )
     least_fall_luck: float = setting(
         0.3,
         "1",
-        "Over the root of the number of windows: so much more is asked where these are few. An effect that does nothing lowered "
-        "an error of 16 windows by 2.5 %, one of 71 by 1 %.",
+        "This, divided by the square root of the number of windows, is added to `least_fall`: with few windows more is required. "
+        "An effect without influence lowered an error over 16 windows by 2.5 %, one over 71 by 1 %.",
     )
     least_fall_windows: int = setting(
         200,
         "windows",
-        "The median counts in that from so many windows on: an effect that does nothing changed it by 0.7 % of 428 windows, by "
-        "7.5 % of 71.",
+        "From this many windows on, the median error counts as well: an effect without influence changed it by 0.7 % over 428 "
+        "windows, by 7.5 % over 71.",
     )
     screen: float = setting(
         0.15,
@@ -130,7 +130,7 @@ class Select:
 
 @dataclass(frozen=True)
 class Verdict:
-    """``diagnosis.py``, ``caveats.py``, ``comparison.py``: what is said beside and instead of an effect."""
+    """``diagnosis.py``, ``caveats.py``, ``comparison.py``: what is reported in addition to an effect, or instead of one."""
 
     few_trials: int = setting(
         40,

@@ -2,7 +2,7 @@
 
 import bns
 
-log = "khepera-log.csv"  # read through khepera-log.csv.import.yaml beside it
+log = "khepera-log.csv"  # read through khepera-log.csv.import.yaml next to it
 model = bns.Model("khepera")
 
 found = bns.diagnose(log, model)

@@ -51,8 +51,8 @@ def checked_lines(path: Path, data: bytes) -> list[str]:
     text = [_text(path, number, line) for number, line in enumerate(lines, 1)]
     if unsealed:
         warnings.warn(
-            f"{path}: lines 1 to {unsealed} were written before lines had checksums; whether they are as they were "
-            "written cannot be told.",
+            f"{path}: lines 1 to {unsealed} were written before lines had checksums, so changes to them cannot be "
+            "detected.",
             LogWarning,
             stacklevel=3,
         )
@@ -92,5 +92,5 @@ def _text(path: Path, number: int, line: bytes) -> str:
 
 def _wrong(path: Path, number: int, what: str) -> HardwareError:
     kept = f"head -n {number - 2} {path}" if number > 2 else ""
-    below = f" What stands above it can be resumed: {kept} > FILE, in its place." if kept else ""
+    below = f" Everything above it can be resumed: {kept} > FILE, in its place." if kept else ""
     return HardwareError(f"line {number} of {path} {what}. Take the file from a copy, unedited.{below}")

@@ -135,7 +135,7 @@ def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stoppi
         eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0, delay_of(rig.tracker))
     except ServoError as error:
         chain.close()
-        raise HardwareError(f"the servos are not fit to drive: {error}. See to it, then try again.") from error
+        raise HardwareError(f"the servos are not fit to drive: {error}. Fix this, then try again.") from error
     except BaseException:
         chain.close()
         raise
@@ -158,5 +158,7 @@ def emulate(rig: Rig, folder: Path, clock: EmulatedClock, plan: FaultPlan, seed:
 
 def _check_tracker(rig: Rig) -> None:
     if rig.tracker["kind"] != "colour":
-        raise HardwareError(f"the snake's ends are told apart by colour; its tracker is {rig.tracker['kind']}, not kind: colour.")
+        raise HardwareError(
+            f"the snake's ends are distinguished by colour; its tracker is {rig.tracker['kind']}, not kind: colour."
+        )
     checked(rig.tracker)

@@ -72,7 +72,7 @@ class DynamixelChain:
         try:
             return self._setting_that_is_wrong(number)
         except ServoAlarmError as error:
-            return f"{error}; see to it, then switch the servos off and on"
+            return f"{error}; fix the cause, then switch the servos off and on"
         except ServoError as error:
             if "corrupt" in str(error):
                 return f"servo {number}: answers are garbled; two servos may have this id ({error})"

@@ -58,7 +58,7 @@ class ServoLimits:
                 raise ServoError(f"servo {number} is at {health.temperature_c:.0f} °C; let it cool below {self.temperature_c:g}")
             if not self.low_v <= health.voltage_v <= self.high_v:
                 allowed = f"{self.low_v:g} to {self.high_v:g}"
-                raise ServoError(f"servo {number} has {health.voltage_v:.1f} V, not {allowed}; see to the supply")
+                raise ServoError(f"servo {number} has {health.voltage_v:.1f} V, not {allowed}; check the supply")
 
 
 class ServoChain(Protocol):

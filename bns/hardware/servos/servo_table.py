@@ -101,4 +101,4 @@ class ServoTable:
         said = [text for bit, text in self.alarms.items() if found & (1 << bit)]
         if refused := bits & ~self.alarm_bits:
             said.append(self.refusals.get(refused, f"error {refused}"))
-        return ", ".join(said) or "an alarm that is over"
+        return ", ".join(said) or "an alarm that has ended"

@@ -162,8 +162,8 @@ class SnakeDrive:
         short = int(np.argmax(np.abs(sent - target)))
         if abs(sent[short] - target[short]) > 1.5 * self._chain.step_rad:
             raise TrialPausedError(
-                f"joint {short + 1} was to go to {math.degrees(target[short]):.0f}° and was only told "
-                f"{math.degrees(sent[short]):.0f}°: widen the angle limits in its servo"
+                f"joint {short + 1} should go to {math.degrees(target[short]):.0f}°, but the command was "
+                f"clipped to {math.degrees(sent[short]):.0f}°: widen the angle limits in its servo"
             )
         self._angles, end_s, looked = target, asked_s + way_rad / speed_rad_s + self._settings.settle_s, False
         while (left_s := end_s - self._clock.now_s()) > 0 or not looked:  # a slow adapter leaves no time, and is looked at too

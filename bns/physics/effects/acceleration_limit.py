@@ -1,7 +1,7 @@
-"""A wheel changes its speed no faster than the motor, or its controller's profile, allows.
+"""The motor, or its controller's speed profile, limits the acceleration of a wheel.
 
-In a model it belongs before delay and lag: it is exact for commands, which are constant in a step, and good
-to one step for speeds that change inside a step.
+In a model it belongs before delay and lag: it is exact for commands, which are constant within a step, and accurate
+to one step for speeds that change within a step.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ EFFECT = Effect(
     name="acceleration-limit",
     stage="wheel",
     parameters=(
-        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest change of a wheel's speed"),
+        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest acceleration of a wheel"),
     ),
     equation="|dw/dt| <= a for each wheel",
-    residuals="A start from rest falls short by half the squared speed over a: fast commands lose "
-    "more than in proportion, and steps of speed are ramps.",
+    residuals="A start from rest falls short by u^2/(2·a): fast commands lose more than in proportion. Steps of "
+    "speed become ramps.",
     lookalikes=("motor-lag", "command-delay"),
-    sentence="the wheels' speed can change only so fast",
+    sentence="the acceleration of the wheels is limited",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
     apply=apply,
     needs="track",

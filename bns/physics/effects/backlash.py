@@ -1,7 +1,7 @@
 """Gears have play: a wheel that reverses stands still until its motor has crossed the gap.
 
-Where in the gap a wheel stands when a trial begins cannot be known from outside: it is taken to touch forward, as after
-a robot was last driven so.
+The position in the gap at the start of a trial is not logged. The gears are assumed to touch in the forward direction,
+as they do after the robot last drove forward.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from bns.physics.wheels.scans import played
 
 
 def apply(wheels: Wheels, gap_m: float) -> Wheels:
-    """Each wheel loses ``gap_m`` of its way whenever it changes direction."""
+    """Each wheel loses ``gap_m`` of its distance whenever it changes direction."""
     return wheels.turning(
         played(wheels.left_m_s, wheels.step_s, gap_m),
         played(wheels.right_m_s, wheels.step_s, gap_m),
@@ -23,13 +23,13 @@ EFFECT = Effect(
     name="backlash",
     stage="wheel",
     parameters=(
-        Parameter("gap_m", "m", 0.0, 0.5, (0.0, 0.05), 0.0, "way that a wheel loses when it reverses", size_power=1.0),
+        Parameter("gap_m", "m", 0.0, 0.5, (0.0, 0.05), 0.0, "distance that a wheel loses when it reverses", size_power=1.0),
     ),
-    equation="g' = min(max(g + u·dt, 0), gap), way driven = u·dt - (g' - g), for each wheel, g = gap at the start",
-    residuals="After each reversal of a wheel a fixed way is missing, whatever the speed; without reversals all fits.",
+    equation="g' = min(max(g + u·dt, 0), gap), distance driven = u·dt - (g' - g), for each wheel, g = gap at the start",
+    residuals="After each reversal of a wheel a fixed distance is missing at any speed; trials without reversals fit.",
     lookalikes=("caster-swing", "command-delay", "dead-zone"),
-    sentence="a wheel stands still for a moment after it changes direction",
-    measurement="hold the motor and turn the wheel by hand: it moves by the gap",
+    sentence="play in the gears stops a wheel briefly whenever it changes direction",
+    measurement="hold the motor still, turn the wheel by hand, and measure the play at its rim",
     apply=apply,
     needs="track",
     starts=tuple((gap,) for gap in (0.0005, 0.002, 0.005, 0.01, 0.02, 0.04)),

@@ -1,4 +1,4 @@
-"""The battery runs down, and the wheels with it."""
+"""The battery discharges, and the wheels become slower."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bns.physics.signals import Array, Wheels
 
 
 def apply(wheels: Wheels, rate_per_s: float, per_volt: float) -> Wheels:
-    """Both speeds fall by ``rate_per_s`` of themselves a second of the session, and by ``per_volt`` a volt."""
+    """Both speeds fall by the fraction ``rate_per_s`` per second of the session, or by ``per_volt`` per volt."""
     kept: Array = 1.0 - rate_per_s * wheels.session_s
     if wheels.conditions.battery_drop_v is not None:
         kept = kept - per_volt * wheels.conditions.battery_drop_v
@@ -27,7 +27,7 @@ EFFECT = Effect(
             0.05,
             (-2e-3, 2e-3),
             0.0,
-            "share of speed lost a second of the session",
+            "fraction of speed lost per second of the session",
             instead_of="battery_v",
         ),
         Parameter(
@@ -37,16 +37,16 @@ EFFECT = Effect(
             2.0,
             (-0.5, 0.5),
             0.0,
-            "share of speed lost a volt below the first one logged",
+            "fraction of speed lost per volt below the first value logged",
             column="battery_v",
         ),
     ),
     equation="u' = u·(1 - rate·session - per_volt·(V0 - V)) for each wheel",
-    residuals="Distances and turns shrink by one share that grows from trial to trial.",
+    residuals="Distances and turns shrink by one fraction, which grows from trial to trial.",
     lookalikes=("speed-gain",),
-    sentence="the robot becomes slower as its battery empties",
+    sentence="the robot becomes slower as its battery discharges",
     measurement="log the battery's voltage (column battery_v)",
     explained_by=("session_s", "battery_v"),
-    caveat="No session_s or battery_v was logged: the session's time is taken as the trials one right after the other.",
+    caveat="No session_s or battery_v was logged: the trials are assumed to follow one another without pauses.",
     apply=apply,
 )

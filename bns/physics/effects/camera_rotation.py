@@ -1,4 +1,4 @@
-"""The tracker's x axis and the zero of its headings do not agree, or the marker is put on the robot turned."""
+"""The tracker's x axis differs from the zero of its headings, or the marker is mounted rotated on the robot."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bns.physics.signals import View
 
 
 def apply(view: View, angle_rad: float) -> View:
-    """Positions turned about the origin by ``angle_rad``, counter-clockwise; headings as they are."""
+    """Positions rotated about the origin by ``angle_rad``, counter-clockwise; headings unchanged."""
     cos, sin = np.cos(angle_rad), np.sin(angle_rad)
     poses = view.poses.copy()
     poses[..., 0] = cos * view.poses[..., 0] - sin * view.poses[..., 1]
@@ -30,15 +30,15 @@ EFFECT = Effect(
             3.2,
             (-3.15, 3.15),
             0.0,
-            "positions turned against headings, left positive",
+            "rotation of positions relative to headings, counter-clockwise positive",
             resolution=2e-3,
         ),
     ),
     equation="x' = x·cos(phi) - y·sin(phi), y' = x·sin(phi) + y·cos(phi)",
-    residuals="The robot seems to drive at an angle to its heading, the same one always, also in reverse.",
+    residuals="The robot appears to drive at a constant angle to its heading, also in reverse.",
     lookalikes=("side-slip", "marker-offset"),
-    sentence="the camera's positions are turned against the robot's headings",
-    measurement="track a straight edge laid along the direction that the headings call north",
+    sentence="the tracker's positions are rotated relative to its headings",
+    measurement="lay a straight edge along heading zero, track both of its ends, and measure its angle to the x axis",
     apply=apply,
     starts=tuple(
         (sign * a,)

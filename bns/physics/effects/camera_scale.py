@@ -1,4 +1,4 @@
-"""The tracker's metre is not a metre."""
+"""The tracker's scale is wrong: it reports every distance too long or too short by one factor."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from bns.physics.signals import View
 
 
 def apply(view: View, factor: float) -> View:
-    """Positions times ``factor``; headings as they are."""
+    """Positions times ``factor``; headings unchanged."""
     poses = view.poses.copy()
     poses[..., :2] *= factor
     return View(poses)
@@ -16,12 +16,12 @@ def apply(view: View, factor: float) -> View:
 EFFECT = Effect(
     name="camera-scale",
     stage="measure",
-    parameters=(Parameter("factor", "1", 0.2, 5.0, (0.7, 1.4), 1.0, "tracked over true distance"),),
+    parameters=(Parameter("factor", "1", 0.2, 5.0, (0.7, 1.4), 1.0, "tracked distance divided by true distance"),),
     equation="x' = c·x, y' = c·y",
-    residuals="All distances are wrong by the same share while all turns fit.",
+    residuals="All distances are wrong by the same fraction, while all turns fit.",
     lookalikes=("speed-gain", "wheelbase"),
-    sentence="the camera's positions are too large or too small",
-    measurement="lay a tape measure on the floor in the camera's view and compare its length with the tracked one",
+    sentence="the tracker reports all distances too long or too short by one factor",
+    measurement="lay an object of known length on the floor, track both of its ends, and compare the lengths",
     apply=apply,
     needs="track",
 )

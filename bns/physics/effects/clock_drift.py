@@ -1,4 +1,4 @@
-"""The tracker's clock and the robot's do not run at the same rate."""
+"""The tracker's clock and the robot's clock do not run at the same rate."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ EFFECT = Effect(
     name="clock-drift",
     stage="clock",
     parameters=(
-        Parameter("rate", "1", -0.2, 0.2, (-0.02, 0.02), 0.0, "seconds that the tracker's clock gains in a second"),
+        Parameter("rate", "1", -0.2, 0.2, (-0.02, 0.02), 0.0, "seconds that the tracker's clock gains per second"),
     ),
     equation="pose'(t) = pose(t - rate·t)",
-    residuals="The track runs ahead of the commands or falls behind, more so the later in the trial; changes of speed show it.",
+    residuals="The track leads or lags behind the commands by a time that grows during the trial; changes of speed show it.",
     lookalikes=("clock-offset", "speed-gain"),
-    sentence="the camera's clock runs faster or slower than the commands' clock",
+    sentence="the tracker's clock runs faster or slower than the clock of the commands",
     apply=apply,
     needs="track",
 )

@@ -1,4 +1,4 @@
-"""The tracker's clock and the robot's do not agree."""
+"""The tracker's clock and the robot's clock differ by a constant time."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ EFFECT = Effect(
     name="clock-offset",
     stage="clock",
     parameters=(
-        Parameter("offset_s", "s", -5.0, 5.0, (-1.0, 1.0), 0.0, "poses are stamped this much late (negative: early)"),
+        Parameter("offset_s", "s", -5.0, 5.0, (-1.0, 1.0), 0.0, "how late poses are time-stamped (negative: early)"),
     ),
     equation="pose'(t) = pose(t - offset)",
-    residuals="The whole track is shifted along itself: errors are speed times the offset, and vanish at rest.",
+    residuals="The whole track is shifted along itself: the error is speed times offset, and zero at rest.",
     lookalikes=("command-delay", "motor-lag"),
-    sentence="the camera's clock and the commands' clock disagree",
-    measurement="film an event that both clocks stamp (an LED switched by the computer that logs the commands)",
+    sentence="the tracker's clock and the clock of the commands differ by a constant time",
+    measurement="film an event that both clocks time-stamp (an LED switched by the computer that logs the commands)",
     beside={
-        "command-delay": "A late command and a late clock look the same from outside: time-stamp an event that both clocks see."
+        "command-delay": "A late command and a late clock look the same in a log: time-stamp an event that both clocks see."
     },
     apply=apply,
     needs="track",

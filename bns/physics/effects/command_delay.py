@@ -1,4 +1,4 @@
-"""A command reaches the wheels some time after it was given."""
+"""A command reaches the wheels a constant time after it was sent."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def apply(wheels: Wheels, delay_s: float) -> Wheels:
 EFFECT = Effect(
     name="command-delay",
     stage="wheel",
-    parameters=(Parameter("delay_s", "s", 0.0, 5.0, (0.0, 1.0), 0.0, "time from giving a command to its effect"),),
+    parameters=(Parameter("delay_s", "s", 0.0, 5.0, (0.0, 1.0), 0.0, "time from sending a command to its effect"),),
     equation="u'(t) = u(t - delay), 0 before the first command",
-    residuals="Every command drives the end of the one before first: errors follow the change of "
-    "speed between commands, and are the same for commands of any duration above the "
-    "delay.",
+    residuals="At the start of every command the wheels still follow the previous one: the error is "
+    "proportional to the change of speed between commands, and the same for all commands that last longer than "
+    "the delay.",
     lookalikes=("motor-lag", "acceleration-limit"),
-    sentence="commands reach the motors late",
+    sentence="commands reach the motors after a delay",
     measurement="film an LED on the robot that lights when a command arrives, with the tracker's camera",
     apply=apply,
     needs="track",

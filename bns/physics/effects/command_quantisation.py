@@ -1,4 +1,4 @@
-"""A controller knows only some speeds: whole counts of its encoder a cycle, percents of its voltage."""
+"""A controller can set only certain speeds: whole encoder counts per cycle, or whole percents of its voltage."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bns.physics.signals import Array, Wheels
 
 
 def apply(wheels: Wheels, step_m_s: float, share: float) -> Wheels:
-    """Each wheel's speed drawn by ``share`` of the way to the nearest multiple of ``step_m_s``."""
+    """Each wheel's speed moved by the fraction ``share`` towards the nearest multiple of ``step_m_s``."""
     return wheels.turning(
         _rounded(wheels.left_m_s, step_m_s, share),
         _rounded(wheels.right_m_s, step_m_s, share),
@@ -25,14 +25,14 @@ EFFECT = Effect(
     name="command-quantisation",
     stage="wheel",
     parameters=(
-        Parameter("step_m_s", "m/s", 1e-4, 2.0, (1e-3, 0.5), 0.02, "distance of the speeds that a wheel knows", resolution=2e-5),
-        Parameter("share", "1", 0.0, 2.0, (0.5, 1.5), 0.0, "of the rounding that acts: 1 is all of it, less is smoothed"),
+        Parameter("step_m_s", "m/s", 1e-4, 2.0, (1e-3, 0.5), 0.02, "difference between neighbouring speeds", resolution=2e-5),
+        Parameter("share", "1", 0.0, 2.0, (0.5, 1.5), 0.0, "fraction of the rounding that acts (1: all)"),
     ),
     equation="u' = u + a·(step·round(u/step) - u) for each wheel, a = 1",
-    residuals="Errors repeat with the command, now fast and now slow, up to half a step; equal commands err equally.",
+    residuals="The error depends on the command alone: positive or negative, up to half a step, and equal for equal commands.",
     lookalikes=("dead-zone",),
-    sentence="the wheels know only speeds in coarse steps",
-    measurement="raise one wheel's command little by little, the robot lifted, and log its encoder: its speed goes up in stairs",
+    sentence="the wheels can run only at speeds in coarse steps",
+    measurement="lift the robot, raise one wheel's command slowly, log its encoder: its speed rises in steps",
     apply=apply,
     needs="track",
     # the loss has as many valleys as there are steps below the fastest command: makers choose round numbers

@@ -1,7 +1,7 @@
-"""Commands act on the ticks of a controller's clock, not when they are given.
+"""Commands take effect on the ticks of a controller's clock, not when they are sent.
 
-The clock is taken to start with the trial, as a program that is started for it does. Where it runs on freely each command
-is late by another part of the period: on average that is a `command-delay` of half of it, and the rest is scatter.
+The clock is assumed to start with the trial, as in a program that is started for each trial. If it runs freely, each
+command is late by a different fraction of the period: a `command-delay` of half a period on average, plus scatter.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from bns.physics.wheels.scans import sampled
 
 
 def apply(wheels: Wheels, period_s: float) -> Wheels:
-    """Each wheel keeps the speed that it was told at the last multiple of ``period_s``."""
+    """Each wheel keeps the speed commanded at the last multiple of ``period_s``."""
     if period_s == 0.0:
         return wheels
     return wheels.turning(
@@ -31,15 +31,15 @@ EFFECT = Effect(
             5.0,
             (0.0, 1.5),
             0.0,
-            "time between two commands that the robot heeds",
+            "time between two updates of the command",
             resolution=1e-4,
         ),
     ),
     equation="u'(t) = u(period·floor(t/period))",
-    residuals="Commands act late by anything from nothing to one period, by what is missing to the next tick of a clock.",
+    residuals="Each command takes effect at the next tick of a clock: late by between zero and one period.",
     lookalikes=("command-delay", "motor-lag"),
-    sentence="the robot heeds new commands only so many times a second",
-    measurement="log on the robot when each command was carried out",
+    sentence="the robot updates its command only at fixed intervals",
+    measurement="log on the robot the time at which each command takes effect",
     apply=apply,
     needs="track",
     # ticks late in a trial must fall into the right frame, so a period is found near these alone: makers choose round ones

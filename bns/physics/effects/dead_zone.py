@@ -1,4 +1,4 @@
-"""Friction eats the first part of a small command."""
+"""Friction takes a constant amount from the speed of each wheel."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bns.physics.signals import Array, Wheels
 
 
 def apply(wheels: Wheels, width_m_s: float) -> Wheels:
-    """Each wheel's speed drawn towards zero by ``width_m_s``, and no further than zero."""
+    """Each wheel's speed reduced towards zero by ``width_m_s``, and not beyond zero."""
     return replace(wheels, left_m_s=_shrunk(wheels.left_m_s, width_m_s), right_m_s=_shrunk(wheels.right_m_s, width_m_s))
 
 
@@ -23,12 +23,12 @@ EFFECT = Effect(
     name="dead-zone",
     stage="wheel",
     parameters=(
-        Parameter("width_m_s", "m/s", 0.0, 1.0, (0.0, 0.1), 0.0, "speed lost by a wheel to friction", size_power=1.0),
+        Parameter("width_m_s", "m/s", 0.0, 1.0, (0.0, 0.1), 0.0, "speed that each wheel loses to friction", size_power=1.0),
     ),
     equation="w = sign(u)·max(|u| - d, 0) for each wheel",
-    residuals="Slow commands fall short by a larger share than fast ones, in proportion to their "
-    "duration; a very slow wheel stands still.",
+    residuals="Slow commands fall short by a larger fraction than fast ones; the error is proportional "
+    "to their duration. A wheel commanded below the dead zone stands still.",
     lookalikes=("speed-gain", "motor-lag"),
-    sentence="a part of every wheel's speed is lost to friction",
+    sentence="every wheel loses a constant part of its speed to friction",
     apply=apply,
 )

@@ -1,6 +1,6 @@
-"""A round patch of floor on which the robot is slower: a carpet's edge, oil, a wet spot.
+"""A round patch of floor on which the robot is slower: the edge of a carpet, oil, a wet spot.
 
-Its rim is a tenth of its radius wide.
+The transition at its rim is a tenth of its radius wide.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _SIDE, _RADII, _TRIED = 13, (0.06, 0.1, 0.15, 0.22, 0.3), 4
 
 
 def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float) -> Body:
-    """All velocities times 1 - ``loss`` within ``radius_m`` of the place."""
+    """All velocities times 1 - ``loss`` within ``radius_m`` of the centre."""
     if body.place is None:
         return body  # first round of a simulation: nobody knows yet where the robot goes
     away = np.hypot(body.place[..., 0] - x_m, body.place[..., 1] - y_m)
@@ -27,7 +27,7 @@ def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float) -> B
 
 
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
-    """The discs in which the way that was seen differs most from the way that was told, per way told, from all around."""
+    """The discs in which the tracked distance differs most from the commanded one, relative to it, from the floor around."""
     middle, told, seen = _ways(wheels)
     if len(told) < _FEWEST:
         return ()
@@ -51,7 +51,7 @@ def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
 
 
 def _ways(wheels: Wheels) -> tuple[Array, Array, Array]:
-    """Pieces of about `_PIECE_S`: where they lie (n, 2), the way of the robot's middle as told and as seen (n,)."""
+    """Pieces of about `_PIECE_S`: their positions (n, 2), and the commanded and tracked distances of the robot's centre (n,)."""
     if wheels.conditions.seen is None:
         return np.zeros((0, 2)), np.zeros(0), np.zeros(0)
     typical = float(np.median(wheels.step_s[wheels.step_s > 0]))
@@ -70,16 +70,16 @@ EFFECT = Effect(
     name="floor-patch",
     stage="body",
     parameters=(
-        Parameter("x_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "middle of the patch, east", resolution=2e-3),
-        Parameter("y_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "middle of the patch, north", resolution=2e-3),
-        Parameter("radius_m", "m", 5e-3, 1e3, (0.02, 100.0), 0.2, "of the patch", floor_share=0.33, resolution=2e-3),
-        Parameter("loss", "1", -1.0, 0.99, (-0.5, 0.95), 0.0, "share of speed lost on it (negative: faster)"),
+        Parameter("x_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, east", resolution=2e-3),
+        Parameter("y_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, north", resolution=2e-3),
+        Parameter("radius_m", "m", 5e-3, 1e3, (0.02, 100.0), 0.2, "radius of the patch", floor_share=0.33, resolution=2e-3),
+        Parameter("loss", "1", -1.0, 0.99, (-0.5, 0.95), 0.0, "fraction of speed lost on it (negative: gained)"),
     ),
     equation="v, s, omega times 1 - k where (x - px)^2 + (y - py)^2 < r^2",
-    residuals="All velocities are too small by one share at one place of the floor, whatever the heading; elsewhere all fits.",
+    residuals="All velocities are too small by one fraction in one area of the floor, at any heading; elsewhere trials fit.",
     lookalikes=("tether-pull", "lens-distortion"),
-    sentence="there is a patch of floor on which the robot is slower",
-    measurement="look at the floor there, or repeat trials with the start moved by twice the patch",
+    sentence="the robot is slower on one patch of the floor",
+    measurement="inspect the floor there, or repeat trials from a start moved by twice the diameter of the patch",
     apply=apply,
     needs="track",
     needs_place=True,

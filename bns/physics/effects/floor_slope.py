@@ -1,4 +1,4 @@
-"""A sloping floor draws the driving robot downhill."""
+"""A sloping floor makes the driving robot drift downhill."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ EFFECT = Effect(
     name="floor-slope",
     stage="world",
     parameters=(
-        Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift to the east", size_power=1.0),
-        Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift to the north", size_power=1.0),
+        Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift velocity east", size_power=1.0),
+        Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "drift velocity north", size_power=1.0),
     ),
     equation="dx/dt += sx, dy/dt += sy while moving",
-    residuals="Positions are off in one direction of the room, whatever the heading, in proportion to the time driven.",
+    residuals="Positions are off in one direction of the floor at any heading, in proportion to the time driven.",
     lookalikes=("tether-pull",),
-    sentence="the robot drifts to one side of the floor, as on a slope",
-    measurement="lay a spirit level on the floor",
+    sentence="the robot drifts in one direction of the floor, as on a slope",
+    measurement="lay a spirit level on the floor, in two directions",
     beside={
-        "tether-pull": "A floor-slope is a tether-pull from far away: drive on both sides of the supposed anchor to tell them "
-        "apart."
+        "tether-pull": "A floor-slope is a tether-pull from far away: to tell them apart, drive on both sides of the "
+        "assumed anchor."
     },
     apply=apply,
     needs="track",

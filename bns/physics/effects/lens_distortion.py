@@ -1,4 +1,4 @@
-"""What is left of a lens's distortion: lengths grow or shrink with the squared distance from its centre."""
+"""Radial distortion left after the lens was calibrated: scale changes with the squared distance from the lens's centre."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bns.physics.signals import View, Wheels
 
 
 def apply(view: View, per_m2: float, x_m: float, y_m: float) -> View:
-    """Positions moved off the centre by ``per_m2``·r^2 of their distance r; headings as the same picture shows them."""
+    """Positions moved away from the centre by the fraction ``per_m2``·r^2 of their distance r; headings distorted likewise."""
     x, y, heading = np.moveaxis(view.poses, -1, 0)
     east, north = x - x_m, y - y_m
     share = per_m2 * (east**2 + north**2)
@@ -37,17 +37,17 @@ EFFECT = Effect(
             2.0,
             (-0.3, 0.3),
             0.0,
-            "share by which a place a metre off the centre is moved out",
+            "fraction by which a point 1 m from the centre is moved outwards",
             resolution=1e-4,
         ),
         Parameter("x_m", "m", -1e3, 1e3, (-100.0, 100.0), 0.0, "centre of the lens, east", resolution=5e-3),
         Parameter("y_m", "m", -1e3, 1e3, (-100.0, 100.0), 0.0, "centre of the lens, north", resolution=5e-3),
     ),
     equation="x' = x + k·r^2·(x - cx), y' = y + k·r^2·(y - cy), r the distance from (cx, cy)",
-    residuals="Distances are right in the middle of the floor and wrong all round its edge, by the same share.",
+    residuals="Distances are right in the middle of the floor, and wrong by the same fraction all round its edge.",
     lookalikes=("tilted-camera", "camera-scale"),
-    sentence="the camera's lens bends its picture towards the edges",
-    measurement="calibrate the lens with a chessboard, or look at a straight edge laid along the picture's border",
+    sentence="the camera's lens distorts the edges of its picture",
+    measurement="calibrate the lens with a chessboard, or film a straight edge along the border of the picture",
     apply=apply,
     needs="track",
     needs_place=True,

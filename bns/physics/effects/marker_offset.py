@@ -1,7 +1,7 @@
-"""The tracked point is not above the middle of the axle.
+"""The tracked point is not above the midpoint of the axle.
 
-A robot that turns about a point ahead of its axle or behind it (skid-steer: the instantaneous centre of rotation) looks the
-same from outside: a turning centre x ahead of the tracked point is a marker at forward -x.
+A robot that turns about a point ahead of or behind its axle (skid-steer: the instantaneous centre of rotation) leaves the
+same log: a centre of rotation x ahead of the tracked point equals a marker at forward -x.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from bns.physics.signals import View
 
 
 def apply(view: View, forward_m: float, left_m: float) -> View:
-    """Positions moved by the offset, turned with the robot; headings as they are."""
+    """Positions moved by the offset, which rotates with the robot; headings unchanged."""
     cos, sin = np.cos(view.poses[..., 2]), np.sin(view.poses[..., 2])
     poses = view.poses.copy()
     poses[..., 0] += cos * forward_m - sin * left_m
@@ -25,15 +25,15 @@ EFFECT = Effect(
     name="marker-offset",
     stage="measure",
     parameters=(
-        Parameter("forward_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker ahead of the axle's middle", size_power=1.0),
+        Parameter("forward_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker ahead of the midpoint of the axle", size_power=1.0),
         Parameter(
-            "left_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker to the left of the axle's middle", size_power=1.0
+            "left_m", "m", -1.0, 1.0, (-0.3, 0.3), 0.0, "marker to the left of the midpoint of the axle", size_power=1.0
         ),
     ),
     equation="x' = x + f·cos(theta) - s·sin(theta), y' = y + f·sin(theta) + s·cos(theta)",
-    residuals="Turns on the spot move the robot on a circle; straight commands fit.",
+    residuals="Turns on the spot move the tracked point on a circle; straight commands fit.",
     lookalikes=("side-slip", "turn-slip"),
-    sentence="the tracked marker does not sit over the point about which the robot turns, the middle of the axle",
-    measurement="measure with a ruler where the marker sits, from the middle of the axle",
+    sentence="the tracked marker is not above the midpoint of the axle, about which the robot turns",
+    measurement="measure the position of the marker from the midpoint of the axle with a ruler",
     apply=apply,
 )

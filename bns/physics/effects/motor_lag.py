@@ -1,4 +1,4 @@
-"""A wheel needs time to reach the speed that it was told."""
+"""A wheel needs time to reach its commanded speed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EFFECT = Effect(
     parameters=(Parameter("tau_s", "s", 0.0, 5.0, (0.0, 1.0), 0.0, "time constant of the wheel's speed control"),),
     equation="dw/dt = (u - w)/tau for each wheel",
     residuals="The first command falls short by speed times tau, whatever its duration; later "
-    "commands keep a rest of the command before, and short ones suffer most.",
+    "commands begin with a rest of the previous one. Short commands are affected most.",
     lookalikes=("command-delay", "acceleration-limit", "speed-gain"),
     sentence="the motors follow their commands with a lag",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",

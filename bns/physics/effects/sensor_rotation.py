@@ -1,7 +1,7 @@
-"""A sensor that rides on the robot, and measures motions in its own frame, is turned against the robot.
+"""A sensor on the robot, which measures motions in its own frame, is mounted rotated relative to the robot.
 
-For single relative motions only (scan matching). A tracker that sees poses in one frame shows the same as `camera-rotation`.
-The sensor's place is `marker-offset`, in the robot's frame: it acts before the turn.
+For single relative motions only (scan matching). With a tracker that reports poses in one frame, the same error is
+`camera-rotation`. The sensor's position is `marker-offset`, in the robot's frame: it acts before the rotation.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ EFFECT = Effect(
             3.2,
             (-3.15, 3.15),
             0.0,
-            "sensor's x axis against the robot's, left positive",
+            "angle from the robot's x axis to the sensor's, counter-clockwise positive",
             resolution=1e-3,
         ),
     ),
-    equation="theta' = theta + a: the displacement in the sensor's frame is the robot's, turned by -a",
-    residuals="Every displacement points away from straight ahead by one angle, the same one always, also in reverse.",
+    equation="theta' = theta + a: the displacement in the sensor's frame is the robot's, rotated by -a",
+    residuals="Every displacement points away from straight ahead by the same angle, also in reverse.",
     lookalikes=("side-slip", "marker-offset"),
-    sentence="the sensor is mounted turned against the robot",
-    measurement="drive straight along a wall and compare the wall's direction in the sensor's picture",
+    sentence="the sensor is mounted rotated relative to the robot",
+    measurement="drive straight along a wall, and measure the wall's direction in the sensor's data",
     apply=apply,
     needs="motions",
     starts=tuple(

@@ -1,4 +1,4 @@
-"""The robot is carried outwards in a curve."""
+"""The robot slides outwards in a curve."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bns.physics.signals import Body
 
 
 def apply(body: Body, slip_s: float) -> Body:
-    """Sideways velocity slip·v·omega: to the right in a left turn, and outwards always."""
+    """Sideways velocity slip·v·omega: to the right in a left turn, always outwards."""
     return replace(body, sideways_m_s=body.sideways_m_s + slip_s * body.forward_m_s * body.yaw_rad_s)
 
 
@@ -20,8 +20,8 @@ EFFECT = Effect(
         Parameter("slip_s", "s", -2.0, 2.0, (-1.0, 1.0), 0.0, "sideways velocity per centripetal acceleration v·omega"),
     ),
     equation="s' = s + k·v·omega, s the velocity to the right",
-    residuals="The path lies outside the commanded arc, more so the faster and sharper it is; headings fit.",
+    residuals="The path lies outside the commanded arc; the error grows with speed and turn rate. Headings fit.",
     lookalikes=("turn-slip", "marker-offset"),
-    sentence="the robot slides sideways in curves",
+    sentence="the robot slides outwards in curves",
     apply=apply,
 )

@@ -18,13 +18,13 @@ EFFECT = Effect(
     stage="wheel",
     parameters=(
         Parameter(
-            "gain", "1", 0.2, 5.0, (0.5, 1.5), 1.0, "driven over commanded speed: true over assumed wheel diameter"
+            "gain", "1", 0.2, 5.0, (0.5, 1.5), 1.0, "true divided by commanded speed (or wheel diameter)"
         ),
     ),
     equation="l' = g·l, r' = g·r",
-    residuals="Distances and turns are wrong by the same share in every command, whatever its speed and duration.",
+    residuals="Distances and turns are wrong by the same fraction in every command, whatever its speed and duration.",
     lookalikes=("motor-lag", "dead-zone", "turn-slip"),
-    sentence="the wheels turn faster or slower than they are told to",
-    measurement="let the robot drive straight and measure the way on the floor with a tape",
+    sentence="both wheels turn faster or slower than commanded, by one factor",
+    measurement="drive straight and measure the distance on the floor with a tape measure",
     apply=apply,
 )

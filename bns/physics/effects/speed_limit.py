@@ -1,4 +1,4 @@
-"""A wheel has a highest speed."""
+"""The speed of a wheel is limited."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ EFFECT = Effect(
     stage="wheel",
     parameters=(Parameter("max_m_s", "m/s", 1e-3, math.inf, (0.02, 5.0), math.inf, "highest speed of a wheel"),),
     equation="w = min(max(u, -limit), limit) for each wheel",
-    residuals="Fast commands fall short, slow ones fit; curves of two fast wheels come out straighter.",
+    residuals="Fast commands fall short, slow ones fit; curves in which both wheels are fast become straighter.",
     lookalikes=("turn-slip", "acceleration-limit"),
-    sentence="the wheels cannot turn faster than a limit",
+    sentence="the speed of the wheels is limited",
     apply=apply,
 )

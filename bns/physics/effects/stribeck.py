@@ -1,4 +1,4 @@
-"""Dry friction that gives way to rolling: a slow wheel loses a part of its speed that a fast one keeps."""
+"""Stribeck friction: it is highest at rest and falls with speed, so that only a slow wheel loses speed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bns.physics.signals import Array, Wheels
 
 
 def apply(wheels: Wheels, width_m_s: float, fade_m_s: float) -> Wheels:
-    """Each wheel's speed drawn towards zero by ``width_m_s``·exp(-|u|/``fade_m_s``), and no further than zero."""
+    """Each wheel's speed reduced towards zero by ``width_m_s``·exp(-|u|/``fade_m_s``), and not beyond zero."""
     left, right = (_braked(speed, width_m_s, fade_m_s) for speed in (wheels.left_m_s, wheels.right_m_s))
     return wheels.turning(left, right)
 
@@ -25,17 +25,17 @@ EFFECT = Effect(
     stage="wheel",
     parameters=(
         Parameter(
-            "width_m_s", "m/s", 0.0, 1.0, (0.0, 0.15), 0.0, "speed lost by a wheel that hardly turns", size_power=1.0
+            "width_m_s", "m/s", 0.0, 1.0, (0.0, 0.15), 0.0, "speed lost by a wheel near rest", size_power=1.0
         ),
         Parameter(
-            "fade_m_s", "m/s", 1e-3, 5.0, (2e-3, 0.5), 0.05, "speed at which a third of that is left", size_power=1.0
+            "fade_m_s", "m/s", 1e-3, 5.0, (2e-3, 0.5), 0.05, "speed at which the loss has fallen to 37 %", size_power=1.0
         ),
     ),
     equation="w = sign(u)·max(|u| - d·exp(-|u|/f), 0) for each wheel",
-    residuals="Slow commands fall short, and the loss vanishes as speed grows: fast ones fit.",
+    residuals="Slow commands fall short; the loss vanishes as speed grows, so that fast commands fit.",
     lookalikes=("dead-zone", "speed-gain"),
-    sentence="slow wheels are braked by friction that fast ones overcome",
-    measurement="log both wheels' own speeds (encoders) against slowly rising commands",
+    sentence="friction brakes slow wheels more than fast ones",
+    measurement="raise both wheels' commands slowly and log the wheels' own speeds (encoders)",
     apply=apply,
     needs="track",
     starts=tuple((width, fade) for fade in (0.01, 0.03, 0.08) for width in (0.005, 0.02)),

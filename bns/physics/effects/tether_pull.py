@@ -1,4 +1,4 @@
-"""A cable draws the driving robot towards the point where it is fixed."""
+"""A cable pulls the driving robot towards its anchor."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def apply(flow: Flow, pull_per_s: float, anchor_x_m: float, anchor_y_m: float) -
 
 
 def _starts() -> tuple[tuple[float, ...], ...]:
-    """Anchors near and far all round, each pulling a robot at the origin with a few millimetres a second."""
+    """Anchors near and far in all directions, each pulling a robot at the origin at a few millimetres per second."""
     return tuple(
         (speed / far, far * math.cos(eighth * math.pi / 4), far * math.sin(eighth * math.pi / 4))
         for far in (1.0, 3.0, 10.0, 40.0)
@@ -33,14 +33,14 @@ EFFECT = Effect(
     name="tether-pull",
     stage="world",
     parameters=(
-        Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.5), 0.0, "velocity per metre from the anchor"),
-        Parameter("anchor_x_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "where the cable is fixed"),
-        Parameter("anchor_y_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "where the cable is fixed"),
+        Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.5), 0.0, "drift velocity per metre of distance from the anchor"),
+        Parameter("anchor_x_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, east"),
+        Parameter("anchor_y_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, north"),
     ),
     equation="dx/dt += k·(ax - x), dy/dt += k·(ay - y) while moving",
-    residuals="Positions are off towards one point of the room, more so the farther the robot is from it.",
+    residuals="Positions are off towards one point; the error grows with the distance from it.",
     lookalikes=("floor-slope",),
-    sentence="something pulls the robot towards one place, as a cable does",
+    sentence="something pulls the robot towards one point, as a cable does",
     measurement="repeat some trials with the cable unplugged or held up",
     apply=apply,
     needs="track",

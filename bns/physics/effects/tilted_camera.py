@@ -1,7 +1,7 @@
-"""The camera does not look straight down: what is far from it in one direction looks too small.
+"""The camera does not look straight down: distances look too short on one side of the floor.
 
-The projective part of the picture alone, about the origin of the tracked frame: the shift, scale and turn that go with it
-are the calibration's, or `camera-scale` and `camera-rotation`.
+Only the perspective part of the projection, about the origin of the tracked frame. The shift, scale and rotation that come
+with a tilt belong to the calibration, or to `camera-scale` and `camera-rotation`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _NEAREST = 0.05
 
 
 def apply(view: View, x_per_m: float, y_per_m: float) -> View:
-    """Positions divided by 1 + ``x_per_m``·x + ``y_per_m``·y; headings as the same picture shows them."""
+    """Positions divided by 1 + ``x_per_m``·x + ``y_per_m``·y; headings distorted likewise."""
     x, y, heading = np.moveaxis(view.poses, -1, 0)
     depth = np.maximum(1.0 + x_per_m * x + y_per_m * y, _NEAREST)
     cos, sin = np.cos(heading), np.sin(heading)
@@ -25,7 +25,7 @@ def apply(view: View, x_per_m: float, y_per_m: float) -> View:
 
 
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
-    """A few percent of the picture's width either way."""
+    """A few percent of the picture's width, in both directions."""
     small = 0.03 / max(float(np.ptp(wheels.places, axis=0).max()), 1e-2)
     return ((small, 0.0), (-small, 0.0), (0.0, small), (0.0, -small))
 
@@ -41,7 +41,7 @@ EFFECT = Effect(
             2.0,
             (-0.5, 0.5),
             0.0,
-            "share that lengths shrink a metre further east",
+            "fraction by which lengths shrink per metre east",
             resolution=1e-4,
         ),
         Parameter(
@@ -51,15 +51,15 @@ EFFECT = Effect(
             2.0,
             (-0.5, 0.5),
             0.0,
-            "share that lengths shrink a metre further north",
+            "fraction by which lengths shrink per metre north",
             resolution=1e-4,
         ),
     ),
     equation="x' = x/(1 + p·x + q·y), y' = y/(1 + p·x + q·y)",
-    residuals="Distances are too small on one side of the floor and too large on the other; they change in a straight line.",
+    residuals="Distances are too short on one side of the floor and too long on the other; the error changes linearly.",
     lookalikes=("lens-distortion", "camera-scale", "tether-pull"),
-    sentence="the camera is tilted, so that distances on one side of its picture look shorter",
-    measurement="track a stick of known length at the four corners of the floor",
+    sentence="the camera is tilted, so that distances on one side of its picture look too short",
+    measurement="track a bar of known length in the four corners of the floor",
     apply=apply,
     needs="track",
     needs_place=True,

@@ -1,6 +1,6 @@
-"""A turning robot drives slower than its wheels say, and the more so the faster it turns: losses grow as its square.
+"""A turning robot drives slower than its wheel speeds imply; the loss grows with the square of the turn rate.
 
-What a curve does sideways, in proportion to v·omega, is `side-slip`.
+The sideways slip in a curve, proportional to v·omega, is `side-slip`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from bns.physics.signals import Body
 
 
 def apply(body: Body, slip_s2: float) -> Body:
-    """Forward speed times 1 - slip·omega², never turned round."""
+    """Forward speed times 1 - slip·omega², never reversed."""
     return body.with_added("forward_m_s", -body.forward_m_s * np.minimum(slip_s2 * body.yaw_rad_s**2, 1.0))
 
 
@@ -21,15 +21,15 @@ EFFECT = Effect(
     stage="body",
     parameters=(
         Parameter(
-            "slip_s2", "s^2/rad^2", 0.0, 1.0, (0.0, 0.4), 0.0, "share of speed lost per squared rad/s of turning"
+            "slip_s2", "s^2/rad^2", 0.0, 1.0, (0.0, 0.4), 0.0, "fraction of speed lost per (rad/s)^2 of turn rate"
         ),
     ),
     equation="v' = v·max(1 - k·omega^2, 0)",
     residuals="Sharp arcs are far too short, wide ones nearly right, left and right alike; headings fit.",
     lookalikes=("turn-slip", "side-slip"),
-    sentence="turning sharply costs much forward speed, turning gently little",
+    sentence="turning costs forward speed, in proportion to the square of the turn rate",
     beside={
-        "turn-slip": "They differ in how the loss grows: drive arcs of one speed at two turn rates, one twice the other."
+        "turn-slip": "The loss grows differently with turn rate: drive arcs at one speed and two turn rates, one twice the other."
     },
     apply=apply,
 )

@@ -1,4 +1,4 @@
-"""A fast robot turns less than its wheels say: skidding wheels and scrubbing tyres give way."""
+"""A fast robot turns less than its wheel speeds imply, because wheels skid and tyres scrub."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bns.physics.signals import Body
 
 
 def apply(body: Body, loss_s_m: float) -> Body:
-    """Turn rate times 1 - loss·|v|, never turned round."""
+    """Turn rate times 1 - loss·|v|, never reversed."""
     kept = np.maximum(1.0 - loss_s_m * np.abs(body.forward_m_s), 0.0)
     return replace(body, yaw_rad_s=body.yaw_rad_s * kept)
 
@@ -21,12 +21,12 @@ EFFECT = Effect(
     stage="body",
     parameters=(
         Parameter(
-            "loss_s_m", "s/m", -2.0, 2.0, (-0.4, 0.4), 0.0, "share of the turn rate lost per m/s (negative: oversteer)"
+            "loss_s_m", "s/m", -2.0, 2.0, (-0.4, 0.4), 0.0, "fraction of turn rate lost per m/s of speed (negative: oversteer)"
         ),
     ),
     equation="omega' = omega·max(1 - k·|v|, 0)",
-    residuals="Turns on the spot fit; curves come out too straight, the more so the faster they are driven.",
+    residuals="Turns on the spot fit; curves are too straight, and more so at higher speed.",
     lookalikes=("wheelbase", "turn-slip", "speed-limit"),
-    sentence="how far the robot turns depends on how fast it drives",
+    sentence="the robot turns less (or more) the faster it drives",
     apply=apply,
 )

@@ -1,4 +1,4 @@
-"""Slow at the beginning of every trial: cold grease, a controller that ramps, a battery that recovers under load."""
+"""The robot is slow at the beginning of every trial: cold grease, a controller that ramps its speed up, a battery under load."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ EFFECT = Effect(
     stage="wheel",
     parameters=(
         Parameter(
-            "loss", "1", -1.0, 1.0, (-0.9, 0.9), 0.0, "share of speed lost at the start of a trial (negative: gained)"
+            "loss", "1", -1.0, 1.0, (-0.9, 0.9), 0.0, "fraction of speed lost at the start of a trial (negative: gained)"
         ),
-        Parameter("time_s", "s", 0.1, 600.0, (0.3, 120.0), 3.0, "time in which that fades to a third", resolution=0.01),
+        Parameter("time_s", "s", 0.1, 600.0, (0.3, 120.0), 3.0, "time constant with which the loss decays", resolution=0.01),
     ),
     equation="u' = u·(1 - k·exp(-t/T)) for each wheel, t since the trial began",
-    residuals="Everything is too slow early in a trial, and right later; each trial begins like that again.",
+    residuals="All motion is too slow early in a trial and right later, in every trial again.",
     lookalikes=("motor-lag", "acceleration-limit", "heating"),
     sentence="the robot is slow at the beginning of every trial",
-    measurement="let the wheels run for a minute before a trial begins, and compare",
+    measurement="run the wheels for a minute before a trial begins, and compare",
     apply=apply,
     needs="track",
     starts=tuple((loss, time) for time in (0.7, 2.0, 5.0, 15.0) for loss in (0.03, 0.2, -0.03)),

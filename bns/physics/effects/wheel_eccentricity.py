@@ -1,8 +1,8 @@
-"""A wheel's axle is not in its middle, or the wheel has a bump: it turns unevenly, once in every turn.
+"""A wheel is eccentric or has a bump: its speed rises and falls once per revolution.
 
-Where in its turn a wheel stands when a trial begins is not logged. Where tracks are fitted it is read from them: the headings
-of each half of a trial say where the wheel stood in the other half, so no pose is explained by itself. What remains to be
-fitted are how uneven each wheel is and how far it rolls in a turn. In a simulation the wheels begin where they are fastest.
+The angle of a wheel at the start of a trial is not logged. In a fit it is estimated from the track: the headings of each
+half of a trial give the angle for the other half, so that no pose explains itself. Only the amplitude of each wheel and the
+distance per revolution remain to be fitted. In a simulation the wheels begin at their fastest angle.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _WAVES = 4
 
 
 def apply(wheels: Wheels, left_share: float, right_share: float, turn_m: float) -> Wheels:
-    """Each wheel's speed times 1 + share·cos(2·pi·way/``turn_m`` + phase)."""
+    """Each wheel's speed times 1 + share·cos(2·pi·distance/``turn_m`` + phase)."""
     angles = [_angle(speed, wheels.step_s, turn_m) for speed in (wheels.left_m_s, wheels.right_m_s)]
     if wheels.conditions.seen is None or (left_share == 0.0 and right_share == 0.0):
         waves = [np.cos(angle) for angle in angles]
@@ -193,17 +193,17 @@ EFFECT = Effect(
     name="wheel-eccentricity",
     stage="wheel",
     parameters=(
-        Parameter("left_share", "1", -0.9, 0.9, (-0.6, 0.6), 0.0, "by which the left wheel's speed goes up and down"),
-        Parameter("right_share", "1", -0.9, 0.9, (-0.6, 0.6), 0.0, "by which the right wheel's speed goes up and down"),
+        Parameter("left_share", "1", -0.9, 0.9, (-0.6, 0.6), 0.0, "amplitude of the left wheel's speed, as a fraction of it"),
+        Parameter("right_share", "1", -0.9, 0.9, (-0.6, 0.6), 0.0, "amplitude of the right wheel's speed, as a fraction of it"),
         Parameter(
-            "turn_m", "m", 5e-3, 20.0, (0.02, 0.6), 0.13, "way of one turn of a wheel", size_power=1.0, resolution=1e-4
+            "turn_m", "m", 5e-3, 20.0, (0.02, 0.6), 0.13, "distance per revolution of a wheel", size_power=1.0, resolution=1e-4
         ),
     ),
-    equation="w' = w·(1 + a·cos(2·pi·way/U + phase)) for each wheel",
-    residuals="The heading swings to and fro with the way driven, once in every turn of a wheel, whatever the speed.",
+    equation="w' = w·(1 + a·cos(2·pi·distance/U + phase)) for each wheel",
+    residuals="The heading oscillates with the distance driven, once per revolution of a wheel, at any speed.",
     lookalikes=("wheel-mismatch", "yaw-bias"),
-    sentence="a wheel turns unevenly, once in every turn",
-    measurement="mark the wheel, roll it along a ruler, and look how high its axle stands",
+    sentence="an eccentric wheel speeds up and slows down once per revolution",
+    measurement="mark the wheel, roll it along a ruler, and measure the height of its axle over one revolution",
     apply=apply,
     needs="track",
     starts_from=starts_from,

@@ -17,12 +17,12 @@ def apply(wheels: Wheels, ratio: float) -> Wheels:
 EFFECT = Effect(
     name="wheel-mismatch",
     stage="wheel",
-    parameters=(Parameter("ratio", "1", 0.5, 2.0, (0.8, 1.25), 1.0, "right over left wheel diameter"),),
+    parameters=(Parameter("ratio", "1", 0.5, 2.0, (0.8, 1.25), 1.0, "right wheel diameter divided by left"),),
     equation="l' = l·2/(1 + m), r' = r·2·m/(1 + m)",
     residuals="The heading drifts to one side in proportion to the distance driven, also in "
     "straight commands; it drifts back in reverse.",
     lookalikes=("yaw-bias",),
-    sentence="one wheel is larger than the other",
+    sentence="the wheels differ in diameter",
     measurement="measure both wheels' circumferences",
     apply=apply,
 )

@@ -1,4 +1,4 @@
-"""The wheels touch the floor nearer together or farther apart than the drawing says."""
+"""The distance between the wheels' contact points differs from the nominal wheelbase."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ EFFECT = Effect(
             5.0,
             (0.7, 2.2),  # skid-steered robots turn as if their wheels stood up to twice as far apart
             1.0,
-            "effective over nominal distance of the wheels; soft tyres lie above 1",
+            "effective divided by nominal wheelbase (soft tyres: above 1)",
         ),
     ),
     equation="b' = e·b, so that omega = (r - l)/(e·b)",
-    residuals="Every turn is too small or too large by the same share, left and right alike; straight commands fit.",
+    residuals="Every turn is too small or too large by the same fraction, left and right alike; straight commands fit.",
     lookalikes=("turn-slip", "wheel-mismatch"),
-    sentence="the wheels stand closer together or further apart than the model says",
-    measurement="measure the distance between the wheels' tracks, or count turns on the spot against a mark on the floor",
+    sentence="the effective wheelbase differs from that of the model",
+    measurement="measure the distance between the wheels' tracks, or compare ten turns on the spot with a mark on the floor",
     apply=apply,
 )

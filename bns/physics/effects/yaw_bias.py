@@ -1,4 +1,4 @@
-"""The robot turns by itself while it drives."""
+"""A constant turn rate is added while the robot drives."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def apply(body: Body, rate_rad_s: float) -> Body:
 EFFECT = Effect(
     name="yaw-bias",
     stage="body",
-    parameters=(Parameter("rate_rad_s", "rad/s", -2.0, 2.0, (-0.5, 0.5), 0.0, "turning rate added, left positive"),),
+    parameters=(Parameter("rate_rad_s", "rad/s", -2.0, 2.0, (-0.5, 0.5), 0.0, "turn rate added, counter-clockwise positive"),),
     equation="omega' = omega + beta while moving",
-    residuals="The heading drifts to one side in proportion to the time driven, whatever the speed; also in reverse.",
+    residuals="The heading drifts to one side in proportion to the time driven, at any speed and also in reverse.",
     lookalikes=("wheel-mismatch",),
-    sentence="the robot turns a little to one side whenever it moves",
-    measurement="lift the robot and log both wheels' own speeds (encoders)",
+    sentence="the robot turns to one side at a constant rate whenever it moves",
+    measurement="lift the robot, command equal speeds, and log both wheels' own speeds (encoders)",
     apply=apply,
 )

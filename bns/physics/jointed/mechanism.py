@@ -179,7 +179,7 @@ def _floor_pairs(plain: Any) -> Iterator[tuple[int, int]]:
 def _check(model: Any) -> None:
     """ModelError unless every actuator is a position servo on a hinge or slide."""
     if not model.nu:
-        raise ModelError("The body has no actuators; each joint that is told a position needs a <position> actuator.")
+        raise ModelError("The body has no actuators; each commanded joint needs a <position> actuator.")
     for k in range(model.nu):
         on_joint = model.actuator_trntype[k] == mujoco.mjtTrn.mjTRN_JOINT
         servo = model.actuator_biasprm[k, 1] < 0 and np.isclose(
@@ -193,5 +193,5 @@ def _check(model: Any) -> None:
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
     if len(free) > 1 or (len(free) and (free[0] != 0 or model.nmocap)):
         raise ModelError(
-            "The body has free joints beside its root; one robot, free at its root or fixed, can be diagnosed."
+            "The body has free joints other than its root; one robot, free at its root or fixed, can be diagnosed."
         )

@@ -45,7 +45,7 @@ def described(path: Path) -> dict[str, Any]:
     try:
         said = json.loads((pq.read_metadata(path).metadata or {})[METADATA_KEY])
         if "archive" in said and is_sealed(path) and not is_intact(path):
-            raise StoreError(f"{path} is not as it was written: it was changed or cut short. Fetch or make it again.")
+            raise StoreError(f"{path} is not as it was written: it was changed or truncated. Fetch or make it again.")
     except READ_FAULTS:
         said = {}
     if said.get("archive") != FORMAT:

@@ -60,7 +60,7 @@ class SweepLock:
     def check(self) -> None:
         """StoreError if the lock was taken and its file is gone: then the results are gone too, or elsewhere."""
         if self._taken_file is not None and not is_same(self._path, self._taken_file):
-            raise gone(self._path, "What was stored before went with it.")
+            raise gone(self._path, "The results stored before are gone with it.")
 
     def release(self) -> None:
         """Give the lock back; without effect if it is not held."""

@@ -111,7 +111,7 @@ def _part(results: Path, table: str, path: Path, memory: Memory, afresh: bool) -
     inside = path.relative_to(results / table)
     folders = [folder.partition("=") for folder in inside.parts[:-1]]
     if [name for name, _, _ in folders] != (["sweep"] if table == "specs" else ["sweep", "task"]):
-        return Unreadable(path, "it does not stand in a folder sweep=NAME/task=TASK")
+        return Unreadable(path, "it is not in a folder sweep=NAME/task=TASK")
     now = identity(path.stat())
     if not (memory.has(path, now) and not afresh):
         fault = _fault(path)

@@ -73,8 +73,8 @@ class SharedLock:
     def _go_without(self, why: str) -> None:
         self.is_supported = False
         warnings.warn(
-            f"{why}: nothing hinders a second process from doing "
-            "the same shard once more (every run still counts once), and bns compact must wait until all shards "
+            f"{why}: nothing prevents a second process from running "
+            "the same shard again (every run still counts once), and bns compact must wait until all shards "
             "have ended.",
             StoreWarning,
             stacklevel=5,

@@ -148,7 +148,7 @@ def _run_ids(parts: list[Part]) -> set[str]:
 def _warn(bad: list[Unreadable]) -> None:
     for file in bad:
         warnings.warn(
-            f"{file.path} is skipped: {file.reason}. bns compact moves it to set-aside/, and the sweep makes up for it.",
+            f"{file.path} is skipped: {file.reason}. bns compact moves it to set-aside/, and the sweep repeats its runs.",
             StoreWarning,
             stacklevel=4,
         )

@@ -76,7 +76,7 @@ def _report_damage(results: Path, file: JournalFile, found: Scan) -> None:
     copy = set_aside(results, file.path, found.data)
     warnings.warn(
         f"{file.path} is damaged ({found.damaged} bytes); {len(found.frames)} whole runs of it are "
-        f"kept, a copy is in {copy}. Run the sweep again: it makes up for what is missing.",
+        f"kept, a copy is in {copy}. Run the sweep again: it repeats what is missing.",
         StoreWarning,
         stacklevel=3,
     )

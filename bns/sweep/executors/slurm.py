@@ -87,7 +87,7 @@ def _submit(sweep: Sweep, request: Request) -> list[submitit.Job[Any]]:
     except (OSError, subprocess.SubprocessError, submitit.core.utils.FailedJobError) as error:
         raise ClusterError(
             f"SLURM did not take the jobs: {' '.join(str(error).split())}. {len(jobs)} of {count} shards are queued. "
-            "Mend what it names (--slurm NAME=VALUE gives an option of sbatch) and repeat the command."
+            "Fix what it names (--slurm NAME=VALUE gives an option of sbatch) and repeat the command."
         ) from error
     return jobs
 

@@ -164,7 +164,7 @@ def _own_cluster(workers: int) -> LocalCluster:
     causes = [str(each) for each in _chain(fault) if str(each)]
     raise ClusterError(
         f"{workers} Dask workers could not be started on this machine, {_STARTS} times: {'; '.join(causes)}. Something kills "
-        "them as they begin, most often for want of memory: try fewer --jobs, or leave --executor out."
+        "them as they begin, most often because memory is short: try fewer --jobs, or leave --executor out."
     ) from fault
 
 

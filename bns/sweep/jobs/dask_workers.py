@@ -165,5 +165,5 @@ def _unfit(address: str | None, fault: Exception) -> ClusterError:
     return ClusterError(
         f"a worker of the Dask scheduler at {address} could not carry out a run: {what}. The same bns, with the same "
         "engine version, must be installed on this machine, the scheduler's and the workers'. What was finished is "
-        "stored; the same command goes on from here."
+        "stored; the same command continues from here."
     )

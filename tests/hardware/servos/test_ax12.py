@@ -51,7 +51,7 @@ def test_an_adapter_that_echoes_is_found_out(chain):
 @pytest.mark.parametrize(
     ("prepare", "message"),
     [
-        (lambda bus: setattr(bus.servos[1], "latched", 32), "^servo 2: overload; see to it, then switch the servos off and on"),
+        (lambda bus: setattr(bus.servos[1], "latched", 32), "^servo 2: overload; fix the cause, then switch the servos off"),
         (lambda bus: bus.servos[1].put("status_return", 1), "servo 2 has status_return 1, not 2 .bns servos check --fix"),
         (lambda bus: bus.servos[1].put("status_return", 0), "servo 2 is missing"),
     ],

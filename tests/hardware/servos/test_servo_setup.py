@@ -88,7 +88,7 @@ def test_check_shows_an_alarm_that_has_not_gone(bus, capsys, kind):
     servos[1].latched = OVERLOAD
     code, said = call(capsys, "check", "--protocol", kind.protocol, "--port", port)
     assert code == 2
-    assert "BAD  servo 2: alarm: overload\n     try: see what holds or heats it" in said.out
+    assert "BAD  servo 2: alarm: overload\n     try: find out what blocks or heats it" in said.out
     assert "servo 1: alarm" not in said.out
 
 

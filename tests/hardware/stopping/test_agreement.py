@@ -127,7 +127,7 @@ def test_wheels_that_do_not_turn_as_ordered_pause_the_trial(tmp_path, share):
         body = opened.operator._emulation.body
         order = body.order
         body.order = lambda left, right, t_s: order(left * share, right, t_s)
-        with pytest.raises(TrialPausedError, match=r"wheels do not turn as|from where its orders lead"):
+        with pytest.raises(TrialPausedError, match=r"wheels do not turn as|from where its commands lead"):
             opened.platform.drive(FAST)
 
 

@@ -66,7 +66,7 @@ COLOUR = {"kind": "colour", "camera": 0, "calibration": "none.json", "diameter_m
         ("khepera", COLOUR | {"yellow": [20, 90]}, "marker colours are too close"),
         ("khepera", COLOUR | {"yellow": [90, 20]}, r"yellow is \[90, 20\]; write two hues"),
         ("khepera", {**COLOUR, "kind": "aruco"}, "lacks side_m"),
-        ("snake", WII, "told apart by colour; its tracker is wii"),
+        ("snake", WII, "distinguished by colour; its tracker is wii"),
         ("snake", COLOUR | {"height_m": 0}, "height_m is 0; it must be a number above 0"),
     ],
 )

@@ -128,7 +128,7 @@ def test_servos_that_fail_pause_the_trial_with_the_robot_stopped(rigged, fault, 
 
 def test_a_limit_in_a_servo_that_cuts_the_gait_is_named(rigged):
     on = rigged(prepare=lambda emulation: emulation.servos[2].put("ccw_angle_limit", 530))
-    with pytest.raises(TrialPausedError, match=r"joint 3 was to go to 2\d° and was only told 5°: widen the angle limits"):
+    with pytest.raises(TrialPausedError, match=r"joint 3 should go to 2\d°, but the command was clipped to 5°: widen"):
         on.platform.drive(np.array([GENTLE], np.float32))
     assert not any(torques(on))
 
@@ -145,7 +145,7 @@ def test_the_doctor_asks_the_servos(rigged, clock, tmp_path, wiring):
     on, said = examined(rigged, clock, tmp_path, wiring=wiring)
     assert f"ok   12 servos answer ({wiring}), 12.0 V or more, 30 °C or less" in said()
     on.emulation.servos[4].put("present_voltage", 80)
-    assert any("servo 5 has 8.0 V, not 9 to 12.5; see to the supply" in found and found.startswith("BAD") for found in said())
+    assert any("servo 5 has 8.0 V, not 9 to 12.5; check the supply" in found and found.startswith("BAD") for found in said())
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def test_a_pause_is_gone_on_with_and_nothing_is_lost(tmp_path, capsys):
     assert 1 <= len(before) < 4
     assert (journal_of(tmp_path).parent / "measurements.csv").exists()
     assert call(*asked) == 2
-    assert "Go on with --resume" in capsys.readouterr().err
+    assert "Continue it with --resume" in capsys.readouterr().err
     assert call(*asked, "--resume") == 0
     after = past_evaluations(journal_of(tmp_path))
     assert len(after) == 4

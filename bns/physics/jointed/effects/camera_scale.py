@@ -1,4 +1,4 @@
-"""The camera's scale is off: all that it sees is larger or smaller."""
+"""The camera's scale is wrong: it reports every distance too long or too short."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def apply(seen: Sighting, scale: float) -> Sighting:
 EFFECT = Effect(
     name="camera-scale",
     stage="sight",
-    parameters=(Parameter("scale", "1", -0.4, 0.4, (-0.1, 0.1), 0.0, "by what share all distances are seen too long"),),
+    parameters=(Parameter("scale", "1", -0.4, 0.4, (-0.1, 0.1), 0.0, "fraction by which all distances are reported too long"),),
     equation="p' = (1 + scale) p",
-    residuals="Displacements and the markers' distance are off by the same share.",
+    residuals="Displacements and the distance between markers are off by the same fraction.",
     lookalikes=("marker-offset", "tilted-camera"),
-    sentence="the camera's scale is off",
-    measurement="lay a ruler into the picture",
+    sentence="the camera reports all distances too long or too short by one factor",
+    measurement="place a ruler in the camera's view and compare its length with the tracked one",
     apply=apply,
 )

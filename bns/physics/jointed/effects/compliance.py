@@ -17,13 +17,13 @@ EFFECT = Effect(
     name="compliance",
     stage="mechanics",
     parameters=(
-        Parameter("stiffness", "1", 0.1, 6.0, (0.3, 3.0), 1.0, "stiffness of the servos, as a multiple of the model's"),
+        Parameter("stiffness", "1", 0.1, 6.0, (0.3, 3.0), 1.0, "stiffness of the servos, as a multiple of that in the model"),
     ),
     equation="torque = stiffness * k * error",
-    residuals="Lifted parts sag and the markers' distance differs from the posture's; the more, the higher the body is lifted.",
+    residuals="Lifted parts sag, so that the distance between markers differs from the model's; more so when lifted higher.",
     lookalikes=("torque-limit", "supply-sag", "dead-band"),
-    sentence="the joints are not as stiff as assumed",
-    measurement="hang a known weight on an arm that a servo holds level, and measure by how much it sinks",
+    sentence="the joints are softer or stiffer than the model's",
+    measurement="hang a known weight on an arm that a servo holds level, and measure how far it sinks",
     starts=((0.86,), (0.58,), (1.4,), (2.2,)),
     apply=apply,
 )

@@ -1,4 +1,4 @@
-"""Servos do nothing while they are nearer to where they should be than this: play of the gear, a wide compliance margin."""
+"""Servos give no torque while their error is smaller than a dead band: play of the gears, a wide compliance margin."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ EFFECT = Effect(
         Parameter("band_rad", "rad", -0.01, 0.4, (0.0, 0.15), 0.0, "dead band of the servos beyond the model's"),
     ),
     equation="torque = 0 while |error| < band",
-    residuals="Small amplitudes move less than foreseen, large ones by nearly the same.",
+    residuals="Small amplitudes move the robot less than predicted; large ones nearly as predicted.",
     lookalikes=("compliance",),
-    sentence="the servos have more play than assumed",
-    measurement="turn a servo's arm by hand to and fro while it holds a position, and measure the play",
+    sentence="the servos have a wider dead band (more play) than the model's",
+    measurement="turn a servo's arm back and forth by hand while it holds a position, and measure the play",
     starts=((0.03,), (0.09,)),
     apply=apply,
 )

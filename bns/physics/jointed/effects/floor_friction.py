@@ -1,6 +1,6 @@
 """The floor is smoother or rougher than the model's.
 
-What is driven slowly by strong servos hardly shows it: friction on all sides alike cancels. What shows is how far links slip.
+A body moved slowly by strong servos hardly shows it: friction that is equal on all sides cancels. The slip of links shows it.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ EFFECT = Effect(
         Parameter("factor", "1", 0.1, 5.0, (0.4, 2.5), 1.0, "friction of the floor, as a multiple of the model's"),
     ),
     equation="mu' = factor * mu",
-    residuals="Cycles that press links sideways go farther or less far; still postures fit.",
+    residuals="Cycles that push links sideways move the robot farther, or less far; postures at rest fit.",
     lookalikes=("friction-anisotropy", "torque-limit", "compliance"),
-    sentence="the floor is not as slippery as assumed",
-    measurement="drag the robot, switched off, with a spring balance: pull over weight is the friction",
+    sentence="the friction of the floor differs from the model's",
+    measurement="switch the robot off and drag it with a spring balance: pull divided by weight is the coefficient of friction",
     apply=apply,
 )

@@ -1,4 +1,4 @@
-"""The floor falls: gravity pulls the robot along it."""
+"""The floor slopes: gravity pulls the robot along it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bns.physics.jointed.plant import Plant
 
 
 def apply(plant: Plant, east_rad: float, north_rad: float) -> Plant:
-    """The fall towards east and north added."""
+    """The slope towards east and north added."""
     return replace(plant, slope=(plant.slope[0] + east_rad, plant.slope[1] + north_rad))
 
 
@@ -17,14 +17,14 @@ EFFECT = Effect(
     name="floor-slope",
     stage="mechanics",
     parameters=(
-        Parameter("east_rad", "rad", -0.2, 0.2, (-0.06, 0.06), 0.0, "how far the floor falls towards east"),
-        Parameter("north_rad", "rad", -0.2, 0.2, (-0.06, 0.06), 0.0, "how far the floor falls towards north"),
+        Parameter("east_rad", "rad", -0.2, 0.2, (-0.06, 0.06), 0.0, "downward slope towards east"),
+        Parameter("north_rad", "rad", -0.2, 0.2, (-0.06, 0.06), 0.0, "downward slope towards north"),
     ),
     equation="F = m g (east, north) on every link",
-    residuals="The robot ends farther down the slope than foreseen, whichever way it faces.",
+    residuals="The robot ends farther down the slope than predicted, at any heading.",
     lookalikes=("tether-pull",),
     sentence="the floor is not level",
     measurement="lay a spirit level on the floor, in two directions",
-    beside={"tether-pull": "a slope acts on all links, a tether on one: lift the tether and repeat some trials"},
+    beside={"tether-pull": "A slope acts on all links, a tether on one: lift the tether and repeat some trials."},
     apply=apply,
 )

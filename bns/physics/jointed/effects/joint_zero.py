@@ -1,4 +1,4 @@
-"""One joint's zero is off: a horn put on by a tooth too far. Which one is part of the effect's name."""
+"""The zero of one joint is off, as when a servo horn is mounted one tooth too far. The effect's name ends in the joint."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from bns.physics.jointed.plant import Plant
 
 
 def apply(plant: Plant, joint: str, offset_rad: float) -> Plant:
-    """One joint that is elsewhere than it believes."""
+    """The angle of one joint offset."""
     return plant.with_joint("zero_rad", joint, offset_rad)
 
 
@@ -18,14 +18,14 @@ EFFECT = PerJoint(
         stage="mechanics",
         parameters=(
             Parameter(
-                "offset_rad", "rad", -0.8, 0.8, (-0.4, 0.4), 0.0, "where the joint is when it believes to be at 0"
+                "offset_rad", "rad", -0.8, 0.8, (-0.4, 0.4), 0.0, "true angle of the joint when its servo reports 0"
             ),
         ),
         equation="angle' = angle + offset of one joint",
-        residuals="The robot curves to one side, or lies bent, in every cycle alike.",
+        residuals="The robot turns to one side, or its body is bent, in every cycle alike.",
         lookalikes=("weak-joint", "marker-offset"),
         sentence="the zero of {joint} is off",
-        measurement="tell all joints to be straight and look at {joint} along the body",
+        measurement="command all joints to zero, look along the body, and measure the angle at {joint}",
         apply=apply,
     )
 )

@@ -1,4 +1,4 @@
-"""A marker does not sit where the model has it. Which one is part of the effect's name."""
+"""A marker is not where the model has it. The effect's name ends in the marker."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ EFFECT = PerSite(
         stage="sight",
         parameters=(
             Parameter(
-                "along_m", "m", -0.2, 0.2, (-0.08, 0.08), 0.0, "how far the marker sits ahead of where the model has it"
+                "along_m", "m", -0.2, 0.2, (-0.08, 0.08), 0.0, "marker ahead of its position in the model"
             ),
-            Parameter("left_m", "m", -0.2, 0.2, (-0.08, 0.08), 0.0, "how far it sits to the left"),
+            Parameter("left_m", "m", -0.2, 0.2, (-0.08, 0.08), 0.0, "marker to the left of its position in the model"),
         ),
         equation="p' = p + along * a + left * l, a and l the link's axes",
-        residuals="The markers' distance is off in every posture; turns of that link move the marker more, or less.",
+        residuals="The distance between markers is off in every posture; rotations of that link move the marker more, or less.",
         lookalikes=("camera-scale", "joint-zero"),
-        sentence="the marker {site} does not sit where the model has it",
-        measurement="measure with a ruler where {site} sits on its link",
+        sentence="the marker {site} is not where the model has it",
+        measurement="measure the position of {site} on its link with a ruler",
         apply=apply,
     )
 )

@@ -1,4 +1,4 @@
-"""Servos follow late: the bus, the controller, the servos' own processors."""
+"""Servos follow their set points after a delay: of the bus, the controller, or the servos' own processors."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ def apply(plant: Plant, delay_s: float) -> Plant:
 EFFECT = Effect(
     name="servo-delay",
     stage="mechanics",
-    parameters=(Parameter("delay_s", "s", -0.02, 1.0, (-0.02, 0.4), 0.0, "delay of the servos beyond the model's"),),
+    parameters=(Parameter("delay_s", "s", -0.02, 1.0, (-0.02, 0.4), 0.0, "delay of the servos in addition to the model's"),),
     equation="set point'(t) = set point(t - delay)",
-    residuals="Postures are reached too late: seen at the camera's rate, and where a cycle ends before they are.",
+    residuals="Postures are reached late: visible at the camera's frame rate, or where a cycle ends before they are reached.",
     lookalikes=("servo-speed-limit", "clock-offset"),
-    sentence="the servos follow later than assumed",
-    measurement="film a servo and the lamp of its bus together",
+    sentence="the servos follow with a longer delay than in the model",
+    measurement="film a servo together with an LED that shows traffic on its bus",
     starts=((-0.01,), (0.08,), (0.24,)),
     apply=apply,
 )

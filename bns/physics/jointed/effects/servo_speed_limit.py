@@ -1,4 +1,4 @@
-"""Servos turn no faster than this, though they are told to: they lag behind where postures are far apart."""
+"""The speed of the servos is limited: they fall behind where successive postures are far apart."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bns.physics.jointed.plant import Plant
 
 
 def apply(plant: Plant, share: float) -> Plant:
-    """The limit of every joint's speed lowered to a share of what it is told."""
+    """The speed limit of every joint lowered to a fraction of its fastest commanded speed."""
     return replace(plant, speed=plant.speed.clip(max=share))
 
 
@@ -18,14 +18,14 @@ EFFECT = Effect(
     stage="mechanics",
     parameters=(
         Parameter(
-            "share", "1", 0.1, 1.0, (0.3, 1.0), 1.0, "highest speed of a servo, as a share of the fastest it is told"
+            "share", "1", 0.1, 1.0, (0.3, 1.0), 1.0, "highest speed of a servo, as a fraction of its fastest commanded speed"
         ),
     ),
-    equation="|d set point / dt| <= share * told",
-    residuals="Wide cycles move less than foreseen, small ones fit; postures are not reached.",
+    equation="|d set point / dt| <= share * fastest commanded",
+    residuals="Wide cycles move the robot less than predicted, small ones fit; postures are not reached.",
     lookalikes=("torque-limit", "servo-delay", "compliance"),
-    sentence="the servos turn more slowly than they are told to",
-    measurement="let one servo turn freely from end to end and take the time",
+    sentence="the servos turn more slowly than commanded",
+    measurement="let one servo turn freely from end to end and measure the time",
     starts=((0.86,), (0.58,), (0.3,)),
     apply=apply,
 )

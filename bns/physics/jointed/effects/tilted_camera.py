@@ -1,6 +1,6 @@
-"""The camera looks at the floor slantwise: one side of the picture is larger than the other.
+"""The camera does not look straight down: one side of the picture is larger than the other.
 
-A camera that is only turned about its own axis turns everything alike: seen from the robot nothing changes.
+A rotation of the camera about its own axis rotates everything alike, so that nothing changes as seen from the robot.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from bns.physics.jointed.plant import Sighting
 
 
 def apply(seen: Sighting, east_1_m: float, north_1_m: float) -> Sighting:
-    """Places drawn out in perspective, which leaves the origin as it is."""
+    """Positions in perspective; the origin stays where it is."""
     larger = 1.0 + east_1_m * seen.point_m[..., :1] + north_1_m * seen.point_m[..., 1:]
     return replace(seen, point_m=seen.point_m * larger)
 
@@ -28,14 +28,14 @@ EFFECT = Effect(
             0.3,
             (-0.1, 0.1),
             0.0,
-            "by what share the picture grows with every metre towards east",
+            "fraction by which the picture grows per metre east",
         ),
-        Parameter("north_1_m", "1/m", -0.3, 0.3, (-0.1, 0.1), 0.0, "the same towards north"),
+        Parameter("north_1_m", "1/m", -0.3, 0.3, (-0.1, 0.1), 0.0, "fraction by which the picture grows per metre north"),
     ),
     equation="p' = p (1 + east x + north y)",
-    residuals="The markers' distance depends on where in the picture they are.",
+    residuals="The distance between markers depends on where in the picture they are.",
     lookalikes=("camera-scale",),
     sentence="the camera does not look straight down",
-    measurement="lay a ruler into the corners of the picture",
+    measurement="place a ruler in each corner of the camera's view and compare the tracked lengths",
     apply=apply,
 )

@@ -1,4 +1,4 @@
-"""Servos give less torque, or more, before they give way."""
+"""The torque limit of the servos is lower, or higher, than the model's."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ EFFECT = Effect(
         ),
     ),
     equation="|torque| <= factor * limit",
-    residuals="Cycles that lift the body high are not reached; flat ones fit.",
+    residuals="Postures that lift the body high are not reached; flat ones fit.",
     lookalikes=("compliance", "supply-sag", "servo-speed-limit"),
-    sentence="the servos are weaker than assumed",
-    measurement="hang a weight on a servo's arm until it gives way",
+    sentence="the servos' highest torque differs from the model's",
+    measurement="hang weights on a servo's arm, and note the torque at which it yields",
     starts=((0.82,), (0.46,), (0.1,)),
     apply=apply,
 )

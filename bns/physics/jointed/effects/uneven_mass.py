@@ -1,4 +1,4 @@
-"""The body's weight lies farther towards one of its ends: batteries, boards, a straightened cable."""
+"""One end of the body is heavier than the other: batteries, boards, a cable."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bns.physics.jointed.plant import Plant
 
 
 def apply(plant: Plant, gradient: float) -> Plant:
-    """Masses that rise evenly from the first link to the last, by this share on either side of the middle."""
+    """Masses that rise linearly from the first link to the last, by this fraction on either side of the middle."""
     return replace(plant, mass=plant.mass * (1.0 + gradient * np.linspace(-1.0, 1.0, len(plant.mass))))
 
 
@@ -20,13 +20,13 @@ EFFECT = Effect(
     stage="mechanics",
     parameters=(
         Parameter(
-            "gradient", "1", -0.95, 0.95, (-0.8, 0.8), 0.0, "share by which the last link is heavier, the first lighter"
+            "gradient", "1", -0.95, 0.95, (-0.8, 0.8), 0.0, "fraction by which the last link is heavier and the first lighter"
         ),
     ),
     equation="m' = m * (1 + gradient * s), s from -1 at the first link to 1 at the last",
-    residuals="One end moves less than foreseen and the other more: heavy links stay where they are.",
+    residuals="One end moves less than predicted and the other more: heavy links tend to stay in place.",
     lookalikes=("tether-drag",),
-    sentence="the weight is not spread over the body as assumed",
+    sentence="the mass is distributed over the body differently from the model",
     measurement="weigh the robot at both ends on two scales",
     apply=apply,
 )

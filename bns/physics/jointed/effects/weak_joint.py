@@ -1,4 +1,4 @@
-"""One servo is weak, or silent: a worn gear, a loose horn, a broken wire. Which one is part of the effect's name."""
+"""One servo is weak or gives no torque: a worn gear, a loose horn, a broken wire. The effect's name ends in the joint."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from bns.physics.jointed.plant import Plant
 
 
 def apply(plant: Plant, joint: str, strength: float) -> Plant:
-    """Stiffness and torque limit of one joint, as a share."""
+    """Stiffness and torque limit of one joint, as a fraction."""
     return plant.with_joint("stiffness", joint, strength).with_joint("torque", joint, strength)
 
 
@@ -18,14 +18,14 @@ EFFECT = PerJoint(
         stage="mechanics",
         parameters=(
             Parameter(
-                "strength", "1", 0.0, 1.0, (0.0, 1.0), 1.0, "strength of the joint's servo; 0 is silent", reached=(0.0,)
+                "strength", "1", 0.0, 1.0, (0.0, 1.0), 1.0, "servo strength over that in the model (0: none)", reached=(0.0,)
             ),
         ),
         equation="torque' = strength * torque of one joint",
-        residuals="The markers' distance and the direction of motion differ in the cycles that need this joint.",
+        residuals="The distance between markers and the direction of motion differ in the cycles that use this joint.",
         lookalikes=("joint-zero", "compliance"),
-        sentence="the servo of {joint} is weak or silent",
-        measurement="switch the robot on, hold it up and press against {joint} by hand",
+        sentence="the servo of {joint} is weak or gives no torque",
+        measurement="switch the robot on, lift it, and press against {joint} by hand: a sound servo resists",
         starts=((0.8,), (0.4,), (0.0,)),
         apply=apply,
     )
