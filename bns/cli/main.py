@@ -144,7 +144,7 @@ def _add_single_runs(command: measuring.Adder) -> None:
     )
     add_trial_options(taken, positive)
     add_looking_options(
-        command("calibrate", calibrate, "calibrate a camera with a ChArUco board"),
+        command("calibrate", calibrate, "calibrate a camera, a Wii remote or colours, or measure the delay of a tracker"),
         command("track", track, "show what the tracker of a rig sees"),
         positive,
         duration,

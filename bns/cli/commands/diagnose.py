@@ -40,7 +40,12 @@ def add_commands(command: Adder) -> None:
         "--map", type=Path, metavar="FILE", help="mapping (YAML); default: LOG.import.yaml next to the log"
     )
     read.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="FILE", help="table to write (.csv or .parquet)"
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="table to write (.csv or .parquet); without a mapping, a proposed mapping is printed and nothing is written",
     )
     held = command("compare", compare, "show how large the errors of a model are, and where they occur")
     found = command(
@@ -58,7 +63,7 @@ def add_commands(command: Adder) -> None:
         default="v",
         metavar="VELOCITY",
         help="velocity that the formula is added to: v (forward), w (turn rate), s (sideways), east, north, "
-        "share (factor of all), wheels, left, right (default: v)",
+        "share (relative change of all three), wheels (each by itself), left, right (default: v)",
     )
     more.add_argument(
         "--per-trial",
@@ -70,7 +75,7 @@ def add_commands(command: Adder) -> None:
     for one in (held, found):
         one.add_argument("data", type=Path, metavar="DATA", help="log: .csv, .parquet, or any file with a mapping")
         one.add_argument("--json", action="store_true", help="print one JSON object")
-        one.add_argument("--findings", action="store_true", help="list all irregularities in the data, not only the first")
+        one.add_argument("--findings", action="store_true", help="list all irregularities in the data, not only five")
     for one in (held, found, more):
         add_model_options(one)
         one.add_argument("--figures", type=Path, metavar="DIR", help="also write figures into this folder")
@@ -92,7 +97,7 @@ def add_model_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wheelbase", type=float, metavar="METRES", help="distance between the wheels, for differential-drive"
     )
-    parser.add_argument("--robot", metavar="NAME", help="robot to use, if the column robot names several")
+    parser.add_argument("--robot", metavar="NAME", help="robot to use, if the column 'robot' of the data names several")
     parser.add_argument(
         "--more",
         action="append",

@@ -14,7 +14,13 @@ from bns.cli.commands.diagnose import Adder, add_effect_options, add_model_optio
 def add_commands(command: Adder) -> None:
     """The parsers of these commands; ``command`` makes one of a name, a function and a text."""
     next_one = command("propose", propose, "plan the next experiment: commands that tell rival explanations apart")
-    next_one.add_argument("-o", "--output", type=Path, metavar="FILE.csv", help="file to write, for bns trial --commands")
+    next_one.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE.csv",
+        help="file to write, for bns trial --commands (default: none)",
+    )
     next_one.add_argument("--json", action="store_true", help="print one JSON object")
     page = command("report", report, "write one HTML page: what is missing, how certain that is, what to do next")
     page.add_argument(

@@ -50,7 +50,8 @@ class Design:
     place_rounds: int = setting(
         3,
         "rounds",
-        "What the floor does depends on where the robot is, and the reverse: each iteration adds one power of it.",
+        "An effect of the floor depends on the robot's position, and the position on the effect: each iteration adds one "
+        "power of the effect.",
     )
     pool: int = setting(200, "sequences", f"Size of the random pool; the time is proportional to it; {BY_HAND}.")
     generations: int = setting(4, "generations", f"Number of times that the best sequences are varied; {BY_HAND}.")
@@ -67,9 +68,9 @@ class Design:
         10.0, "s", f"Assumed time for placing the robot, when trials of different lengths are compared; {BY_HAND}."
     )
     scale: float = setting(
-        8.0, "log-likelihood", f"Above this discrimination, more of it counts less and less; {BY_HAND}."
+        8.0, "log-likelihood", f"Above this discrimination, each further unit counts less; {BY_HAND}."
     )
-    enough: float = setting(20.0, "log-likelihood", f"Discrimination that nearly decides; {BY_HAND}.")
+    enough: float = setting(20.0, "log-likelihood", f"Discrimination with which a pair is nearly decided; {BY_HAND}.")
     urgent: float = setting(
         4.0,
         "1",

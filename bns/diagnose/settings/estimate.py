@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from bns.diagnose.settings.setting import BY_HAND, setting
 
-_NOISE_UNITS = "m, rad, drive (3)"
+_NOISE_UNITS = "m, rad, m/√m, m/√m, rad/√m"
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,10 @@ class Estimate:
         24, "trials", "The noise is estimated from at most this many trials: enough for its five numbers."
     )
     noise_guess: tuple[float, ...] = setting(
-        (2e-3, 8e-3, 4e-3, 2e-3, 2e-2), _NOISE_UNITS, f"Start values of the noise estimate; {BY_HAND}."
+        (2e-3, 8e-3, 4e-3, 2e-3, 2e-2),
+        _NOISE_UNITS,
+        "Start values of the noise estimate: position and heading of a tracked pose; scatter of the drive forward, "
+        f"sideways and in heading, per square root of a metre driven; {BY_HAND}.",
     )
     noise_low: tuple[float, ...] = setting(
         (2e-5, 1e-4, 1e-5, 1e-5, 1e-4), _NOISE_UNITS, f"Lower bounds of the noise estimate; {BY_HAND}."
@@ -90,7 +93,7 @@ class Estimate:
     flips: int = setting(
         20_000,
         "samples",
-        "Random sign flips of whole trials: a p-value of 0.002 (0.05 divided by 25 effects) is then known to 16 %.",
+        "Random sign flips of whole trials: a p-value of 0.002, near the usual threshold, is then known to 16 %.",
     )
     flips_seed: int = setting(
         20_250_101, "1", "A fixed key, so that the same data give the same p-value. Any number would do."

@@ -58,7 +58,7 @@ class Predict:
         f"plausible range; {BY_HAND}.",
     )
     screening_shares: tuple[float, ...] = setting(
-        (0.6, 1.2), "1", f"The same for the screening of effects, where one node on each side is enough; {BY_HAND}."
+        (0.6, 1.2), "1", f"As `response_shares`, for the screening of effects, where fewer nodes are enough; {BY_HAND}."
     )
     response_clipped_m: float = setting(
         0.5,
@@ -82,8 +82,8 @@ class Predict:
     node_beside: float = setting(
         0.3,
         "1",
-        "So are intervals next to a parameter that lies within this fraction of `node_long` of a node: fits stop at "
-        f"the bends of a curve; {BY_HAND}.",
+        "Intervals next to a node are halved as well if the fitted parameter is nearer to the node than this fraction of "
+        f"`node_long`: fits stop at the bends of a curve; {BY_HAND}.",
     )
     screening_cycles: int = setting(
         64, "cycles", f"Number of evenly spaced cycles with which the effects of a body are screened; {BY_HAND}."
@@ -151,7 +151,8 @@ class Predict:
     robot_explained: float = setting(
         0.25,
         "1",
-        f"The model is of another robot if scaled turns leave less than this fraction of the deviation; {BY_HAND}.",
+        "The model is of another robot if a common factor on all its turns reduces the deviation to less than this "
+        f"fraction; {BY_HAND}.",
     )
     robot_fewest: int = setting(
         5, "windows", f"With fewer windows of one second, the check of the robot is not made; {BY_HAND}."
@@ -162,8 +163,8 @@ class Predict:
     robot_arc_rad: float = setting(
         1.2,
         "rad",
-        "Turns that are smaller than this in the model can be distinguished from turns with a further full "
-        f"revolution; {BY_HAND}.",
+        "Only windows in which the model turns by less than this are used: larger turns could be confused with turns "
+        f"that have a further full revolution; {BY_HAND}.",
     )
     robot_together: float = setting(
         0.8, "1", f"Directions agree if the length of their mean vector is larger (1: all the same); {BY_HAND}."

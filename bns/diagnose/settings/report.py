@@ -20,8 +20,8 @@ class Report:
     strange: float = setting(
         6.0,
         "1",
-        "Trials whose error is this many times the median come last: their first pose was a mistaken marker, not an "
-        f"error of the model; {BY_HAND}.",
+        "Trials whose error is this many times the median are shown last: probably their first pose was a mistaken "
+        f"marker, not an error of the model; {BY_HAND}.",
     )
     rows: int = setting(8, "rows", f"Rows of a ranking in the terminal; {BY_HAND}.")
     network_bins: int = setting(8, "bins", f"Bins of a figure of networks' errors; {BY_HAND}.")

@@ -36,16 +36,19 @@ class Residuals:
     least_alike: float = setting(
         0.06,
         "correlation",
-        "Within commands, robots without a missing effect reach +0.04, for a jitter of the motors of 0.2 to 4 %.",
+        "Least positive autocorrelation within a command that counts: robots without a missing effect reach +0.04, for "
+        "a jitter of the motors of 0.2 to 4 %.",
     )
     least_opposed: float = setting(
         0.10,
         "correlation",
-        "They also reach -0.07: the filter takes what is constant during a command for random steps, and corrects "
-        "too much.",
+        "The same for negative autocorrelation within a command: robots without a missing effect reach -0.07, because the "
+        "filter takes an error that is constant during a command for random steps, and corrects too much.",
     )
     least_between: float = setting(
-        0.33, "correlation", "From one command to the next they reach +0.32: a robot whose clock is 0.12 s late."
+        0.33,
+        "correlation",
+        "The same from one command to the next: +0.32 was reached by a robot whose clock is 0.12 s late.",
     )
     correlation_z: float = setting(
         4.5,
@@ -61,9 +64,9 @@ class Residuals:
     moves_z: float = setting(
         2.0,
         "standard errors",
-        "From here on, displacements count as correlated. Autocorrelated tracking errors (0.4 to 0.9 per frame, "
-        "AR(1), up to 5 mm and 0.05 rad) stay below 0, over 3 to 18 frames; a heading that oscillates by 0.02 rad "
-        "in 1.5 s reaches 24.",
+        "Displacements count as correlated from this value on. With autocorrelated tracking errors (0.4 to 0.9 per frame, "
+        "AR(1), up to 5 mm and 0.05 rad) it stays below 0, over 3 to 18 frames; with a heading that oscillates by 0.02 rad "
+        "in 1.5 s it reaches 24.",
     )
     tracker_memory: float = setting(
         0.08,
@@ -80,8 +83,8 @@ class Residuals:
     flexible_terms: int = setting(
         3,
         "terms",
-        "Largest number of flexible terms in addition to the effects: each has about ten parameters, together half "
-        "as many as there are trials.",
+        "Largest number of flexible terms in addition to the effects: each has about ten parameters, so that three have "
+        "half as many as a log of 60 trials has trials.",
     )
     clearly_better: float = setting(
         0.0015,
@@ -114,8 +117,8 @@ class Residuals:
     rounding_steps: tuple[int, int] = setting(
         (240, 41),
         "steps",
-        "Speed steps that are tried, then refined around the best: all but one in a hundred speeds are then rounded "
-        "correctly.",
+        "Numbers of step sizes of the speed that are tried: first over the whole range, then around the best. All but one "
+        "in a hundred speeds are then rounded correctly.",
     )
     whole_rounding: float = setting(
         0.2,
@@ -183,8 +186,9 @@ class Residuals:
     outlier_moved: float = setting(
         5.0,
         "standard deviations",
-        "It must also have moved this much further from the prediction than most windows, by the track alone. Of "
-        "3,399 windows of four generated logs with an autocorrelated tracker (0.7 to 0.97 a frame, 20 to 60 Hz) and "
+        "By the track alone, without the filter, the window must also depart from the prediction by this many times the "
+        "usual distance. Of 3,399 windows of four generated logs with an autocorrelated tracker (0.7 to 0.97 per frame, "
+        "20 to 60 Hz) and "
         "a right model, the largest value was 3.9.",
     )
     outlier_trials: int = setting(
@@ -196,8 +200,8 @@ class Residuals:
     worst_share: float = setting(
         0.03,
         "1",
-        "Largest fraction of trials, rounded up, that may be set aside as unlike the rest: more are a phenomenon; "
-        f"{BY_HAND}.",
+        "Largest fraction of trials, rounded up, that may be excluded as outliers: a larger fraction is a property of the "
+        f"robot; {BY_HAND}.",
     )
     worst_far: float = setting(
         6.0,

@@ -50,13 +50,14 @@ class Select:
     behind: float = setting(
         0.5,
         "1",
-        "It is dropped if, when fitted, it misses more than this fraction of that gain and also more than "
-        f"`behind_loss`; {BY_HAND}.",
+        "Such an effect is dropped if, when fitted, it misses more than this fraction of the other's gain and also more "
+        f"than `behind_loss`; {BY_HAND}.",
     )
     behind_loss: float = setting(
         20.0,
         "log-likelihood",
-        "The log-likelihood that it must also miss: three standard errors, if the difference were noise alone.",
+        "The log-likelihood by which such an effect must also be worse to be dropped: three standard errors, if the "
+        "difference were noise alone.",
     )
     clocks_chance: float = setting(
         0.01, "1", f"Probability of a false alarm about clocks that differ between trials; {BY_HAND}."
@@ -64,8 +65,8 @@ class Select:
     most_effects: int = setting(
         6,
         "effects",
-        "Largest number of effects that a search accepts: further ones only correct what the others left of a "
-        f"seventh; {BY_HAND}.",
+        "Largest number of effects that a search accepts: later ones mostly correct what earlier ones explain "
+        f"imperfectly; {BY_HAND}.",
     )
     screen_most: int = setting(
         8,
@@ -75,7 +76,8 @@ class Select:
     screen_chance: float = setting(
         0.2,
         "1",
-        f"Of these, only effects that look as good by chance in less than one case of five, on few cycles; {BY_HAND}.",
+        "Of these, only effects are fitted whose p-value in the screening, on few cycles, is below this; "
+        f"{BY_HAND}.",
     )
     screen_share: float = setting(
         0.6,
@@ -87,23 +89,25 @@ class Select:
         2.0,
         "standard errors",
         "Two explanations cannot be told apart if their held-out losses differ by fewer standard errors: the usual "
-        "95 %.",
+        "level of 95 %.",
     )
     tie_signs_z: float = setting(
         4.0,
         "standard errors",
-        f"Unless nearly all trials are against one of them, by this many standard errors of a fair coin; {BY_HAND}.",
+        "Except where nearly all trials favour the same one: by at least this many standard errors in a sign test over "
+        f"trials; {BY_HAND}.",
     )
     tie_share: float = setting(
         0.001,
         "1",
-        "Nor can they be told apart if they differ by a smaller fraction of the gain of either: no model is that "
-        "exact.",
+        "Nor can two explanations be told apart if their held-out losses differ by a smaller fraction of the gain of "
+        "either: no model is that exact.",
     )
     tie_loss: float = setting(
         3.0,
         "log-likelihood",
-        "Nor if they differ by less over all trials: odds of twenty to one. A superfluous parameter costs as much.",
+        "Nor if their losses, summed over all trials, differ by less: odds of twenty to one. A superfluous parameter "
+        "costs as much.",
     )
     pair_left_over: float = setting(
         0.03,
@@ -114,8 +118,8 @@ class Select:
     pair_alone: float = setting(
         0.1,
         "1",
-        "And neither of the pair alone misses less than this: otherwise the other one would have nothing left to "
-        f"explain; {BY_HAND}.",
+        "A pair is tried only if each of its effects alone misses at least this fraction: otherwise the other one would "
+        f"have nothing left to explain; {BY_HAND}.",
     )
     pair_tried: int = setting(
         2,
