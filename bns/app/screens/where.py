@@ -55,7 +55,7 @@ class WhereScreen:
         """The tab's log and model, compared."""
         bench = self._tab.bench
         if bench is None:
-            self._problem.show(self._tab.why_no_bench or "Open a log first: the screen Data.")
+            self._problem.show(self._tab.why_no_bench or "Open a log first, on the Data screen.")
             return
         self._problem.show("")
         if bench is not self._bench:
