@@ -7,7 +7,6 @@ from itertools import pairwise
 from typing import Any
 
 import panel as pn
-from panel.io.state import set_curdoc
 
 from bns.app.design import template
 from bns.app.jobs import Jobs
@@ -71,19 +70,15 @@ class Screens:
         pn.state.location.update_query(tab=name)
         self._jobs.begin()
 
-    def _make_first(self) -> None:
+    async def _make_first(self) -> None:
         """The screen that is shown first is made beside the page, while the browser still reads its files."""
         self._making = name = self._chosen.value
 
-        def made() -> Any:
-            with set_curdoc(self._document):
-                return self._made(name)
-
-        def shown(screen: Any) -> None:
+        def add(screen: Any) -> None:
             self._making = ""
             self._add(name, screen)
 
-        self._jobs.run("drawing the page", made, shown, self._say)
+        await self._jobs.first(lambda: self._made(name), add)
 
     def _name_next(self) -> None:
         """What comes next, for somebody who sees the page for the first time."""

@@ -19,6 +19,10 @@ MARKERS = ("yellow", "green")
 """Of a snake, in the order of `CycleTracks.markers_m`."""
 
 
+_JUST = 1e-9
+"""Both ends of a stretch are part of it."""
+
+
 class PathFigure:
     """Measured (solid) and predicted (dashed) path of one trial, and where both are at a time."""
 
@@ -34,6 +38,8 @@ class PathFigure:
             self._lines, (BLUE, RED), ("solid", "dashed"), ("measured", "predicted"), strict=True
         ):
             self.figure.line("x", "y", source=source, color=color, line_dash=dash, line_width=2, legend_label=name)
+        self._marked = ColumnDataSource({"x": [], "y": [], "color": []})
+        self.figure.multi_line("x", "y", source=self._marked, line_color="color", line_width=7, line_alpha=0.45)
         self.figure.scatter("x", "y", source=self._dots, color="color", size=11, line_color="black")
         self.figure.legend.location, self.figure.legend.background_fill_alpha = "top_left", 0.6
 
@@ -45,6 +51,16 @@ class PathFigure:
             if not (np.array_equal(source.data["x"], shown[:, 0]) and np.array_equal(source.data["y"], shown[:, 1])):
                 source.data = {"x": shown[:, 0], "y": shown[:, 1]}  # what is drawn already is not sent again
         self._times, self._poses = t_s, (measured, predicted)
+
+    def mark(self, stretches: Sequence[tuple[float, float]]) -> None:
+        """Of both paths what lies within these times (from, to; s)."""
+        rows = [np.searchsorted(self._times, (a - _JUST, b + _JUST)) for a, b in stretches]
+        parts = [(poses[a:b], color) for a, b in rows for poses, color in zip(self._poses, (BLUE, RED), strict=True)]
+        self._marked.data = {
+            "x": [p[:, 0] for p, _ in parts],
+            "y": [p[:, 1] for p, _ in parts],
+            "color": [color for _, color in parts],
+        }
 
     def at(self, t_s: float) -> None:
         """Dots where both are at a time (s)."""

@@ -108,7 +108,7 @@ class DiagnosisPart:
             self._offer([("Switch on what it found", result.effects, self.terms, ())])
 
     def _offer(self, offers: list[Offer]) -> None:
-        """Buttons that are made now would name themselves to the server as new, which Bokeh complains of: they were made before."""
+        """The buttons were made before: one that the browser got late tells the server that it is new, which Bokeh warns of."""
         self._offers = offers
         for n, each in enumerate(self._buttons):
             each.visible = n < len(offers)

@@ -70,7 +70,7 @@ class EffectsScreen:
             self._problem.show(self._tab.why_no_bench or "Open a log first, on the Data screen.")
             return
         if bench.of_networks:
-            text = f"{self._tab.networks} holds networks, which have no effects; they are compared on the screen “Where it fails”."
+            text = f"{self._tab.networks} holds networks, which have no effects; they are compared on “Where it fails”."
             self._problem.show(text)
         self._body.visible = not bench.of_networks
         if bench.of_networks:
@@ -112,7 +112,7 @@ class EffectsScreen:
                 self._refresh_effects()
                 self._sync_switches(self._tab.now)
 
-        self._jobs.run("listing the effects", self._groups, listed, self._problem.show)
+        self._jobs.run("listing the effects", self._groups, listed, self._problem.show, later=True)
 
     def move(self, effect: str, parameter: str, value: float) -> None:
         """A number was moved by hand."""

@@ -80,7 +80,8 @@ class NextScreen:
             self._summary.object = "<p>Networks are compared: there is no model to save.</p>"
         else:
             sizes = "" if shown.switches.by_hand else found_numbers(shown.numbers).removeprefix("<br>")
-            self._summary.object = _to_copy(shown.model.summary(), "bns-saved") + (f"<p id='bns-sizes'>{sizes}</p>" if sizes else "")
+            listed = f"<p id='bns-sizes'>{sizes}</p>" if sizes else ""
+            self._summary.object = _to_copy(shown.model.summary(), "bns-saved") + listed
             text = shown.model.to_yaml().encode()
             self._model.object = download("Save the model", "extended.yaml", text, "text/yaml")
         if self._tab.files:

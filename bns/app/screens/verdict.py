@@ -72,6 +72,6 @@ def _as_it_is(result: DiagnoseResult) -> str:
         return ""
     e = errors.horizons[horizon]
     return (
-        f"The model's position error {ahead(horizon)} ahead is {mm(e.models[0].rms_m)} mm; the noise of the tracking alone causes "
-        f"{mm(e.noise_floor_m)} mm. Nothing needs to be switched on: the Next screen saves the model as it is, and the report."
+        f"The model's position error {ahead(horizon)} ahead is {mm(e.models[0].rms_m)} mm; the noise of the tracking alone "
+        f"causes {mm(e.noise_floor_m)} mm. Nothing needs to be switched on: the Next screen saves it as it is, and the report."
     )
