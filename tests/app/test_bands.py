@@ -1,5 +1,7 @@
 """The error in bins: each bin's root mean square, an interval over whole trials, and no interval where there are too few."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ def test_every_window_counts_in_one_bin(errors):
     found = band(*errors)
     assert len(found.x) == MOST_BINS
     edges = np.quantile(errors[0], np.linspace(0, 1, MOST_BINS + 1))
-    for n, (low, high) in enumerate(zip(edges[:-1], edges[1:], strict=True)):  # the slow way
+    for n, (low, high) in enumerate(pairwise(edges)):  # the slow way
         inside = [e for x, e in zip(*errors[:2], strict=True) if (low < x <= high or (n == 0 and x == low))]
         assert found.rms[n] == pytest.approx(np.sqrt(np.mean(np.square(inside))))
     assert (np.diff(found.x) > 0).all()

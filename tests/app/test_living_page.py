@@ -207,11 +207,14 @@ def test_the_first_picture_comes_with_the_page_or_after_it(visit, monkeypatch, l
 
     monkeypatch.setattr(jobs.Jobs, "begin", once_all_wait)
     visited = visit(LOG)
-    page, came = visited.browser.new_page(), []
-    said = []
+    page, came, said = visited.browser.new_page(), [], []
+
+    def keep(frame):
+        came.append(frame)
+
     page.on("console", lambda message: said.append(message.text) if message.type in {"error", "warning"} else None)
     page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("websocket", lambda socket: socket.on("framereceived", lambda frame: came.append(frame)))
+    page.on("websocket", lambda socket: socket.on("framereceived", keep))
     page.goto(visited.address)
     page.get_by_role("checkbox", name="motor-lag:").check()
     error_of(page, "+ motor-lag")

@@ -25,10 +25,10 @@ class Band:
     high: Array
 
 
-def band(x: Array, error: Array, trial: Array) -> Band:
+def band(x: Array, error: Array, trials: Array) -> Band:
     """Bins with as many windows each; values that are equal stay together."""
     known = np.isfinite(x) & np.isfinite(error)
-    x, error, trial = x[known], error[known], np.unique(trial[known], return_inverse=True)[1]
+    x, error, trial = x[known], error[known], np.unique(trials[known], return_inverse=True)[1]
     if not len(x):
         return Band(*(np.zeros(0) for _ in range(4)))
     bins = int(np.clip(len(x) // _LEAST_WINDOWS, 1, MOST_BINS))
