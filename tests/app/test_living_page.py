@@ -2,11 +2,16 @@
 
 import re
 import threading
+import time
 
 import pytest
 
 import bns
+
+pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
+
 from bns.app import jobs
+from bns.app.page import Screens
 from bns.examples import FOLDER
 from tests.app.visits import error_of, go, settled
 
@@ -205,7 +210,15 @@ def test_the_first_picture_comes_with_the_page_or_after_it(visit, monkeypatch, l
         else:
             begin(self)
 
+    def once_it_is_asked_for(self, name, made=Screens._made):
+        screen = made(self, name)
+        while longest_s > 0 and self._document.session_context.session.connection_count == 0:
+            time.sleep(0.05)
+        time.sleep(0.5)  # what asks for the page stands in the line by now; without it the test only asks less
+        return screen
+
     monkeypatch.setattr(jobs.Jobs, "begin", once_all_wait)
+    monkeypatch.setattr(Screens, "_made", once_it_is_asked_for)
     visited = visit(LOG)
     page, came, said = visited.browser.new_page(), [], []
 

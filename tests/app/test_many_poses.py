@@ -75,6 +75,11 @@ def test_paths_of_a_million_poses_are_drawn_thinned():
     figure = LogFigure()
     figure.fill(paths, {"x": [], "y": [], "text": []})
     assert sum(map(len, figure.paths.data["x"])) <= DRAWN
+    assert "drawn" not in figure.figure.title.text
+    many = [(str(n), "", np.zeros((100, 3))) for n in range(10_000)]
+    figure.fill(many, {"x": [], "y": [], "text": []})
+    assert sum(map(len, figure.paths.data["x"])) <= DRAWN
+    assert "one of 2 paths is drawn" in figure.figure.title.text
     one = [("0", "", np.zeros((1_000_000, 3)))]
     figure.fill(one, {"x": [], "y": [], "text": []})
     assert len(figure.paths.data["x"][0]) <= DRAWN

@@ -99,14 +99,19 @@ def _cycles(tracks: CycleTracks, trial: int) -> Array:
     return np.concatenate([np.zeros((0, 2, 2)), *parts])
 
 
+_MOST_OF_ALL, _LEAST_OF_A_PATH = 60_000, 12
+"""Points: more of all paths together make a browser slow; fewer show no curve."""
+
+
 class LogFigure:
     """All measured paths, what was found odd on them, and trials that can be selected."""
 
     def __init__(self, title: str = "", height: int = 420) -> None:
         self.paths = ColumnDataSource({"x": [[0.0]], "y": [[0.0]], "trial": [""], "marker": [""], "color": [BLUE]})
         self.findings = ColumnDataSource({"x": [], "y": [], "text": []})
+        self._title = title or "Measured paths; crosses: findings"
         self.figure = blank(
-            title or "Measured paths; crosses: findings",
+            self._title,
             *EAST_NORTH,
             tools=SELECTING,
             height=height,
@@ -122,8 +127,14 @@ class LogFigure:
         self.figure.add_tools(HoverTool(renderers=[marks], tooltips=[("", "@text")]))
 
     def fill(self, paths: Sequence[tuple[str, str, Array]], findings: dict[str, list[Any]]) -> None:
-        """As `paths_of` gives them: a colour a trial, or a marker; findings as x, y, text."""
-        most = max(50, 60_000 // max(len(paths), 1))
+        """As `paths_of` gives them: a colour a trial, or a marker; findings as x, y, text.
+
+        Of more paths than can be told apart every so-many-th is drawn, which the title says.
+        """
+        every = max(1, -(-len(paths) * _LEAST_OF_A_PATH // _MOST_OF_ALL))
+        self.figure.title.text = self._title + (f"; one of {every} paths is drawn" if every > 1 else "")
+        paths = paths[::every]
+        most = max(_LEAST_OF_A_PATH, _MOST_OF_ALL // max(len(paths), 1))
         thin = [p[:: max(1, -(-len(p) // most))] for _, _, p in paths]
         sites = list(dict.fromkeys(site for _, site, _ in paths))
         trials = list(dict.fromkeys(name for name, _, _ in paths))
