@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from analysis.checks.exact_tests import fewer
 from analysis.intervals import wilson
 from analysis.labels import TITLES, valued
 from analysis.results import NoDataError, Results
@@ -50,8 +51,6 @@ def lower_cluster_is(store: Results, chosen: Selection, task: str, parameter: st
 
 def large_population_has_fewer_bad(store: Results, chosen: Selection, task: str) -> Checked:
     """Of combinations with the largest population fewer have less than half of the best one's success than of the others."""
-    from scipy.stats import fisher_exact  # noqa: PLC0415  # slow to load
-
     rows = combinations(store, chosen)[0].query("task == @task")
     share, largest = rows.success / rows.runs, rows.population_size == rows.population_size.max()
     claim = f"population {rows.population_size.max()} removes the badly performing combinations"
@@ -59,9 +58,8 @@ def large_population_has_fewer_bad(store: Results, chosen: Selection, task: str)
         return Checked(claim, "not compared yet", UNDECIDED)
     bad = share < BAD * share.max()
     counts = [[int((bad & part).sum()), int((~bad & part).sum())] for part in (largest, ~largest)]
-    found = fisher_exact(counts, alternative="less")
     ours = f"{counts[0][0]} of {sum(counts[0])} are bad, {counts[1][0]} of {sum(counts[1])} with smaller ones"
-    return Checked(claim, ours, likely(1 - float(found.pvalue)))
+    return Checked(claim, ours, likely(1 - fewer(counts)))
 
 
 def _diversities(store: Results, chosen: Selection, task: str) -> pd.DataFrame:

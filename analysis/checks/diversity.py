@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.checks.bootstrap import bootstrapped, ends, interval, whole_and_samples
+from analysis.checks.exact_tests import rank_correlation
 from analysis.diversity_of_extremes import FIRST_EVALUATION, curves
 from analysis.labels import CELL, TITLES
 from analysis.ranking import by_seed_array
@@ -80,16 +81,14 @@ def diversity_of_worst_saturates(store: Results, chosen: Selection, task: str) -
 
 
 def error_rises(store: Results, chosen: Selection, task: str) -> Checked:
-    from scipy.stats import spearmanr  # noqa: PLC0415  # slow to load
-
     rows = combinations(store, chosen)[0].query("task == @task").dropna(subset=["diversity", "fitness_error"])
     upper = rows[rows.diversity > rows.diversity.median()]
     claim = "fitness error rises beyond some diversity"
     if len(upper) < 4 or upper.fitness_error.nunique() < 2:
         return Checked(claim, "too few combinations", UNDECIDED)
-    found = spearmanr(upper.diversity, upper.fitness_error, alternative="greater")
-    ours = f"rank correlation {found.statistic:+.2f} in the upper half ({len(upper)} combinations)"
-    return Checked(claim, ours, likely(1 - float(found.pvalue)))
+    correlation, chance = rank_correlation(upper.diversity, upper.fitness_error, rises=True)
+    ours = f"rank correlation {correlation:+.2f} in the upper half ({len(upper)} combinations)"
+    return Checked(claim, ours, likely(1 - chance))
 
 
 def low_diversity_spreads(store: Results, chosen: Selection, task: str, measure: str) -> Checked:
@@ -108,16 +107,13 @@ def low_diversity_spreads(store: Results, chosen: Selection, task: str, measure:
 
 
 def goes_with(store: Results, chosen: Selection, task: str, parameter: str, measure: str, direction: str) -> Checked:
-    from scipy.stats import spearmanr  # noqa: PLC0415  # slow to load
-
     rows = combinations(store, chosen)[0].query("task == @task").dropna(subset=[measure])
     claim = f"{measure.replace('_', ' ')} {direction} with the {TITLES[parameter]}"
     if rows[parameter].nunique() < 2 or rows[measure].nunique() < 2:
         return Checked(claim, "not compared yet", UNDECIDED)
-    sided = {"grows": "greater", "falls": "less"}[direction]
-    found = spearmanr(rows[parameter], rows[measure], alternative=sided)
-    ours = f"rank correlation {found.statistic:+.2f} ({len(rows)} combinations)"
-    return Checked(claim, ours, likely(1 - float(found.pvalue)))
+    correlation, chance = rank_correlation(rows[parameter], rows[measure], rises={"grows": True, "falls": False}[direction])
+    ours = f"rank correlation {correlation:+.2f} ({len(rows)} combinations)"
+    return Checked(claim, ours, likely(1 - chance))
 
 
 def _inside(values: np.ndarray, range: list[float]) -> np.ndarray:
