@@ -2,7 +2,10 @@
 
 ROOMS: dict[str, tuple[str, str]] = {
     "engine": ("bns/engine/[!_rj]*.py bns/engine/rprop.py", "tests/engine tests/robots/test_snake_breeding.py"),
-    "tasks": ("bns/tasks/__init__.py bns/robots/khepera/robot.py", "tests/robots/test_task_files.py tests/robots/test_khepera.py tests/robots/test_contract.py"),
+    "tasks": (
+        "bns/tasks/__init__.py bns/robots/khepera/robot.py",
+        "tests/robots/test_task_files.py tests/robots/test_khepera.py tests/robots/test_contract.py",
+    ),
     "store": (
         "bns/store/disk/*.py bns/store/write/*.py bns/store/read/*.py",
         "tests/store/test_damage.py tests/store/test_order.py tests/store/test_journal.py tests/store/test_compact.py "
