@@ -14,7 +14,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test test-slow lint dist docs sweep-khepera sweep-budget figures bench bench-check bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants replication
+.PHONY: help setup test test-slow lint dist docs sweep-khepera sweep-budget figures bench bench-check bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants replication ranking-check
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -108,6 +108,9 @@ soak: setup ## 200 emulated trials of each robot with faults at random: how they
 fuzz: setup ## files that nobody would write, for every reader of users' files, and damages to result files: five minutes
 	BNS_FUZZ_EXAMPLES=1500 $(BIN)/python -m pytest -q tests/fuzz
 	$(BIN)/python -m tests.store.damages 60
+
+ranking-check: setup ## how many runs `--until ranking` needs, and how often it finds the same winners: 100 studies of each kind, ten minutes
+	$(BIN)/python -m tests.sweep.ranking_study
 
 mutants: setup ## small faults planted in the rooms where numbers are made: do the tests notice? MINUTES=20; writes docs/mutants.md
 	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[mutants]'

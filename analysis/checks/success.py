@@ -70,7 +70,8 @@ def half_by(store: Results, chosen: Selection, task: str, evaluation: int) -> Ch
     rows = rows.assign(curve=curve)
     (sums, columns), (counts, _) = (by_seed_array(rows, name, "curve") for name in ("successes_20cm", "runs"))
     whole, samples = whole_and_samples(sums, counts)
-    own = np.array([list(cells[list(CELL)].itertuples(index=False, name=None)).index(one[1:]) for one in columns])
+    numbers = {cell: number for number, cell in enumerate(cells[list(CELL)].itertuples(index=False, name=None))}
+    own = np.array([numbers[one[1:]] for one in columns])
     reached = [bool((whole[own == number] >= HALF).any()) for number in range(len(cells))]
     ours = f"{sum(reached)} of {len(cells)}"
     if samples is None:

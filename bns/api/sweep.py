@@ -173,6 +173,8 @@ class Sweep(Shown):
         shard: tuple[int, int] | None = None,
         budget_s: float | None = None,
         until: str | None = None,
+        confidence: float | None = None,
+        within: float | None = None,
         retry_failed: bool = False,
         progress: Progress | None = None,
     ) -> SweepResult:
@@ -186,8 +188,15 @@ class Sweep(Shown):
             shard: (k, n): only the k-th (from 1) of n parts.
             budget_s: stop after this time, s.
             until: "ranking": stop when the ten best combinations of each task are known; ``.ranking`` holds them.
+<<<<<<< HEAD
             retry_failed: repeat failed and quarantined runs.
             progress: called with the fraction done and a text.
+=======
+            confidence: with ``until``: that they are those of the whole sweep, for each task (default 0.95; 1: for certain).
+            within: with ``until``: what is left out may be better than the last of them by less than this (default 0).
+            retry_failed: do failed and quarantined runs again.
+            progress: told the share that is done.
+>>>>>>> trust2
 
         Raises:
             StoreError: the results cannot be written, or another process writes this sweep.
@@ -205,10 +214,13 @@ class Sweep(Shown):
             scheduler=scheduler,
         )
         way = load_executor(_way(device, executor, jobs))
+        asked = {name: value for name, value in (("confidence", confidence), ("within", within)) if value is not None}
+        if until is None and asked:
+            raise SpecError(f"{' and '.join(asked)} belong to until=\"ranking\"")
         if until is not None:
             if until != "ranking":
                 raise SpecError(unknown_name("end of a sweep", until, ["ranking"]))
-            counts, ranking = run_until_ranked(way, self._described, request)
+            counts, ranking = run_until_ranked(way, self._described, request, **asked)
             return SweepResult(counts, Path(results), ranking)
         return SweepResult(way.carry_out(self._described, request), Path(results))
 

@@ -11,6 +11,7 @@ from panel.theme.bootstrap import Bootstrap
 
 from bns.app.parts import CSS
 from bns.app.sliders import NAMES
+from bns.app.web.dropped import SCRIPT as DROPPED
 
 ICON = (
     "data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 8 8'><circle cx='4' cy='4' r='3' "
@@ -48,5 +49,5 @@ def template(title: str) -> Any:
     made: Any = pn.template.BootstrapTemplate(
         title=title, header_background="#23395d", favicon=ICON, raw_css=[CSS], design=Lean, busy_indicator=None
     )
-    made.template = parse_template(_PAGE.replace("SCRIPT", NAMES))
+    made.template = parse_template(_PAGE.replace("SCRIPT", NAMES + DROPPED))
     return made

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from html import escape
+from itertools import pairwise
 from typing import Any
 
 import panel as pn
-from panel.io.state import set_curdoc
 
 from bns.app.design import template
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, html, on_change
+from bns.app.parts import WIDE, button, html, on_change, row
 from bns.app.screens.data import DataScreen
 from bns.app.screens.effects import EffectsScreen
 from bns.app.screens.model import ModelScreen
@@ -57,7 +57,9 @@ class Screens:
         )
         on_change(self._chosen, lambda: self._enter(self._chosen.value))
         self._shown = pn.Column(**WIDE)
-        self.view = pn.Column(self._chosen, self._said, self._shown, **WIDE)
+        self._on = button("", self._go_on)
+        self._name_next()
+        self.view = pn.Column(self._chosen, row(self._on, self._said, align_items="center"), self._shown, **WIDE)
         self._making = ""
         self._document = pn.state.curdoc
         pn.state.onload(lambda: self._loaded(name))
@@ -68,22 +70,28 @@ class Screens:
         pn.state.location.update_query(tab=name)
         self._jobs.begin()
 
-    def _make_first(self) -> None:
+    async def _make_first(self) -> None:
         """The screen that is shown first is made beside the page, while the browser still reads its files."""
         self._making = name = self._chosen.value
 
-        def made() -> Any:
-            with set_curdoc(self._document):
-                return self._made(name)
-
-        def shown(screen: Any) -> None:
+        def add(screen: Any) -> None:
             self._making = ""
             self._add(name, screen)
 
-        self._jobs.run("drawing the page", made, shown, self._say)
+        await self._jobs.first(lambda: self._made(name), add)
+
+    def _name_next(self) -> None:
+        """What comes next, for somebody who sees the page for the first time."""
+        following = [name for before, name in pairwise(SCREENS) if before == self._chosen.value]
+        self._on.visible = bool(following)
+        self._on.name = f"Continue: {following[0]}" if following else ""
+
+    def _go_on(self) -> None:
+        self._chosen.value = next(name for before, name in pairwise(SCREENS) if before == self._chosen.value)
 
     def _enter(self, name: str) -> None:
         self._tab.screen = name
+        self._name_next()
         if name == self._making:
             return
         if name not in self._screens:

@@ -2,10 +2,16 @@
 
 import re
 import threading
+import time
 
 import pytest
 
 import bns
+
+pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
+
+from bns.app import jobs
+from bns.app.page import Screens
 from bns.examples import FOLDER
 from tests.app.visits import error_of, go, settled
 
@@ -190,3 +196,42 @@ def test_what_one_change_brings_comes_in_one_message(visit):
     assert len(changes) == 1
     assert "by hand" in changes[0]
     assert not page.locator("script[src*='mathjax']").count()  # 2 MB that nobody would use
+
+
+@pytest.mark.parametrize("longest_s", [0.0, 60.0])
+def test_the_first_picture_comes_with_the_page_or_after_it(visit, monkeypatch, longest_s):
+    """However long it takes: what is there before the browser has the page waits, and comes in its order."""
+    monkeypatch.setattr(jobs, "LONGEST_S", longest_s)
+    begin, after = jobs.Jobs.begin, 2 if longest_s == 0 else 1  # the screen and the list of effects; of a whole page the list
+
+    def once_all_wait(self):
+        if len(self._early) < after:
+            self._document.add_timeout_callback(lambda: once_all_wait(self), 50)
+        else:
+            begin(self)
+
+    def once_it_is_asked_for(self, name, made=Screens._made):
+        screen = made(self, name)
+        while longest_s > 0 and self._document.session_context.session.connection_count == 0:
+            time.sleep(0.05)
+        time.sleep(0.5)  # what asks for the page stands in the line by now; without it the test only asks less
+        return screen
+
+    monkeypatch.setattr(jobs.Jobs, "begin", once_all_wait)
+    monkeypatch.setattr(Screens, "_made", once_it_is_asked_for)
+    visited = visit(LOG)
+    page, came, said = visited.browser.new_page(), [], []
+
+    def keep(frame):
+        came.append(frame)
+
+    page.on("console", lambda message: said.append(message.text) if message.type in {"error", "warning"} else None)
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("websocket", lambda socket: socket.on("framereceived", keep))
+    page.goto(visited.address)
+    page.get_by_role("checkbox", name="motor-lag:").check()
+    error_of(page, "+ motor-lag")
+    settled(page)
+    [whole] = [frame for frame in came if isinstance(frame, str) and frame.startswith('{"doc"')]
+    assert ("bns-errors" in whole) == (longest_s > 0)
+    assert said == []

@@ -12,6 +12,7 @@ from bns.diagnose.data import tracker_faults
 from bns.diagnose.data.tracks import MOST_FRAMES, tracks_of
 from bns.diagnose.predict import paired_errors
 from tests.app.test_screens import AtOnce
+from tests.app.visits import error_of, go, settled
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
@@ -74,6 +75,11 @@ def test_paths_of_a_million_poses_are_drawn_thinned():
     figure = LogFigure()
     figure.fill(paths, {"x": [], "y": [], "text": []})
     assert sum(map(len, figure.paths.data["x"])) <= DRAWN
+    assert "drawn" not in figure.figure.title.text
+    many = [(str(n), "", np.zeros((100, 3))) for n in range(10_000)]
+    figure.fill(many, {"x": [], "y": [], "text": []})
+    assert sum(map(len, figure.paths.data["x"])) <= DRAWN
+    assert "one of 2 paths is drawn" in figure.figure.title.text
     one = [("0", "", np.zeros((1_000_000, 3)))]
     figure.fill(one, {"x": [], "y": [], "text": []})
     assert len(figure.paths.data["x"][0]) <= DRAWN
@@ -97,3 +103,29 @@ def test_the_fastest_wheel_nearby_is_that_of_the_slow_search():
     for trial in range(3):
         t_s = tracks.t_s[tracks.first[trial] : tracks.first[trial + 1]]
         assert np.array_equal(tracker_faults._fastest(tracks, trial, t_s), slowly(tracks, trial, t_s))
+
+
+DRAWN_IN_THE_BROWSER = """() => {
+  const sources = [...Bokeh.documents[0]._all_models.values()].filter(one => one.type === "ColumnDataSource")
+  const points = (column) => [...column].reduce((n, one) => n + (one?.length > 1 && typeof one !== "string" ? one.length : 1), 0)
+  const columns = (data) => data instanceof Map ? [...data.values()] : Object.values(data)
+  return sources.map(one => Math.max(0, ...columns(one.data).map(points)))
+}"""
+
+
+@pytest.mark.slow
+def test_a_million_poses_open_in_a_browser_thinned_with_numbers_of_the_command_line(tmp_path, visit):
+    table = measured(hidden(turn_slip={"slip_s": 0.12}), trials=40, commands=8)
+    table = repeated(table, -(-1_000_000 // len(table)))
+    path = tmp_path / "million.parquet"
+    table.to_parquet(path, index=False)
+    page = visit(path, bns.Model(NOMINAL)).open()
+    before = error_of(page, "as given")
+    said = bns.compare(path, bns.Model(NOMINAL)).to_json()["error"]["1s"]
+    assert before == round(1e3 * said["position_m"], 2)
+    page.get_by_role("checkbox", name="turn-slip:").wait_for()
+    assert 0 < sum(page.evaluate(DRAWN_IN_THE_BROWSER)) <= DRAWN
+    go(page, "Data", "#bns-log")
+    settled(page)
+    assert f"{len(table)} poses" in page.locator("#bns-log").inner_text()
+    assert 10_000 < max(page.evaluate(DRAWN_IN_THE_BROWSER)) <= DRAWN

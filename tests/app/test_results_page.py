@@ -52,18 +52,39 @@ def test_what_is_no_store_is_said(tmp_path, results):
         Study(results).curve("x' OR 1=1 --")
 
 
+def point_at_a_dot(page):
+    """Until the path of the run under the pointer is drawn; dots are looked for row by row."""
+    dots = figures(page).nth(1)
+    dots.scroll_into_view_if_needed()
+    settled(page)
+    box = dots.bounding_box()
+    named = page.locator("#bns-hovered")
+    for y in range(60, int(box["height"]) - 50, 4):
+        for x in range(50, int(box["width"]) - 10, 4):
+            page.mouse.move(box["x"] + x, box["y"] + y)
+            if page.get_by_text("run:").filter(visible=True).count():
+                named.wait_for()
+                assert "seed" in named.inner_text()
+                page.get_by_text("The run under the pointer").wait_for()
+                figures(page).nth(3).wait_for()
+                return
+    raise AssertionError("there is no dot")
+
+
 def test_runs_are_filtered_compared_and_driven_again_in_the_browser(results, visit):
     visited = visit(results)
     page = visited.open()
     page.get_by_text("12 of 12 finished runs.").wait_for()
     page.get_by_label("Only mutation rate (none: all)").select_option("0.9")
     page.get_by_text("6 of 12 finished runs.").wait_for()
+    point_at_a_dot(page)
+    shown(page, "hovered")
     page.get_by_label("Run A", exact=True).select_option(index=1)
     page.locator("#bns-run-a").wait_for()
     page.get_by_label("Run B", exact=True).select_option(index=4)
     page.locator("#bns-run-b").wait_for()
     page.get_by_role("button", name="Repeat the run to see its path").first.click()
-    figures(page).nth(3).wait_for()  # the path beside the three that are there from the start
+    figures(page).nth(4).wait_for()  # the path beside the three that are there from the start, and that under the pointer
     settled(page)
     shown(page, "results")
     page.close()

@@ -37,7 +37,7 @@ LOG = FOLDER / "khepera-log.csv"
 class AtOnce:
     """Does every job at once; a failure is one of the test."""
 
-    def run(self, _text, work, done, failed):
+    def run(self, _text, work, done, failed, later=False):
         done(work())
 
     def changed(self, _screen):
@@ -224,3 +224,31 @@ def test_networks_are_compared_and_have_no_effects(snake, capsys, tmp_path):
     again = opened(saved)
     assert again.networks == "snake-networks"
     assert again.bench.of_networks
+
+
+def test_what_is_brushed_is_marked_on_the_paths_of_its_trial():
+    tab = Tab()
+    tab.open(LOG, "log.csv")
+    screen = entered(WhereScreen, tab)
+    windows = screen._windows
+    chosen = windows.index[windows["number"] == 4].tolist()[:2]
+    screen._pictures.source.selected.indices = chosen
+    assert screen._trial.value == 4
+    t_s, measured = tab.bench.measured(4)
+    marked = screen._path._marked.data
+    assert len(marked["x"]) == 4  # measured and predicted, of two windows
+    first = windows.loc[chosen[0]]
+    inside = (t_s >= first["from_s"]) & (t_s <= first["t_s"])
+    assert marked["x"][0].tolist() == measured[inside, 0].tolist()
+    screen._trial.value = 5
+    assert screen._path._marked.data["x"] == []
+
+
+def test_the_error_over_time_has_a_band_and_the_floor_says_the_noise():
+    tab = Tab()
+    tab.open(LOG, "log.csv")
+    screen = entered(WhereScreen, tab)
+    for source in screen._pictures._bands.values():
+        assert (source.data["low"] < source.data["high"]).all()
+    noise = tab.bench.as_given.errors.horizons["1s"].noise_floor_m
+    assert f"{1e3 * noise:.2f} mm" in screen._pictures.floor.title.text

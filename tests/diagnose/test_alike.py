@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bns.diagnose.select.indistinguishable import indistinguishable
+from bns.diagnose.select.indistinguishable import TIE_LOSS, TIE_SHARE, indistinguishable, matters
 
 RNG = np.random.default_rng(0)
 FIT = SimpleNamespace(held_out=RNG.normal(10, 1, 60))
@@ -44,3 +44,8 @@ def test_losses_that_are_small_in_all_are_a_tie_though_every_trial_shows_them():
     little = SimpleNamespace(held_out=FIT.held_out + 1)  # what either earns is little too
     assert indistinguishable(losing(np.full(60, 0.04)), FIT, little)
     assert not indistinguishable(losing(np.full(60, 0.06)), FIT, little)
+
+
+def test_a_loss_as_large_as_the_least_that_matters_matters():
+    assert matters(np.array([0.0, 1.0, 2.0]) * TIE_SHARE, 1.0, 10**9).tolist() == [False, True, True]
+    assert matters(np.array([0.5, 1.0, 2.0]) * TIE_LOSS, 0.0, 1).tolist() == [False, True, True]

@@ -1,5 +1,7 @@
 """Errors on held-out trials come from fits that have not seen these trials."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,3 +41,23 @@ def test_a_robot_unlike_the_others_is_predicted_as_the_others():
     as_drawn, turned = odd.steps(MODEL).body[own, 2], steps[own, 2]
     turning = np.abs(as_drawn) > 1e-3
     assert np.median(turned[turning] / as_drawn[turning]) == pytest.approx(1.0, abs=0.01)
+
+
+def test_what_carries_the_robot_is_predicted_by_the_other_folds_too():
+    """The drift of each fold is that of the model fitted to the others, as its displacements are."""
+    plain, drifting = predictor(), NOMINAL.with_effect("wheelbase", factor=1.0)
+    pose_filter, real = problem_for(plain, drifting).pose_filter, plain.steps
+
+    class Carried:
+        """Steps with a drift that every frame has a number of its own for."""
+
+        def __getattr__(self, name):
+            return getattr(plain, name)
+
+        def steps(self, model, *more, **named):
+            found = real(model, *more, **named)
+            ahead = np.arange(2.0 * len(found.drift_m)).reshape(-1, 2)
+            return replace(found, drift_m=found.drift_m + 1e-9 * ahead)
+
+    found = held_out_steps(Carried(), pose_filter, drifting).drift_m
+    np.testing.assert_allclose(found, 1e-9 * np.arange(float(found.size)).reshape(-1, 2), atol=1e-12)

@@ -1,6 +1,7 @@
 """Effects that are certain and matter to no prediction are said, and not named."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,7 +12,7 @@ from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.established import Established
-from bns.diagnose.select.negligible import negligible
+from bns.diagnose.select.negligible import LUCK, MEDIAN_OF, _largest_fall, negligible
 from bns.diagnose.select.result import SelectionResult
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
@@ -79,3 +80,18 @@ def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named)
     assert ended.selection.accepted == named
     assert ended.imitating == (("wheel-mismatch",) if matters else ())
     assert (ended.terms, ended.errors_with_terms) == ((("a term",), "errors") if matters else ((), None))
+
+
+def errors(windows, **models):
+    """Errors of models at one horizon: position, heading, median."""
+    found = {name: {1.0: SimpleNamespace(rms_m=a, heading_rad=b, median_m=c)} for name, (a, b, c) in models.items()}
+    return SimpleNamespace(of=found.get, horizons={1.0: SimpleNamespace(windows=windows)})
+
+
+def test_an_error_falls_by_the_share_beyond_luck_of_the_measure_that_falls_most():
+    few, many = MEDIAN_OF - 1, MEDIAN_OF
+    models = {"before": (0.5, 0.25, 0.5), "after": (0.375, 0.125, 0.125)}
+    assert _largest_fall(errors(few, **models), "before", "after") == pytest.approx(0.5 - LUCK / few**0.5)
+    assert _largest_fall(errors(many, **models), "before", "after") == pytest.approx(0.75 - LUCK / many**0.5)
+    nothing = {"before": (0.0, 0.0, 0.0), "after": (1.0, 1.0, 1.0)}
+    assert _largest_fall(errors(many, **nothing), "before", "after") == 0.0

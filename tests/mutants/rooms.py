@@ -2,7 +2,10 @@
 
 ROOMS: dict[str, tuple[str, str]] = {
     "engine": ("bns/engine/[!_rj]*.py bns/engine/rprop.py", "tests/engine tests/robots/test_snake_breeding.py"),
-    "tasks": ("bns/tasks/__init__.py bns/robots/khepera/robot.py", "tests/robots/test_khepera.py tests/robots/test_contract.py"),
+    "tasks": (
+        "bns/tasks/__init__.py bns/robots/khepera/robot.py",
+        "tests/robots/test_task_files.py tests/robots/test_khepera.py tests/robots/test_contract.py",
+    ),
     "store": (
         "bns/store/disk/*.py bns/store/write/*.py bns/store/read/*.py",
         "tests/store/test_damage.py tests/store/test_order.py tests/store/test_journal.py tests/store/test_compact.py "
@@ -11,11 +14,12 @@ ROOMS: dict[str, tuple[str, str]] = {
     "estimate": (
         "bns/diagnose/estimate/*.py",
         "tests/diagnose/test_held_out.py tests/diagnose/test_evidence.py tests/diagnose/test_clocks.py "
-        "tests/diagnose/test_normal.py",
+        "tests/diagnose/test_normal.py tests/diagnose/test_formula_starts.py tests/jointed/test_stretch_noise.py",
     ),
     "select": (
         "bns/diagnose/select/*.py",
-        "tests/diagnose/test_alike.py tests/diagnose/test_equivalents.py tests/diagnose/test_search.py",
+        "tests/diagnose/test_alike.py tests/diagnose/test_negligible.py tests/diagnose/test_equivalents.py "
+        "tests/diagnose/test_search.py",
     ),
     "safety": (
         "bns/hardware/safety.py",

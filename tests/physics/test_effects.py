@@ -163,3 +163,10 @@ def test_unknown_missing_and_misspelt_names():
 def test_what_is_no_number_is_refused(value, hint):
     with pytest.raises(ModelError, match=hint):
         number("tau_s", value, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("name", sorted(all_effects()))
+def test_every_effect_says_how_to_confirm_it_on_the_bench(name):
+    effect = all_effects()[name]
+    assert len(effect.measurement.split()) >= 4
+    assert effect.sentence

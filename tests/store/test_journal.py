@@ -2,6 +2,7 @@
 
 import shutil
 import warnings
+from dataclasses import replace
 
 import pandas.testing as pdt
 import pytest
@@ -135,3 +136,16 @@ def test_empty_journal_is_removed(tmp_path):
     with warnings.catch_warnings(), Writer(tmp_path, "s") as writer:
         assert writer.recovered == 0
     assert not path.exists()
+
+
+def test_damage_is_counted_to_the_byte(left):
+    _, path, _, starts = left
+    file, data = journals(path.parents[1])[0], path.read_bytes()
+    whole = journal_module.scan(data, file)
+    assert (len(whole.frames), whole.damaged, whole.torn) == (3, 0, 0)
+    middle = bytearray(data)
+    middle[starts[1] + 60] ^= 1
+    found = journal_module.scan(bytes(middle), file)
+    assert (len(found.frames), found.damaged, found.torn) == (2, starts[2] - starts[1], 0)
+    other = replace(file, sweep="another")
+    assert (journal_module.scan(data, other).damaged, journal_module.scan(data, other).frames) == (len(data), [])

@@ -8,11 +8,13 @@ from bns.cli.main import main
 from bns.errors import SpecError
 from bns.sweep.confirm import best
 from bns.sweep.expand.grid import parse_sweep
-from bns.sweep.ranking.confidence import capital, confidences
-from bns.sweep.ranking.race import Results, bar, next_runs, possible
+from bns.sweep.ranking.betting import capital
+from bns.sweep.ranking.confidence import confidences
+from bns.sweep.ranking.race import Aim, Results, bar, next_runs, possible
 from bns.sweep.ranking.stored import Race
+from tests.sweep.ranking_study import TOP, least_runs, outcome, published_rates, raced, ranked, spread_rates
 
-TOP = 10
+CERTAIN, SURE = Aim(TOP, confidence=1.0), Aim(TOP)
 
 
 def tiny(combinations, seeds):
@@ -28,36 +30,65 @@ def study(draw, combinations=75, seeds=30, spread=2.5, centre=-0.5):
     return rate, (draw.random((combinations, seeds)) < rate[:, None]).astype(float)
 
 
-def empty(outcomes):
-    return Results(np.full(outcomes.shape, np.nan), np.zeros(outcomes.shape, bool))
+def one(outcomes):
+    """Evidence of the results of one combination, in the order of its seeds."""
+    return lambda seeds, total: float(
+        capital(np.pad(outcomes, (0, seeds - len(outcomes)))[None], np.arange(seeds)[None] < len(outcomes), total)[0]
+    )
 
 
-def raced(outcomes, rounds=10**6):
-    """What a race reveals of a complete study."""
-    results = empty(outcomes)
-    while rounds and (batch := next_runs(results, TOP)):
-        at = tuple(np.array(batch).T)
-        assert not results.seen[at].any()
-        results.seen[at], results.success[at] = True, outcomes[at]
-        rounds -= 1
-    return results
-
-
-def ranked(means, among=None):
-    order = np.argsort(-means, kind="stable")
-    return [n for n in order.tolist() if among is None or among[n]][:TOP]
-
-
-@pytest.mark.parametrize(("combinations", "studies", "share"), [(75, 100, 0.5), (500, 5, 0.25)])
-def test_resampled_studies_have_the_same_winners_in_the_same_order_from_a_part_of_the_runs(combinations, studies, share):
-    draw, shares = np.random.default_rng(1), []
-    rate, _ = study(draw, combinations)
+@pytest.mark.parametrize(
+    ("rates", "studies", "share"),
+    [(spread_rates(-0.5, 75), 100, 0.4), (spread_rates(-2.0, 75), 40, 0.42), (spread_rates(-0.5, 500), 3, 0.2)],
+    ids=["75", "75-rare", "500"],
+)
+def test_resampled_studies_have_the_same_winners_in_the_same_order_from_a_part_of_the_runs(rates, studies, share):
+    draw, found = np.random.default_rng(1), []
     for _ in range(studies):
-        outcomes = (draw.random((combinations, 30)) < rate[:, None]).astype(float)
-        results = raced(outcomes)
-        assert ranked(outcomes.mean(1), results.whole) == ranked(outcomes.mean(1))
-        shares.append(results.seen.mean())
-    assert np.mean(shares) < share
+        rate = rates(draw)
+        found.append(outcome((draw.random((len(rate), 30)) < rate[:, None]).astype(float), SURE))
+    assert sum(each.same for each in found) >= 0.95 * studies
+    assert np.mean([each.share for each in found]) < share
+
+
+def test_the_published_study_is_decided_from_fewer_runs_the_more_may_be_let_pass():
+    draw = np.random.default_rng(4)
+    rate = published_rates("infinity", 200)(draw)
+    outcomes = (draw.random((200, 30)) < rate[:, None]).astype(float)
+    found = [outcome(outcomes, aim) for aim in (CERTAIN, SURE, Aim(TOP, within=0.1), Aim(TOP, within=0.2))]
+    shares = [each.share for each in found]
+    assert shares == sorted(shares, reverse=True)
+    assert shares[-1] < 0.6 * shares[0]
+    assert found[0].same
+    assert [each.lost < limit + 1e-9 for each, limit in zip(found[1:], (0.0, 0.1, 0.2), strict=True)] == [True] * 3
+
+
+def test_what_is_left_out_is_hardly_ever_better_by_more_than_is_let_pass():
+    draw, beyond, differ = np.random.default_rng(6), 0, 0
+    for _ in range(60):
+        rate = draw.beta(2.0, 3.0, 60)
+        each = outcome((draw.random((60, 30)) < rate[:, None]).astype(float), Aim(TOP, within=0.1))
+        beyond, differ = beyond + (each.lost >= 0.1), differ + (each.lost > 0)
+    assert beyond <= 3
+    assert differ > 30  # something is let pass indeed
+
+
+@pytest.mark.parametrize("confidence", [0.5, 0.95])
+def test_winners_are_lost_no_oftener_than_the_confidence_says_even_where_all_are_alike(confidence):
+    draw, lost = np.random.default_rng(8), 0
+    for _ in range(60):
+        outcomes = (draw.random((40, 30)) < 0.2).astype(float)
+        lost += outcome(outcomes, Aim(TOP, confidence)).lost > 0
+    assert lost <= 60 * (1 - confidence)
+    assert outcome(outcomes, CERTAIN).share > outcome(outcomes, Aim(TOP, 0.5)).share
+
+
+def test_no_rule_needs_less_than_the_bound():
+    """Two totals of two seeds: one look tells 0 from 2; without errors a rule that must tell 0 from 1 looks at both."""
+    assert least_runs(0, 2, 2, 0.0) == pytest.approx(1.0)
+    assert least_runs(0, 1, 2, 0.0) == pytest.approx(2.0)
+    assert least_runs(0, 1, 2, 0.5) == pytest.approx(0.0)
+    assert 0.0 < least_runs(6, 18, 30, 0.05) < least_runs(12, 18, 30, 0.05) < least_runs(17, 18, 30, 0.05) <= 30.0
 
 
 def test_equals_of_the_last_place_are_all_run_to_the_end():
@@ -71,13 +102,13 @@ def test_bounds_hold_whatever_the_other_runs_do():
     _, outcomes = study(draw, 30, 12)
     outcomes[draw.random(outcomes.shape) < 0.1] = np.nan  # runs that failed
     for rounds in range(1, 8):
-        results = raced(outcomes, rounds)
+        results = raced(outcomes, CERTAIN, rounds)
         low, high = results.bounds()
         mean = np.nan_to_num(np.nanmean(outcomes, axis=1))
         assert (low <= mean + 1e-12).all()
         assert (mean <= high + 1e-12).all()
-        assert possible(results, TOP)[ranked(mean)].all()
-        assert bar(results, TOP) <= np.sort(mean)[-TOP] + 1e-12
+        assert possible(results, CERTAIN)[ranked(mean)].all()
+        assert bar(results, CERTAIN) <= np.sort(mean)[-TOP] + 1e-12
 
 
 def test_a_bettor_gains_nothing_from_totals_that_are_reached():
@@ -85,10 +116,13 @@ def test_a_bettor_gains_nothing_from_totals_that_are_reached():
     draw, rich = np.random.default_rng(5), 0
     for _ in range(2000):
         outcomes = draw.permutation(np.repeat([1.0, 0.0], [20, 10]))
-        rich += capital(outcomes[:25], 30, 20) >= 20
+        rich += one(outcomes[:25])(30, 20) >= 20
     assert rich / 2000 < 0.05
-    assert capital(np.array([0.0, 0.0, 1.0]), 10, 9) == np.inf
-    assert capital(np.zeros(5), 30, 20) > 20
+    assert one(np.array([0.0, 0.0, 1.0]))(10, 9) == np.inf
+    assert one(np.zeros(5))(30, 20) > 20
+    assert one(np.ones(5))(30, 20) == 1.0
+    totals = [one(outcomes[:12])(30, total) for total in range(5, 29)]
+    assert totals == sorted(totals)
 
 
 def test_confidence_of_a_ranking_cut_short_is_kept_and_grows_to_certainty():
@@ -96,27 +130,47 @@ def test_confidence_of_a_ranking_cut_short_is_kept_and_grows_to_certainty():
     for _ in range(60):
         _, outcomes = study(draw, 60, 30)
         for rounds in (10, 15, 20, 25):
-            results = raced(outcomes, rounds)
+            results = raced(outcomes, SURE, rounds)
             mine = ranked(results.bounds()[0], results.whole)
-            told += confidences(results, mine, TOP)
+            told += confidences(results, mine, SURE)
             kth = np.sort(outcomes.mean(1))[-TOP]
             right += [outcomes[n].mean() >= kth for n in mine]
     told, right = np.array(told), np.array(right)
     assert (told >= 0.9).sum() > 50
     assert right[told >= 0.9].mean() >= 0.9
-    results = raced(outcomes)
-    assert confidences(results, ranked(outcomes.mean(1), results.whole), TOP) == [1.0] * TOP
+    assert min(confidences(raced(outcomes, SURE), ranked(outcomes.mean(1)), SURE)) >= 0.95
+    assert confidences(raced(outcomes), ranked(outcomes.mean(1)), CERTAIN) == [1.0] * TOP
 
 
 def test_the_last_of_the_best_is_as_sure_as_what_is_known_of_its_rivals():
     results = Results(np.full((11, 10), np.nan), np.zeros((11, 10), bool))
     results.success[:10], results.seen[:10] = 1.0, True
     results.success[:10, 5:] = 0.0
-    assert confidences(results, list(range(10)), TOP) == [1.0] * 9 + [0.0]
-    results.success[10, :5], results.seen[10, :5] = [0.0, 0.0, 1.0, 0.0, 0.0], True
-    *sure, last = confidences(results, list(range(10)), TOP)
-    assert (sure, last) == ([1.0] * 9, pytest.approx(1 - 1 / capital(results.success[10, :5], 10, 5)))
+    assert confidences(results, list(range(10)), SURE) == [1.0] * 9 + [0.0]
+    results.success[10, :5], results.seen[10, :5] = 0.0, True
+    *sure, last = confidences(results, list(range(10)), SURE)
+    assert (sure, last) == ([1.0] * 9, pytest.approx(1 - 10 / one(np.zeros(5))(10, 5)))
     assert 0.5 < last < 1.0
+    assert confidences(results, list(range(10)), Aim(TOP, within=0.1))[-1] == 1.0
+
+
+def test_a_failed_run_is_no_evidence_against_its_combination():
+    outcomes = np.zeros((30, 20))
+    outcomes[:9], outcomes[9:, :8] = 1.0, 1.0
+    outcomes[20, 8:], outcomes[20, :8] = 1.0, np.nan  # fails first, succeeds in all else: the tenth
+    results = raced(outcomes, SURE)
+    assert results.whole[[*range(9), 20]].all()
+    assert not results.whole.all()
+
+
+def test_what_is_certain_to_be_among_the_best_is_run_on_however_badly_it_began():
+    results = Results(np.full((11, 30), np.nan), np.zeros((11, 30), bool))
+    results.success[:10], results.seen[:10] = 0.0, True
+    results.success[:10, :12] = 1.0
+    results.success[10, :14], results.success[10, 14:27], results.seen[10, :27] = 0.0, 1.0, True
+    assert capital(results.hopeful, results.seen, 12.0)[10] > SURE.level
+    assert possible(results, SURE)[10]
+    assert next_runs(results, SURE)[0] == (10, 27)
 
 
 def small_sweep(combinations=19, seeds=12):
@@ -174,3 +228,18 @@ def test_what_does_not_go_together_is_refused(tmp_path, capsys, more):
     assert "--until ranking" in capsys.readouterr().err
     with pytest.raises(SpecError, match="ranking"):
         bns.Sweep.from_file(file).run(tmp_path / "a", until="tomorrow")
+
+
+@pytest.mark.parametrize(("option", "value", "said"), [("confidence", 0.2, "0.5 to 1"), ("within", -0.1, "0 to less than 1")])
+def test_an_aim_that_cannot_be_is_refused(tmp_path, capsys, option, value, said):
+    file = tmp_path / "race.yaml"
+    file.write_text(tiny(2, 1))
+    asked = ["sweep", str(file), "--results", str(tmp_path / "a"), f"--{option}={value}"]
+    assert main([*asked, "--until", "ranking"]) == 2
+    assert said in capsys.readouterr().err
+    assert main(asked) == 2
+    assert f"--{option}: only with --until ranking" in capsys.readouterr().err
+    with pytest.raises(SpecError, match=said):
+        bns.Sweep.from_file(file).run(tmp_path / "a", until="ranking", **{option: value})
+    with pytest.raises(SpecError, match='until="ranking"'):
+        bns.Sweep.from_file(file).run(tmp_path / "a", **{option: value})

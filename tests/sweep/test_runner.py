@@ -13,6 +13,7 @@ from bns.spec import RunSpec
 from bns.store.read.reader import load
 from bns.store.record import RunRecord
 from bns.store.write.writer import Writer
+from bns.sweep import runner
 from bns.sweep.budget import Budget
 from bns.sweep.expand.grid import Sweep
 from bns.sweep.expand.order import ordered_specs
@@ -213,3 +214,12 @@ def test_real_runs_are_the_same_for_any_number_of_workers(tmp_path):
     assert tables[0].groupby("seed")["fitness_world"].sum().nunique() == 4
     runs = load(tmp_path / "1", "runs")
     assert runs["peak_memory_mib"].between(20, 20_000).all()
+
+
+@pytest.mark.parametrize("retry", [True, False])
+def test_quarantined_runs_are_redone_like_failed_ones_and_only_on_request(tmp_path, monkeypatch, retry):
+    sweep = make_sweep(seeds=3)
+    first, second, third = (spec.run_id for spec in ordered_specs(sweep)[:3])
+    monkeypatch.setattr(runner, "finished", lambda *_: {first: "quarantined", second: "failed"})
+    todo = [spec.run_id for spec in runner._SweepRun(sweep, tmp_path, Budget(), lambda _: None, None).plan(retry, None)]
+    assert ([first in todo, second in todo, third in todo]) == [retry, retry, True]

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from bokeh.models import ColumnDataSource, FactorRange, HoverTool, Span, Whisker
 
+from bns.app.figures.bands import band
 from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank
 from bns.diagnose.predict.paired_errors import HorizonErrors
 from bns.diagnose.report.variables import label
-from bns.plotting.style import BLUE, GREY, RED
+from bns.plotting.style import BLUE, GREY, OKABE_ITO, RED
 
 
 class LadderFigure:
@@ -50,6 +51,7 @@ class WindowFigures:
         numbers = ("t_s", "number", "error_mm", "x_m", "y_m", "along", "from_s", "size")
         self.source = ColumnDataSource({**{k: [0.0] for k in numbers}, "trial": [""]})
         self._noise: list[Span] = []
+        self._bands = {name: ColumnDataSource({k: [0.0] for k in ("x", "rms", "low", "high")}) for name in ("t_s", "along")}
         self.time = self._scatter("Over time", "time in the trial (s)", "t_s")
         self.along = self._scatter("Along a variable", "", "along")
         self.trial = self._scatter("By trial", "trial", "number")
@@ -60,6 +62,9 @@ class WindowFigures:
     def _scatter(self, title: str, x: str, column: str) -> Any:
         made = blank(title, x, "position error (mm)", tools=SELECTING)
         self._dots(made, column, "error_mm", 6)
+        if column in self._bands:
+            made.varea("x", "low", "high", source=self._bands[column], fill_color=OKABE_ITO[1], fill_alpha=0.35)
+            made.line("x", "rms", source=self._bands[column], line_color="black", line_width=2)
         noise = Span(location=0, dimension="width", line_dash="dotted", line_color=GREY, line_width=2)
         made.add_layout(noise)
         self._noise.append(noise)
@@ -81,9 +86,14 @@ class WindowFigures:
         size = 4 + 14 * columns["error_mm"] / largest
         self.source.selected.indices = []
         self.source.data = {**columns, "along": table[variable].to_numpy(), "size": size}
+        for name, source in self._bands.items():
+            found = band(table[variable if name == "along" else name].to_numpy(float), columns["error_mm"], columns["number"])
+            source.data = {key: getattr(found, key) for key in ("x", "rms", "low", "high")}
         self.along.xaxis.axis_label = label(variable)
         self.along.title.text = f"Along {label(variable)}"
         named = dict(zip(columns["number"].tolist(), map(str, columns["trial"]), strict=True))
         self.trial.xaxis.major_label_overrides = named  # as the lists name them, whatever the log counts from
         for span in self._noise:
             span.location = 1e3 * noise_floor_m if np.isfinite(noise_floor_m) else 0
+        noise = f"; noise of the tracking: {1e3 * noise_floor_m:.2f} mm" if np.isfinite(noise_floor_m) else ""
+        self.floor.title.text = f"On the floor: area grows with the error{noise}"

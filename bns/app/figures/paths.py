@@ -19,6 +19,10 @@ MARKERS = ("yellow", "green")
 """Of a snake, in the order of `CycleTracks.markers_m`."""
 
 
+_JUST = 1e-9
+"""Both ends of a stretch are part of it."""
+
+
 class PathFigure:
     """Measured (solid) and predicted (dashed) path of one trial, and where both are at a time."""
 
@@ -34,6 +38,8 @@ class PathFigure:
             self._lines, (BLUE, RED), ("solid", "dashed"), ("measured", "predicted"), strict=True
         ):
             self.figure.line("x", "y", source=source, color=color, line_dash=dash, line_width=2, legend_label=name)
+        self._marked = ColumnDataSource({"x": [], "y": [], "color": []})
+        self.figure.multi_line("x", "y", source=self._marked, line_color="color", line_width=7, line_alpha=0.45)
         self.figure.scatter("x", "y", source=self._dots, color="color", size=11, line_color="black")
         self.figure.legend.location, self.figure.legend.background_fill_alpha = "top_left", 0.6
 
@@ -45,6 +51,16 @@ class PathFigure:
             if not (np.array_equal(source.data["x"], shown[:, 0]) and np.array_equal(source.data["y"], shown[:, 1])):
                 source.data = {"x": shown[:, 0], "y": shown[:, 1]}  # what is drawn already is not sent again
         self._times, self._poses = t_s, (measured, predicted)
+
+    def mark(self, stretches: Sequence[tuple[float, float]]) -> None:
+        """Of both paths what lies within these times (from, to; s)."""
+        rows = [np.searchsorted(self._times, (a - _JUST, b + _JUST)) for a, b in stretches]
+        parts = [(poses[a:b], color) for a, b in rows for poses, color in zip(self._poses, (BLUE, RED), strict=True)]
+        self._marked.data = {
+            "x": [p[:, 0] for p, _ in parts],
+            "y": [p[:, 1] for p, _ in parts],
+            "color": [color for _, color in parts],
+        }
 
     def at(self, t_s: float) -> None:
         """Dots where both are at a time (s)."""
@@ -83,14 +99,19 @@ def _cycles(tracks: CycleTracks, trial: int) -> Array:
     return np.concatenate([np.zeros((0, 2, 2)), *parts])
 
 
+_MOST_OF_ALL, _LEAST_OF_A_PATH = 60_000, 12
+"""Points: more of all paths together make a browser slow; fewer show no curve."""
+
+
 class LogFigure:
     """All measured paths, what was found odd on them, and trials that can be selected."""
 
     def __init__(self, title: str = "", height: int = 420) -> None:
         self.paths = ColumnDataSource({"x": [[0.0]], "y": [[0.0]], "trial": [""], "marker": [""], "color": [BLUE]})
         self.findings = ColumnDataSource({"x": [], "y": [], "text": []})
+        self._title = title or "Measured paths; crosses: findings"
         self.figure = blank(
-            title or "Measured paths; crosses: findings",
+            self._title,
             *EAST_NORTH,
             tools=SELECTING,
             height=height,
@@ -106,8 +127,14 @@ class LogFigure:
         self.figure.add_tools(HoverTool(renderers=[marks], tooltips=[("", "@text")]))
 
     def fill(self, paths: Sequence[tuple[str, str, Array]], findings: dict[str, list[Any]]) -> None:
-        """As `paths_of` gives them: a colour a trial, or a marker; findings as x, y, text."""
-        most = max(50, 60_000 // max(len(paths), 1))
+        """As `paths_of` gives them: a colour a trial, or a marker; findings as x, y, text.
+
+        Of more paths than can be told apart every so-many-th is drawn, which the title says.
+        """
+        every = max(1, -(-len(paths) * _LEAST_OF_A_PATH // _MOST_OF_ALL))
+        self.figure.title.text = self._title + (f"; one of {every} paths is drawn" if every > 1 else "")
+        paths = paths[::every]
+        most = max(_LEAST_OF_A_PATH, _MOST_OF_ALL // max(len(paths), 1))
         thin = [p[:: max(1, -(-len(p) // most))] for _, _, p in paths]
         sites = list(dict.fromkeys(site for _, site, _ in paths))
         trials = list(dict.fromkeys(name for name, _, _ in paths))

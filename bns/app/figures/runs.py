@@ -7,26 +7,40 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from bokeh.models import ColumnDataSource, FixedTicker, HoverTool
+from bokeh.models import ColumnDataSource, CustomJS, FixedTicker, HoverTool
 
 from bns.app.figures.common import blank
-from bns.plotting.style import BLUE, OKABE_ITO, RED
+from bns.plotting.style import BLUE, GREY, OKABE_ITO, RED
 
 SUCCEEDED, FAILED = OKABE_ITO[2], RED
 MOST_DOTS, MOST_LINES = 20_000, 1_500
 """More of them no screen shows apart; the figure's title says how many are drawn."""
 
 
-class RunsFigure:
-    """A dot a run; ``picked`` is told the run whose dot is clicked."""
+_POINTED = """
+const [dot] = cb_data.index.indices
+clearTimeout(window.bnsPointed)
+if (dot === undefined) return
+const run = dots.data.run[dot], what = dots.data.what[dot]
+window.bnsPointed = setTimeout(() => { if (pointed.data.run[0] !== run) pointed.data = {run: [run], what: [what]} }, 200)
+"""
+"""A dot that the mouse only passes is not told of."""
 
-    def __init__(self, picked: Callable[[str], None]) -> None:
+
+class RunsFigure:
+    """A dot a run; ``picked`` is told the run whose dot is clicked, ``hovered`` the one pointed at, and what is known of it."""
+
+    def __init__(self, picked: Callable[[str], None], hovered: Callable[[str, str], None]) -> None:
         self.source = ColumnDataSource({"x": [0.0], "y": [0.0], "run": [""], "what": [""], "color": [SUCCEEDED]})
         self.figure: Any = blank("", "", "", tools="tap,pan,wheel_zoom,box_zoom,reset", height=360)
         dots = self.figure.scatter(
             "x", "y", source=self.source, size=8, color="color", fill_alpha=0.55, nonselection_fill_alpha=0.15
         )
         self.figure.add_tools(HoverTool(renderers=[dots], tooltips=[("run", "@run"), ("", "@what")]))
+        pointed = ColumnDataSource({"run": [""], "what": [""]})
+        tell = CustomJS(args={"dots": self.source, "pointed": pointed}, code=_POINTED)
+        self.figure.select_one(HoverTool).callback = tell
+        pointed.on_change("data", lambda _a, _o, new: hovered(str(new["run"][0]), str(new["what"][0])))
         self.source.selected.on_change("indices", lambda _a, _o, new: self._tell(new, picked))
 
     def _tell(self, indices: Sequence[int], picked: Callable[[str], None]) -> None:
@@ -108,19 +122,19 @@ def _heights(column: pd.Series) -> tuple[np.ndarray, tuple[str, str]]:
 
 
 class CurveFigure:
-    """One quantity over the evaluations of two runs."""
+    """One quantity over the evaluations of two runs, and of the one under the pointer."""
 
     def __init__(self) -> None:
         self.figure: Any = blank("", "evaluation", "", height=300)
-        self._sources = [ColumnDataSource({"x": [0.0], "y": [0.0]}) for _ in range(2)]
-        for source, color, dash, name in zip(self._sources, (BLUE, RED), ("solid", "dashed"), "AB", strict=True):
-            self.figure.line(
-                "x", "y", source=source, color=color, line_dash=dash, line_width=2, legend_label=f"run {name}"
-            )
+        self._sources = [ColumnDataSource({"x": [0.0], "y": [0.0]}) for _ in range(3)]
+        names = ("run A", "run B", "under the pointer")
+        looks = zip(self._sources, (BLUE, RED, GREY), ("solid", "dashed", "dotted"), names, strict=True)
+        for source, color, dash, name in looks:
+            self.figure.line("x", "y", source=source, color=color, line_dash=dash, line_width=2, legend_label=name)
         self.figure.legend.location, self.figure.legend.background_fill_alpha = "top_right", 0.6
 
     def fill(self, which: int, evaluations: Any, values: Any) -> None:
-        """Run A (0) or B (1)."""
+        """Run A (0), B (1), or the one under the pointer (2)."""
         self._sources[which].data = {"x": np.asarray(evaluations), "y": np.asarray(values, dtype=float)}
 
     def name(self, words: str) -> None:

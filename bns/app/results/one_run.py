@@ -55,11 +55,16 @@ class OneRun:
             self._background.start("driving", lambda tell: study.drive_again(run_id, tell))
 
     def _show(self, result: RunResult) -> None:
-        spec = result.spec
-        robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
-        driven, expected = (floor_poses(robot, poses) for poses in (result.result.world_poses, result.result.snn_poses))
-        self._picture.fill(f"{task.title}: the fittest at the end", task.goals_m, driven, expected)
+        fill_path(self._picture, result)
         self._canvas.objects = [drawn(self._picture.figure)]
+
+
+def fill_path(picture: GoalFigure, result: RunResult) -> None:
+    """Where the fittest controller drove at the end, and where its networks expected it."""
+    spec = result.spec
+    robot, task = load_robot(spec.robot), load_task(spec.robot, spec.task)
+    driven, expected = (floor_poses(robot, poses) for poses in (result.result.world_poses, result.result.snn_poses))
+    picture.fill(f"{task.title}: the fittest at the end", task.goals_m, driven, expected)
 
 
 def _text(value: Any) -> str:

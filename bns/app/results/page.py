@@ -8,7 +8,8 @@ import panel as pn
 
 from bns.app.design import template
 from bns.app.figures.runs import CurveFigure, ParallelFigure, RunsFigure
-from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row, together
+from bns.app.results.hovered import HoveredRun
 from bns.app.results.one_run import OneRun
 from bns.app.results.study import CURVES, OUTCOMES, PARAMETERS, Study
 from bns.app.web.connection import watch_connection
@@ -41,8 +42,8 @@ class ResultsScreen:
         self._live = pn.widgets.Checkbox(name="Look for new runs every 10 s", value=False)
         self._clock: Any = None
         self._next = 0
-        self._dots, self._parallel, self._curves = RunsFigure(self._pick), ParallelFigure(), CurveFigure()
-        self._runs = [OneRun(study, letter) for letter in "AB"]
+        self._dots, self._parallel, self._curves = RunsFigure(self._pick, self._hover), ParallelFigure(), CurveFigure()
+        self._runs, self._hovered = [OneRun(study, letter) for letter in "AB"], HoveredRun(study)
         for menu in self._filters.values():
             menu.param.watch(lambda _event: self._draw(), "value")
         for axis in (self._x, self._y):
@@ -64,8 +65,12 @@ class ResultsScreen:
             *self._filters.values(),
             **WIDE,
         )
-        pictures = pn.Column(drawn(self._parallel.figure), row(self._x, self._y), drawn(self._dots.figure), **WIDE)
-        words = html("<p>Click a dot, or choose here: the first click is run A, the next run B.</p>")
+        dots = drawn(self._dots.figure)
+        pictures = pn.Column(drawn(self._parallel.figure), row(self._x, self._y), dots, self._hovered.view, **WIDE)
+        words = html(
+            "<p>Click a dot, or choose here: the first click is run A, the next run B. Point at a dot to see its path and "
+            "its curve.</p>"
+        )
         pair = beside(self._runs[0].view, self._runs[1].view)
         compared = pn.Column(
             heading("Two runs side by side"),
@@ -105,6 +110,12 @@ class ResultsScreen:
         menu.value = run_id
         self._next = 1 - self._next
 
+    def _hover(self, run_id: str, words: str) -> None:
+        if run_id:
+            with together():
+                self._hovered.show(run_id, words)
+                self._draw_curves()
+
     def _show_run(self, which: int, run_id: str) -> None:
         self._runs[which].show(run_id or "")
         self._draw_curves()
@@ -112,9 +123,9 @@ class ResultsScreen:
     def _draw_curves(self) -> None:
         column = self._curve.value
         self._curves.name(CURVES[column])
-        for which, menu in enumerate(self._names):
-            if menu.value:
-                rows = self._study.curve(menu.value)
+        for which, run_id in enumerate((*(menu.value for menu in self._names), self._hovered.run_id)):
+            if run_id:
+                rows = self._study.curve(run_id)
                 self._curves.fill(which, rows["evaluation"], rows[column])
             else:
                 self._curves.fill(

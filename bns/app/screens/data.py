@@ -39,7 +39,7 @@ class DataScreen:
         self._sample = pn.widgets.Select(name="A sample log", options=list(SAMPLES), **WIDE)
         self._path = pn.widgets.TextInput(name="Or a file of this machine", placeholder="/path/to/log.csv", **WIDE)
         self._file = pn.widgets.FileInput(
-            name="Or drop files here", accept=",".join((*ENDINGS, ".yaml", ".yml")), multiple=True
+            name="Or choose files", accept=",".join((*ENDINGS, ".yaml", ".yml")), multiple=True
         )
         self._columns = ColumnsPart(self._read_mapped)
         self._other = button("Columns and units", self._ask_columns, visible=False)
@@ -65,7 +65,9 @@ class DataScreen:
             if self._tab.asked:
                 self._failed(self._tab.why_no_log)
             return
-        self._said.object = f"<p id='bns-log'><b>{escape(log.summary().splitlines()[0])}</b>{self._taking_part()}</p>"
+        summary, model = escape(log.summary().splitlines()[0]), escape(" ".join(self._tab.model_words))
+        compared = f"<br>Compared with the model {model}; the Model screen has others."
+        self._said.object = f"<p id='bns-log'><b>{summary}</b>{self._taking_part()}{compared}</p>"
         self._findings.enter()
         self._cut.refresh()
         names = [str(n) for n in log.trials["trial"]]
@@ -209,8 +211,8 @@ class DataScreen:
             self._path,
             button("Open the file", self._open_path),
             html(
-                "<p>Or drop files on the button: logs (.csv, .parquet, recordings of ROS), its .import.yaml if it has one, or "
-                "a saved session with its log.</p>"
+                "<p>Or drop files anywhere on this screen: logs (.csv, .parquet, ROS bags), with their .import.yaml if there is "
+                "one, or a saved session with its log.</p>"
             ),
             self._file,
             self._problem.view,

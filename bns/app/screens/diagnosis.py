@@ -2,40 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from html import escape
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import pandas as pd
 import panel as pn
 
 from bns.api.diagnose import DiagnoseResult, diagnose
-from bns.app.html import found_errors, found_numbers
-from bns.app.parts import WIDE, button, heading
+from bns.app.jobs import Jobs
+from bns.app.parts import WIDE, button, heading, row
+from bns.app.screens.verdict import Rival, rivals, verdict_html
 from bns.app.screens.working import Working
 from bns.app.switches import Term
 from bns.app.tab import Tab
-from bns.diagnose.report.plain_language import certainty, headline
+from bns.diagnose.design.competing_models import MOST_TIED
 
-_THEN = "<br>Switch it on, see the error fall in the table, and save the mended model on the screen Next."
+SwitchTo = Callable[[tuple[str, ...], tuple[Term, ...], tuple[str, ...]], None]
+"""Called with the effects and terms to switch on, and with those to switch off."""
+Offer = tuple[str, tuple[str, ...], tuple[Term, ...], tuple[str, ...]]
+"""What a button says, and what `SwitchTo` is called with."""
 
 
 class DiagnosisPart:
-    """``found``: called when there is something new to show; ``switch_on``: with the effects that were found."""
+    """``found``: called when there is something new to show; ``switch_to``: with what the user takes of what was found."""
 
-    def __init__(
-        self, tab: Tab, found: Callable[[], None], switch_on: Callable[[tuple[str, ...], tuple[Term, ...]], None]
-    ) -> None:
-        self._tab, self._found, self._switch_to = tab, found, switch_on
+    def __init__(self, tab: Tab, jobs: Jobs, found: Callable[[], None], switch_to: SwitchTo) -> None:
+        self._tab, self._jobs, self._found, self._switch_to = tab, jobs, found, switch_to
         self._work = Working("Diagnose in the background", self._start, lambda: tab.diagnosis, self._show, self._meanwhile)
         self._told = 0
-        self._switch_on = button("Switch on what it found", self._take)
-        self._work.buttons.append(self._switch_on)
-        self.view = pn.Column(heading("What is missing?"), self._work.buttons, self._work.said, **WIDE)
+        self._of: DiagnoseResult | None = None
+        self._others: Sequence[Rival] = ()
+        self._offers: list[Offer] = []
+        self._buttons = [button("", partial(self._take, n), visible=False) for n in range(MOST_TIED)]
+        self.view = pn.Column(heading("What is missing?"), self._work.buttons, self._work.said, row(*self._buttons), **WIDE)
 
     def enter(self) -> None:
         """As the tab has it: at work, done, or not begun."""
-        self._switch_on.disabled = True
+        self._offer([])
         self._work.enter()
 
     def alone(self, name: str) -> str:
@@ -68,7 +72,7 @@ class DiagnosisPart:
     def _start(self) -> None:
         bench, model = self._tab.bench, self._tab.model
         if bench is not None and not bench.of_networks:
-            self._switch_on.disabled = True
+            self._offer([])
             found: dict[str, Mapping[str, Any]] = {}
             self._tab.alone = found
 
@@ -85,20 +89,39 @@ class DiagnosisPart:
             self._told = len(self._tab.alone)
             self._found()
 
-    def _take(self) -> None:
-        result = self._tab.diagnosis.result
-        if result is not None:
-            self._switch_to(result.effects, self.terms)
-
     def _show(self, result: DiagnoseResult) -> None:
-        self._switch_on.disabled = not (result.effects or result.diagnosis.terms)
-        said, sure = escape(headline(result.diagnosis)), escape(certainty(result.diagnosis))
-        words = "".join(f"<br>It behaves like this: {escape(each)}." for each in result.diagnosis.terms_in_words)
-        errors = result.diagnosis.errors_with_terms or result.diagnosis.errors
-        sizes = found_numbers(result.to_json()["parameters"])
-        then = "" if self._switch_on.disabled else _THEN
-        self._work.said.object = f"<p id='bns-verdict'><b>{said}</b> {sure}{sizes}{words}{then}</p>{found_errors(errors)}"
+        known = self._others if self._of is result else ()
+        self._say(result, known)
+        if result.verdict == "tie" and not known:
+            self._jobs.run("fitting the alternatives", lambda: rivals(result), partial(self._say, result), self._work.fail)
         self._found()
+
+    def _say(self, result: DiagnoseResult, others: Sequence[Rival]) -> None:
+        if result is not self._tab.diagnosis.result:
+            return
+        self._of, self._others = result, others
+        self._work.said.object = verdict_html(result, others)
+        sets = [result.effects, *(other.names for other in others)]
+        if others:
+            self._offer([(f"Switch on {' and '.join(names)}", names, (), _others(names, sets)) for names in sets])
+        elif result.verdict != "tie" and (result.effects or result.diagnosis.terms):
+            self._offer([("Switch on what it found", result.effects, self.terms, ())])
+
+    def _offer(self, offers: list[Offer]) -> None:
+        """The buttons were made before: one that the browser got late tells the server that it is new, which Bokeh warns of."""
+        self._offers = offers
+        for n, each in enumerate(self._buttons):
+            each.visible = n < len(offers)
+            each.name = offers[n][0] if n < len(offers) else ""
+
+    def _take(self, number: int) -> None:
+        if number < len(self._offers):
+            self._switch_to(*self._offers[number][1:])
+
+
+def _others(names: tuple[str, ...], sets: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """What stands against an explanation: of a tie one is on at a time."""
+    return tuple(dict.fromkeys(each for one in sets for each in one if each not in names))
 
 
 def in_words(entry: Any, when: str) -> str:

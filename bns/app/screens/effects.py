@@ -50,7 +50,7 @@ class EffectsScreen:
         self._horizon = pn.widgets.Select(name="Error how far ahead", options={ahead("1s"): "1s"}, width=160)
         self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
         self._time = Slider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
-        self._diagnosis = DiagnosisPart(tab, self._learned, self._switch_to)
+        self._diagnosis = DiagnosisPart(tab, jobs, self._learned, self._switch_to)
         self._snapshots = SnapshotsPart(tab, jobs, self._go_to, lambda: str(self._horizon.value))
         self._name = pn.widgets.TextInput(name="Name", value="mine", width=110)
         self._term = pn.widgets.TextInput(name="Formula", placeholder="k * v * abs(w)", width=220)
@@ -67,10 +67,10 @@ class EffectsScreen:
         """Drawn again: another log or model brings other effects."""
         bench = self._tab.bench
         if bench is None:
-            self._problem.show(self._tab.why_no_bench or "Open a log first: the screen Data.")
+            self._problem.show(self._tab.why_no_bench or "Open a log first, on the Data screen.")
             return
         if bench.of_networks:
-            text = f"{self._tab.networks} holds networks, which have no effects: the screen Where it fails compares them."
+            text = f"{self._tab.networks} holds networks, which have no effects; they are compared on “Where it fails”."
             self._problem.show(text)
         self._body.visible = not bench.of_networks
         if bench.of_networks:
@@ -112,7 +112,7 @@ class EffectsScreen:
                 self._refresh_effects()
                 self._sync_switches(self._tab.now)
 
-        self._jobs.run("listing the effects", self._groups, listed, self._problem.show)
+        self._jobs.run("listing the effects", self._groups, listed, self._problem.show, later=True)
 
     def move(self, effect: str, parameter: str, value: float) -> None:
         """A number was moved by hand."""
@@ -128,8 +128,10 @@ class EffectsScreen:
         self._tab.history.to(state.switched(name, on) if term is None else state.with_term(term))
         self.update()
 
-    def _switch_to(self, names: tuple[str, ...], terms: tuple[Term, ...]) -> None:
+    def _switch_to(self, names: tuple[str, ...], terms: tuple[Term, ...], off: tuple[str, ...]) -> None:
         state = self._tab.now
+        for name in off:
+            state = state.switched(name, False) if name in state.on else state
         for name in names:
             state = state if name in state.on else state.switched(name, True)
         for term in terms:

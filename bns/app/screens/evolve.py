@@ -20,7 +20,7 @@ MOST_EVALUATIONS = 200
 
 
 class EvolvePart:
-    """Of the screen Next. The run is that of `bns run --world MODEL.yaml` with the same numbers."""
+    """Of the Next screen. The run is that of `bns run --world MODEL.yaml` with the same numbers."""
 
     def __init__(self, tab: Tab) -> None:
         self._tab, self._problem = tab, Problem()
@@ -55,7 +55,7 @@ class EvolvePart:
     def _begin(self) -> None:
         bench, state = self._tab.bench, self._tab.now
         if bench is None:
-            self._problem.show("Open a log first: the screen Data.")
+            self._problem.show("Open a log first, on the Data screen.")
             return
         self._problem.show("")
         task, evaluations, seed = self._task.value, int(self._evaluations.value), int(self._seed.value)

@@ -23,7 +23,7 @@ _SIDES = ("x from (m)", "x to (m)", "y from (m)", "y to (m)")
 
 
 class ExperimentPart:
-    """Of the screen Next. The proposal is that of `bns propose` for the model as given."""
+    """Of the Next screen. The proposal is that of `bns propose` for the model as given."""
 
     def __init__(self, tab: Tab) -> None:
         self._tab, self._problem = tab, Problem()
@@ -85,7 +85,7 @@ class ExperimentPart:
     def _begin(self) -> None:
         bench, model, minutes, arena = self._tab.bench, self._tab.model, float(self._minutes.value or 0), self._arena()
         if bench is None:
-            self._problem.show("Open a log first: the screen Data.")
+            self._problem.show("Open a log first, on the Data screen.")
             return
         try:
             checked_minutes(minutes)
@@ -108,11 +108,13 @@ class ExperimentPart:
         columns = ["which is it?", "chance of a decision", "minutes for a probability of 90 %"]
         self._table.object = table(columns, rows, caption, "bns-pairs")
         curves = [(p.power_by_minutes, f"{p.first} / {p.second}") for p in pairs if p.power_by_minutes]
-        self._power.fill([c for c, _ in curves], [name for _, name in curves])
+        if curves:
+            self._power.fill([c for c, _ in curves], [name for _, name in curves])
         numbers = range(len(result.proposal.plan))
         offer(self._trial, {f"trial {n}": n for n in numbers})
         player = row(self._trial, self._time, align_items="end")
-        self._found.objects = [player, self._table, drawn(self._power.figure), self._save]
+        power = [drawn(self._power.figure)] if curves else []  # Bokeh complains of a picture without a point
+        self._found.objects = [*([player] if numbers else []), self._table, *power, self._save]
         self._save.object = ""
         if numbers:
             text = result.commands.to_csv(index=False).encode()

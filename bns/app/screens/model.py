@@ -29,7 +29,9 @@ class ModelScreen:
         self._problem, self._bench_problem, self._said = Problem(), Problem(), html()
         self._name = pn.widgets.Select(name="A robot of the catalogue", options=ROBOTS, **WIDE)
         self._path = pn.widgets.TextInput(name="Or a model file of this machine", placeholder="mine.yaml", **WIDE)
-        self._file = pn.widgets.FileInput(name="Or drop a model file", accept=".yaml,.yml,.xml,.safetensors")
+        self._file = pn.widgets.FileInput(
+            name="Or choose a model file, or drop it on this screen", accept=".yaml,.yml,.xml,.safetensors"
+        )
         self._wheelbase = pn.widgets.FloatInput(
             name="Or a differential drive: wheelbase (m)", value=0.1, start=0.001, end=10, step=0.001, **WIDE
         )

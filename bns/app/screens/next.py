@@ -6,6 +6,7 @@ from html import escape
 
 import panel as pn
 
+from bns.app.html import found_numbers
 from bns.app.jobs import Jobs
 from bns.app.parts import WIDE, Problem, beside, button, download, heading, html
 from bns.app.same_elsewhere import commands, python
@@ -55,7 +56,7 @@ class NextScreen:
         self._make.disabled = bench is None or bench.of_networks
         self._model.object = self._used.object = self._report.object = self._session.object = ""
         if bench is None:
-            self._problem.show(tab.why_no_bench or "Open a log first: the screen Data.")
+            self._problem.show(tab.why_no_bench or "Open a log first, on the Data screen.")
             return
         self._problem.show("")
         self._experiment.view.visible = not bench.of_networks
@@ -78,7 +79,9 @@ class NextScreen:
         if self._tab.networks:
             self._summary.object = "<p>Networks are compared: there is no model to save.</p>"
         else:
-            self._summary.object = _to_copy(shown.model.summary(), "bns-saved")
+            sizes = "" if shown.switches.by_hand else found_numbers(shown.numbers).removeprefix("<br>")
+            listed = f"<p id='bns-sizes'>{sizes}</p>" if sizes else ""
+            self._summary.object = _to_copy(shown.model.summary(), "bns-saved") + listed
             text = shown.model.to_yaml().encode()
             self._model.object = download("Save the model", "extended.yaml", text, "text/yaml")
         if self._tab.files:
@@ -107,5 +110,11 @@ class NextScreen:
         self._report.object = download("Save the report", "report.html", page, "text/html")
 
 
+_COPY = (
+    "<button type='button' class='bns-copy-it' onclick='navigator.clipboard.writeText(this.nextElementSibling.innerText)"
+    '.then(() => { this.textContent = "Copied" })\'>Copy</button>'
+)
+
+
 def _to_copy(text: str, identifier: str) -> str:
-    return f"<pre class='bns-copy' id='{identifier}' tabindex='0'>{escape(text)}</pre>"
+    return f"{_COPY}<pre class='bns-copy' id='{identifier}' tabindex='0'>{escape(text)}</pre>"

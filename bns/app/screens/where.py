@@ -36,7 +36,7 @@ class WhereScreen:
         self._time = Slider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
         self._errors, self._explained, self._brushed = html(), html(), html()
         self._shown: Shown | None = None
-        self._windows = pd.DataFrame()
+        self._windows, self._rows = pd.DataFrame(), list[int]()
         self._bench: Workbench | None = None
         self._to_choose = True  # the variable that explains most is shown, until the user wants another
         for widget, act in (
@@ -55,7 +55,7 @@ class WhereScreen:
         """The tab's log and model, compared."""
         bench = self._tab.bench
         if bench is None:
-            self._problem.show(self._tab.why_no_bench or "Open a log first: the screen Data.")
+            self._problem.show(self._tab.why_no_bench or "Open a log first, on the Data screen.")
             return
         self._problem.show("")
         if bench is not self._bench:
@@ -122,9 +122,11 @@ class WhereScreen:
         self._windows = self._bench.windows(predictor.steps(model), self._horizon.value)
         floor = self._shown.errors.horizons[self._horizon.value].noise_floor_m
         self._pictures.fill(self._windows, self._variable.value, floor)
+        self._rows = []
         self._say_brushed([])
 
     def _say_brushed(self, rows: list[int]) -> None:
+        self._rows = rows
         chosen = self._windows.iloc[rows] if rows else self._windows
         if not len(chosen):
             return
@@ -139,6 +141,13 @@ class WhereScreen:
             worst = chosen.iloc[int(chosen["error_mm"].to_numpy().argmax())]
             self._trial.value = int(worst["number"])
             self._time.value = min(float(worst["t_s"]), self._time.end)
+        self._mark()
+
+    def _mark(self) -> None:
+        """On the paths what was brushed of the trial that is shown."""
+        mine = self._windows.iloc[self._rows]
+        mine = mine[mine["number"] == self._trial.value] if self._rows else mine
+        self._path.mark(list(zip(mine["from_s"], mine["t_s"], strict=True)) if self._rows else [])
 
     def _go_to(self) -> None:
         if self._bench is None or self._worst.value is None:
@@ -157,6 +166,7 @@ class WhereScreen:
         self._path.fill(f"Trial {self._bench.ready.predictor.tracks.names[number]}", t_s, measured, path)
         if len(t_s) and t_s[-1] > 0:
             self._time.end = float(t_s[-1])
+        self._mark()
         self._show_time()
 
     def _show_time(self) -> None:
@@ -170,6 +180,10 @@ class WhereScreen:
             row(self._which, self._horizon, self._variable, align_items="end"),
             beside(self._errors, self._explained),
             heading("Every window: brush in one picture, see it in all"),
+            html(
+                "<p>Line and band: root mean square in bins along the axis, and its 95 % interval over trials. Dotted: noise of "
+                "the tracking. What is brushed is marked on the paths below, too.</p>"
+            ),
             self._brushed,
             beside(drawn(p.time), drawn(p.along), drawn(p.trial), drawn(p.floor), least=420),
             heading("Measured and predicted"),

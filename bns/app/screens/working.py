@@ -41,6 +41,10 @@ class Working(Generic[T]):
             self._clock = pn.state.add_periodic_callback(self._look_again, period=EVERY_MS)
         self._look()
 
+    def fail(self, text: str) -> None:
+        """Something that followed the work did not succeed: the message stands below what is said."""
+        self.said.object += message(text)
+
     def _start(self, begin: Callable[[], None]) -> None:
         begin()
         self.enter()

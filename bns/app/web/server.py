@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import secrets
 import signal
 import socket
@@ -15,6 +16,8 @@ from typing import Any
 
 from panel.io.server import get_server
 from tornado.ioloop import IOLoop
+from tornado.iostream import StreamClosedError
+from tornado.websocket import WebSocketClosedError
 
 from bns.app.web.guard import LOOPBACK, Guard
 from bns.errors import BnsError
@@ -65,6 +68,8 @@ class PageServer:
     def serve(self, browser: bool = False) -> None:
         """Answer until Ctrl-C, SIGTERM or `stop`."""
         asyncio.set_event_loop(self._loop)
+        self._loop.set_exception_handler(_unless_closed)
+        logging.getLogger("bokeh.server.views.ws").addFilter(_not_of_closed)
         self._server.start()
         if threading.current_thread() is threading.main_thread():
             with suppress(NotImplementedError):  # on Windows Ctrl-C raises KeyboardInterrupt
@@ -85,6 +90,17 @@ class PageServer:
         """End `serve`, from any thread."""
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._loop.stop)
+
+
+def _unless_closed(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """A tab that was closed while the page spoke to it is no fault: nobody wants a traceback of it in the terminal."""
+    if not isinstance(context.get("exception"), WebSocketClosedError | StreamClosedError):
+        loop.default_exception_handler(context)
+
+
+def _not_of_closed(record: logging.LogRecord) -> bool:
+    """Everything but Bokeh's warning of the same."""
+    return "connection was closed" not in record.getMessage()
 
 
 def _only_needed(resources: Callable[..., Any]) -> Callable[..., Any]:

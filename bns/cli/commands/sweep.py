@@ -40,6 +40,20 @@ def add_commands(command: Adder) -> None:
         help="stop when the ten best combinations of each task are known; others get no further runs",
     )
     many.add_argument(
+        "--confidence",
+        type=float,
+        metavar="P",
+        help="with --until ranking: confidence, per task, that these are the ten best of the complete sweep (default 0.95; 1: "
+        "certainty)",
+    )
+    many.add_argument(
+        "--within",
+        type=float,
+        metavar="D",
+        help="with --until ranking: tolerance; the mean success (0 to 1) of an excluded combination may exceed that of the tenth "
+        "by less than D (default: 0)",
+    )
+    many.add_argument(
         "--dry-run", action="store_true", help="only say how many runs there are, how long they take and how much disk they need"
     )
     costs = command(
@@ -65,6 +79,9 @@ def sweep(options: argparse.Namespace) -> int:
     if options.until and (options.confirm_top or options.dry_run):
         other = "--confirm-top" if options.confirm_top else "--dry-run"
         raise SpecError(f"--until {options.until} ends a sweep early, and {other} is about whole ones. Leave one of them out.")
+    asked = {name: value for name in ("confidence", "within") if (value := getattr(options, name)) is not None}
+    if asked and not options.until:
+        raise SpecError(f"{' and '.join(f'--{name}' for name in asked)}: only with --until ranking")
     files = [load_sweep(file) for file in options.files]
     sweeps = in_turn(files, options.results, options.confirm_top)
     backend = load_executor(backend_name(options))
@@ -83,7 +100,7 @@ def sweep(options: argparse.Namespace) -> int:
         failed = 0
         for one in sweeps:
             if options.until:
-                summary, ranking = run_until_ranked(backend, one, request)
+                summary, ranking = run_until_ranked(backend, one, request, **asked)
                 print(ranking.in_words())
             else:
                 summary = backend.carry_out(one, request)

@@ -28,5 +28,6 @@ EFFECT = Effect(
     residuals="Fast commands fall short, slow ones fit; curves in which both wheels are fast become straighter.",
     lookalikes=("turn-slip", "acceleration-limit"),
     sentence="the speed of the wheels is limited",
+    measurement="command full speed and log the wheels' own speeds (encoders)",
     apply=apply,
 )

@@ -24,5 +24,6 @@ EFFECT = Effect(
     residuals="Arcs are too short, sharp ones most, left and right alike; straight commands and headings fit.",
     lookalikes=("speed-gain", "wheelbase", "side-slip"),
     sentence="turning costs forward speed",
+    measurement="log the wheels' own speeds (encoders) in curves: they follow the commands although the robot is slower",
     apply=apply,
 )

@@ -28,6 +28,7 @@ EFFECT = Effect(
     residuals="Sharp arcs are far too short, wide ones nearly right, left and right alike; headings fit.",
     lookalikes=("turn-slip", "side-slip"),
     sentence="turning costs forward speed, in proportion to the square of the turn rate",
+    measurement="log the wheels' own speeds (encoders) in curves: they follow the commands although the robot is slower",
     beside={
         "turn-slip": "The loss grows differently with turn rate: drive arcs at one speed and two turn rates, one twice the other."
     },

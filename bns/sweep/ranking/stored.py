@@ -12,10 +12,11 @@ import numpy as np
 from bns.spec import FIELDS, RunSpec
 from bns.store.read.reader import finished, query
 from bns.sweep.expand.grid import Sweep
-from bns.sweep.ranking.race import Results, next_runs
+from bns.sweep.ranking.race import Aim, Results, next_runs
 
 BEST = 10
 """How many combinations of each task are ranked."""
+USUAL = Aim(BEST)
 
 
 @dataclass
@@ -23,6 +24,7 @@ class Race:
     """Of a whole sweep. Its rounds follow from results of earlier rounds alone, so that it goes the same way after any kill."""
 
     sweep: Sweep
+    aim: Aim = USUAL
     tasks: dict[str, list[int]] = field(init=False)
     """Numbers of the combinations of each task, in the order of the file."""
     results: dict[str, Results] = field(init=False)
@@ -67,7 +69,7 @@ class Race:
         runs = [
             (self.tasks[task][place], self.sweep.first_seed + seed)
             for task, results in self.results.items()
-            for place, seed in next_runs(results, BEST)
+            for place, seed in next_runs(results, self.aim)
         ]
         return sorted(runs, key=lambda run: run[1])
 

@@ -12,8 +12,8 @@ from bns.sweep.confirm import best
 from bns.sweep.executors import Backend
 from bns.sweep.expand.grid import Sweep
 from bns.sweep.ranking.confidence import confidences
-from bns.sweep.ranking.race import possible
-from bns.sweep.ranking.stored import BEST, Race, results_of
+from bns.sweep.ranking.race import Aim, possible
+from bns.sweep.ranking.stored import BEST, USUAL, Race, results_of
 from bns.sweep.request import Request
 from bns.sweep.runner import Summary
 
@@ -40,6 +40,7 @@ class Ranking:
     open: int
     runs: int
     total: int
+    aim: Aim = USUAL
 
     @property
     def saved(self) -> float:
@@ -53,19 +54,29 @@ class Ranking:
             told = ", ".join(f"{name} {value}" for name, value in one.combination.items() if name != "task")
             lines.append(f"{one.task:12} {one.place:5} {one.success:8.3f} {one.confidence:10.1%}  {told}")
         state = "decided" if not self.open else f"not decided: {self.open} more combinations may be among them"
-        lines.append(f"the {BEST} best of each task are {state}; {self.runs} of {self.total} runs, {self.saved:.0%} saved")
+        sure = "for certain" if self.aim.confidence == 1.0 else f"at {self.aim.confidence:.4g} confidence for each task"
+        lines.append(f"the {BEST} best of each task are {state} ({sure})")
+        lines[-1] += f"; {self.runs} of {self.total} runs, {self.saved:.0%} saved"
+        if self.aim.within:
+            lines.append(f"what is left out may be better than the last of them by less than {self.aim.within:g} of mean success")
         return "\n".join(lines)
 
 
-def run_until_ranked(backend: Backend, sweep: Sweep, request: Request) -> tuple[Summary, Ranking]:
+def run_until_ranked(
+    backend: Backend, sweep: Sweep, request: Request, *, confidence: float = Aim.confidence, within: float = Aim.within
+) -> tuple[Summary, Ranking]:
     """Carry out rounds until the best combinations are known, or the budget or a signal ends it.
 
+    ``confidence`` that the best of a task are those of the complete sweep, 1 for certain; ``within``: what is left out may
+    be better than the last of them by less than this mean success.
+
     Raises:
-        SpecError: only one shard is to be done.
+        SpecError: only one shard is to be done, or ``confidence`` or ``within`` cannot be.
     """
     if request.shard is not None:
         raise SpecError("--until ranking decides by the results of all runs; leave --shard out, or give --executor slurm.")
-    race, tried, new, new_failed = Race(sweep), set[str](), 0, 0
+    aim = _aim(confidence, within)
+    race, tried, new, new_failed = Race(sweep, aim), set[str](), 0, 0
     while True:
         stored, success = results_of(request.results, sweep.name)
         failed = {run for run, status in stored.items() if status != "ok"} if request.retry_failed else set()
@@ -92,12 +103,20 @@ def ranking(race: Race, folder: Path) -> Ranking:
         results = race.results[task]
         own = [race.sweep.combos.index(combo) for combo in chosen]
         places = [numbers.index(number) for number in own if number in numbers]
-        sure, (mean, _) = confidences(results, places, BEST), results.bounds()
+        sure, (mean, _) = confidences(results, places, race.aim), results.bounds()
         for at, (place, confidence) in enumerate(zip(places, sure, strict=True), 1):
             found.append(Ranked(task, at, race.sweep.combos[numbers[place]], float(mean[place]), confidence))
-    left = sum(int((possible(results, BEST) & ~results.whole).sum()) for results in race.results.values())
+    left = sum(int((possible(results, race.aim) & ~results.whole).sum()) for results in race.results.values())
     done = sum(int(results.seen.sum()) for results in race.results.values())
-    return Ranking(tuple(found), left, done, race.sweep.described)
+    return Ranking(tuple(found), left, done, race.sweep.described, race.aim)
+
+
+def _aim(confidence: float, within: float) -> Aim:
+    if not 0.5 <= confidence <= 1.0:
+        raise SpecError(f"confidence is a number from 0.5 to 1 (1: for certain), not {confidence}")
+    if not 0.0 <= within < 1.0:
+        raise SpecError(f"within is a difference of mean success, a number from 0 to less than 1, not {within}")
+    return Aim(BEST, confidence, within)
 
 
 def _counted(sweep: Sweep, race: Race, stored: dict[str, str], new: int, new_failed: int) -> Summary:

@@ -329,6 +329,25 @@ def test_a_silent_servo_leaves_the_stop_unconfirmed(chain, clock):
     assert "servo 1" not in stop.problem
 
 
+def test_a_stop_is_acknowledged_when_the_last_servo_has_confirmed_it_and_not_before(chain, clock):
+    driver, *_ = chain(Fault("silent-servo", at_s=2.0, for_s=0.3, servo=2))
+    driver.arm()
+    clock.sleep(2.0 - clock.now_s())
+    stop = driver.stop()
+    assert stop.confirmed
+    assert 0.3 <= stop.acknowledged_s <= stop.seconds <= 0.8
+    at_once = driver.stop()
+    assert 0.0 < at_once.acknowledged_s < 0.1
+    assert driver.stop(patience_s=0.0).acknowledged_s < 0.1
+
+
+def test_nothing_is_acknowledged_while_a_servo_is_silent(chain, clock):
+    driver, *_ = chain(Fault("silent-servo", at_s=1.0, for_s=1e9, servo=2))
+    driver.arm()
+    clock.sleep(1.0)
+    assert driver.stop(patience_s=0.5).acknowledged_s is None
+
+
 def test_stop_on_a_dead_line_does_not_raise(chain):
     driver, _, line = chain()
     line.cut()

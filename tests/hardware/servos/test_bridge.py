@@ -1,5 +1,7 @@
 """The Arduino bridge: frames as documented, the driver against an emulated bridge."""
 
+import itertools
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -118,6 +120,29 @@ def test_a_stop_waits_for_joints_that_are_turned(bridge, clock):
     assert stop.confirmed
     assert 0.3 < stop.seconds < 0.4
     assert stop.acknowledged_s < 0.05
+
+
+def test_a_stop_of_joints_that_stand_is_timed_from_its_order(bridge, clock):
+    driver, _ = bridge()
+    clock.sleep(3.0)
+    stop = driver.stop()
+    assert stop.confirmed
+    assert 0.0 < stop.acknowledged_s <= stop.seconds < 0.2
+
+
+def test_no_question_has_the_number_of_one_of_the_255_before(bridge):
+    driver, _ = bridge()
+    numbers, real = [], driver._once
+
+    def asked(frame, timeout_s):
+        numbers.append(frame.sequence)
+        return real(frame, timeout_s)
+
+    driver._once = asked
+    for _ in range(260):
+        driver.health()
+    assert [(b - a) % 256 for a, b in itertools.pairwise(numbers)] == [1] * 259
+    assert set(numbers) == set(range(256))
 
 
 def test_a_silent_servo_is_not_stopped(bridge):

@@ -161,3 +161,24 @@ def test_what_is_refused_is_refused_as_the_manual_says():
     assert asked(servo, clock, READ, [66, 0, 1, 0]) == 7  # nothing there
     assert asked(servo, clock, WRITE, [64, 0, 1]) == 0
     assert asked(servo, clock, WRITE, [*limit, 0, 2, 0, 0]) == 7  # locked while the torque is on
+
+
+def test_a_header_that_leads_nowhere_is_passed_over_wherever_it_ends():
+    wire = WIRES[1]
+    whole, short = wire.instruction(3, WRITE, b"\x20"), b"\xff\xff\x03\x00"
+    for cut in range(len(whole)):
+        assert wire.taken(whole[:cut])[0] is None
+    assert wire.taken(whole) == (Packet(3, WRITE, b"\x20"), b"")
+    assert wire.taken(short) == (None, b"\x00")
+    assert wire.taken(short + whole) == (Packet(3, WRITE, b"\x20"), b"")
+
+
+@pytest.mark.parametrize("protocol", [1, 2])
+def test_an_answer_is_whole_only_behind_its_header_and_with_all_of_its_bytes(protocol):
+    wire = WIRES[protocol]
+    answer = wire.status(3, 0, b"\x20")
+    assert wire.seems_whole(answer)
+    for cut in range(6 * protocol, len(answer)):
+        assert not wire.seems_whole(answer[:cut]), cut
+    for at in (0, 1):
+        assert not wire.seems_whole(answer[:at] + b"\x00" + answer[at + 1 :])

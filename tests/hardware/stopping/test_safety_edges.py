@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
@@ -185,3 +186,47 @@ def test_another_thread_takes_no_signals_over():
     thread.start()
     thread.join()
     assert found == [before, "asked for"]
+
+
+EARLY_S = 0.125  # no multiple of what follows: a remainder is no difference here
+
+
+def test_the_next_look_is_after_a_tick_or_when_a_picture_is_overdue(hands):
+    looked = watch(hands)
+    assert looked.next_look_s(0.5, None) == 0.5
+    assert looked.next_look_s(0.125, BEGIN_S) == 0.125
+    assert looked.next_look_s(8.0, BEGIN_S) == pytest.approx(0.255)
+    assert looked.next_look_s(8.0, BEGIN_S - 10.0) == pytest.approx(0.255)  # the drive began later than that picture
+    hands.t_s = BEGIN_S + 0.125
+    assert looked.next_look_s(8.0, BEGIN_S) == pytest.approx(0.13)
+    assert looked.next_look_s(8.0, BEGIN_S + 0.0625) == pytest.approx(0.1925)
+    hands.t_s = BEGIN_S + 1.0
+    assert looked.next_look_s(8.0, BEGIN_S) == pytest.approx(0.005)
+
+
+def test_a_picture_is_overdue_beyond_the_limit_and_not_on_it(hands):
+    looked = watch(hands)
+    assert not looked.overdue(BEGIN_S)
+    hands.t_s = BEGIN_S + 0.25
+    assert not looked.overdue(BEGIN_S)
+    assert not looked.overdue(BEGIN_S - 10.0)
+    hands.t_s = BEGIN_S + 0.375
+    assert looked.overdue(BEGIN_S)
+    assert looked.overdue(BEGIN_S - 10.0)
+    assert not looked.overdue(BEGIN_S + 0.125)
+    assert not looked.overdue(BEGIN_S + 0.25)
+
+
+def test_pictures_are_timed_by_differences_from_the_first_second_on(hands):
+    hands.t_s = EARLY_S
+    looked = watch(hands)
+    hands.t_s = 0.5
+    assert looked.overdue(EARLY_S)
+    with pytest.raises(DriveEnded, match=r"no new picture for 0\.45 s"):
+        looked.check(seen(hands.t_s), picture_s=0.05)
+
+
+@pytest.mark.parametrize("fixed", [SURFACE, Limits(SURFACE)])
+def test_limits_cannot_be_changed_while_a_robot_drives(fixed):
+    with pytest.raises(FrozenInstanceError):
+        fixed.lost_s = 5.0

@@ -1,0 +1,77 @@
+"""What a diagnosis says on the page: the verdict, how large the effects are, what else it could be, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+from bns.api.diagnose import DiagnoseResult
+from bns.app.html import found_errors, found_numbers, mm
+from bns.diagnose.design.competing_models import competing_models_of
+from bns.diagnose.report.plain_language import certainty, headline
+from bns.diagnose.report.tables import ahead
+from bns.diagnose.values import numbers_of
+
+_SWITCH_ON = "Switch it on, see the error fall in the table, then save the extended model on the Next screen."
+_EITHER = (
+    "Switch on one of them: these measurements do not show which is right, and the table shows how well each predicts. The Next "
+    "screen saves the model, and its next experiment says what would decide."
+)
+_UNLISTED = (
+    "The screen “Where it fails” shows where and when the rest occurs. A formula of your own, below the effects, can describe it."
+)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An explanation that fits as well as the one that was accepted: its effects, and their parameters as fitted."""
+
+    names: tuple[str, ...]
+    numbers: Mapping[str, Mapping[str, Mapping[str, Any]]]
+
+
+def rivals(result: DiagnoseResult) -> tuple[Rival, ...]:
+    """Of a tie, with the numbers that `bns report` gives; none after any other verdict."""
+    if result.verdict != "tie":
+        return ()
+    others = competing_models_of(result.diagnosis)[1:]
+    fitted = [(other.names, numbers_of(other.fit)) for other in others]
+    return tuple(Rival(names, {n: numbers[n] for n in names if n in numbers}) for names, numbers in fitted)
+
+
+def verdict_html(result: DiagnoseResult, others: Sequence[Rival]) -> str:
+    """All of it; every text is escaped."""
+    d = result.diagnosis
+    sure = certainty(d)
+    words = "".join(f"<br>It behaves like this: {escape(each)}." for each in d.terms_in_words)
+    sizes = found_numbers(result.to_json()["parameters"])
+    either = "".join(f"<br>or{found_numbers(other.numbers)}" for other in others)
+    then = _then(result)
+    said = f"<b>{escape(headline(d))}</b> {escape(sure)}{sizes}{either}{words}" + (f"<br>{then}" if then else "")
+    notes = "".join(f"<li>{escape(note)}</li>" for note in d.notes if note not in sure)
+    listed = f"<ul id='bns-notes'>{notes}</ul>" if notes else ""
+    return f"<p id='bns-verdict'>{said}</p>{listed}{found_errors(d.errors_with_terms or d.errors)}"
+
+
+def _then(result: DiagnoseResult) -> str:
+    """The next step of somebody who has read the verdict."""
+    if result.verdict == "tie":
+        return _EITHER
+    if result.effects or result.diagnosis.terms:
+        return _SWITCH_ON
+    return {"none": _as_it_is(result), "unlisted": _UNLISTED}.get(result.verdict, "")
+
+
+def _as_it_is(result: DiagnoseResult) -> str:
+    """Nothing is missing: how good the model is, beside the best that these measurements could show."""
+    errors = result.diagnosis.errors
+    horizon = result.ready.predictor.near
+    if errors is None or not errors.horizons[horizon].windows:
+        return ""
+    e = errors.horizons[horizon]
+    return (
+        f"The model's position error {ahead(horizon)} ahead is {mm(e.models[0].rms_m)} mm; the noise of the tracking alone "
+        f"causes {mm(e.noise_floor_m)} mm. Nothing needs to be switched on: the Next screen saves it as it is, and the report."
+    )
