@@ -112,3 +112,9 @@ def test_acceptable_answers():
     slope = acceptable(World("w", "single", {"floor-slope": {"x_m_s": 0.01, "y_m_s": 0.0}}))
     assert [answer["verdict"] for answer in slope] == ["effects", "tie"]
     assert slope[1]["allowed"] == [("tether-pull",)]
+
+
+def test_causes_act_in_the_order_of_the_machine_however_a_world_names_them():
+    named = {"backlash": {"gap_m": 0.004}, "motor-lag": {"tau_s": 0.1}}
+    for hidden in (named, dict(reversed(named.items()))):
+        assert [type(one).__name__ for one in World("one", "triple", hidden=hidden).causes()] == ["MotorLag", "Backlash"]

@@ -56,8 +56,8 @@ class World:
         return ROBOTS[self.robot]
 
     def causes(self) -> list[Cause]:
-        """Everything that is hidden."""
-        listed = [cause(name, parameters) for name, parameters in self.hidden.items()]
+        """Everything that is hidden, in the order in which it acts: gears have play behind a motor that lags, not before it."""
+        listed = [cause(name, self.hidden[name]) for name in LISTED if name in self.hidden]
         return listed + [{**LISTED, **UNLISTED}[name](**parameters) for name, parameters in self.unlisted.items()]
 
     @property
