@@ -49,7 +49,7 @@ VARIABLES: Mapping[str, str] = {
     "y": "position north, m",
     "heading": "heading, rad",
     "moving": "1 while a wheel turns, else 0",
-    "swing": "difference between the direction of motion and that over the last half wheelbase of distance: 0 the same, "
+    "swing": "how far the present direction of motion differs from that over the last half wheelbase of distance: 0 the same, "
     "1 the opposite",
 }
 OF_A_WHEEL: Mapping[str, str] = {
