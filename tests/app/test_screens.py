@@ -251,4 +251,8 @@ def test_the_error_over_time_has_a_band_and_the_floor_says_the_noise():
     for source in screen._pictures._bands.values():
         assert (source.data["low"] < source.data["high"]).all()
     noise = tab.bench.as_given.errors.horizons["1s"].noise_floor_m
-    assert f"{1e3 * noise:.2f} mm" in screen._pictures.floor.title.text
+    for picture in (screen._pictures.floor, screen._path.figure):
+        assert f"{1e3 * noise:.2f} mm" in picture.title.text
+    screen._horizon.value = "5s"
+    noise = tab.bench.as_given.errors.horizons["5s"].noise_floor_m
+    assert f"{1e3 * noise:.2f} mm" in screen._path.figure.title.text

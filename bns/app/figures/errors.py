@@ -95,5 +95,9 @@ class WindowFigures:
         self.trial.xaxis.major_label_overrides = named  # as the lists name them, whatever the log counts from
         for span in self._noise:
             span.location = 1e3 * noise_floor_m if np.isfinite(noise_floor_m) else 0
-        noise = f"; noise of the tracking: {1e3 * noise_floor_m:.2f} mm" if np.isfinite(noise_floor_m) else ""
-        self.floor.title.text = f"On the floor: area grows with the error{noise}"
+        self.floor.title.text = f"On the floor: area grows with the error{noise_in_words(noise_floor_m)}"
+
+
+def noise_in_words(noise_floor_m: float) -> str:
+    """For the title of a picture without an axis of errors; "" where the noise is not known."""
+    return f"; noise of the tracking: {1e3 * noise_floor_m:.2f} mm" if np.isfinite(noise_floor_m) else ""

@@ -8,7 +8,7 @@ import pandas as pd
 import panel as pn
 
 from bns.api.compare import CompareResult
-from bns.app.figures.errors import WindowFigures
+from bns.app.figures.errors import WindowFigures, noise_in_words
 from bns.app.figures.paths import PathFigure
 from bns.app.html import mm, note, table, velocity
 from bns.app.jobs import Jobs
@@ -122,6 +122,8 @@ class WhereScreen:
         self._windows = self._bench.windows(predictor.steps(model), self._horizon.value)
         floor = self._shown.errors.horizons[self._horizon.value].noise_floor_m
         self._pictures.fill(self._windows, self._variable.value, floor)
+        if self._trial.value is not None:
+            self._path.figure.title.text = self._path_title()
         self._rows = []
         self._say_brushed([])
 
@@ -163,11 +165,18 @@ class WhereScreen:
         number = self._trial.value
         t_s, measured = self._bench.measured(number)
         path = self._bench.path(self._bench.ready.predictor.steps(self._shown.model), number)
-        self._path.fill(f"Trial {self._bench.ready.predictor.tracks.names[number]}", t_s, measured, path)
+        self._path.fill(self._path_title(), t_s, measured, path)
         if len(t_s) and t_s[-1] > 0:
             self._time.end = float(t_s[-1])
         self._mark()
         self._show_time()
+
+    def _path_title(self) -> str:
+        """Trial and noise, at the horizon of the other pictures."""
+        assert self._bench is not None
+        assert self._shown is not None
+        floor = self._shown.errors.horizons[self._horizon.value].noise_floor_m
+        return f"Trial {self._bench.ready.predictor.tracks.names[self._trial.value]}{noise_in_words(floor)}"
 
     def _show_time(self) -> None:
         self._path.at(min(self._time.value, self._time.end))
