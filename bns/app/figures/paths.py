@@ -41,7 +41,8 @@ class PathFigure:
         self._marked = ColumnDataSource({"x": [], "y": [], "color": []})
         self.figure.multi_line("x", "y", source=self._marked, line_color="color", line_width=7, line_alpha=0.45)
         self.figure.scatter("x", "y", source=self._dots, color="color", size=11, line_color="black")
-        self.figure.legend.location, self.figure.legend.background_fill_alpha = "top_left", 0.6
+        self.figure.add_layout(self.figure.legend[0], "above")  # inside it would cover where some path begins
+        self.figure.legend.orientation = "horizontal"
 
     def fill(self, title: str, t_s: Array, measured: Array, predicted: Array) -> None:
         """Poses (frames, 3) of both at the times ``t_s`` (frames,)."""

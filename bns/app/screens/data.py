@@ -45,8 +45,8 @@ class DataScreen:
         self._other = button("Columns and units", self._ask_columns, visible=False)
         self._said, self._picture = html(), LogFigure()
         self._findings, self._cut = FindingsPart(tab, self._to_part), CutPart(tab, self._to_part)
-        self._left_out = pn.widgets.MultiSelect(name="Trials left out", options=[], size=8, width=200)
-        self._leave = button("Leave these out", self._leave_out)
+        self._left_out = pn.widgets.MultiSelect(name="Trials excluded", options=[], size=8, width=200)
+        self._leave = button("Exclude these", self._leave_out)
         self._brushed = button("Exclude the selection in the picture", self._leave_selected)
         self._file.param.watch(lambda _event: self._read_uploaded(), "value")
         self._open_log = pn.Column(**WIDE)
@@ -196,7 +196,7 @@ class DataScreen:
     def _of_open_log(self) -> list[Any]:
         return [
             drawn(self._picture.figure),
-            html("<p>To leave out trials, choose them in the list, or tap or brush their paths above.</p>"),
+            html("<p>To exclude trials, choose them in the list, or tap or brush their paths above.</p>"),
             row(self._left_out, pn.Column(self._leave, self._brushed)),
             self._part_problem.view,
             self._findings.view,
