@@ -107,7 +107,7 @@ def test_the_strangers_effect_is_found_in_what_its_robot_did(done):
 
 def test_the_report_has_the_strangers_words(done, folder):
     page = (folder / "report.html").read_text()
-    assert "the robot turns less to the left than it is told to" in page
+    assert "the robot turns less to the left than commanded" in page
 
 
 def test_the_strangers_tracker_saw_the_trial(done, folder):
