@@ -22,6 +22,17 @@ from bns.registry import APPROACHES, WORLDS, Registry
 ENGINE_VERSION = 3
 """Raised whenever the same spec would give other numbers; part of every run's name."""
 
+APPROACH_VERSIONS: Mapping[str, int] = {
+    "anytime": 2,
+    "back-to-reality": 2,
+    "estimation-exploration": 2,
+    "transferability": 2,
+}
+"""Raised where a spec would give other numbers with one approach alone; part of its runs' names. The others have 1, unsaid.
+
+2: physics models are integrated in graded steps (`bns.bootstrap.simulators.GROWTH`).
+"""
+
 RADII_CM = (7, 10, 14, 20)
 """Radii of the goals, cm, at which success is recorded."""
 
@@ -122,12 +133,20 @@ class RunSpec:
     def canonical_json(self) -> str:
         """The spec and the engine's version as JSON with sorted keys: what the run's name is the hash of."""
         given = {name: value for name, value in dataclasses.asdict(self).items() if not _left_out(name, value)}
-        return json.dumps(given | {"engine_version": ENGINE_VERSION}, sort_keys=True, separators=(",", ":"))
+        given |= {"engine_version": ENGINE_VERSION}
+        if version := APPROACH_VERSIONS.get(self.approach.split(OPTION_MARK)[0]):
+            given |= {"approach_version": version}
+        return json.dumps(given, sort_keys=True, separators=(",", ":"))
 
     @property
     def run_id(self) -> str:
         """Name of the run: ``r`` and 20 hexadecimal digits (a letter first, so that no reader takes it for a number)."""
         return "r" + hashlib.sha256(self.canonical_json().encode()).hexdigest()[:20]
+
+
+def parameters_in(canonical: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters that a `RunSpec.canonical_json`, read back, was made from: all but the versions."""
+    return {name: value for name, value in canonical.items() if name not in {"engine_version", "approach_version"}}
 
 
 FIELDS: Mapping[str, dataclasses.Field[Any]] = {f.name: f for f in dataclasses.fields(RunSpec)}

@@ -6,7 +6,7 @@ import json
 import pytest
 
 from bns.errors import SpecError
-from bns.spec import FIELDS, RunSpec, checked
+from bns.spec import APPROACH_VERSIONS, FIELDS, RunSpec, checked, parameters_in
 
 
 def test_equal_specs_have_equal_names_and_every_field_changes_the_name():
@@ -26,6 +26,15 @@ def test_equal_specs_have_equal_names_and_every_field_changes_the_name():
 def test_name_begins_with_a_letter_and_the_engine_is_part_of_it():
     assert RunSpec().run_id[0] == "r"
     assert "engine_version" in json.loads(RunSpec().canonical_json())
+
+
+def test_the_version_of_an_approach_is_part_of_its_runs_names_alone():
+    for name, version in APPROACH_VERSIONS.items():
+        said = json.loads(RunSpec(approach=name).canonical_json())
+        assert said["approach_version"] == version
+        assert RunSpec(**parameters_in(said)) == RunSpec(approach=name)
+    assert "approach_version" in json.loads(RunSpec(approach="anytime+restart=0.1").canonical_json())
+    assert "approach_version" not in json.loads(RunSpec(approach="on-robot").canonical_json())
 
 
 def test_whole_numbers_and_shares_are_taken_as_their_own_type():

@@ -14,9 +14,14 @@ from bns.physics.wheels.differential_drive import simulate
 from bns.robots.base import RandomStream, Robot, Scores, TwoWheeled
 from bns.tasks import Task
 
-STEP_S = 0.05
-"""Integration step in evolution. Each step is an arc, so that only what changes within one is lost: the pose after ten commands
-departs by half a millimetre at most from that at 5 ms, in a tenth of the time."""
+STEP_S = 0.03
+GROWTH = 1.4
+"""Steps of a command in evolution: the first one in seconds, and by what factor each is longer than the one before.
+
+Speeds change early in a command and settle later, and each step is an arc, so that only what changes within one is lost. After ten
+commands with lag and slip, the median distance to the end at 5 ms is 0.05 mm (1 in 1,000: 0.2 mm). Equal steps of 50 ms are off
+by 0.1 mm (0.3 mm) and take 2.5 times as long.
+"""
 
 
 class Simulator(Protocol):
@@ -80,9 +85,12 @@ class PhysicsSimulator:
 
     def walk(self, population: Population, paths: np.ndarray, stream: RandomStream | None = None) -> Scores:
         """Fitness of paths (n, longest, 3) that were simulated already."""
-        driven = zip(paths, population.lengths, strict=True)
-        moved = np.vstack([self.robot.measured_displacements(path[:length]) for path, length in driven])
-        return self.robot.walk(population, moved, self.task, stream)
+        start = np.broadcast_to(self.robot.start_pose()[0], (len(paths), 1, paths.shape[2]))
+        there = np.arange(paths.shape[1] + 1) <= population.lengths[:, None]
+        joined = np.concatenate([start, paths], axis=1)[there]  # all paths in one: the way back to the start is left out
+        begins = np.cumsum(population.lengths + 1) - (population.lengths + 1)
+        moved = self.robot.measured_displacements(joined)
+        return self.robot.walk(population, np.delete(moved, begins, axis=0), self.task, stream)
 
     def paths(self, population: Population) -> np.ndarray:
         """Poses (n, longest, 3) of all controllers; a list that is shorter stays where it ends."""
@@ -91,7 +99,7 @@ class PhysicsSimulator:
         left, right, duration = self.robot.wheel_speeds_m_s(commands.reshape(-1, commands.shape[2]).astype(np.float64))
         there = np.arange(longest) < population.lengths[:, None]
         sides = (np.where(there, values.reshape(there.shape), 0.0) for values in (left, right, duration))
-        return simulate(replace(self.model, dt_s=STEP_S), *sides, start=self.robot.start_pose()[0])
+        return simulate(replace(self.model, dt_s=STEP_S), *sides, start=self.robot.start_pose()[0], growth=GROWTH)
 
     def plan(self, controller: np.ndarray, stream: RandomStream | None = None) -> np.ndarray:
         """A controller is driven as it is."""

@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 from bns.errors import BnsError, HardwareError, StoreError, TrialFileError
 from bns.hardware.link.hardware_log import events
 from bns.measurements import write_measurements
-from bns.spec import RunSpec
+from bns.spec import RunSpec, parameters_in
 from bns.trial.driver import REPEATED, Stuck
 from bns.trial.evaluation import Evaluation
 
@@ -76,8 +76,7 @@ class TrialFolder:
 def spec_of(journal: Path) -> RunSpec:
     """The spec that a journal was driven with."""
     for event in events(journal, "trial"):
-        given = {name: value for name, value in event["spec"].items() if name != "engine_version"}
-        return RunSpec(**given)
+        return RunSpec(**parameters_in(event["spec"]))
     raise HardwareError(f"{journal} does not say which run it is of; name the journal.jsonl of a trial.")
 
 

@@ -40,6 +40,20 @@ def test_a_model_s_scores_are_those_of_its_drives_in_the_world():
         assert scores.fitness[i] == pytest.approx(KHEPERA.evaluate_path(driven, TASK)[0], rel=1e-2)
 
 
+def test_displacements_of_many_lists_at_once_are_those_of_each_list():
+    simulator, seen = PhysicsSimulator(KHEPERA, TASK, load_model("khepera")), []
+    population = KHEPERA.initial_population(KEY, 30, 4, 13)
+    paths = simulator.paths(population)
+
+    class Watched(type(KHEPERA)):
+        def walk(self, population, displacements, task, stream=None):
+            seen.append(displacements)
+
+    PhysicsSimulator(Watched(), TASK, simulator.model).walk(population, paths)
+    each = [KHEPERA.measured_displacements(path[:n]) for path, n in zip(paths, population.lengths, strict=True)]
+    np.testing.assert_array_equal(seen[0], np.vstack(each))
+
+
 def test_without_a_simulator_paths_are_unknown_and_nobody_is_fit():
     simulator, population = NoSimulator(KHEPERA, TASK), KHEPERA.initial_population(KEY, 5, 4, 8)
     assert np.isnan(simulator.poses(population.controller(0))).all()

@@ -1,11 +1,15 @@
 """Drives whose result is known on paper."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from bns.bootstrap.simulators import GROWTH, STEP_S
 from bns.errors import ModelError
 from bns.physics.model import Model
 from bns.physics.wheels.differential_drive import observe, simulate, track
+from bns.physics.wheels.grid import step_grid
 
 B = 0.0884
 IDEAL = Model(wheelbase_m=B)
@@ -170,3 +174,30 @@ def test_what_cannot_be_seen_is_refused():
         track(IDEAL, [[0.1]], [[0.1]], [[1.0]], dense_dt_s=0)
     with pytest.raises(ModelError, match=r"last axis must be x_m, y_m, heading_rad"):
         observe([0.0, 1.0], None, IDEAL)
+
+
+def test_few_steps_that_grow_within_a_command_are_as_exact_as_many_equal_ones():
+    rng = np.random.default_rng(2)
+    model = Model(B).with_effect("motor-lag", tau_s=0.1).with_effect("turn-slip", slip_s=0.05)
+    left, right = rng.uniform(0.02, 0.2, (2, 60, 10))
+    duration = rng.uniform(0.4, 3.0, (60, 10))
+    duration[::3, 7:] = 0.0  # short lists
+
+    def off_mm(dt_s, growth):
+        ends = simulate(replace(model, dt_s=dt_s), left, right, duration, growth=growth)
+        return 1000 * np.hypot(*(ends - simulate(model, left, right, duration))[:, -1, :2].T)
+
+    assert np.median(off_mm(STEP_S, GROWTH)) < min(0.2, np.median(off_mm(0.05, 1.0)))
+    assert off_mm(STEP_S, GROWTH).max() < 0.5
+    grid = step_grid(left, right, duration, STEP_S, GROWTH)
+    assert grid.step_s.shape[1] < step_grid(left, right, duration, 0.05).step_s.shape[1] / 3
+    ends_s = np.take_along_axis(grid.node_s, grid.ends, axis=1)
+    np.testing.assert_allclose(ends_s, np.cumsum(duration, axis=1), atol=1e-12)  # no time is lost or added
+
+
+@pytest.mark.parametrize("growth", [1.0, 1.4])
+def test_a_command_of_whole_steps_has_no_empty_step_more(growth):
+    edges = STEP_S * (growth ** np.arange(1, 6) - 1) / (growth - 1) if growth > 1 else STEP_S * np.arange(1, 6)
+    grid = step_grid(np.ones((5, 1)), np.ones((5, 1)), edges[:, None], STEP_S, growth)
+    assert grid.ends[:, 0].tolist() == [1, 2, 3, 4, 5]
+    np.testing.assert_allclose(grid.step_s.sum(axis=1), edges)

@@ -12,6 +12,7 @@ import pandas as pd
 from bns.api.run import RunResult, run_spec, spec_of
 from bns.app.background import Tell
 from bns.errors import StoreError
+from bns.spec import parameters_in
 from bns.store import query
 
 PARAMETERS = (
@@ -103,8 +104,7 @@ class Study:
         rows = query(self.results, f"SELECT spec FROM runs WHERE run_id = '{_checked(run_id)}' LIMIT 1")
         if rows.empty:
             raise StoreError(f"There is no run {run_id} in {self.results}.")
-        fields = {k: v for k, v in json.loads(rows["spec"][0]).items() if k != "engine_version"}
-        result = run_spec(spec_of(fields), progress=tell)
+        result = run_spec(spec_of(parameters_in(json.loads(rows["spec"][0]))), progress=tell)
         if result.run_id != run_id:
             raise StoreError(
                 f"The run {run_id} is of another engine version; repeated, it would be {result.run_id}, with different results."

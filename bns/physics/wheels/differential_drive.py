@@ -43,6 +43,7 @@ def simulate(
     *,
     start: ArrayLike = (0.0, 0.0, 0.0),
     normals: ArrayLike | None = None,
+    growth: float = 1.0,
 ) -> Array:
     """True poses at the end of every command, (batch, commands, 3): x_m, y_m, heading_rad (unwrapped).
 
@@ -50,13 +51,13 @@ def simulate(
     a duration of 0 pads a short trial. ``start`` is one pose or (batch, 3). ``normals`` (batch, commands,
     2) scale the jitter of left and right; without them there is none. Lag and delay run on from command
     to command; a pose is taken when its command's time is over, and coasting after the last is not seen.
-    ModelError if shapes do not agree or a number is not finite.
+    ``growth``: of the steps within a command (`step_grid`). ModelError if shapes do not agree or a number is not finite.
     """
     left, right, duration = _jittered(model, _commands(left_m_s, right_m_s, duration_s), normals)
     poses0 = _start(start, len(left))
     poses = np.empty((*left.shape, 3))
     for rows in _chunks(len(left)):
-        grid = step_grid(left[rows], right[rows], duration[rows], model.dt_s)
+        grid = step_grid(left[rows], right[rows], duration[rows], model.dt_s, growth)
         nodes = _integrate(model, grid, poses0[rows])
         if any(model.at("clock")):
             _sample(poses[rows], taken_at(model, np.cumsum(duration[rows], axis=1)), grid.node_s, nodes)
