@@ -191,3 +191,16 @@ def _no_elbow():
     from tests.jointed.arm import log
 
     return log(1).drop(columns=["elbow_set_rad"])
+
+
+def test_a_joint_without_torque_is_not_put_where_its_servo_was_told_to_bring_it():
+    body = machine(SNAKE.mechanism)
+    postures = np.vstack([cycle_angles(GAITS[0])[3:5], cycle_angles(GAITS[0])])
+    drive = through_postures(SNAKE.mechanism, postures, body.model.opt.timestep, np.zeros(3), before=2)
+    simulator, joint = Simulator(body, [drive], 1), 4
+    at = 1 + body.joint_at[joint]
+    silent = body.plant.with_joint("torque", body.plant.joints[joint], 0.0)
+    told = drive.set_points[0, joint]
+    assert abs(told) > 0.2
+    assert simulator.settled(body.plant)[0, at] == pytest.approx(told, abs=0.05)
+    assert abs(simulator.settled(silent)[0, at]) < 0.1

@@ -26,7 +26,7 @@ from bns.diagnose.estimate.normal_equations import (
     normal_equations,
     normal_equations_by_trial,
 )
-from bns.diagnose.estimate.parameters import FreeParameter, active_mask, increment, moved_by
+from bns.diagnose.estimate.parameters import FreeParameter, active_mask, increment, increments, moved_by
 from bns.diagnose.estimate.significance import PairedComparison, paired_elpd_diff, sign_flip_p
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.settings import DEFAULTS
@@ -189,8 +189,9 @@ class Problem:
             fresh = lower is None or model.per_trial_effect is not None or gain < _TRUSTED * predicted_decrease
             if fresh:
                 reduced = self._jacobian(at, free)
-        if not fresh and rounds is None:
-            reduced = self._jacobian(at, free)
+        rough = self.predictor.luck is not None
+        if rounds is None and (rough or not fresh):
+            reduced = self._jacobian(at, free, wide=rough)
         return self._concluded(at.model, free, at.whitened, reduced.jacobian)
 
     def _point(self, model: Model) -> _Point:
@@ -283,19 +284,32 @@ class Problem:
         return np.stack(out, axis=2)
 
     def _jacobian(
-        self, at: _Point, free: Sequence[FreeParameter], nearby: Mapping[FreeParameter, Array] | None = None
+        self,
+        at: _Point,
+        free: Sequence[FreeParameter],
+        nearby: Mapping[FreeParameter, Array] | None = None,
+        wide: bool = False,
     ) -> ReducedJacobian:
-        """By differences, but for numbers whose columns are known; clocks of trials shift those, and all are worked out anew."""
+        """By differences, but for numbers whose columns are known; clocks of trials shift those, and all are worked out anew.
+
+        ``wide``: over a good part of what is plausible, to the side where less changes. The response of a body to a servo's
+        strength has steps, and the slope within one says that a number is known far better than it is.
+        """
         nearby = nearby if nearby and at.model.per_trial_effect is None else {}
         out = np.zeros((*at.whitened.shape, len(free)))
         for j, number in enumerate(free):
             if number in nearby:
                 out[..., j] = nearby[number]
                 continue
-            small = increment(number, number.of(at.model))
-            changed = moved_by(at.model, free, small * np.eye(len(free))[j])
-            out[..., j] = (self.whitened(changed) - at.whitened) / small
+            slopes = [self._slope(at, free, j, by) for by in increments(number, number.of(at.model), wide)]
+            out[..., j] = min(slopes, key=lambda slope: float((slope**2).sum()))
         return eliminate_clocks(self, at.model, at.whitened, out)
+
+
+    def _slope(self, at: _Point, free: Sequence[FreeParameter], j: int, by: float) -> Array:
+        changed = moved_by(at.model, free, by * np.eye(len(free))[j])
+        slope: Array = (self.whitened(changed) - at.whitened) / by
+        return slope
 
 
 def chance(joint: NormalEquations, base_numbers: int) -> float:

@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Parameter
 from bns.physics.model import Model
+
+_WIDE = DEFAULTS.predict.node_long
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,16 @@ def increment(number: FreeParameter, value: float) -> float:
     usual = 1e-3 * (abs(value) if np.isinf(p.neutral) else p.plausible[1] - p.plausible[0])
     scale = p.resolution or usual
     return -scale if value + scale > p.high else scale
+
+
+def increments(number: FreeParameter, value: float, wide: bool = False) -> list[float]:
+    """Steps for differences: `increment`; or ``wide`` ones, to both sides as far as the bounds leave room for half of one."""
+    p = number.parameter
+    far = _WIDE * (p.plausible[1] - p.plausible[0])
+    if not wide or not np.isfinite(far):
+        return [increment(number, value)]
+    ways = [min(far, p.high - value), -min(far, value - p.low)]
+    return [way for way in ways if abs(way) >= far / 2] or [increment(number, value)]
 
 
 def active_mask(model: Model, free: Sequence[FreeParameter], gradient: Array) -> NDArray[np.bool_]:

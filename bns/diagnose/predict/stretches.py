@@ -12,7 +12,7 @@ from bns.physics.jointed.drives import Drive
 from bns.physics.jointed.mechanism import Mechanism, machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.jointed.plant import Plant, Sighting
-from bns.physics.jointed.simulate import Rest, Simulator
+from bns.physics.jointed.simulate import Rest, Simulator, replace_state
 from bns.physics.model import Model
 from bns.sweep.jobs.cores import cores
 
@@ -71,7 +71,10 @@ class Simulations:
 
     def seen_of(self, plant: Plant) -> Array:
         """The same of a plant."""
-        return _stacked(self._coarse.sightings(plant, self._rests[1]))
+        rest = self._rests[1]
+        if (np.minimum(plant.stiffness, plant.torque) < 1).any():  # a servo that gives no torque did not bring its joint anywhere
+            rest = replace_state(rest, self._coarse.settled(plant))
+        return _stacked(self._coarse.sightings(plant, rest))
 
     @property
     def plant(self) -> Plant:

@@ -61,23 +61,32 @@ class Simulator:
         """Rows simulated so far."""
 
     def at_rest(self) -> Rest:
-        """Every body put down in the first posture of its drive, come to rest; then driven once for where it is first seen."""
-        hold = round(SETTLE_S / self._dt_s)
-        put = self._put_down()
-        held = [Drive(np.repeat(d.set_points[:1], hold, axis=0), np.array([hold]), d.begin) for d in self.drives]
-        resting = Simulator(self.machine, held, self._threads)
-        nothing = np.zeros(len(held))
-        rest = Rest(put, nothing, np.zeros((len(held), 2)), np.zeros((len(held), 2)))
-        _, settled = resting._stepped(self.machine.plant, rest)
+        """Every body come to rest in the first posture of its drive; then driven once for where it is first seen."""
+        settled = self.settled(self.machine.plant)
+        rest = self._unmoved(settled)
         begin = np.array([d.begin for d in self.drives])
         if not self.machine.free:
-            return Rest(settled, nothing, np.zeros((len(held), 2)), np.zeros((len(held), 2)))
+            return rest
         first = Simulator(
             self.machine, [Drive(d.set_points, d.frames[:1], d.begin) for d in self.drives], self._threads
         )
-        seen = first.sightings(self.machine.plant, replace_state(rest, settled)).point_m
+        seen = first.sightings(self.machine.plant, rest).point_m
         middle, heading = _poses(seen)
         return Rest(settled, begin[:, 2] - heading, middle, begin[:, :2])
+
+    def settled(self, plant: Plant) -> Array:
+        """States (drives, n) of every body put down in the first posture of its drive and come to rest.
+
+        A joint is put down as far from its rest position to its set point as its servo is strong: one that gives no torque has
+        not moved there.
+        """
+        hold = round(SETTLE_S / self._dt_s)
+        held = [Drive(np.repeat(d.set_points[:1], hold, axis=0), np.array([hold]), d.begin) for d in self.drives]
+        _, settled = Simulator(self.machine, held, self._threads)._stepped(plant, self._unmoved(self._put_down(plant)))
+        return settled
+
+    def _unmoved(self, state: Array) -> Rest:
+        return Rest(state, np.zeros(len(state)), np.zeros((len(state), 2)), np.zeros((len(state), 2)))
 
     def sightings(self, plant: Plant, rest: Rest) -> Sighting:
         """What is seen in every frame of every drive, one after the other; (frames, sites, 2) each."""
@@ -93,14 +102,14 @@ class Simulator:
         moved[:, :, 0] += rest.begin_m[which][:, None]
         return Sighting(moved[:, :, 0], moved[:, :, 1], moved[:, :, 2])
 
-    def _put_down(self) -> Array:
-        """States with every joint at its first set point, the lowest geom just above the floor."""
-        m = self.machine
+    def _put_down(self, plant: Plant) -> Array:
+        """States with every joint at its first set point, as far as its servo is strong; the lowest geom just above the floor."""
+        m, strength = self.machine, np.clip(np.minimum(plant.stiffness, plant.torque), 0.0, 1.0)
         data, model = mujoco.MjData(m.model), m.model
         rows = np.zeros((len(self.drives), mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
         for row, drive in zip(rows, self.drives, strict=True):
             qpos = model.qpos0.copy()
-            qpos[m.joint_at] = drive.set_points[0]
+            qpos[m.joint_at] += strength * (drive.set_points[0] - qpos[m.joint_at])
             if m.free:
                 data.qpos[:] = qpos
                 mujoco.mj_kinematics(model, data)
