@@ -282,14 +282,15 @@ def check_renderable(spec: RunSpec, world: World, path: Path) -> None:
 def _text(r: RunResult) -> str:
     evals, spec = r.result.tables["evals"], r.spec
     names = [f"success_{cm}cm" for cm in RADII_CM]
-    within = [f"within {cm} cm: " for cm in RADII_CM]
+    within = [f"  within {cm:2} cm: " for cm in RADII_CM]
     if evals[names[0]][0] is None:
-        names, within = ["success"], [""]
+        names, within = ["success"], ["  "]
     reached = [text + _first(evals[name], evals["evaluation"]) for text, name in zip(within, names, strict=True)]
     return "\n".join(
         [
             f"run {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {spec.evaluations} evaluations in {r.wall_s:.1f} s",
-            "the fittest controller reaches all goals: " + "; ".join(reached),
+            "the fittest controller reaches all goals:",
+            *reached,
             f"its fitness at the end: {evals['fitness_simulation'][-1]:.3f} in simulation, "
             f"{evals['fitness_world'][-1]:.3f} in the world ({spec.world})",
             *(f"{kind}: {path}" for kind, path in r.files.items()),
