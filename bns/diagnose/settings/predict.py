@@ -58,7 +58,10 @@ class Predict:
         f"plausible range; {BY_HAND}.",
     )
     screening_shares: tuple[float, ...] = setting(
-        (0.6, 1.2), "1", f"As `response_shares`, for the screening of effects, where fewer nodes are enough; {BY_HAND}."
+        (0.6, 1.2),
+        "1",
+        "Nodes of a response curve while effects are screened, in the same unit as `response_shares`; fewer are enough "
+        f"there; {BY_HAND}.",
     )
     response_clipped_m: float = setting(
         0.5,

@@ -17,9 +17,9 @@ class Residuals:
     field_bumps: int = setting(5, "bumps", f"Basis functions per side of a field over the floor; {BY_HAND}.")
     penalties: tuple[float, ...] = setting(
         (1.0, 30.0),
-        "1",
-        "How strongly curves are shrunk to zero, in expected squares of the standardised curve; the better value is "
-        f"used; {BY_HAND}.",
+        "trials",
+        "How strongly a curve is shrunk towards zero: as if so many typical trials said that it is zero. Both are tried, "
+        f"and the one that predicts held-out trials better is used; {BY_HAND}.",
     )
     chance: float = setting(0.02, "1", f"Probability of any false alarm over all variables and channels; {BY_HAND}.")
     least: float = setting(
@@ -181,7 +181,9 @@ class Residuals:
         "counts in it.",
     )
     outlier_far: float = setting(
-        6.0, "standard deviations", f"A window stands out if its error is this many times the median; {BY_HAND}."
+        6.0,
+        "standard deviations",
+        f"A window stands out if its error is this many robust standard deviations of all windows' errors; {BY_HAND}.",
     )
     outlier_moved: float = setting(
         5.0,
