@@ -29,11 +29,12 @@ def notes_on(
     hint: Candidate | None,
     longer: Sequence[tuple[str, ...]] = (),
     terms: Sequence[str] = (),
+    slight: Sequence[str] = (),
 ) -> Iterator[str]:
     """All notes, one sentence or two each.
 
     ``hint``: an effect that more trials might confirm; ``longer``: explanations with one effect more that fit as well;
-    ``terms``: the terms in words.
+    ``terms``, ``slight``: the terms in words.
     """
     selection = found.selection
     for name, why in selection.implausible.items():
@@ -52,6 +53,11 @@ def notes_on(
         yield (
             f"{' with '.join(found.withdrawn)} would raise the likelihood, but not improve predictions of held-out trials "
             "(root mean square on the same windows). So it is not presented as an explanation."
+        )
+    if slight:
+        yield (
+            f"What is left is certain but slight: {'; '.join(slight)}. A term for it lowers no error on held-out trials by "
+            f"{LEAST_FALL:.0%} for certain, so the verdict does not count it."
         )
     for name, numbers in found.negligible.items():
         said = ", ".join(f"{key} = {number['value']:.3g} {number['unit']}" for key, number in numbers.items())

@@ -245,7 +245,7 @@ def _diagnosed(
         imitating=found.imitating,
         errors=found.errors,
         errors_with_terms=found.errors_with_terms,
-        notes=tuple(notes_on(found, predictor.tracks, hint, pairs, words)),
+        notes=tuple(notes_on(found, predictor.tracks, hint, pairs, words, [in_words(t, predictor) for t in found.slight])),
         calibration=calibrated(predictor, model, barred),
     )
 

@@ -14,7 +14,7 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.diagnose.residuals.established import Established, established, left_over
 from bns.diagnose.residuals.symbolic import Formula, best_formula
-from bns.diagnose.residuals.unexplained import Unexplained, unexplained
+from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.negligible import LEAST_FALL, negligible
 from bns.diagnose.select.result import SelectionResult, certainly_lower
@@ -51,6 +51,8 @@ class Outcome:
     imitating: tuple[str, ...]
     negligible: dict[str, dict[str, dict[str, Any]]]
     terms: tuple[Formula, ...]
+    slight: tuple[Formula, ...]
+    """Terms that describe all that is left, which is certain and lowers no held-out error by `least_fall`."""
     errors_with_terms: PairedErrors | None
     formula: Formula | None
     """The first term; without terms, a formula fitted to the variable along which most is left, where it earns something."""
@@ -59,17 +61,22 @@ class Outcome:
 def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, tick: Callable[[str], None]) -> Outcome:
     """Which of the effects that a search accepted are presented, and with which terms.
 
-    Effects that only imitate what is left give way to its terms, if the terms matter; else the effects stay as they are.
+    Effects that only imitate what is left give way to its terms, if the terms matter; else the effects stay as they are. What
+    terms describe wholly, and which lowers no error that matters, counts as nothing left.
     """
     stands = _standing(searched, predictor, given, tick)
     imitating: tuple[str, ...] = ()
     terms: tuple[Formula, ...] = ()
+    slight: tuple[Formula, ...] = ()
     with_terms: PairedErrors | None = None
     if found := _established(stands.selection, predictor, stands.rest):
         lost = tuple(name for name in stands.selection.accepted if name not in found.names)
         next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
         errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
-        if errors is None or next_to.rest.any or _matters(errors):
+        matters = errors is None or _matters(errors)
+        if not matters and next_to.rest.any and not _unexplained_beside(found).any:
+            slight, stands = found.terms, replace(stands, rest=NOTHING)
+        elif matters or next_to.rest.any:
             stands, imitating, terms, with_terms = next_to, lost, found.terms, errors
     whole = stands.selection
     tiny = () if terms else _negligible(whole)
@@ -86,6 +93,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         imitating,
         {name: numbers for name, numbers in numbers_of(whole.fit).items() if name in tiny},
         terms,
+        slight,
         with_terms,
         formula,
     )
@@ -108,17 +116,35 @@ def errors_before_and_after(selection: SelectionResult, given: Model) -> PairedE
 
 
 def _standing(selection: SelectionResult, predictor: Predictor, given: Model, tick: Callable[[str], None]) -> Standing:
-    """The effects of a selection if the held-out error falls with them; else none."""
+    """The effects of a selection with which the held-out error falls: all, or those left when the worst were withdrawn."""
     tick("errors on trials held out")
     selection = refitted(selection, predictor, given)
     errors = errors_before_and_after(selection, given)
-    withdrawn: tuple[str, ...] = ()
-    if selection.accepted and not errors.falls:
-        withdrawn, selection = selection.accepted, selection.withdrawn()
-        errors = errors_before_and_after(selection, given)
+    searched = selection.accepted
+    while selection.accepted and not errors.falls:
+        selection, errors = _without_the_worst(selection, predictor, given)
+    withdrawn = tuple(name for name in searched if name not in selection.accepted)
     tick("what is left")
     dependence = residual_dependence(selection.problem, selection.fit)
     return Standing(selection, errors, withdrawn, dependence, unexplained(selection.problem, selection.fit, dependence))
+
+
+def _without_the_worst(
+    selection: SelectionResult, predictor: Predictor, given: Model
+) -> tuple[SelectionResult, PairedErrors]:
+    """The selection without the effect whose absence leaves the lowest held-out error, where possible one that lets it fall."""
+    if len(selection.accepted) == 1:
+        bare = selection.withdrawn()
+        return bare, errors_before_and_after(bare, given)
+    tried = [refitted(selection.lacking((name,)), predictor, given) for name in selection.accepted]
+    judged = [(one, errors_before_and_after(one, given)) for one in tried]
+    return min(judged, key=lambda pair: (not pair[1].falls, _relative(pair[1])))
+
+
+def _relative(errors: PairedErrors) -> float:
+    """The errors with the effects over those of the model as given, averaged over the horizons."""
+    ratios = [at.models[-1].rms_m / max(at.models[0].rms_m, 1e-12) for at in errors.horizons.values()]
+    return sum(ratios) / max(len(ratios), 1)
 
 
 def _negligible(selection: SelectionResult) -> tuple[str, ...]:
@@ -154,6 +180,11 @@ def _matters(errors: PairedErrors) -> bool:
         if change.fell and -change.change_m >= LEAST_FALL * before.rms_m:
             return True
     return False
+
+
+def _unexplained_beside(found: Established) -> Unexplained:
+    """What is left beside the terms."""
+    return unexplained(found.problem, found.fit, residual_dependence(found.problem, found.fit))
 
 
 def _errors_with_terms(selection: SelectionResult, given: Model, found: Established) -> PairedErrors:

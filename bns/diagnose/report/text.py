@@ -42,7 +42,10 @@ def diagnosis_text(d: Diagnosis) -> str:
 
 def _diagnosis(d: Diagnosis) -> Iterator[str]:
     yield f"verdict: {d.verdict}"
-    yield _VERDICTS[d.verdict].format(effects=" and ".join(d.effects) or "nothing listed")
+    if d.verdict == "unlisted" and d.effects:
+        yield f"Missing from the model: {' and '.join(d.effects)}, and something that no listed effect explains."
+    else:
+        yield _VERDICTS[d.verdict].format(effects=" and ".join(d.effects) or "nothing listed")
     if d.selection is not None:
         yield from (f"It behaves like this: {words}." for words in d.terms_in_words)
         yield from _numbers(d)

@@ -3,7 +3,8 @@
 What is left biases all that is fitted without it, and listed effects are accepted because they imitate it. So the search is
 done again with flexible terms (`grammar`) as candidates beside the accepted effects, on equal terms: whatever predicts trials
 held out best comes in first; an effect is preferred to a free curve only if the curve is not better for certain. In the end every
-effect must earn its place beside the terms, at the level that all candidates share.
+effect must earn its place beside the terms, at the level that all candidates share. An effect that a curve can draw earns nothing
+beside it, whatever is true: where effects alone do nearly all that the terms do, they stand.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ MIN_GAIN = DEFAULTS.select.min_gain
 TERMS = DEFAULTS.residuals.flexible_terms
 KEPT = DEFAULTS.residuals.kept_share
 KEPT_TERM = DEFAULTS.residuals.kept_share_of_term
+SPANNED = DEFAULTS.residuals.spanned_share
 WHOLE = DEFAULTS.residuals.whole_rounding
 CLEARLY = DEFAULTS.residuals.clearly_better
 
@@ -91,6 +93,7 @@ def established(
     state = _pruned(predictor, state, level)
     state = _without_needless_terms(predictor, state, accepted, level)
     state = _pruned(predictor, state, level, _alone(predictor, given, state))
+    state = _restored(predictor, state, accepted, level)
     terms = tuple(replace(term, fit=state.fit) for term in state.terms)
     return Established(state.names, terms, state.problem, state.fit)
 
@@ -177,6 +180,42 @@ def _without_needless_terms(
             terms = tuple(one for one in state.terms if one.name != term.name)
             state = _pruned(predictor, _State(problem, without, tuple(accepted), terms), level)
     return state
+
+
+def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect], level: float) -> _State:
+    """With the effects that do nearly all that the terms do: a curve that can draw an effect leaves nothing for it to earn.
+
+    As few of them as do so (`SPANNED`), under the noise of either model; then the terms that still earn their place beside them.
+    """
+    lost = {name: effect for name, effect in accepted.items() if name not in state.names}
+    if not lost or not state.terms:
+        return state
+    problem, model = state.problem, state.fit.model
+    for term in state.terms:
+        model = model.without(term.name)
+    bare = fit = problem.fit(model)
+    names = state.names
+    while _share(bare, fit, state.fit) < SPANNED:
+        tried = {name: fit_with(problem, fit, effect) for name, effect in lost.items() if name not in names}
+        best = min(tried, key=lambda name: float(tried[name].held_out.sum()), default="")
+        if not best or not _earns(problem.paired_comparison(fit, tried[best]), fit, level) or implausible(tried[best], best):
+            return state
+        fit, names = tried[best], (*names, best)
+    restored = replace(state, names=names, terms=()).settled(predictor, fit)
+    under_its_noise = restored.problem.fit(model), restored.fit, restored.problem.fit(state.fit.model)
+    if _share(*under_its_noise) < SPANNED:
+        return state
+    for term in state.terms:
+        again = fitted(restored.problem, restored.fit, term.on, term.term, term.name, term.signal, term.values)
+        if again is not None and _term_earns(again.paired_comparison, restored.fit, level):
+            restored = replace(restored.settled(predictor, again.fit), terms=(*restored.terms, again))
+    return restored
+
+
+def _share(bare: Fit, effects: Fit, terms: Fit) -> float:
+    """What effects gain on held-out trials, as a share of what terms gain."""
+    without = float(bare.held_out.sum())
+    return (without - float(effects.held_out.sum())) / max(without - float(terms.held_out.sum()), 1e-9)
 
 
 def _alone(predictor: Predictor, given: Model, state: _State) -> dict[str, float]:

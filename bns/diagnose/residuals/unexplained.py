@@ -28,6 +28,10 @@ class Unexplained:
         return bool(self.residual_dependence or self.autocorrelation or self.outliers)
 
 
+NOTHING = Unexplained((), None, ())
+"""Nothing is left."""
+
+
 def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence]) -> Unexplained:
     """Of the patterns ``seen`` in a fitted model, and of its innovations, what is too large and too certain to be luck."""
     largest = autocorrelations(problem, fit)[0]

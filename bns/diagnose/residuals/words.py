@@ -115,7 +115,8 @@ def _steps(term: Formula, _: Predictor) -> str:
 def _changes(term: Formula, _: Predictor) -> str:
     jump = np.array([0.1])
     rest = float(_curve(term, "fresh", jump, u=0.1)[0] / jump[0])
-    return f"just after a change of speed, {abs(rest):.0%} of it is {'missing' if rest < 0 else 'added'}, fading within 0.15 s"
+    share = "less than 1%" if abs(rest) < 0.01 else f"{abs(rest):.0%}"
+    return f"just after a change of speed, {share} of it is {'missing' if rest < 0 else 'added'}, fading within 0.15 s"
 
 
 def _response(term: Formula, _: Predictor) -> str:

@@ -105,6 +105,12 @@ class Residuals:
         "added. The least that a right term kept is 25 % (backlash, with the lag that imitates it); a term that "
         "two effects explain kept nothing.",
     )
+    spanned_share: float = setting(
+        0.8,
+        "1",
+        "If the effects that were lost to terms gain this fraction of what the terms gain, the effects stand: a curve that "
+        "can draw an effect leaves nothing for it to gain. TO BE MEASURED",
+    )
     large: float = setting(
         0.02,
         "1",
