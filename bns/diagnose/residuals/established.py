@@ -185,7 +185,9 @@ def _without_needless_terms(
 def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect], level: float) -> _State:
     """With the effects that do nearly all that the terms do: a curve that can draw an effect leaves nothing for it to earn.
 
-    As few of them as do so (`SPANNED`), under the noise of either model; then the terms that still earn their place beside them.
+    One effect for a term, and as few as do so (`SPANNED`), under the noise of either model: several that draw one curve together
+    imitate it. Then the terms that still earn their place beside them, but for those that can draw one of them: beside such a
+    curve the effect's number says nothing.
     """
     lost = {name: effect for name, effect in accepted.items() if name not in state.names}
     if not lost or not state.terms:
@@ -198,18 +200,31 @@ def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect
     while _share(bare, fit, state.fit) < SPANNED:
         tried = {name: fit_with(problem, fit, effect) for name, effect in lost.items() if name not in names}
         best = min(tried, key=lambda name: float(tried[name].held_out.sum()), default="")
-        if not best or not _earns(problem.paired_comparison(fit, tried[best]), fit, level) or implausible(tried[best], best):
+        if len(names) == len(state.names) + len(state.terms) or not best:
+            return state
+        if not _earns(problem.paired_comparison(fit, tried[best]), fit, level) or implausible(tried[best], best):
             return state
         fit, names = tried[best], (*names, best)
     restored = replace(state, names=names, terms=()).settled(predictor, fit)
     under_its_noise = restored.problem.fit(model), restored.fit, restored.problem.fit(state.fit.model)
     if _share(*under_its_noise) < SPANNED:
         return state
+    back = [name for name in names if name not in state.names]
+    alone = {name: _worth(restored, name) for name in back}
     for term in state.terms:
         again = fitted(restored.problem, restored.fit, term.on, term.term, term.name, term.signal, term.values)
-        if again is not None and _term_earns(again.paired_comparison, restored.fit, level):
-            restored = replace(restored.settled(predictor, again.fit), terms=(*restored.terms, again))
+        if again is None or not _term_earns(again.paired_comparison, restored.fit, level):
+            continue
+        beside = replace(restored.settled(predictor, again.fit), terms=(*restored.terms, again))
+        if all(_worth(beside, name) >= KEPT * alone[name] for name in back):
+            restored = beside
     return restored
+
+
+def _worth(state: _State, name: str) -> float:
+    """What an effect of a state earns on held-out trials beside all else in it."""
+    lacking = state.problem.fit(state.fit.model.without(name), nearby=state.fit.jacobian_by_parameter)
+    return paired_elpd_diff(lacking.held_out, state.fit.held_out)[0]
 
 
 def _share(bare: Fit, effects: Fit, terms: Fit) -> float:

