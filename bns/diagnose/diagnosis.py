@@ -21,7 +21,7 @@ from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.symbolic import Formula
-from bns.diagnose.residuals.unexplained import Unexplained
+from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.residuals.words import in_words
 from bns.diagnose.residuals.worst_trials import WithoutWorst, standing_out
 from bns.diagnose.select.equivalents import equivalent_pairs
@@ -37,9 +37,6 @@ FEW_TRIALS = DEFAULTS.verdict.few_trials
 _HINT = DEFAULTS.verdict.hint
 
 
-NOTHING_LEFT = Unexplained((), None, ())
-
-
 @dataclass(frozen=True)
 class Diagnosis:
     """A verdict and everything it rests on. ``selection`` is None where there was too little to search."""
@@ -47,7 +44,7 @@ class Diagnosis:
     verdict: str
     selection: SelectionResult | None
     residual_dependence: tuple[ResidualDependence, ...] = ()
-    rest: Unexplained = NOTHING_LEFT
+    rest: Unexplained = NOTHING
     formula: Formula | None = None
     """The first of the terms; where there are none, a formula that is fitted to the effects and earns something."""
     terms: tuple[Formula, ...] = ()

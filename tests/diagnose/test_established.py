@@ -1,6 +1,7 @@
 """Effects stand only beside what describes the rest; what describes it is a term that can be added, in words of physics."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -9,8 +10,9 @@ from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals.established import _State, _step, established, left_over
+from bns.diagnose.residuals.established import _restored, _State, _step, established, left_over
 from bns.diagnose.residuals.grammar import families, ranked, rounding, significant
+from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.words import in_words
 from bns.physics.formula import formula_effect
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -137,3 +139,32 @@ def test_a_patch_of_floor_keeps_its_numbers_where_it_is_weighed_against_effects(
     assert found.names == ()
     said = r"slower by (4|5)\d\.\d+% within 0\.2[3-7]\d* m of \(0\.[01]\d*, -0\.0\d*\) m"
     assert re.match(said, in_words(found.terms[0], predictor))
+
+
+def drawn_by_a_curve(predictor, signal, on):
+    """A search that ended in one term of this family, where no effect came in."""
+    problem = problem_for(predictor, NOMINAL)
+    fit = problem.fit(NOMINAL)
+    family = next(f for f in families(predictor, NOMINAL.wheelbase_m) if (f.signal, f.on) == (signal, on))
+    term = fitted(problem, fit, on, family.term, signal=signal)
+    return replace(_State(problem, fit).settled(predictor, term.fit), terms=(term,))
+
+
+def test_an_effect_that_does_what_a_curve_does_stands_in_its_place():
+    predictor = predictor_of(hidden(dead_zone={"width_m_s": 0.02}))
+    catalogue = listed(NOMINAL, None, predictor.tracks)
+    state = drawn_by_a_curve(predictor, "speed of each wheel", "wheels")
+    ended = _restored(predictor, state, {name: catalogue[name] for name in ("wheelbase", "dead-zone")}, 0.01)
+    assert (ended.names, ended.terms) == (("dead-zone",), ())
+    assert ended.fit.values.tolist() == pytest.approx([0.02], abs=3e-4)
+    assert _restored(predictor, state, {"wheelbase": catalogue["wheelbase"]}, 0.01) is state
+
+
+def test_several_effects_that_draw_one_curve_together_do_not():
+    """A dead zone of one wheel: one of both, with wheels that differ, does most of it."""
+    one_sided = formula_effect("left", "-k * sign(u) * min(abs(u), 0.01)", "left")
+    predictor = predictor_of(NOMINAL.with_active(one_sided, (1.0,)), speeds=(0.05, 0.2))
+    catalogue = listed(NOMINAL, None, predictor.tracks)
+    state = drawn_by_a_curve(predictor, "speed of the left wheel", "left")
+    both = {name: catalogue[name] for name in ("wheel-mismatch", "dead-zone")}
+    assert _restored(predictor, state, both, 0.01) is state

@@ -1,5 +1,6 @@
 """Effects that are certain and matter to no prediction are said, and not named."""
 
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
@@ -7,11 +8,12 @@ import pytest
 
 from bns.diagnose import outcome
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import NOTHING_LEFT, diagnose
+from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.established import Established
+from bns.diagnose.residuals.unexplained import NOTHING
 from bns.diagnose.select.negligible import LUCK, MEDIAN_OF, _largest_fall, negligible
 from bns.diagnose.select.result import SelectionResult
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -75,11 +77,44 @@ def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named)
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
     monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
     monkeypatch.setattr(outcome, "_matters", lambda _: matters)
-    monkeypatch.setattr(outcome, "unexplained", lambda *_: NOTHING_LEFT)
+    monkeypatch.setattr(outcome, "unexplained", lambda *_: NOTHING)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
     assert ended.selection.accepted == named
     assert ended.imitating == (("wheel-mismatch",) if matters else ())
     assert (ended.terms, ended.errors_with_terms) == ((("a term",), "errors") if matters else ((), None))
+
+
+@pytest.mark.parametrize("matters", [True, False])
+def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matters):
+    """Stand-ins: something is left beside the effect, nothing beside a term, and the term lowers an error or does not."""
+    searched = selected("wheelbase")
+    found = Established(("wheelbase",), ("a term",), searched.problem, "fit with the term")
+    left = replace(NOTHING, residual_dependence=("something",))
+    monkeypatch.setattr(outcome, "_established", lambda *_: found)
+    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
+    monkeypatch.setattr(outcome, "_matters", lambda _: matters)
+    monkeypatch.setattr(outcome, "residual_dependence", lambda *_: [])
+    monkeypatch.setattr(outcome, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
+    monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
+    ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
+    assert ended.selection.accepted == ("wheelbase",)
+    assert (ended.terms, ended.slight) == ((("a term",), ()) if matters else ((), ("a term",)))
+    assert ended.rest == (left if matters else NOTHING)
+
+
+def test_of_several_effects_only_those_that_raise_the_error_are_withdrawn(monkeypatch):
+    """A stand-in for the errors: with the mismatch they rise, and fall with the wheelbase alone."""
+    searched = selected("wheelbase", "wheel-mismatch", "clock-offset")
+
+    def judged(selection, _):
+        ratio = 0.5 + 0.6 * ("wheel-mismatch" in selection.accepted) - 0.1 * len(selection.accepted)
+        at = SimpleNamespace(models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=ratio)])
+        return SimpleNamespace(falls=ratio < 0.5, horizons={1.0: at})
+
+    monkeypatch.setattr(outcome, "errors_before_and_after", judged)
+    stands = outcome._standing(searched, predictor(), NOMINAL, lambda _: None)
+    assert stands.selection.accepted == ("wheelbase", "clock-offset")
+    assert stands.withdrawn == ("wheel-mismatch",)
 
 
 def errors(windows, **models):
