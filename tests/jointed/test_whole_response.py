@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.estimate.fit import Problem, _Point
+from bns.diagnose.estimate.fit import Fit, Problem, _Point
 from bns.diagnose.estimate.parameters import FreeParameter, increments
 from bns.physics.effects import effect_named
 from bns.physics.jointed.model_files import load_body
@@ -56,3 +56,13 @@ def test_wide_steps_stay_within_the_bounds(value, signs):
     steps = increments(FreeParameter("weak-joint-joint5", parameter), value, wide=True)
     assert np.sign(steps).tolist() == signs
     assert all(0 <= value + step <= 1 for step in steps)
+
+
+def test_an_interval_ends_at_the_bounds_of_its_number():
+    parameter = load_body("snake").catalogue()["weak-joint-joint5"].parameters[0]
+    fit = SimpleNamespace(
+        free=(FreeParameter("weak-joint-joint5", parameter),), values=np.array([0.02]), losses=np.zeros(20), se=lambda _: 0.1
+    )
+    low, high = Fit.interval(fit, 0)
+    assert low == 0.0
+    assert high == pytest.approx(0.02 + 0.1 * 2.093, abs=1e-3)

@@ -70,10 +70,11 @@ class Fit:
         return float(np.sqrt(max(self.covariance[index, index], 0.0)))
 
     def interval(self, index: int, share: float = 0.95) -> tuple[float, float]:
-        """Student's interval with as many degrees of freedom as there are trials to spare."""
+        """Student's interval with as many degrees of freedom as there are trials to spare, within the number's bounds."""
         freedom = max(len(self.losses) - len(self.free), 1)
         half = float(student.ppf((1 + share) / 2, freedom)) * self.se(index)
-        return float(self.values[index] - half), float(self.values[index] + half)
+        value, p = float(self.values[index]), self.free[index].parameter
+        return max(value - half, min(p.low, value)), min(value + half, max(p.high, value))
 
 
 @dataclass(frozen=True)
