@@ -12,12 +12,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.residuals.grammar import (
     NAME,
     PLACE,
@@ -185,9 +187,9 @@ def _without_needless_terms(
 def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect], level: float) -> _State:
     """With the effects that do nearly all that the terms do: a curve that can draw an effect leaves nothing for it to earn.
 
-    One effect for a term, and as few as do so (`SPANNED`), under the noise of either model: several that draw one curve together
-    imitate it. Then the terms that still earn their place beside them, but for those that can draw one of them: beside such a
-    curve the effect's number says nothing.
+    One effect for a term, and as few as do so (`SPANNED`), in likelihood and in metres at every horizon: several that draw
+    one curve together imitate it. Then the terms that still earn their place beside them, but for those that can draw one of
+    them: beside such a curve the effect's number says nothing.
     """
     lost = {name: effect for name, effect in accepted.items() if name not in state.names}
     if not lost or not state.terms:
@@ -206,8 +208,7 @@ def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect
             return state
         fit, names = tried[best], (*names, best)
     restored = replace(state, names=names, terms=()).settled(predictor, fit)
-    under_its_noise = restored.problem.fit(model), restored.fit, restored.problem.fit(state.fit.model)
-    if _share(*under_its_noise) < SPANNED:
+    if _least_share_m(predictor, restored.problem, (model, restored.fit.model, state.fit.model)) < SPANNED:
         return state
     back = [name for name in names if name not in state.names]
     alone = {name: _worth(restored, name) for name in back}
@@ -219,6 +220,17 @@ def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect
         if all(_worth(beside, name) >= KEPT * alone[name] for name in back):
             restored = beside
     return restored
+
+
+def _least_share_m(predictor: Predictor, problem: Problem, models: tuple[Model, Model, Model]) -> float:
+    """As `_share`, of the held-out root mean square error, at the horizon where it is least; bare, with effects, with terms."""
+    names = ("bare", "effects", "terms")
+    fits = [problem.fit(model).model for model in models]
+    steps = [(name, held_out_steps(predictor, problem.pose_filter, m)) for name, m in zip(names, fits, strict=True)]
+    errors = paired_errors(predictor, steps)
+    bare, effects, terms = (errors.of(name) for name in names)
+    falls = [(bare[h].rms_m - effects[h].rms_m, bare[h].rms_m - terms[h].rms_m) for h in errors.horizons]
+    return min((by_effects / by_terms for by_effects, by_terms in falls if by_terms > 0), default=1.0)
 
 
 def _worth(state: _State, name: str) -> float:
