@@ -37,6 +37,7 @@ def test_wilson_agrees_with_statsmodels_for_every_count_of_thirty():
     assert np.array(wilson(successes, runs)) == pytest.approx(np.array(theirs), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_all_figures_come_with_their_captions_and_numbers(real_results, tmp_path, capsys):
     assert main(["--results", str(real_results), "--out", str(tmp_path)]) == 0
     shown = capsys.readouterr()

@@ -23,6 +23,7 @@ def table():
     return measured(hidden(turn_slip={"slip_s": 0.12}), trials=12, commands=3)
 
 
+@pytest.mark.slow
 def test_a_setting_decides_the_verdict_and_is_said(table):
     assert bns.diagnose(table, NOMINAL).effects == ("turn-slip",)
     found = bns.diagnose(table, NOMINAL, settings=STRICT)

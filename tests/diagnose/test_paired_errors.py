@@ -142,6 +142,7 @@ def test_a_jump_is_listed_with_its_trial_and_time(table, tmp_path, capsys):
     assert "stays there" in said
 
 
+@pytest.mark.slow
 def test_jumps_do_not_bend_the_numbers(table, tmp_path, capsys):
     numbers = {}
     for name, rows in {"clean": table, "jumpy": moved(table, [3, 8])}.items():

@@ -142,6 +142,7 @@ def bent_arm(arm):
     return bns.diagnose(log(12, seed=1, zero_rad=0.08), bns.Model(arm))
 
 
+@pytest.mark.slow
 def test_a_joint_of_an_arm_whose_zero_is_off_is_named(bent_arm):
     assert (bent_arm.verdict, bent_arm.effects) == ("effects", ("joint-zero-elbow",))
     assert bent_arm.diagnosis.numbers["joint-zero-elbow"]["offset_rad"]["value"] == pytest.approx(0.08, abs=0.005)
