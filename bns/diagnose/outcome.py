@@ -69,7 +69,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
     terms: tuple[Formula, ...] = ()
     slight: tuple[Formula, ...] = ()
     with_terms: PairedErrors | None = None
-    if found := _established(stands.selection, predictor, stands.rest):
+    if found := _established(stands.selection, predictor, stands.rest, True if stands.withdrawn else None):
         lost = tuple(name for name in stands.selection.accepted if name not in found.names)
         next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
         errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
@@ -153,10 +153,13 @@ def _negligible(selection: SelectionResult) -> tuple[str, ...]:
     return () if costly or selection.fit.model.per_trial_effect is not None else negligible(selection)
 
 
-def _established(selection: SelectionResult, predictor: Predictor, rest: Unexplained) -> Established | None:
+def _established(
+    selection: SelectionResult, predictor: Predictor, rest: Unexplained, response: bool | None = None
+) -> Established | None:
     """The search with flexible terms, where anything is left; None where nothing is, or trials have clocks of their own.
 
-    Single relative motions are calibrated with all numbers free instead (`calibrated`).
+    ``response`` as in `established`: where effects were withdrawn, those that stayed are no reason to leave it out. Single
+    relative motions are calibrated with all numbers free instead (`calibrated`).
     """
     wheeled = isinstance(predictor, WheelPredictor)
     if not wheeled or selection.fit.model.per_trial_effect is not None or predictor.tracks.relative:
@@ -164,7 +167,7 @@ def _established(selection: SelectionResult, predictor: Predictor, rest: Unexpla
     if not rest.any and not left_over(selection.problem, selection.fit, not selection.accepted):
         return None
     known = known_effects(selection)
-    found = established(predictor, selection.nominal.model, {name: known[name] for name in selection.accepted})
+    found = established(predictor, selection.nominal.model, {name: known[name] for name in selection.accepted}, response)
     lost = set(selection.accepted) - set(found.names)
     if lost and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):
         # the effects predict better than what they are said to imitate: it is the terms that imitate
