@@ -187,8 +187,8 @@ def diagnose(
 
     ``alone`` is told what an effect earns by itself as soon as that is known, by several threads; a later search may correct it.
 
-    A set of effects with which the held-out error does not fall is withdrawn. A few trials that are unlike the rest count nothing
-    in the fits of a second search, whose end is presented; errors are always those of all trials.
+    Where the held-out error does not fall with all effects, the worst are withdrawn until it does. A few trials that are unlike
+    the rest count nothing in the fits of a second search, whose end is presented; errors are always those of all trials.
     """
     found = _diagnosed(predictor, model, extra, tick, barred, alone)
     if found.selection is None or not isinstance(predictor, WheelPredictor) or predictor.tracks.relative:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from bns.errors import SweepWarning
 from bns.spec import RunSpec
-from bns.store.read.reader import finished
 from bns.store.record import RunRecord
 from bns.store.write.writer import Writer
 from bns.sweep.budget import Budget
@@ -124,9 +123,7 @@ class _SweepRun:
 
     def plan(self, retry_failed: bool, limit: int | None) -> list[RunSpec]:
         """The runs to do, in order; whatever has a result is counted as such."""
-        known = finished(self.results, self._sweep.name)
-        if "ok" in known.values():
-            self._digests.read()
+        known = self._digests.read()
         skipped = {"ok"} if retry_failed else {"ok", "failed", "quarantined"}
         everything, todo = ordered_specs(self._sweep), []
         own = everything if self._shard is None else self._shard.share(everything)

@@ -29,9 +29,9 @@ def stands(predictor, *names):
     return established(predictor, NOMINAL, {name: catalogue[name] for name in names})
 
 
-def warming(**effects):
+def warming(share=-0.15, **effects):
     """A robot that is slower when a trial begins, by a rule that no list holds, and has listed effects as well."""
-    return hidden(**effects).with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (-0.15,))
+    return hidden(**effects).with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (share,))
 
 
 def test_an_effect_that_is_there_stands_and_one_that_imitates_the_rest_does_not():
@@ -141,19 +141,21 @@ def test_a_patch_of_floor_keeps_its_numbers_where_it_is_weighed_against_effects(
     assert re.match(said, in_words(found.terms[0], predictor))
 
 
-def drawn_by_a_curve(predictor, signal, on):
-    """A search that ended in one term of this family, where no effect came in."""
+def drawn_by_curves(predictor, *wanted):
+    """A search that ended in terms of these families (signal, on), where no effect came in."""
     problem = problem_for(predictor, NOMINAL)
-    fit = problem.fit(NOMINAL)
-    family = next(f for f in families(predictor, NOMINAL.wheelbase_m) if (f.signal, f.on) == (signal, on))
-    term = fitted(problem, fit, on, family.term, signal=signal)
-    return replace(_State(problem, fit).settled(predictor, term.fit), terms=(term,))
+    state = _State(problem, problem.fit(NOMINAL))
+    for number, one in enumerate(wanted, 1):
+        family = next(f for f in families(predictor, NOMINAL.wheelbase_m) if (f.signal, f.on) == one)
+        term = fitted(state.problem, state.fit, one[1], family.term, f"term-{number}", one[0])
+        state = replace(state.settled(predictor, term.fit), terms=(*state.terms, term))
+    return state
 
 
 def test_an_effect_that_does_what_a_curve_does_stands_in_its_place():
     predictor = predictor_of(hidden(dead_zone={"width_m_s": 0.02}))
     catalogue = listed(NOMINAL, None, predictor.tracks)
-    state = drawn_by_a_curve(predictor, "speed of each wheel", "wheels")
+    state = drawn_by_curves(predictor, ("speed of each wheel", "wheels"))
     ended = _restored(predictor, state, {name: catalogue[name] for name in ("wheelbase", "dead-zone")}, 0.01)
     assert (ended.names, ended.terms) == (("dead-zone",), ())
     assert ended.fit.values.tolist() == pytest.approx([0.02], abs=3e-4)
@@ -165,6 +167,33 @@ def test_several_effects_that_draw_one_curve_together_do_not():
     one_sided = formula_effect("left", "-k * sign(u) * min(abs(u), 0.01)", "left")
     predictor = predictor_of(NOMINAL.with_active(one_sided, (1.0,)), speeds=(0.05, 0.2))
     catalogue = listed(NOMINAL, None, predictor.tracks)
-    state = drawn_by_a_curve(predictor, "speed of the left wheel", "left")
+    state = drawn_by_curves(predictor, ("speed of the left wheel", "left"))
     both = {name: catalogue[name] for name in ("wheel-mismatch", "dead-zone")}
     assert _restored(predictor, state, both, 0.01) is state
+
+
+def test_an_effect_that_leaves_metres_behind_does_not_stand_in_place_of_a_curve():
+    """A strong warm-up beside slow wheels: the gain has nearly all of the likelihood, and too little of the error in metres."""
+    predictor = predictor_of(warming(-0.4, speed_gain={"gain": 0.8}))
+    catalogue = listed(NOMINAL, None, predictor.tracks)
+    state = drawn_by_curves(predictor, ("time in the trial", "share"))
+    assert _restored(predictor, state, {"speed-gain": catalogue["speed-gain"]}, 0.01) is state
+
+
+@pytest.mark.parametrize("warm_up", [-0.05, -0.2])
+def test_an_effect_stands_in_place_of_its_curve_beside_another_curve_that_stays(warm_up):
+    predictor = predictor_of(warming(warm_up, dead_zone={"width_m_s": 0.02}))
+    catalogue = listed(NOMINAL, None, predictor.tracks)
+    state = drawn_by_curves(predictor, ("speed of each wheel", "wheels"), ("time in the trial", "share"))
+    ended = _restored(predictor, state, {"dead-zone": catalogue["dead-zone"]}, 0.01)
+    assert (ended.names, [term.signal for term in ended.terms]) == (("dead-zone",), ["time in the trial"])
+    assert ended.fit.values.tolist()[-1] == pytest.approx(0.02, abs=1e-3)
+
+
+def test_a_curve_that_can_draw_an_effect_does_not_come_back_beside_it():
+    """The curve still earns something, the rest that it cannot draw well; the effect would earn nothing beside it."""
+    predictor = predictor_of(warming(-0.05, dead_zone={"width_m_s": 0.02}))
+    catalogue = listed(NOMINAL, None, predictor.tracks)
+    state = drawn_by_curves(predictor, ("speed of each wheel", "wheels"))
+    ended = _restored(predictor, state, {"dead-zone": catalogue["dead-zone"]}, 0.01)
+    assert (ended.names, ended.terms) == (("dead-zone",), ())

@@ -13,6 +13,8 @@ from bns.store import Writer, connect
 from bns.store.archive.kept import DECIMALS, EVAL_COLUMNS, RUN_COLUMNS, rounded_evals
 from bns.store.archive.read import archives, connect_archives, described
 from bns.store.archive.write import archive
+from bns.sweep.expand.grid import parse_sweep
+from bns.sweep.runner import run_sweep
 from store.synthetic import failed, record, records, specs
 
 TEXT = "name: grid\nrobot: khepera\nseeds: 2\ngrid: {mutation_rate: [0.1, 0.5]}\n"
@@ -107,3 +109,20 @@ def test_the_command_writes_the_file_or_says_why_not(results, tmp_path, capsys):
     assert main(["archive", str(tmp_path / "nowhere"), "-o", str(tmp_path / "t.parquet")]) == 2
     assert "there are no results in" in capsys.readouterr().err
     assert not (tmp_path / "t.parquet").exists()
+
+
+def test_runs_of_an_archive_beside_the_results_count_as_done_and_are_kept(tmp_path):
+    """A study goes on where its results are no longer: with its archive alone."""
+    text = "name: tiny\nrobot: khepera\nseeds: 2\nfixed: {evaluations: 1, generations_per_evaluation: 1, population_size: 50}\n"
+    sweep, first, second = tmp_path / "tiny.yaml", tmp_path / "first", tmp_path / "second"
+    sweep.write_text(text)
+    assert main(["sweep", str(sweep), "--results", str(first), "--jobs", "1"]) == 0
+    whole = archive(first, tmp_path / "whole.parquet")
+    run_sweep(parse_sweep(text, sweep), tmp_path / "half", limit=1)
+    archive(tmp_path / "half", second / "archived" / "half.parquet")
+    assert main(["sweep", str(sweep), "--results", str(second), "--jobs", "1"]) == 0
+    runs = connect(second).execute("SELECT seed FROM runs").fetchall()
+    assert len(runs) == 1
+    joined = archive(second, tmp_path / "joined.parquet")
+    assert joined.runs == whole.runs == 2
+    assert described(joined.path)["spec_hashes"] == described(whole.path)["spec_hashes"]

@@ -107,7 +107,8 @@ class Study:
         result = run_spec(spec_of(parameters_in(json.loads(rows["spec"][0]))), progress=tell)
         if result.run_id != run_id:
             raise StoreError(
-                f"The run {run_id} is of another engine version; repeated, it would be {result.run_id}, with different results."
+                f"The run {run_id} is of another version of the engine or of its approach; "
+                f"repeated, it would be {result.run_id}, with different results."
             )
         return result
 

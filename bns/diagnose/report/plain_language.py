@@ -76,8 +76,9 @@ def headline(d: Diagnosis) -> str:
     return {
         "none": "Nothing is missing from the model that these measurements could show.",
         "effects": f"Missing from the model: {said}.",
-        "unlisted": "Something is missing from the model that none of the known effects explains"
-        + (f". Also missing: {said}." if said else "."),
+        "unlisted": f"Missing from the model: {said}, and something that none of the known effects explains."
+        if said
+        else "Something is missing from the model that none of the known effects explains.",
         "insufficient-data": "These measurements do not suffice to say whether anything is missing.",
     }[d.verdict]
 

@@ -185,34 +185,48 @@ def _without_needless_terms(
 
 
 def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect], level: float) -> _State:
-    """With the effects that do nearly all that the terms do: a curve that can draw an effect leaves nothing for it to earn.
+    """With the effects that do nearly all that a term does: a curve that can draw an effect leaves nothing for it to earn.
 
-    One effect for a term, and as few as do so (`SPANNED`), in likelihood and in metres at every horizon: several that draw
-    one curve together imitate it. Then the terms that still earn their place beside them, but for those that can draw one of
-    them: beside such a curve the effect's number says nothing.
+    One effect takes the place of one term, beside the others; then as many of all terms that are left, together. Several effects
+    that draw one curve together imitate it.
     """
     lost = {name: effect for name, effect in accepted.items() if name not in state.names}
-    if not lost or not state.terms:
-        return state
+    for dropped in [*([term] for term in state.terms), list(state.terms)]:
+        still_there = [term for term in state.terms if term.name in {one.name for one in dropped}]
+        still_lost = {name: effect for name, effect in lost.items() if name not in state.names}
+        if still_there and still_lost and len(still_there) == len(dropped):
+            state = _exchanged(predictor, state, still_lost, still_there, level)
+    return state
+
+
+def _exchanged(
+    predictor: Predictor, state: _State, lost: Mapping[str, Effect], dropped: Sequence[Formula], level: float
+) -> _State:
+    """With at most as many effects as terms in their place, where these do nearly all that they do (`SPANNED`).
+
+    In likelihood and in metres at every horizon. Then the dropped terms that still earn their place, but for those that can draw
+    one of the effects: beside such a curve its number says nothing.
+    """
     problem, model = state.problem, state.fit.model
-    for term in state.terms:
+    for term in dropped:
         model = model.without(term.name)
     bare = fit = problem.fit(model)
     names = state.names
     while _share(bare, fit, state.fit) < SPANNED:
         tried = {name: fit_with(problem, fit, effect) for name, effect in lost.items() if name not in names}
         best = min(tried, key=lambda name: float(tried[name].held_out.sum()), default="")
-        if len(names) == len(state.names) + len(state.terms) or not best:
+        if len(names) == len(state.names) + len(dropped) or not best:
             return state
         if not _earns(problem.paired_comparison(fit, tried[best]), fit, level) or implausible(tried[best], best):
             return state
         fit, names = tried[best], (*names, best)
-    restored = replace(state, names=names, terms=()).settled(predictor, fit)
-    if _least_share_m(predictor, restored.problem, (model, restored.fit.model, state.fit.model)) < SPANNED:
+    others = tuple(term for term in state.terms if term not in dropped)
+    restored = replace(state, names=names, terms=others).settled(predictor, fit)
+    if _least_share_m(predictor, restored, restored.problem.fit(model), restored.problem.fit(state.fit.model)) < SPANNED:
         return state
     back = [name for name in names if name not in state.names]
     alone = {name: _worth(restored, name) for name in back}
-    for term in state.terms:
+    for term in dropped:
         again = fitted(restored.problem, restored.fit, term.on, term.term, term.name, term.signal, term.values)
         if again is None or not _term_earns(again.paired_comparison, restored.fit, level):
             continue
@@ -222,15 +236,14 @@ def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect
     return restored
 
 
-def _least_share_m(predictor: Predictor, problem: Problem, models: tuple[Model, Model, Model]) -> float:
-    """As `_share`, of the held-out root mean square error, at the horizon where it is least; bare, with effects, with terms."""
-    names = ("bare", "effects", "terms")
-    fits = [problem.fit(model).model for model in models]
-    steps = [(name, held_out_steps(predictor, problem.pose_filter, m)) for name, m in zip(names, fits, strict=True)]
-    errors = paired_errors(predictor, steps)
-    bare, effects, terms = (errors.of(name) for name in names)
-    falls = [(bare[h].rms_m - effects[h].rms_m, bare[h].rms_m - terms[h].rms_m) for h in errors.horizons]
-    return min((by_effects / by_terms for by_effects, by_terms in falls if by_terms > 0), default=1.0)
+def _least_share_m(predictor: Predictor, effects: _State, bare: Fit, terms: Fit) -> float:
+    """As `_share`, of the root mean square error on held-out trials, at the horizon where it is least."""
+    fits = {"bare": bare, "effects": effects.fit, "terms": terms}
+    pose_filter = effects.problem.pose_filter
+    errors = paired_errors(predictor, [(name, held_out_steps(predictor, pose_filter, f.model)) for name, f in fits.items()])
+    without, by_effects, by_terms = (errors.of(name) for name in fits)
+    falls = [(without[h].rms_m - by_effects[h].rms_m, without[h].rms_m - by_terms[h].rms_m) for h in errors.horizons]
+    return min((one / other for one, other in falls if other > 0), default=1.0)
 
 
 def _worth(state: _State, name: str) -> float:

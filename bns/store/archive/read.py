@@ -18,6 +18,8 @@ from bns.store.disk.parquet import READ_FAULTS
 from bns.store.read.views import pattern
 from bns.store.schema import METADATA_KEY, PARAMETERS
 
+ARCHIVED = "archived"
+"""Folder in the results: archives whose runs count as done."""
 _SPECS = ("sweep", "spec_hash", "written_at", "text", "runs")
 
 
@@ -52,6 +54,27 @@ def described(path: Path) -> dict[str, Any]:
         why = f"has format {said['archive']}, and this bns reads {FORMAT}" if "archive" in said else "is no archive"
         raise StoreError(f"{path} {why}. Make one from the results: bns archive results -o {path.name}")
     return dict(said)
+
+
+def stored_archives(results: Path | str) -> list[Path]:
+    """The archives in the folder ``results``/archived, by name; usually none."""
+    return sorted((Path(results) / ARCHIVED).glob("*.parquet"))
+
+
+def archived(results: Path | str, sweep: str) -> pd.DataFrame:
+    """The runs of a sweep that lie in archives in the folder ``results``/archived: run_id, status, task, world, world_digest.
+
+    A study goes on where its results are no longer: such runs count as done, and `archive` puts them beside the new ones.
+
+    Raises:
+        StoreError: a file there is no archive, or not as it was written.
+    """
+    columns = "run_id, status, task, world, world_digest"
+    files = stored_archives(results)
+    if not files:
+        return pd.DataFrame(columns=columns.split(", "), dtype=str)
+    with connect_archives(files) as connection:
+        return connection.execute(f"SELECT {columns} FROM runs WHERE sweep = ? ORDER BY run_id", [sweep]).df()
 
 
 def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 
 from bns.errors import StoreError, unknown_name
 from bns.store.archive.kept import DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE, bits, whole
+from bns.store.archive.read import connect_archives, stored_archives
 from bns.store.disk.digest import BLANK, FIELD, sealed
 from bns.store.disk.files import publish
 from bns.store.read.reader import connect
@@ -21,6 +22,9 @@ from bns.store.schema import METADATA_KEY, PARAMETERS, SCHEMA_VERSION
 
 _LEVEL = 19
 """Of zstd: an archive is written once and kept."""
+_ORDER = ", ".join(
+    ("sweep", "task", *(name for name in PARAMETERS if name not in ("seed", "root_seed")), "root_seed", "seed", "run_id")
+)
 _ENGINE = re.compile(r'"engine_version":(\d+)')
 
 
@@ -42,7 +46,8 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
     """Write one parquet file from which figures and findings are drawn as from the results themselves.
 
     Args:
-        results: the folder of all results; it is only read, and may grow meanwhile.
+        results: the folder of all results; it is only read, and may grow meanwhile. Archives in its folder ``archived`` are
+            kept with it: a study that goes on where its earlier results are no longer.
         output: the file to write; an older one is replaced as a whole.
         sweeps: names of the sweeps to keep; all by default.
 
@@ -64,11 +69,31 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
         chosen = sorted(set(sweeps or there))
         connection.execute("CREATE TEMP TABLE chosen AS SELECT unnest(?::VARCHAR[]) AS sweep", [chosen])
         table = connection.sql(_select()).to_arrow_table()
-        plans = connection.sql("SELECT * FROM specs SEMI JOIN chosen USING (sweep) ORDER BY ALL").to_arrow_table()
-    data = _file_bytes(table, plans.to_pylist())
+        plans = connection.sql("SELECT * FROM specs SEMI JOIN chosen USING (sweep) ORDER BY ALL").to_arrow_table().to_pylist()
+    if former := stored_archives(results):
+        table, plans = _with_former(table, plans, former, chosen)
+    data = _file_bytes(table, plans)
     publish(data, path.with_name(f".{path.name}.part"), path)
     names = table["sweep"].to_pylist()
     return ArchiveSummary(path, len(names), {name: names.count(name) for name in chosen}, len(data))
+
+
+def _with_former(
+    table: pa.Table, plans: list[dict[str, Any]], former: Sequence[Path], chosen: Sequence[str]
+) -> tuple[pa.Table, list[dict[str, Any]]]:
+    """The rows and the sweeps' files with those of the archives that lie in the results; a run that went well comes first."""
+    with connect_archives(former) as connection:
+        connection.register("stored", table)
+        both: pa.Table = connection.sql(
+            f"""SELECT * FROM (
+                SELECT *, 0 AS place FROM stored UNION ALL BY NAME SELECT *, 1 FROM archived WHERE list_contains(?, sweep))
+            QUALIFY row_number() OVER (PARTITION BY sweep, run_id ORDER BY status <> 'ok', place) = 1 ORDER BY {_ORDER}""",
+            params=[list(chosen)],
+        ).to_arrow_table()
+        older = connection.sql("SELECT * FROM specs WHERE list_contains(?, sweep)", params=[list(chosen)]).to_arrow_table()
+    known = {(plan["sweep"], plan["spec_hash"]) for plan in plans}
+    plans = [*plans, *(plan for plan in older.to_pylist() if (plan["sweep"], plan["spec_hash"]) not in known)]
+    return both.select(table.column_names).cast(table.schema), sorted(plans, key=lambda plan: (plan["sweep"], plan["spec_hash"]))
 
 
 def _select() -> str:
@@ -82,8 +107,7 @@ def _select() -> str:
         FROM runs SEMI JOIN chosen USING (sweep)
         LEFT JOIN (SELECT run_id, sweep, count({NEAR[0]}) > 0 AS radii, {listed}
                    FROM evals SEMI JOIN chosen USING (sweep) GROUP BY run_id, sweep) AS kept USING (run_id, sweep)
-        ORDER BY sweep, task, {", ".join(f"runs.{name}" for name in PARAMETERS if name not in ("seed", "root_seed"))},
-                 root_seed, seed, run_id"""
+        ORDER BY {_ORDER}"""
 
 
 def _file_bytes(table: pa.Table, plans: list[dict[str, Any]]) -> bytes:

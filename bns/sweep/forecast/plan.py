@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from bns.spec import RunSpec
+from bns.store.archive.read import archived
 from bns.store.read.reader import finished, load
 from bns.store.write.compaction import bytes_per_run
 from bns.sweep.expand.grid import Sweep
@@ -65,7 +66,9 @@ def plan(
     Nothing is written. The seconds are wall time with ``jobs`` workers; NaN if the trial run failed.
     """
     known = finished(results, sweep.name)
-    had = {run_id for run_id, status in known.items() if status == "ok" or not retry_failed}
+    kept = archived(results, sweep.name)
+    had = set(kept["run_id"][(kept["status"] == "ok") | (not retry_failed)])
+    had |= {run_id for run_id, status in known.items() if status == "ok" or not retry_failed}
     everything = ordered_specs(sweep)
     specs = everything if shard is None else list(shard.share(everything))
     todo = [spec for spec in specs if spec.run_id not in had] if had else specs
