@@ -186,7 +186,7 @@ def _matters(errors: PairedErrors) -> bool:
 
 
 def _unexplained_beside(found: Established) -> Unexplained:
-    """What is left beside the terms."""
+    """What neither the effects nor the terms of the search explain."""
     return unexplained(found.problem, found.fit, residual_dependence(found.problem, found.fit))
 
 

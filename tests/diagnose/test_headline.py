@@ -39,6 +39,16 @@ def test_a_set_with_which_the_held_out_error_does_not_fall_is_withdrawn(monkeypa
     assert all(error["after"] == error["before"] for error in found.as_json()["error"].values())
 
 
+def test_effects_come_before_what_is_not_explained(monkeypatch):
+    predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": 0.05}), trials=14, seed=11)))
+    found = found_with(monkeypatch, predictor, "yaw-bias")
+    assert headline(found).startswith("Missing from the model: ")
+    said = headline(replace(found, verdict="unlisted"))
+    assert said == headline(found)[:-1] + ", and something that none of the known effects explains."
+    bare = headline(replace(found, verdict="unlisted", selection=replace(found.selection, accepted=())))
+    assert bare == "Something is missing from the model that none of the known effects explains."
+
+
 def test_a_set_with_which_it_falls_stays(monkeypatch):
     predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": 0.05}), trials=14, seed=11)))
     found = found_with(monkeypatch, predictor, "yaw-bias")

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from bns.diagnose import outcome
+from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
@@ -71,7 +72,7 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
 
 @pytest.mark.parametrize(("matters", "named"), [(True, ("wheelbase",)), (False, ("wheelbase", "wheel-mismatch"))])
 def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named):
-    """Stand-ins for the search with flexible terms and for its judgement: it keeps one effect beside a term."""
+    """The search with flexible terms and its judgement are replaced: the search keeps one effect beside a term."""
     searched = selected("wheelbase", "wheel-mismatch")
     found = Established(("wheelbase",), ("a term",), searched.problem, searched.fit)
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
@@ -86,7 +87,7 @@ def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named)
 
 @pytest.mark.parametrize("matters", [True, False])
 def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matters):
-    """Stand-ins: something is left beside the effect, nothing beside a term, and the term lowers an error or does not."""
+    """Replaced: something is left beside the effect, nothing beside a term, and the term lowers an error or does not."""
     searched = selected("wheelbase")
     found = Established(("wheelbase",), ("a term",), searched.problem, "fit with the term")
     left = replace(NOTHING, residual_dependence=("something",))
@@ -100,6 +101,9 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
     assert ended.selection.accepted == ("wheelbase",)
     assert (ended.terms, ended.slight) == ((("a term",), ()) if matters else ((), ("a term",)))
     assert ended.rest == (left if matters else NOTHING)
+    if not matters:
+        said = notes_on(replace(ended, terms=()), predictor().tracks, None, slight=["slower for two seconds"])
+        assert next(said).startswith("What is left is certain but slight: slower for two seconds.")
 
 
 def test_of_several_effects_only_those_that_raise_the_error_are_withdrawn(monkeypatch):

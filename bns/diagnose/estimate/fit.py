@@ -291,7 +291,7 @@ class Problem:
         nearby: Mapping[FreeParameter, Array] | None = None,
         wide: bool = False,
     ) -> ReducedJacobian:
-        """By differences, but for numbers whose columns are known; clocks of trials shift those, and all are worked out anew.
+        """By differences, but for numbers whose columns are known; clocks of trials shift those, so all are computed again.
 
         ``wide``: over a good part of what is plausible, to the side where less changes. The response of a body to a servo's
         strength has steps, and the slope within one says that a number is known far better than it is.

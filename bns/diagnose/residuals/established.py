@@ -3,8 +3,8 @@
 What is left biases all that is fitted without it, and listed effects are accepted because they imitate it. So the search is
 done again with flexible terms (`grammar`) as candidates beside the accepted effects, on equal terms: whatever predicts trials
 held out best comes in first; an effect is preferred to a free curve only if the curve is not better for certain. In the end every
-effect must earn its place beside the terms, at the level that all candidates share. An effect that a curve can draw earns nothing
-beside it, whatever is true: where effects alone do nearly all that the terms do, they stand.
+effect must predict held-out trials significantly better beside the terms, at the level that all candidates share. A curve that
+can draw an effect leaves it no gain, whatever is true: where effects do nearly all that their terms do, they are kept.
 """
 
 from __future__ import annotations
