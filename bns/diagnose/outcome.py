@@ -167,7 +167,8 @@ def _established(
     if not rest.any and not left_over(selection.problem, selection.fit, not selection.accepted):
         return None
     known = known_effects(selection)
-    found = established(predictor, selection.nominal.model, {name: known[name] for name in selection.accepted}, response)
+    accepted = {name: known[name] for name in selection.accepted}
+    found = established(predictor, selection.nominal.model, accepted, response, selection.fit.model)
     lost = set(selection.accepted) - set(found.names)
     if lost and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):
         # the effects predict better than what they are said to imitate: it is the terms that imitate

@@ -141,6 +141,16 @@ def test_a_patch_of_floor_keeps_its_numbers_where_it_is_weighed_against_effects(
     assert re.match(said, in_words(found.terms[0], predictor))
 
 
+def test_a_patch_that_slows_forward_motion_alone_is_described():
+    """Turns there are as commanded: a share of all motion does not describe it."""
+    patch = formula_effect("patch", "-0.4 * v / (1 + (((x - 0.1)**2 + (y + 0.05)**2) / 0.2**2)**8) * k", "v")
+    predictor = predictor_of(NOMINAL.with_active(patch, (1.0,)), trials=40, commands=8)
+    found = stands(predictor)
+    assert [(term.signal, term.on) for term in found.terms] == [("place", "v")]
+    said = r"slower by (3|4)\d\.\d+% in forward motion within 0\.(19|2)\d* m of \(0\.(09|1)\d*, -0\.0\d*\) m"
+    assert re.match(said, in_words(found.terms[0], predictor))
+
+
 def drawn_by_curves(predictor, *wanted):
     """A search that ended in terms of these families (signal, on), where no effect came in."""
     problem = problem_for(predictor, NOMINAL)

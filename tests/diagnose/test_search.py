@@ -10,7 +10,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import _from_better_numbers, diagnose
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.starts import fit_with
+from bns.diagnose.estimate.starts import fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.select.stepwise import StepwiseSelection
@@ -108,6 +108,19 @@ def test_a_few_late_trials_do_not_bring_a_clock_in_by_exchange(late, stays):
     tried = fit_with(problem, fit, search.catalogue["clock-offset"])
     assert tried.held_out.sum() < fit.held_out.sum() - 0.5
     assert search._may_stay(problem, tried, "clock-offset") is stays
+
+
+def test_numbers_that_are_known_are_one_start_more(monkeypatch):
+    """A patch of floor has many valleys; from a start beside it, it is not found."""
+    true = hidden(floor_patch={"x_m": 0.1, "y_m": -0.05, "radius_m": 0.15, "loss": 0.4})
+    predictor = WheelPredictor(tracks_of(measured(true, trials=20, seed=11)))
+    problem = problem_for(predictor, NOMINAL)
+    base, effect = problem.fit(NOMINAL), listed(NOMINAL, None, predictor.tracks)["floor-patch"]
+    monkeypatch.setattr("bns.diagnose.estimate.starts._starts", lambda *_: iter([(-0.5, 0.5, 0.1, 0.1)]))
+    known = NOMINAL.with_active(effect, (0.1, -0.05, 0.15, 0.4))
+    alone, helped = (fit_with(problem, base, effect, model) for model in (None, known))
+    assert helped.loss < alone.loss - 1.0
+    assert helped.model.values_of("floor-patch")["loss"] == pytest.approx(0.4, abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -53,21 +53,24 @@ def fitting(effect: Effect, model: Model, tracks: Tracks | None) -> Effect:
     return scaled.within(float(np.hypot(*(high - low))))
 
 
-def fit_with(problem: Problem, base: Fit, effect: Effect) -> Fit:
+def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = None) -> Fit:
     """The model with that effect, all numbers fitted; from the best of the effect's starts.
 
+    ``known``: a model whose numbers of the effect, where it has it, are one start more: places have many valleys.
     An effect that earns next to nothing there is not followed further: the answer would be the same.
     """
-    start = best_start(problem, base, effect)
+    start = best_start(problem, base, effect, known)
     hopeless = base.loss - start.loss < NOTHING * base.loss / len(base.losses)
     return problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter)
 
 
-def best_start(problem: Problem, base: Fit, effect: Effect) -> StartingPoint:
+def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None = None) -> StartingPoint:
     """The fitted model with the effect at the most promising of its starts, one step of least squares taken."""
     lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
     found = (tuple(np.clip(values, lows, highs).tolist()) for values in _starts(effect, problem.predictor, base.model))
     starts = [base.model.with_active(effect, values) for values in found]
+    if known is not None and effect.name in {active.effect.name for active in known.effects}:
+        starts.append(base.model.with_active(effect, tuple(known.values_of(effect.name).values())))
     losses = [problem.loss(start) for start in starts]
     best = int(np.argmin(losses))
     stepped = problem.gauss_newton_step(starts[best], base)

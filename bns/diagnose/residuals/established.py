@@ -23,6 +23,7 @@ from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.residuals.grammar import (
     NAME,
     PLACE,
+    SPEED_THERE,
     STEPPED,
     Earned,
     Family,
@@ -64,6 +65,8 @@ class _State:
     fit: Fit
     names: tuple[str, ...] = ()
     terms: tuple[Formula, ...] = ()
+    known: Model | None = None
+    """The model that a search without terms ended in."""
 
     def without(self, predictor: Predictor, name: str, lacking: Fit) -> _State:
         """The same without an effect; ``lacking``: fitted without it."""
@@ -76,14 +79,18 @@ class _State:
 
 
 def established(
-    predictor: Predictor, given: Model, accepted: Mapping[str, Effect], response: bool | None = None
+    predictor: Predictor,
+    given: Model,
+    accepted: Mapping[str, Effect],
+    response: bool | None = None,
+    known: Model | None = None,
 ) -> Established:
-    """The search with flexible terms; ``accepted``: the effects that a search without them ended in.
+    """The search with flexible terms; ``accepted``: the effects that a search without them ended in, ``known``: with its numbers.
 
     ``response``: is the wheels' free response a candidate; by default where no effect was accepted.
     """
     problem = problem_for(predictor, given)
-    state, left = _State(problem, problem.fit(given)), dict(accepted)
+    state, left = _State(problem, problem.fit(given), known=known), dict(accepted)
     grammar = families(predictor, given.wheelbase_m, not accepted if response is None else response)
     level = FALSE_ALARM / max(len(left) + len(grammar), 1)
     for _ in range(len(accepted) + TERMS):
@@ -110,7 +117,7 @@ def _step(
 ) -> _State | None:
     """The best effect or term added; None where neither earns anything."""
     problem, fit = state.problem, state.fit
-    tried = {name: fit_with(problem, fit, effect) for name, effect in left.items()}
+    tried = {name: fit_with(problem, fit, effect, state.known) for name, effect in left.items()}
     earned = {name: one for name, one in tried.items() if _earns(problem.paired_comparison(fit, one), fit, level)}
     best = min(earned, key=lambda name: float(earned[name].held_out.sum()), default="")
     curves = _curves(problem, fit, grammar, state.terms)
@@ -138,7 +145,8 @@ def _written_out(problem: Problem, fit: Fit, family: Family, number: int) -> For
     """The family as a term; a round patch where it is a field over the floor and that does better."""
     name = NAME if not number else f"{NAME}-{number + 1}"
     free = fitted(problem, fit, family.on, family.term, name, family.signal)
-    round_patch = patch(problem, fit, family.on, name) if family.signal == PLACE and family.on == SHARE else None
+    over_floor = (family.signal, family.on) == (PLACE, SHARE) or family.signal == SPEED_THERE
+    round_patch = patch(problem, fit, family.on, name) if over_floor else None
     found = [term for term in (free, round_patch) if term is not None and _whole(term)]
     return max(found, key=lambda term: term.paired_comparison.elpd_diff, default=None)
 
@@ -173,14 +181,14 @@ def _without_needless_terms(
         model = state.fit.model.without(term.name)
         for effect in others:
             loose = problem_for(predictor, model)
-            model = fit_with(loose, loose.fit(model), effect).model
+            model = fit_with(loose, loose.fit(model), effect, state.known).model
         problem = problem_for(predictor, model, state.problem.pose_filter.noise)
         without = problem.fit(model)
         again = fitted(problem, without, term.on, term.term, term.name, term.signal, term.values)
         kept = again.paired_comparison.elpd_diff if again is not None else 0.0
         if kept < KEPT_TERM * term.paired_comparison.elpd_diff:
             terms = tuple(one for one in state.terms if one.name != term.name)
-            state = _pruned(predictor, _State(problem, without, tuple(accepted), terms), level)
+            state = _pruned(predictor, _State(problem, without, tuple(accepted), terms, state.known), level)
     return state
 
 
@@ -213,7 +221,7 @@ def _exchanged(
     bare = fit = problem.fit(model)
     names = state.names
     while _share(bare, fit, state.fit) < SPANNED:
-        tried = {name: fit_with(problem, fit, effect) for name, effect in lost.items() if name not in names}
+        tried = {n: fit_with(problem, fit, effect, state.known) for n, effect in lost.items() if n not in names}
         best = min(tried, key=lambda name: float(tried[name].held_out.sum()), default="")
         if len(names) == len(state.names) + len(dropped) or not best:
             return state

@@ -27,6 +27,7 @@ from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, formula_effect
 NAME = "unlisted"
 RESPONSE = "response of each wheel in time"
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
+SPEED_THERE = "forward speed at a place"
 CHANCE = DEFAULTS.residuals.chance
 LEAST = DEFAULTS.residuals.least
 LARGE, LARGE_Z = DEFAULTS.residuals.large, DEFAULTS.residuals.large_z
@@ -133,6 +134,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     (x0, x1), (y0, y1) = (np.quantile(predictor.tracks.pose[:, i], [0.02, 0.98]) for i in (0, 1))
     bumps = tuple(_bumps(x0, x1, y0, y1))
     yield Family(PLACE, SHARE, bumps)
+    yield Family(SPEED_THERE, "v", tuple(f"v * {b}" for b in bumps))
     yield Family(PLACE, "east", tuple(f"moving * {b}" for b in bumps))
     yield Family(PLACE, "north", tuple(f"moving * {b}" for b in bumps))
     yield Family(PLACE, "w", tuple(f"moving * {bump}" for bump in bumps))

@@ -21,7 +21,8 @@ def in_words(term: Formula, predictor: Predictor) -> str:
     """One sentence without its full stop."""
     if term.signal == "place" and "c" in term.values:
         v = term.values
-        return f"{_slower(-v['k'])} within {abs(v['c']):.3g} m of ({v['a']:.3g}, {v['b']:.3g}) m"
+        forward = " in forward motion" if term.on == "v" else ""
+        return f"{_slower(-v['k'])}{forward} within {abs(v['c']):.3g} m of ({v['a']:.3g}, {v['b']:.3g}) m"
     said = _SAID.get((term.signal, term.on))
     return (
         said(term, predictor)
