@@ -47,6 +47,7 @@ VALUES: dict[str, dict[str, float]] = {
     "speed-gain": {"gain": 1.1},
     "speed-limit": {"max_m_s": 0.1},
     "stribeck": {"width_m_s": 0.03, "fade_m_s": 0.05},
+    "dead-band": {"threshold_m_s": 0.04},
     "tether-pull": {"pull_per_s": 0.015, "anchor_x_m": 0.0, "anchor_y_m": 0.5},
     "tilted-camera": {"x_per_m": 0.3, "y_per_m": 0.1},
     "turn-slip": {"slip_s": 0.12},

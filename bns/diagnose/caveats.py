@@ -54,11 +54,7 @@ def notes_on(
             f"{' with '.join(found.withdrawn)} would raise the likelihood, but not improve predictions of held-out trials "
             "(root mean square on the same windows). So it is not presented as an explanation."
         )
-    if slight:
-        yield (
-            f"What is left is certain but slight: {'; '.join(slight)}. A term for it lowers no error on held-out trials by "
-            f"{LEAST_FALL:.0%} for certain, so the verdict does not count it."
-        )
+    yield from _on_slight(found.unseen, slight)
     for name, numbers in found.negligible.items():
         said = ", ".join(f"{key} = {number['value']:.3g} {number['unit']}" for key, number in numbers.items())
         yield (
@@ -82,6 +78,21 @@ def notes_on(
     for c in selection.steps[0].ranking:
         if c.rejected_because and c.paired_comparison.elpd_diff > NOTABLE * float(selection.nominal.losses.mean()):
             yield f"{c.name} was not considered: {c.rejected_because}."
+
+
+def _on_slight(unseen: bool, slight: Sequence[str]) -> Iterator[str]:
+    """On what is certainly left and does not count."""
+    if unseen:
+        described = f" ({'; '.join(slight)})" if slight else ""
+        yield (
+            f"What is left is certain but slight{described}: at every horizon it adds less to the error than the noise of the "
+            "tracker does, so the verdict does not count it."
+        )
+    elif slight:
+        yield (
+            f"What is left is certain but slight: {'; '.join(slight)}. A term for it lowers no error on held-out trials by "
+            f"{LEAST_FALL:.0%} for certain, so the verdict does not count it."
+        )
 
 
 def on_worst(both: WithoutWorst) -> str:

@@ -18,9 +18,11 @@ from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.negligible import LEAST_FALL, negligible
 from bns.diagnose.select.result import SelectionResult, certainly_lower
+from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of
 from bns.physics.model import Model
 
+SLIGHT = DEFAULTS.residuals.slight_excess
 WITH_EFFECTS = "with the effects"
 """The name of the refitted model in tables of errors."""
 WITH_TERMS = "and what is left, too"
@@ -52,7 +54,9 @@ class Outcome:
     negligible: dict[str, dict[str, dict[str, Any]]]
     terms: tuple[Formula, ...]
     slight: tuple[Formula, ...]
-    """Terms that describe all that is left, which is certain and lowers no held-out error by `least_fall`."""
+    """Terms for what is certainly left and does not count, because it is slight."""
+    unseen: bool
+    """What is left adds less to the errors than the tracker's noise does."""
     errors_with_terms: PairedErrors | None
     formula: Formula | None
     """The first term; without terms, a formula fitted to the variable along which most is left, where it earns something."""
@@ -61,23 +65,27 @@ class Outcome:
 def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, tick: Callable[[str], None]) -> Outcome:
     """Which of the effects that a search accepted are presented, and with which terms.
 
-    Effects that only imitate what is left give way to its terms, if the terms matter; else the effects stay as they are. What
-    terms describe wholly, and which lowers no error that matters, counts as nothing left.
+    Effects that only imitate what is left give way to its terms, if the terms matter; else the effects stay as they are. Nothing
+    counts as left where the errors are at the noise of the tracker, or where terms describe all of it and lower no error that
+    matters.
     """
     stands = _standing(searched, predictor, given, tick)
     imitating: tuple[str, ...] = ()
     terms: tuple[Formula, ...] = ()
     slight: tuple[Formula, ...] = ()
     with_terms: PairedErrors | None = None
+    unseen = stands.rest.any and not stands.rest.outliers and _within_noise(stands.errors)
     if found := _established(stands.selection, predictor, stands.rest, True if stands.withdrawn else None):
         lost = tuple(name for name in stands.selection.accepted if name not in found.names)
         next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
         errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
         matters = errors is None or _matters(errors)
-        if not matters and next_to.rest.any and not _unexplained_beside(found).any:
-            slight, stands = found.terms, replace(stands, rest=NOTHING)
+        if unseen or (not matters and next_to.rest.any and not _unexplained_beside(found).any):
+            slight = found.terms
         elif matters or next_to.rest.any:
             stands, imitating, terms, with_terms = next_to, lost, found.terms, errors
+    if unseen or slight:
+        stands = replace(stands, rest=NOTHING)
     whole = stands.selection
     tiny = () if terms else _negligible(whole)
     selection = refitted(whole.lacking(tiny), predictor, given) if tiny else whole
@@ -94,6 +102,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         {name: numbers for name, numbers in numbers_of(whole.fit).items() if name in tiny},
         terms,
         slight,
+        unseen,
         with_terms,
         formula,
     )
@@ -184,6 +193,12 @@ def _matters(errors: PairedErrors) -> bool:
         if change.fell and -change.change_m >= LEAST_FALL * before.rms_m:
             return True
     return False
+
+
+def _within_noise(errors: PairedErrors) -> bool:
+    """Does what is left add less to the held-out error (root sum of squares) than tracking noise does, at every horizon?"""
+    pairs = [(at.models[-1].rms_m, at.noise_floor_m) for at in errors.horizons.values()]
+    return bool(pairs) and all(rms_m**2 - noise_m**2 < (SLIGHT * noise_m) ** 2 for rms_m, noise_m in pairs)
 
 
 def _unexplained_beside(found: Established) -> Unexplained:

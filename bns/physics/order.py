@@ -14,6 +14,7 @@ ORDER = (
     "warm-up",
     "dead-zone",
     "stribeck",
+    "dead-band",
     "speed-limit",
     OTHERS,
     "acceleration-limit",  # exact for commands, which are constant in a step: so before delay and lag

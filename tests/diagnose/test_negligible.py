@@ -106,6 +106,27 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
         assert next(said).startswith("What is left is certain but slight: slower for two seconds.")
 
 
+@pytest.mark.parametrize(
+    ("error_m", "outliers", "counts"), [(0.0013, (), False), (0.0015, (), True), (0.0013, ("a moment",), True)]
+)
+def test_what_adds_less_than_tracking_noise_does_not_count(monkeypatch, error_m, outliers, counts):
+    """Replaced: something is left beside the effect, no term describes it, and errors are given, with a noise of 1 mm."""
+    searched = selected("wheelbase")
+    left = replace(NOTHING, residual_dependence=("something",), outliers=outliers)
+    at = SimpleNamespace(models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=error_m)], noise_floor_m=0.001)
+    monkeypatch.setattr(outcome, "errors_before_and_after", lambda *_: SimpleNamespace(falls=True, horizons={1.0: at}))
+    monkeypatch.setattr(outcome, "_established", lambda *_: None)
+    monkeypatch.setattr(outcome, "residual_dependence", lambda *_: [])
+    monkeypatch.setattr(outcome, "unexplained", lambda *_: left)
+    monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
+    ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
+    assert ended.unseen is not counts
+    assert ended.rest == (left if counts else NOTHING)
+    if not counts:
+        said = next(notes_on(ended, predictor().tracks, None))
+        assert said.startswith("What is left is certain but slight: at every horizon it adds less to the error than the noise")
+
+
 def test_of_several_effects_only_those_that_raise_the_error_are_withdrawn(monkeypatch):
     """A stand-in for the errors: with the mismatch they rise, and fall with the wheelbase alone."""
     searched = selected("wheelbase", "wheel-mismatch", "clock-offset")

@@ -81,6 +81,16 @@ class DeadZone(Cause):
 
 
 @dataclass
+class DeadBand(Cause):
+    """A wheel stands while its command is below this."""
+
+    threshold_m_s: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        return np.where(np.abs(wheels) < self.threshold_m_s, 0.0, wheels)
+
+
+@dataclass
 class SpeedLimit(Cause):
     """No wheel is faster than this."""
 
@@ -248,6 +258,7 @@ LISTED: dict[str, type[Cause]] = {
     "command-delay": CommandDelay,
     "dead-zone": DeadZone,
     "stribeck": Stribeck,
+    "dead-band": DeadBand,
     "warm-up": WarmUp,
     "speed-gain": SpeedGain,
     "wheel-mismatch": WheelMismatch,

@@ -75,6 +75,12 @@ def test_commands_wait_for_ticks_and_are_rounded():
     assert way("command-quantisation", step_m_s=0.03, share=1.0)[0] == pytest.approx(0.09)
 
 
+def test_a_wheel_stands_below_the_dead_band_and_loses_nothing_above_it():
+    model = IDEAL.with_effect("dead-band", threshold_m_s=0.05)
+    for speed, driven in ((0.048, 0.0), (0.052, 0.052), (-0.048, 0.0), (-0.1, -0.1), (0.0, 0.0)):
+        assert simulate(model, [[speed]], [[speed]], [[1.0]])[0, 0, 0] == pytest.approx(driven, abs=2e-3)
+
+
 def test_a_patch_slows_where_it_lies():
     model = IDEAL.with_effect("floor-patch", x_m=0.15, y_m=0.0, radius_m=0.05, loss=0.5)
     assert simulate(model, [[0.1]], [[0.1]], [[2.0]])[0, 0, 0] == pytest.approx(0.15, abs=1e-3)
@@ -96,6 +102,8 @@ def test_the_judges_second_equations_agree(name):
     values = LONGER[name][1]
     if name == "floor-patch":
         values = {"x_m": 0.9, "y_m": 0.45, "radius_m": 0.08, "loss": 0.3}
+    if name == "dead-band":
+        values = {"threshold_m_s": 0.095}
     full = values | ({"share": 1.0} if name == "command-quantisation" else {})
     start = np.array([[0.8, 0.4, 0.3]])
     model = IDEAL.with_effect(name, **full)

@@ -20,6 +20,7 @@ from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_e
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import paired_errors
+from bns.diagnose.residuals.along_variables import residual_dependence
 from bns.diagnose.residuals.grammar import (
     NAME,
     PLACE,
@@ -34,6 +35,7 @@ from bns.diagnose.residuals.grammar import (
     significant,
 )
 from bns.diagnose.residuals.symbolic import Formula, fitted, patch
+from bns.diagnose.residuals.unexplained import unexplained
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 from bns.physics.formula import SHARE
@@ -175,7 +177,10 @@ def _earns(comparison: PairedComparison, before: Fit, level: float) -> bool:
 def _without_needless_terms(
     predictor: Predictor, state: _State, accepted: Mapping[str, Effect], level: float
 ) -> _State:
-    """Without the terms that several accepted effects together do as well: a curve came in before it could be known."""
+    """Without the terms that several accepted effects together do as well: a curve came in before it could be known.
+
+    They do not where they leave something unexplained and the curve leaves nothing.
+    """
     others = [effect for name, effect in accepted.items() if name not in state.names]
     for term in state.terms if others else ():
         model = state.fit.model.without(term.name)
@@ -186,10 +191,16 @@ def _without_needless_terms(
         without = problem.fit(model)
         again = fitted(problem, without, term.on, term.term, term.name, term.signal, term.values)
         kept = again.paired_comparison.elpd_diff if again is not None else 0.0
-        if kept < KEPT_TERM * term.paired_comparison.elpd_diff:
+        if kept < KEPT_TERM * term.paired_comparison.elpd_diff and not (
+            _leaves_something(problem, without) and not _leaves_something(state.problem, state.fit)
+        ):
             terms = tuple(one for one in state.terms if one.name != term.name)
             state = _pruned(predictor, _State(problem, without, tuple(accepted), terms, state.known), level)
     return state
+
+
+def _leaves_something(problem: Problem, fit: Fit) -> bool:
+    return unexplained(problem, fit, residual_dependence(problem, fit)).any
 
 
 def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect], level: float) -> _State:
