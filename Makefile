@@ -14,7 +14,7 @@ TORCH   := torch==2.13.0
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup test test-slow lint dist docs sweep-khepera sweep-budget figures bench bench-check bench-gpu compare-gpu hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants replication ranking-check
+.PHONY: help setup test test-slow lint dist docs sweep-khepera sweep-budget figures bench bench-check bench-gpu compare-gpu contact-worlds hidden-effects precompute soak-dask fuzz clean sweep-snake soak real-robots propose-benchmark closing-the-gap mutants replication ranking-check
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/' | awk -F'\t' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -78,6 +78,9 @@ bench-gpu: setup ## both studies on this machine's GPU, from slices of them (nee
 
 compare-gpu: setup ## 200 runs a side and robot on GPU and CPU: do success, diversity and fitness error differ? (needs a GPU likewise)
 	$(BIN)/python -m tests.bench.devices --json "$(RESULTS)/compare-gpu.json"
+
+contact-worlds: setup ## the same for robots with contact physics (MuJoCo), a quarter of an hour
+	$(BIN)/python -m tests.contact_worlds "$(RESULTS)/contact-worlds" $(if $(ONLY),--only "$(ONLY)")
 
 hidden-effects: setup ## does the diagnosis name what is missing? Generated worlds, half an hour; QUICK=1 for a look in minutes
 	$(BIN)/python -m tests.hidden_effects --results "$(RESULTS)/hidden-effects" $(if $(QUICK),--quick) $(if $(ONLY),--only "$(ONLY)")

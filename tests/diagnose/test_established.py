@@ -151,6 +151,15 @@ def test_a_patch_that_slows_forward_motion_alone_is_described():
     assert re.match(said, in_words(found.terms[0], predictor))
 
 
+def test_a_slope_on_which_wheels_do_not_slip_sideways_is_described():
+    """The listed slope drifts downhill whatever the heading; wheels that hold only lose or gain forward speed."""
+    slope = formula_effect("slope", "k * moving * cos(heading - 0.8)", "v")
+    predictor = predictor_of(NOMINAL.with_active(slope, (-0.02,)))
+    found = stands(predictor)
+    assert [(term.signal, term.on) for term in found.terms] == [("heading", "v")]
+    assert not left_over(found.problem, found.fit)
+
+
 def drawn_by_curves(predictor, *wanted):
     """A search that ended in terms of these families (signal, on), where no effect came in."""
     problem = problem_for(predictor, NOMINAL)

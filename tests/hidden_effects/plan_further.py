@@ -18,7 +18,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "heating": ({"loss_per_m": 0.03, "cool_s": 60.0}, {"loss_per_m": 0.05, "cool_s": 90.0}),
     "warm-up": ({"loss": 0.08, "time_s": 4.0}, {"loss": 0.25, "time_s": 3.0}),
     "stribeck": ({"width_m_s": 0.02, "fade_m_s": 0.04}, {"width_m_s": 0.04, "fade_m_s": 0.05}),
-    "dead-band": ({"threshold_m_s": 0.02}, {"threshold_m_s": 0.04}),
+    "dead-band": ({"threshold_m_s": 0.03}, {"threshold_m_s": 0.045}),
     "turn-slip-quadratic": ({"slip_s2": 0.03}, {"slip_s2": 0.07}),
     "floor-patch": (
         {"x_m": 0.8, "y_m": 0.5, "radius_m": 0.35, "loss": 0.12},

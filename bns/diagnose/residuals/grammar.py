@@ -129,7 +129,8 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
         times = [first + share * (last - first) for share in SESSION_KNOTS]
         yield Family("time of the session", SHARE, tuple(_hats("t", times)))
     turns = ("cos(heading)", "sin(heading)", "cos(2*heading)", "sin(2*heading)")
-    yield Family("heading", "v", tuple(f"v * {t}" for t in turns))
+    uphill = ("moving * cos(heading)", "moving * sin(heading)")  # a slope on which wheels do not slip sideways
+    yield Family("heading", "v", (*(f"v * {t}" for t in turns), *uphill))
     yield Family("heading", "w", tuple(f"moving * {t}" for t in turns))
     (x0, x1), (y0, y1) = (np.quantile(predictor.tracks.pose[:, i], [0.02, 0.98]) for i in (0, 1))
     bumps = tuple(_bumps(x0, x1, y0, y1))

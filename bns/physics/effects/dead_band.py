@@ -9,8 +9,8 @@ import numpy as np
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
 
-_SHARPNESS = 100
-"""From 0.1 to 0.9 of the command within 2.2 % of the threshold either way: a fit needs a slope."""
+_SHARPNESS = 250
+"""From 0.1 to 0.9 of the command within 0.9 % of the threshold either way: a fit needs a slope."""
 
 
 def apply(wheels: Wheels, threshold_m_s: float) -> Wheels:
@@ -45,5 +45,5 @@ EFFECT = Effect(
     "turn, and at once how fast it turns then",
     apply=apply,
     needs="track",
-    starts=tuple((round(0.003 * 1.12**i, 5),) for i in range(32)),
+    starts=tuple((round(0.003 * 1.07**i, 5),) for i in range(52)),
 )
