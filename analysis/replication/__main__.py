@@ -101,8 +101,8 @@ def _origin(store: Results, archive: Path, *, fresh: bool) -> list[str]:
     versions = sorted({version for one in said for version in one["bns_version"]})
     return [
         f"{made} from `results/{PUBLISHED.as_posix()}`, {sum(one['runs'] for one in said):,} runs (`make replication`).",
-        f"Engine version {', '.join(engines)}; bns {', '.join(versions)}; commits {', '.join(commits)}; "
-        f"sweep files {', '.join(specs)}.",
+        f"Engine version {', '.join(engines)}; bns {', '.join(versions)}; commits {', '.join(commits)}.",
+        f"Sweep files {', '.join(specs)}.",
     ]
 
 
