@@ -10,7 +10,14 @@ from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals.established import _restored, _State, _step, established, left_over
+from bns.diagnose.residuals.established import (
+    _restored,
+    _State,
+    _step,
+    _without_needless_terms,
+    established,
+    left_over,
+)
 from bns.diagnose.residuals.grammar import families, ranked, rounding, significant
 from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.words import in_words
@@ -217,3 +224,18 @@ def test_a_curve_that_can_draw_an_effect_does_not_come_back_beside_it():
     state = drawn_by_curves(predictor, ("speed of each wheel", "wheels"))
     ended = _restored(predictor, state, {"dead-zone": catalogue["dead-zone"]}, 0.01)
     assert (ended.names, ended.terms) == (("dead-zone",), ())
+
+
+@pytest.mark.parametrize("effects_leave_something", [False, True])
+def test_effects_that_leave_something_do_not_replace_a_curve_that_leaves_nothing(monkeypatch, effects_leave_something):
+    """A dead zone explains its curve; only what is left beside each of them is mocked."""
+    predictor = predictor_of(hidden(dead_zone={"width_m_s": 0.02}))
+    state = drawn_by_curves(predictor, ("speed of each wheel", "wheels"))
+
+    def leaves_something(_, fit):
+        return effects_leave_something and "term-1" not in {active.effect.name for active in fit.model.effects}
+
+    monkeypatch.setattr("bns.diagnose.residuals.established._leaves_something", leaves_something)
+    accepted = {"dead-zone": listed(NOMINAL, None, predictor.tracks)["dead-zone"]}
+    ended = _without_needless_terms(predictor, state, accepted, 0.01)
+    assert (ended.names, ended.terms == state.terms) == (((), True) if effects_leave_something else (("dead-zone",), False))

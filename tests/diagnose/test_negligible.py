@@ -72,7 +72,7 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
 
 @pytest.mark.parametrize(("matters", "named"), [(True, ("wheelbase",)), (False, ("wheelbase", "wheel-mismatch"))])
 def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named):
-    """The search with flexible terms and its judgement are replaced: the search keeps one effect beside a term."""
+    """The search with flexible terms and its judgement are mocked: the search keeps one effect beside a term."""
     searched = selected("wheelbase", "wheel-mismatch")
     found = Established(("wheelbase",), ("a term",), searched.problem, searched.fit)
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
@@ -87,7 +87,7 @@ def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named)
 
 @pytest.mark.parametrize("matters", [True, False])
 def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matters):
-    """Replaced: something is left beside the effect, nothing beside a term, and the term lowers an error or does not."""
+    """With mocked parts: something is left beside the effect, nothing beside a term, and the term lowers an error or does not."""
     searched = selected("wheelbase")
     found = Established(("wheelbase",), ("a term",), searched.problem, "fit with the term")
     left = replace(NOTHING, residual_dependence=("something",))
@@ -110,7 +110,7 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
     ("error_m", "outliers", "counts"), [(0.0013, (), False), (0.0015, (), True), (0.0013, ("a moment",), True)]
 )
 def test_what_adds_less_than_tracking_noise_does_not_count(monkeypatch, error_m, outliers, counts):
-    """Replaced: something is left beside the effect, no term describes it, and errors are given, with a noise of 1 mm."""
+    """With mocked parts: something is left beside the effect, no term describes it; the errors are given, the noise is 1 mm."""
     searched = selected("wheelbase")
     left = replace(NOTHING, residual_dependence=("something",), outliers=outliers)
     at = SimpleNamespace(models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=error_m)], noise_floor_m=0.001)

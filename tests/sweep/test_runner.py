@@ -220,6 +220,6 @@ def test_real_runs_are_the_same_for_any_number_of_workers(tmp_path):
 def test_quarantined_runs_are_redone_like_failed_ones_and_only_on_request(tmp_path, monkeypatch, retry):
     sweep = make_sweep(seeds=3)
     first, second, third = (spec.run_id for spec in ordered_specs(sweep)[:3])
-    monkeypatch.setattr("bns.sweep.expand.digests.finished", lambda *_: {first: "quarantined", second: "failed"})
+    monkeypatch.setattr("bns.sweep.runner.recorded", lambda *_: {first: "quarantined", second: "failed"})
     todo = [spec.run_id for spec in runner._SweepRun(sweep, tmp_path, Budget(), lambda _: None, None).plan(retry, None)]
     assert ([first in todo, second in todo, third in todo]) == [retry, retry, True]

@@ -3,8 +3,9 @@
 What is left biases all that is fitted without it, and listed effects are accepted because they imitate it. So the search is
 done again with flexible terms (`grammar`) as candidates beside the accepted effects, on equal terms: whatever predicts trials
 held out best comes in first; an effect is preferred to a free curve only if the curve is not better for certain. In the end every
-effect must predict held-out trials significantly better beside the terms, at the level that all candidates share. A curve that
-can draw an effect leaves it no gain, whatever is true: where effects do nearly all that their terms do, they are kept.
+effect must predict held-out trials significantly better beside the terms, at the level that all candidates share. A curve
+that can reproduce an effect leaves it nothing to explain, even if the effect is real: where an effect explains nearly all that
+its term does, the effect is kept.
 """
 
 from __future__ import annotations
@@ -207,7 +208,7 @@ def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect
     """With the effects that do nearly all that a term does: a curve that can draw an effect leaves nothing for it to earn.
 
     One effect takes the place of one term, beside the others; then as many of all terms that are left, together. Several effects
-    that draw one curve together imitate it.
+    that only together reproduce one curve imitate it.
     """
     lost = {name: effect for name, effect in accepted.items() if name not in state.names}
     for dropped in [*([term] for term in state.terms), list(state.terms)]:

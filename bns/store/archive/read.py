@@ -15,6 +15,7 @@ from bns.errors import StoreError
 from bns.store.archive.kept import DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE
 from bns.store.disk.digest import is_intact, is_sealed
 from bns.store.disk.parquet import READ_FAULTS
+from bns.store.read.reader import finished
 from bns.store.read.views import pattern
 from bns.store.schema import METADATA_KEY, PARAMETERS
 
@@ -64,7 +65,7 @@ def stored_archives(results: Path | str) -> list[Path]:
 def archived(results: Path | str, sweep: str) -> pd.DataFrame:
     """The runs of a sweep that lie in archives in the folder ``results``/archived: run_id, status, task, world, world_digest.
 
-    A study goes on where its results are no longer: such runs count as done, and `archive` puts them beside the new ones.
+    They count as done, and `archive` writes them together with the new ones: so a study continues on another machine.
 
     Raises:
         StoreError: a file there is no archive, or not as it was written.
@@ -75,6 +76,12 @@ def archived(results: Path | str, sweep: str) -> pd.DataFrame:
         return pd.DataFrame(columns=columns.split(", "), dtype=str)
     with connect_archives(files) as connection:
         return connection.execute(f"SELECT {columns} FROM runs WHERE sweep = ? ORDER BY run_id", [sweep]).df()
+
+
+def recorded(results: Path | str, sweep: str) -> dict[str, str]:
+    """Status of every run of a sweep by run id: those in the results, as `finished` gives them, and those in their archives."""
+    kept = archived(results, sweep)
+    return dict(zip(kept["run_id"], kept["status"], strict=True)) | finished(results, sweep)
 
 
 def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:

@@ -15,7 +15,7 @@ from typing import Any
 
 from bns.errors import ClusterError
 from bns.extras import extra
-from bns.sweep.expand.digests import WorldDigests
+from bns.store.archive.read import recorded
 from bns.sweep.expand.grid import Sweep
 from bns.sweep.expand.order import ordered_specs
 from bns.sweep.expand.shard import Shard
@@ -136,7 +136,7 @@ def _wait(sweep: Sweep, request: Request, jobs: Sequence[submitit.Job[Any]]) -> 
 
 def _stand(sweep: Sweep, request: Request, stopped_by: str | None, began: Summary | None = None) -> Summary:
     """What the store says of the sweep; with what is new since ``began``."""
-    known = WorldDigests(request.results, sweep.name).read()
+    known = recorded(request.results, sweep.name)
     counts = [known.get(spec.run_id) for spec in ordered_specs(sweep)] if known else []
     done, failed, quarantined = (counts.count(status) for status in ("ok", "failed", "quarantined"))
     new = 0 if began is None else done + failed + quarantined - (sweep.total - began.remaining)

@@ -7,7 +7,7 @@ from pathlib import Path
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store.archive.read import archived
-from bns.store.read.reader import finished, load
+from bns.store.read.reader import load
 from bns.store.record import RunRecord
 
 
@@ -18,17 +18,14 @@ class WorldDigests:
         self._results, self._sweep = results, sweep
         self._known: dict[tuple[str, str], str] = {}
 
-    def read(self) -> dict[str, str]:
-        """Take note of the runs in the store and in its archives; the status of each by run id, as `finished` gives it."""
-        stored, kept = finished(self._results, self._sweep), archived(self._results, self._sweep)
+    def read(self) -> None:
+        """Take note of the runs in the store, which must exist, and in its archives."""
         columns = ["task", "world", "world_digest"]
-        known = [kept.loc[kept["status"] == "ok", columns]]
-        if "ok" in stored.values():
-            known.append(load(self._results, "runs", columns=columns, where={"sweep": self._sweep, "status": "ok"}))
-        for runs in known:
+        kept = archived(self._results, self._sweep)
+        stored = load(self._results, "runs", columns=columns, where={"sweep": self._sweep, "status": "ok"})
+        for runs in (kept.loc[kept["status"] == "ok", columns], stored):
             for task, world, digest in runs.drop_duplicates().itertuples(index=False):
                 self.compare(task, world, digest)
-        return dict(zip(kept["run_id"], kept["status"], strict=True)) | stored
 
     def check(self, record: RunRecord) -> None:
         """StoreError if there are runs of this sweep, task and world with another digest."""

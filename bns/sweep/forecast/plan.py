@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from bns.spec import RunSpec
-from bns.store.archive.read import archived
+from bns.store.archive.read import recorded
 from bns.store.read.reader import finished, load
 from bns.store.write.compaction import bytes_per_run
 from bns.sweep.expand.grid import Sweep
@@ -65,18 +65,14 @@ def plan(
 
     Nothing is written. The seconds are wall time with ``jobs`` workers; NaN if the trial run failed.
     """
-    known = finished(results, sweep.name)
-    kept = archived(results, sweep.name)
-    had = set(kept["run_id"][(kept["status"] == "ok") | (not retry_failed)])
-    had |= {run_id for run_id, status in known.items() if status == "ok" or not retry_failed}
+    had = {run for run, status in recorded(results, sweep.name).items() if status == "ok" or not retry_failed}
     everything = ordered_specs(sweep)
     specs = everything if shard is None else list(shard.share(everything))
     todo = [spec for spec in specs if spec.run_id not in had] if had else specs
     if not todo:
         return Plan(sweep.name, len(specs), len(specs), 0, 0.0, 0.0, "nothing is left to do")
-    seconds, basis = (
-        _from_store(results, sweep.name, todo) if "ok" in known.values() else _from_trial(todo, job, warm_up)
-    )
+    stored = "ok" in finished(results, sweep.name).values()
+    seconds, basis = _from_store(results, sweep.name, todo) if stored else _from_trial(todo, job, warm_up)
     return Plan(
         sweep.name,
         len(specs),
