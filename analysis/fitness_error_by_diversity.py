@@ -9,7 +9,7 @@ from analysis.figure_result import FigureResult
 from analysis.intervals import mean_interval
 from analysis.labels import TITLES, task_title
 from analysis.results import Results
-from analysis.scatter import Panel, combinations, described, scatter_figure
+from analysis.scatter import Panel, combinations, described, intervals_shown, scatter_figure
 from analysis.selection import Selection, selections
 from bns.plotting.style import style
 
@@ -36,8 +36,8 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
         ax.set_ylim(0, min(ax.get_ylim()[1], LONGEST * panel.rows.y.max()) or None)
     what = (
         "Mean absolute difference between the fitness of the fittest controller in simulation and in the world at the last "
-        f"evaluation, against the mean diversity of the populations then, by {TITLES[COLOUR]}; bars are Student's 95 % "
-        "intervals of the mean"
+        f"evaluation, against the mean diversity of the populations then, by {TITLES[COLOUR]}; "
+        + intervals_shown(rows, "Student's 95 % intervals of the mean")
     )
     return described(
         store, chosen, figure, rows, name=NAME, title="Fitness error against diversity", what=what,

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.coverage import coverage
 from analysis.figure_result import FigureResult
+from analysis.intervals import mean_interval
 from analysis.labels import SHORT, TITLES, counted, each, valued
 from analysis.outcomes import at_the_end, fewest
 from analysis.results import BEGIN, NoDataError, Results, remembered
@@ -18,7 +20,9 @@ from analysis.selection import Selection
 from bns.plotting.style import lettered, note, ordered_styles, panels, style
 
 CROWD = 60
-"""From this many dots a panel on, their intervals are drawn faintly."""
+"""From this many dots a panel on, means of groups are drawn in place of each dot's interval: nobody could tell these apart."""
+GROUPS = 5
+"""Groups of equally many combinations, by diversity, whose means are drawn."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +66,12 @@ def scatter_figure(shown: Sequence[Panel], parameter: str, label: str) -> tuple[
 def _dots(ax: Axes, rows: pd.DataFrame, parameter: str, looks: dict[float, dict[str, str]]) -> None:
     for value, dots in rows.groupby(parameter):
         look = {"color": looks[value]["color"], "zorder": 2 + len(looks)}
-        faint = 0.7 if len(rows) < CROWD else 0.2
-        ax.vlines(dots.diversity, dots.low, dots.high, linewidth=1.0, color=look["color"], alpha=faint)
+        small: dict[str, float] = {}
+        if len(rows) < CROWD:
+            ax.vlines(dots.diversity, dots.low, dots.high, linewidth=1.0, color=look["color"], alpha=0.7)
+        else:
+            _means(ax, dots, look["color"])
+            small = {"markersize": 2.5, "alpha": 0.6}
         ax.plot(
             dots.diversity,
             dots.y,
@@ -73,9 +81,30 @@ def _dots(ax: Axes, rows: pd.DataFrame, parameter: str, looks: dict[float, dict[
             markeredgewidth=0.3,
             label=valued(parameter, value),
             **look,
+            **small,
         )
     if rows.diversity.notna().any() and rows.diversity.max() > 0:
         ax.set_xlim(0, 1.08 * rows.diversity.max())
+
+
+def _means(ax: Axes, dots: pd.DataFrame, colour: str) -> None:
+    """Mean of each of `GROUPS` groups along the diversity, with its 95 % interval over their combinations."""
+    inner = dots.dropna(subset=["diversity", "y"]).sort_values("diversity")
+    groups = (inner.iloc[members] for members in np.array_split(np.arange(len(inner)), GROUPS))
+    known = [group for group in groups if len(group) > 1]
+    if not known:
+        return
+    x, y = (np.array([group[column].mean() for group in known]) for column in ("diversity", "y"))
+    low, high = mean_interval(y, [group.y.std() for group in known], [len(group) for group in known])
+    ax.fill_between(x, low, high, color=colour, alpha=0.25, linewidth=0, zorder=20)
+    ax.plot(x, y, color=colour, linewidth=1.6, zorder=21)
+
+
+def intervals_shown(rows: pd.DataFrame, intervals: str) -> str:
+    """What bars, or lines and bands, of such a figure are; ``intervals``: those of single combinations."""
+    if rows.groupby("task").size().max() < CROWD:
+        return f"bars: {intervals}"
+    return f"lines: means of {GROUPS} equal groups of combinations by diversity, with Student's 95 % intervals over them"
 
 
 def _legend(figure: Figure, axes: Sequence[Axes], parameter: str, values: Sequence[float]) -> None:
@@ -114,7 +143,10 @@ def described(
     runs = each(rows.runs.min(), rows.runs.max())
     note(
         figure,
-        "; ".join((f"{counted(len(rows), 'dot')} of {runs} each", *said.sentences, *thinned, f"bars: {intervals}")) + ".",
+        "; ".join(
+            (f"{counted(len(rows), 'dot')} of {runs} each", *said.sentences, *thinned, intervals_shown(rows, intervals))
+        )
+        + ".",
     )
     shows = (
         f"{what}; one dot per task and combination of {', '.join(SHORT.values())} ({runs} each, n = {n:,} runs of "

@@ -9,7 +9,7 @@ from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
 from analysis.labels import TITLES, task_title
 from analysis.outcomes import criterion, radii_cm
 from analysis.results import Results
-from analysis.scatter import Panel, combinations, described, scatter_figure
+from analysis.scatter import Panel, combinations, described, intervals_shown, scatter_figure
 from analysis.selection import Selection, selections
 from bns.plotting.style import style
 
@@ -33,7 +33,8 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
         ax.set_ylim(-2, 102)
     what = (
         f"Fraction of runs whose fittest controller {criterion(store, chosen)} at the last evaluation, against the mean "
-        f"diversity of their populations then, by {TITLES[COLOUR]}; bars are 95 % Wilson intervals ({INDEPENDENCE})"
+        f"diversity of their populations then, by {TITLES[COLOUR]}; "
+        + intervals_shown(rows, f"95 % Wilson intervals ({INDEPENDENCE})")
     )
     return described(
         store, chosen, figure, rows, name=NAME, title="Success against diversity", what=what, intervals=INTERVALS,

@@ -7,7 +7,7 @@ from analysis.intervals import INDEPENDENCE, INTERVALS
 from analysis.labels import TITLES
 from analysis.outcomes import criterion
 from analysis.results import Results
-from analysis.scatter import combinations, described, scatter_figure
+from analysis.scatter import combinations, described, intervals_shown, scatter_figure
 from analysis.selection import Selection, selections
 from analysis.success_by_diversity import COLOUR, in_words, success_panels
 from bns.plotting.style import style
@@ -30,7 +30,8 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
         ax.set_ylim(-2, 102)
     what = (
         f"Fraction of runs whose fittest controller {criterion(store, chosen)} at the last evaluation, against the mean "
-        f"diversity of their populations of {largest} then, by {TITLES[COLOUR]}; bars are 95 % Wilson intervals ({INDEPENDENCE})"
+        f"diversity of their populations of {largest} then, by {TITLES[COLOUR]}; "
+        + intervals_shown(rows, f"95 % Wilson intervals ({INDEPENDENCE})")
     )
     return described(
         store, chosen, figure, rows, name=NAME, title=f"Success against diversity, population {largest}", what=what,

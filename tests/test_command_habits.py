@@ -57,6 +57,13 @@ def test_help_loads_no_library():
     assert {name.split(".")[0] for name in done.stdout.split()} & slow == set()
 
 
+def test_a_diagnosis_loads_nothing_that_only_figures_and_formulas_need():
+    """Each takes half a second, of the four that a diagnosis of sixty trials takes."""
+    code = "import sys, bns.api.add, bns.api.compare, bns.api.diagnose, bns.cli.commands.diagnose\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) & {"matplotlib", "sklearn", "scipy.stats", "torch"} == set()
+
+
 def test_status_as_json(results, capsys):
     [row] = answer(capsys, "status", "--json", "--results", results)
     assert (row["sweep"], row["task"], row["done"], row["failed"], row["total"]) == ("grid", "circle", 2, 0, None)

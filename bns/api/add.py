@@ -5,26 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from matplotlib.axes import Axes
 
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Progress, silent
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Shown, drawn
+from bns.api.common.shown import Shown
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
 from bns.diagnose.adding import ExtendedModel, Memory, add_effects, effect_from
 from bns.diagnose.predict.paired_errors import noise_json
-from bns.diagnose.report.figures import error_by_step_axes
 from bns.diagnose.report.text import extension_text
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.settings.chosen import in_force
 from bns.diagnose.values import numbers_of
 from bns.errors import ModelError
 from bns.physics.effect import Effect
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Wanted = str | PathLike[str] | Effect
 
@@ -78,6 +79,9 @@ class AddResult(Shown):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """The error at every step, one line per horizon; dotted: the tracking noise."""
+        from bns.api.common.axes import drawn  # noqa: PLC0415  # matplotlib is slow to load
+        from bns.diagnose.report.figures import error_by_step_axes  # noqa: PLC0415  # matplotlib is slow to load
+
         return drawn(ax, lambda axes: error_by_step_axes(axes, self.extended), (5.4, 3.0))
 
     def _line(self) -> str:

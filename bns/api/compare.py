@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import pandas as pd
-from matplotlib.axes import Axes
 
 from bns.api.common.cache import remembered
 from bns.api.common.prepared import Prepared, prepared, prepared_networks
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Shown, drawn
+from bns.api.common.shown import Shown
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.comparison import compare as held_against
 from bns.diagnose.predict.networks import NetworkPredictor
-from bns.diagnose.report.figures import curve_axes, curves_of
 from bns.diagnose.report.network_text import network_errors_text
 from bns.diagnose.report.text import ahead, comparison_text
 from bns.diagnose.residuals.network_errors import NetworkErrors, why_wrong
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.settings.chosen import in_force
 from bns.errors import DataError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PHASES = {"noise": 0.0, "errors": 0.3, "what explains them": 0.5, "curves": 0.9}
 """What share of a comparison is done when it tells so."""
@@ -81,6 +82,9 @@ class CompareResult(Shown):
 
         DataError if there is no such variable or direction, or no curve at all.
         """
+        from bns.api.common.axes import drawn  # noqa: PLC0415  # matplotlib is slow to load
+        from bns.diagnose.report.figures import curve_axes, curves_of  # noqa: PLC0415  # matplotlib is slow to load
+
         curves = curves_of(self.comparison, variable, direction)
         if not curves:
             known = ", ".join(dict.fromkeys(curve.variable for curve in self.comparison.curves)) or "none"

@@ -9,18 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from matplotlib.axes import Axes
 
 from bns.api.common.cache import remembered
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Shown, drawn
+from bns.api.common.shown import Shown
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.diagnosis import diagnose as find
-from bns.diagnose.report.figures import ranking_axes
 from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.settings import DEFAULTS, Settings
 from bns.diagnose.settings.chosen import Chosen, changes_text, in_force, settings_of
@@ -30,6 +28,8 @@ from bns.physics.effect import Effect
 from bns.physics.effects import effect_in_file
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from bns.api.propose import ProposeResult
     from bns.api.report import ReportResult
 
@@ -131,6 +131,9 @@ class DiagnoseResult(Shown):
 
     def plot(self, ax: Axes | None = None, most: int = 12) -> Axes:
         """Gain of each effect on held-out trials, with 95 % intervals. DataError if there were too few data for a search."""
+        from bns.api.common.axes import drawn  # noqa: PLC0415  # matplotlib is slow to load
+        from bns.diagnose.report.figures import ranking_axes  # noqa: PLC0415  # matplotlib is slow to load
+
         if self.diagnosis.selection is None:
             raise DataError(f"Nothing was ranked: {'; '.join(self.notes)}")
         return drawn(ax, lambda axes: ranking_axes(axes, self.diagnosis, most), (5.4, 3.8))

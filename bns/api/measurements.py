@@ -7,14 +7,13 @@ from copy import copy
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, Union
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from bns.api.common.shown import Shown, drawn
+from bns.api.common.shown import Shown
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.bodies.cycles import CycleTracks
 from bns.diagnose.data.checks import left_out_rows, own_rows, rows_by_trial, rows_of_losses
@@ -25,7 +24,9 @@ from bns.diagnose.predict.check_robot import suggested_wheelbase_m
 from bns.diagnose.report.text import findings_text
 from bns.errors import DataError
 from bns.measurements import LEFT_OUT, POSE
-from bns.plotting.style import OKABE_ITO
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Log = Union[str, PathLike[str], pd.DataFrame, "Measurements", Sequence[str | PathLike[str]]]
 """A file (.csv, .csv.gz, .parquet), several, a table, or measurements already read."""
@@ -214,6 +215,9 @@ class Measurements(Shown):
 
     def plot_paths(self, ax: Axes | None = None, trials: Iterable[int] | None = None) -> Axes:
         """Where the robot went, one line per trial, m; ``trials``: which, by their number from 0 (default: all)."""
+        from bns.api.common.axes import drawn  # noqa: PLC0415  # matplotlib is slow to load
+        from bns.plotting.style import OKABE_ITO  # noqa: PLC0415  # matplotlib is slow to load
+
         tracks = self._measured.tracks
         chosen = range(len(tracks)) if trials is None else trials
 

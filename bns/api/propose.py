@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from matplotlib.axes import Axes
 
 from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Shown, drawn
+from bns.api.common.shown import Shown
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log
 from bns.api.model import Given
@@ -24,13 +23,15 @@ from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.design.proposal import propose as search
 from bns.diagnose.design.search import GENERATIONS
 from bns.diagnose.design.sequences import Arena, Bounds
-from bns.diagnose.report.proposal_figure import trial_axes
 from bns.diagnose.report.proposal_text import proposal_text
 from bns.diagnose.settings.chosen import in_force
 from bns.errors import DataError
 from bns.physics.effect import Effect
 from bns.physics.jointed.model import JointedModel
 from bns.store.disk.files import publish
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MOST_MINUTES = 600.0
 PHASES = {"competing models": 0.0, "random trials": 0.15, "random commands, for comparison": 0.75, "power": 0.9}
@@ -81,6 +82,9 @@ class ProposeResult(Shown):
 
     def plot(self, ax: Axes | None = None, trial: int = 0) -> Axes:
         """One proposed trial (by its number from 0) in the arena, as each explanation predicts it. DataError if there is none."""
+        from bns.api.common.axes import drawn  # noqa: PLC0415  # matplotlib is slow to load
+        from bns.diagnose.report.proposal_figure import trial_axes  # noqa: PLC0415  # matplotlib is slow to load
+
         if not 0 <= trial < len(self.proposal.plan):
             raise DataError(f"There is no trial {trial}; {len(self.proposal.plan)} are proposed.")
         return drawn(ax, lambda axes: trial_axes(axes, self.proposal, trial))

@@ -9,19 +9,17 @@ from datetime import UTC, datetime
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypedDict, Unpack, cast
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, cast
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
 from bns.api.common.progress import Progress, silent
-from bns.api.common.shown import Shown, drawn
+from bns.api.common.shown import Shown
 from bns.approaches import check_networked
 from bns.bootstrap import loop
 from bns.errors import ModelError, SpecError, unknown_name
 from bns.measurements import check_table_name
-from bns.plotting.style import COLUMN_IN, path_axes, path_figure
 from bns.robots import load_robot
 from bns.robots.simulator import StaticSimulator, check_writable, save_simulator
 from bns.spec import FIELDS, RADII_CM, RunSpec
@@ -31,6 +29,9 @@ from bns.tasks import default_task, load_task
 from bns.worlds import build_world
 from bns.worlds.base import RenderableWorld, World
 from bns.worlds.logged import LoggedWorld
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 BY_HAND = "by-hand"
 """The sweep under whose name the store keeps single runs."""
@@ -121,6 +122,9 @@ class RunResult(Shown):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """The path of the fittest controller: as the robot drove it (solid) and as its networks predict it (dashed), cm."""
+        from bns.api.common.axes import drawn  # noqa: PLC0415  # matplotlib is slow to load
+        from bns.plotting.style import COLUMN_IN, path_axes  # noqa: PLC0415  # matplotlib is slow to load
+
         robot, task = load_robot(self.spec.robot), load_task(self.spec.robot, self.spec.task)
         return drawn(
             ax, lambda axes: path_axes(axes, self.spec, task, robot, self.result), (COLUMN_IN, COLUMN_IN + 0.4)
@@ -249,6 +253,8 @@ def telling(
 
 
 def _drawn(run_: RunResult, results: Path) -> dict[str, Path]:
+    from bns.plotting.style import path_figure  # noqa: PLC0415  # matplotlib is slow to load
+
     spec, robot = run_.spec, load_robot(run_.spec.robot)
     stem = results / "figures" / f"run-{spec.task}-{spec.seed}-{spec.run_id}"
     return {"path": path_figure(spec, load_task(spec.robot, spec.task), robot, run_.result, stem)}

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, Unpack, overload
-
-from matplotlib.axes import Axes
+from typing import TYPE_CHECKING, Any, Unpack, overload
 
 from bns.api.common.progress import Progress
 from bns.api.common.shown import Shown
@@ -27,6 +25,9 @@ from bns.trial.experiment import drive_commands
 from bns.trial.folder import MEASUREMENTS
 from bns.trial.report import TrialResult as Driven
 from bns.trial.session import MOST_ROUNDS, TrialSetup, carry_out
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _Path = str | PathLike[str]
 

@@ -14,7 +14,7 @@ from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
-from bns.diagnose.outcome import outcome_of
+from bns.diagnose.outcome import outcome_of, predicts_better_throughout
 from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
@@ -225,6 +225,10 @@ def _diagnosed(
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
     found = outcome_of(_from_better_numbers(search.run(), before), predictor, model, tick)
+    if found.own_clocks and model.per_trial_effect is None and found.rest.any:
+        shared = StepwiseSelection(predictor, model, extra, tick, barred, own_clocks=False)
+        without = outcome_of(_from_better_numbers(shared.run(), before), predictor, model, tick)
+        found = found if predicts_better_throughout(found, without) else without
     left = found.rest.any or bool(found.terms)
     words = tuple(in_words(term, predictor) for term in found.terms)
     hint = _hint(found.selection, len(predictor.tracks))

@@ -8,6 +8,7 @@ from typing import Any
 
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
 from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -61,6 +62,23 @@ class Outcome:
     formula: Formula | None
     """The first term; without terms, a formula fitted to the variable along which most is left, where it earns something."""
 
+    @property
+    def own_clocks(self) -> bool:
+        """Has each trial a clock of its own?"""
+        return self.selection.fit.model.per_trial_effect is not None
+
+
+def predicts_better_throughout(one: Outcome, other: Outcome) -> bool:
+    """Is the held-out error of one lower at every horizon, each with the terms for what it leaves?
+
+    Asked of clocks that each trial has for itself where something is left beside them: a number that is fitted to each trial
+    takes up whatever is peculiar to it, and may stand only if nothing that all trials share does as well. A horizon without
+    windows says nothing.
+    """
+    ours, theirs = (found.errors_with_terms or found.errors for found in (one, other))
+    pairs = [(at.models[-1].rms_m, theirs.horizons[h].models[-1].rms_m) for h, at in ours.horizons.items()]
+    return not any(a >= b for a, b in pairs)  # NaN where there are no windows: neither
+
 
 def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, tick: Callable[[str], None]) -> Outcome:
     """Which of the effects that a search accepted are presented, and with which terms.
@@ -76,6 +94,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
     with_terms: PairedErrors | None = None
     unseen = stands.rest.any and not stands.rest.outliers and _within_noise(stands.errors)
     if found := _established(stands.selection, predictor, stands.rest, True if stands.withdrawn else None):
+        found = _without_negligible(found, stands.selection, predictor)
         lost = tuple(name for name in stands.selection.accepted if name not in found.names)
         next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
         errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
@@ -183,6 +202,22 @@ def _established(
         # the effects predict better than what they are said to imitate: it is the terms that imitate
         return replace(established(predictor, selection.fit.model, {}, False), names=selection.accepted)
     return found
+
+
+def _without_negligible(found: Established, selection: SelectionResult, predictor: Predictor) -> Established:
+    """Without the effects that lower no held-out error of the model with the terms; as it is where there are no terms."""
+    if not found.terms or not found.names:
+        return found
+    beside = replace(selection, problem=found.problem, fit=found.fit, accepted=found.names)
+    if not (tiny := negligible(beside, fewest=0)):
+        return found
+    model = found.fit.model
+    for name in tiny:
+        model = model.without(name)
+    problem = problem_for(predictor, model, found.problem.pose_filter.noise)
+    fit = problem.fit(model)
+    names = tuple(name for name in found.names if name not in tiny)
+    return Established(names, tuple(replace(term, fit=fit) for term in found.terms), problem, fit)
 
 
 def _matters(errors: PairedErrors) -> bool:

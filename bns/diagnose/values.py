@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.predict.paired_errors import PairedErrors, plain
@@ -58,7 +58,7 @@ def _spread(per_trial_effect: ActiveEffect) -> dict[str, dict[str, Any]]:
     p, own = per_trial_effect.effect.parameters[0], np.array(per_trial_effect.trial_values)
     scatter = float(own.std(ddof=1))
     se = scatter / np.sqrt(len(own))
-    half = float(student.ppf(0.975, len(own) - 1)) * se
+    half = float(stdtrit(len(own) - 1, 0.975)) * se
     mean = {"value": float(own.mean()), "se": se, "low": float(own.mean()) - half, "high": float(own.mean()) + half}
     loose = scatter / np.sqrt(2 * (len(own) - 1))
     between = {"value": scatter, "se": loose, "low": max(scatter - 1.96 * loose, 0.0), "high": scatter + 1.96 * loose}

@@ -60,8 +60,11 @@ OF_A_WHEEL: Mapping[str, str] = {
     "lately100": "the same over the last 100 s",
 }
 """Further names in a term on `WHEELS`, `LEFT` or `RIGHT`."""
-PAST: Mapping[str, str] = {AGO: "ago(0.1, 0.2): mean speed of this wheel from 0.1 to 0.2 s ago, m/s"}
-"""A function in such a term: its arguments are times in seconds, the smaller first."""
+PAST: Mapping[str, str] = {
+    AGO: "ago(0.1, 0.2): mean from 0.1 to 0.2 s ago of this wheel's speed (m/s); with v or w, of that velocity (m/s, rad/s)"
+}
+"""A function in a term on `WITH_PAST`: its arguments are times in seconds, the smaller first."""
+WITH_PAST = (*WHICH_WHEELS, "v", "w")
 RECENT_S = 0.15
 NEVER_M = 1e3
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
@@ -98,8 +101,10 @@ def formula_effect(
     if on not in ON:
         raise ModelError(f"formula {name}: " + unknown_name("velocity to add to (on)", on, ON))
     code = _parsed(name, term)
-    if AGO in code.called and on not in WHICH_WHEELS:
-        raise ModelError(f"formula {name}: {AGO}(...) is of one wheel; it needs on: {', '.join(WHICH_WHEELS)}, not {on}.")
+    if AGO in code.called and on not in WITH_PAST:
+        raise ModelError(
+            f"formula {name}: {AGO}(...) is of a wheel or a velocity; it needs on: {', '.join(WITH_PAST)}, not {on}."
+        )
     known = set(VARIABLES) | (set(OF_A_WHEEL) if on in WHICH_WHEELS else set())
     logged, unknown = _sorted(name, code.names - known, set(columns), None if numbers is None else set(numbers))
     if not unknown:
@@ -202,6 +207,8 @@ def _apply(name: str, code: Compiled, on: str, logged: list[str], body: Body, **
         )
         turned = body.with_added("yaw_rad_s", (right - left) / body.wheelbase_m)
         return turned.with_added("forward_m_s", (left + right) / 2.0)
+    if on in WITH_PAST:
+        values |= _past(body, body.forward_m_s if on == "v" else body.yaw_rad_s, code)
     added = _added(name, code, values, body)
     if on == SHARE:
         return body.scaled(1.0 + added)
@@ -266,12 +273,16 @@ def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Any]:
         "lately10": lambda: lately(body, speed, 10.0),
         "lately100": lambda: lately(body, speed, 100.0),
     }
+    return {**_past(body, speed, code), **{name: make() for name, make in made.items() if name in code.code.co_names}}
+
+
+def _past(body: Body, velocity: Array, code: Compiled) -> dict[str, Any]:
+    """`PAST` of a velocity, where the term asks for it."""
 
     def ago(from_s: float, to_s: float) -> Array:
-        return averaged(speed, _step_s(body), float(from_s), float(to_s))
+        return averaged(velocity, _step_s(body), float(from_s), float(to_s))
 
-    past = {AGO: ago} if AGO in code.called else {}
-    return {**past, **{name: make() for name, make in made.items() if name in code.code.co_names}}
+    return {AGO: ago} if AGO in code.called else {}
 
 
 def lately(body: Body, speed: Array, fade_s: float) -> Array:

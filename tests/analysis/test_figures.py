@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from store.synthetic import failed, make_store, record
 
-from analysis import budget, paths, success_by_diversity, success_by_mutation
+from analysis import budget, paths, scatter, success_by_diversity, success_by_mutation
 from analysis.__main__ import figures
 from analysis.intervals import wilson
 from analysis.results import NoDataError, Results
@@ -104,6 +104,22 @@ def test_success_by_diversity_shows_what_pandas_counts(real_results):
         f"({letter}) {task}, within {cm} cm"
         for letter, (task, cm) in zip("abcd", [(t, cm) for t in ("circle", "complex") for cm in (7, 10)], strict=True)
     ]
+
+
+def test_a_crowd_of_combinations_shows_means_of_groups_in_place_of_intervals(real_results, monkeypatch):
+    few = success_by_diversity.draw(Results(real_results))[0]
+    monkeypatch.setattr(scatter, "CROWD", 1)
+    monkeypatch.setattr(scatter, "GROUPS", 1)
+    frame = pd.DataFrame({"diversity": [1.0, 3.0, 2.0], "y": [0.0, 50.0, 40.0], "low": 0.0, "high": 100.0, "mutation_rate": 0.1})
+    _figure, [ax] = scatter.scatter_figure([scatter.Panel("circle", frame)], "mutation_rate", "successful runs (%)")
+    mean = next(line for line in ax.get_lines() if line.get_marker() == "None")
+    assert (mean.get_xdata()[0], mean.get_ydata()[0]) == (2.0, 30.0)
+    ends = ax.collections[0].get_paths()[0].vertices[:, 1]
+    assert ends.max() - 30.0 == pytest.approx(4.303 * np.std([0, 50, 40], ddof=1) / np.sqrt(3), rel=1e-3)  # Student, 2 to spare
+    many = success_by_diversity.draw(Results(real_results))[0]
+    assert "bars" in few.shows
+    assert "bars" not in many.shows
+    assert "lines: means of 1 equal groups" in many.shows
 
 
 def test_budget_shows_success_and_median_cost_of_each_cell_and_what_is_missing(real_results):

@@ -28,3 +28,17 @@ def test_what_is_not_there_may_be_luck():
     for name in ("acceleration-limit", "wheelbase", "heating", "caster-swing"):
         added = fit_with(problem, base, listed(NOMINAL, None, predictor.tracks)[name])
         assert problem.paired_comparison(base, added).p_value > 1e-3
+
+
+def test_a_delay_that_gives_way_to_another_delay_with_a_lag_is_no_luck():
+    """One delay for both stands a long way off: seen from it, the lag's own way from nothing gains nothing certain (p 0.1)."""
+    both = hidden(command_delay={"delay_s": 0.1}, motor_lag={"tau_s": 0.14})
+    predictor = WheelPredictor(tracks_of(measured(both, trials=20, seed=1, speeds=(-0.2, 0.2), commands=8)))
+    effects = listed(NOMINAL, None, predictor.tracks)
+    problem = problem_for(predictor, NOMINAL)
+    late = fit_with(problem, problem.fit(NOMINAL), effects["command-delay"])
+    problem = problem_for(predictor, late.model)
+    base = problem.fit(late.model)
+    added = fit_with(problem, base, effects["motor-lag"])
+    assert added.model.values_of("command-delay")["delay_s"] == pytest.approx(0.1, abs=0.02)
+    assert problem.paired_comparison(base, added).p_value < 1e-4

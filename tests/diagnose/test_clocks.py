@@ -1,16 +1,21 @@
 """Clocks that differ from trial to trial: found, judged on poses that did not set them, written down."""
 
+from dataclasses import fields
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from bns.cli.main import main
+from bns.diagnose import diagnosis
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.clocks.trial_clock_test import every_other_block, fit_trial_clocks, with_trial_clocks
 from bns.diagnose.estimate.clocks.trial_clocks import eliminate_clocks, with_fitted_clocks
 from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import ModelError
 from bns.measurements import write_measurements
@@ -44,6 +49,43 @@ def test_clocks_and_what_they_hide_are_found(predictor):
     )
     assert answer["error"]["1s"]["after"] < 0.5 * answer["error"]["1s"]["before"]
     assert any("a separate value in each trial" in note for note in answer["notes"])
+
+
+@pytest.mark.parametrize(
+    ("one_s", "left", "kept"), [(1.9, True, True), (2.1, True, False), (2.1, False, True), (np.nan, True, True)]
+)
+def test_beside_something_left_clocks_stand_only_if_the_error_is_lower_at_every_horizon(monkeypatch, one_s, left, kept):
+    """With mocked searches: with clocks the errors are 1 mm over a command and ``one_s`` over 1 s, with a term 2 and 2 mm."""
+    asked = []
+
+    class Search(diagnosis.StepwiseSelection):
+        def run(self):
+            asked.append(self._own_clocks)
+            return self._own_clocks
+
+    def ended(clocks, *_):
+        pairs = {"command": 1.0, "1s": one_s} if clocks else {"command": 2.0, "1s": 2.0}
+        errors = SimpleNamespace(horizons={h: SimpleNamespace(models=[SimpleNamespace(rms_m=e)]) for h, e in pairs.items()})
+        model = SimpleNamespace(per_trial_effect=clocks or None)
+        selection = SimpleNamespace(fit=SimpleNamespace(model=model), nominal=SimpleNamespace(model=NOMINAL))
+        unknown = dict.fromkeys(field.name for field in fields(Outcome))
+        rest = SimpleNamespace(any=left)
+        given = {"selection": selection, "errors": errors, "rest": rest, "terms": (), "slight": (), "dependence": []}
+        return Outcome(**{**unknown, **given})
+
+    monkeypatch.setattr(diagnosis, "StepwiseSelection", Search)
+    monkeypatch.setattr(diagnosis, "outcome_of", ended)
+    monkeypatch.setattr(diagnosis, "_from_better_numbers", lambda selection, _: selection)
+    monkeypatch.setattr(diagnosis, "_longer", lambda *_: [])
+    monkeypatch.setattr(diagnosis, "_hint", lambda *_: None)
+    monkeypatch.setattr(diagnosis, "_verdict", lambda *_: "unlisted")
+    monkeypatch.setattr(diagnosis, "notes_on", lambda *_: [])
+    monkeypatch.setattr(diagnosis, "listed", lambda *_: {})
+    monkeypatch.setattr(diagnosis, "calibrated", lambda *_: None)
+    plain = WheelPredictor(tracks_of(measured(NOMINAL)))
+    found = diagnosis._diagnosed(plain, NOMINAL, None, lambda _: None, (), lambda _: None)
+    assert (found.selection.fit.model.per_trial_effect is not None) is kept
+    assert asked == ([True, False] if left else [True])
 
 
 def test_one_clock_for_all_is_not_called_many():

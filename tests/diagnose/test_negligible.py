@@ -11,9 +11,11 @@ from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.established import Established
+from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import NOTHING
 from bns.diagnose.select.negligible import LUCK, MEDIAN_OF, _largest_fall, negligible
 from bns.diagnose.select.result import SelectionResult
@@ -77,6 +79,7 @@ def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named)
     found = Established(("wheelbase",), ("a term",), searched.problem, searched.fit)
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
     monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
+    monkeypatch.setattr(outcome, "_without_negligible", lambda found, *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: matters)
     monkeypatch.setattr(outcome, "unexplained", lambda *_: NOTHING)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
@@ -87,12 +90,13 @@ def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named)
 
 @pytest.mark.parametrize("matters", [True, False])
 def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matters):
-    """With mocked parts: something is left beside the effect, nothing beside a term, and the term lowers an error or does not."""
+    """With mocked parts: the effect leaves something, a term leaves nothing, and the term lowers an error or does not."""
     searched = selected("wheelbase")
     found = Established(("wheelbase",), ("a term",), searched.problem, "fit with the term")
     left = replace(NOTHING, residual_dependence=("something",))
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
     monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
+    monkeypatch.setattr(outcome, "_without_negligible", lambda found, *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: matters)
     monkeypatch.setattr(outcome, "residual_dependence", lambda *_: [])
     monkeypatch.setattr(outcome, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
@@ -106,11 +110,28 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
         assert next(said).startswith("What is left is certain but slight: slower for two seconds.")
 
 
+def test_with_a_term_in_the_model_an_effect_that_lowers_no_error_is_not_named():
+    """A clock that is right, beside a wheelbase that is wrong and a curve; without a curve the search has judged it already."""
+    seen = WheelPredictor(tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=12)))
+    model = NOMINAL.with_effect("wheelbase", factor=1.05).with_effect("clock-offset", offset_s=0.0)
+    problem = problem_for(seen, model)
+    fit = problem.fit(model)
+    term = fitted(problem, fit, "v", "k * v * abs(v)", "unlisted", "speed and turn")
+    names = ("wheelbase", "clock-offset")
+    searched = SelectionResult(problem, problem.fit(NOMINAL), fit, names, ())
+    found = outcome._without_negligible(Established(names, (term,), problem, term.fit), searched, seen)
+    assert found.names == ("wheelbase",)
+    assert {active.effect.name for active in found.fit.model.effects} == {"wheelbase", "unlisted"}
+    assert found.terms[0].fit is found.fit
+    alone = Established(names, (), problem, fit)
+    assert outcome._without_negligible(alone, searched, seen) is alone
+
+
 @pytest.mark.parametrize(
     ("error_m", "outliers", "counts"), [(0.0013, (), False), (0.0015, (), True), (0.0013, ("a moment",), True)]
 )
 def test_what_adds_less_than_tracking_noise_does_not_count(monkeypatch, error_m, outliers, counts):
-    """With mocked parts: something is left beside the effect, no term describes it; the errors are given, the noise is 1 mm."""
+    """With mocked parts: the effect leaves something that no term describes; the errors are given, the noise is 1 mm."""
     searched = selected("wheelbase")
     left = replace(NOTHING, residual_dependence=("something",), outliers=outliers)
     at = SimpleNamespace(models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=error_m)], noise_floor_m=0.001)

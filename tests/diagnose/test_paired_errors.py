@@ -96,6 +96,19 @@ def test_noise_at_rest_includes_what_wanders_slowly():
     assert rest.position_m == pytest.approx(0.002, rel=0.3)
 
 
+def test_noise_at_rest_is_not_the_robot_that_creeps():
+    """A proportional controller lets wheels creep down a slope: 10 mm/s here, under noise of 1.5 mm."""
+    driven = measured(NOMINAL, trials=8, seed=1)
+    still = driven.assign(left_m_s=0.0, right_m_s=0.0, trial=driven["trial"] + 100)
+    rng = np.random.default_rng(3)
+    still[["x_m", "y_m", "heading_rad"]] = rng.normal(size=(len(still), 3)) * [0.0015, 0.0015, 0.005]
+    creeps = still.assign(x_m=still["x_m"] + 0.01 * still["t_s"])
+    standing, creeping = (tracking_noise(tracks(pd.concat([driven, one], ignore_index=True))) for one in (still, creeps))
+    assert standing.basis == creeping.basis == "at rest"
+    assert standing.position_m == pytest.approx(0.0015, rel=0.1)
+    assert creeping.position_m == pytest.approx(0.0015, rel=0.15)
+
+
 def test_a_window_is_left_out_for_a_jump_and_never_for_a_bad_model(table):
     wrong, seen = Model(wheelbase_m=0.3), tracks(moved(table, [3, 7]))
     jumpy = replace(seen, jumped=jumps(seen))

@@ -14,7 +14,7 @@ from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals import grammar
 from bns.diagnose.residuals.established import established
-from bns.diagnose.residuals.grammar import RESPONSE
+from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_OF
 from bns.diagnose.residuals.words import in_words
 from tests.diagnose.worlds import NOMINAL
 
@@ -23,16 +23,34 @@ DENSE_S, FRAME_S, TRIAL_S = 0.002, 0.04, 8.0
 
 
 def ringing(trials=24, seed=5):
-    """Second-order wheels, w'' = f²(u - w) - 2·z·f·w', solved by scipy; the pose by small arcs; a camera at 25 Hz."""
-    rng = np.random.default_rng(seed)
+    """Second-order wheels, w'' = f²(u - w) - 2·z·f·w', solved by scipy."""
     t = np.arange(0.0, TRIAL_S, DENSE_S)
     system = ([FREQUENCY**2], [1.0, 2 * DAMPING * FREQUENCY, FREQUENCY**2])
+    return driven(lambda told: [lsim(system, u, t)[1] for u in told], trials, seed)
+
+
+def two_lags(trials=24, seed=6):
+    """A heavy robot: its mean speed lags by 0.25 s, the difference of its wheels by 0.06 s."""
+    t = np.arange(0.0, TRIAL_S, DENSE_S)
+
+    def moved(told):
+        mean, half = (told[0] + told[1]) / 2, (told[1] - told[0]) / 2
+        mean, half = (lsim(([1.0], [tau_s, 1.0]), u, t)[1] for tau_s, u in ((0.25, mean), (0.06, half)))
+        return mean - half, mean + half
+
+    return driven(moved, trials, seed)
+
+
+def driven(moved, trials, seed):
+    """The wheels of random commands; the pose by small arcs; a camera at 25 Hz."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, TRIAL_S, DENSE_S)
     tables = []
     for trial in range(trials):
         changes = np.cumsum(rng.integers(10, 50, 20)) * FRAME_S
         speeds = rng.uniform(-0.2, 0.2, (2, len(changes) + 1)) * (rng.random(len(changes) + 1) > 0.15)
         told = speeds[:, np.searchsorted(changes, t + 1e-9, side="right")]
-        left, right = (lsim(system, u, t)[1] for u in told)
+        left, right = moved(told)
         turn = np.cumsum((right - left) / NOMINAL.wheelbase_m * DENSE_S)
         heading, ahead = rng.uniform(-3, 3) + turn, (left + right) / 2 * DENSE_S
         pose = np.column_stack([np.cumsum(ahead * np.cos(heading)), np.cumsum(ahead * np.sin(heading)), heading])
@@ -79,6 +97,16 @@ def test_a_free_response_is_tried_only_where_no_effect_was_accepted(monkeypatch)
     established(predictor, NOMINAL, {})
     established(predictor, NOMINAL, {"motor-lag": listed(NOMINAL, None, predictor.tracks)["motor-lag"]})
     assert asked == [True, False]
+
+
+def test_a_robot_that_goes_ahead_more_slowly_than_it_turns_is_described_beside_its_lag():
+    predictor = two_lags()
+    accepted = {name: listed(NOMINAL, None, predictor.tracks)[name] for name in ("motor-lag", "turn-slip")}
+    found = established(predictor, NOMINAL, accepted)
+    assert found.names == ("motor-lag",)
+    assert found.fit.model.values_of("motor-lag")["tau_s"] == pytest.approx(0.06, abs=0.01)
+    assert [term.signal for term in found.terms][:1] == [RESPONSE_OF["v"]]
+    assert in_words(found.terms[0], predictor).startswith("after a change of its command the robot's forward motion has half")
 
 
 @pytest.mark.slow

@@ -49,6 +49,22 @@ def test_a_wheel_that_does_what_it_was_told_a_while_ago():
     np.testing.assert_allclose(body_motion(model, grid).forward_m_s[0], mean, atol=1e-4)
 
 
+def test_a_robot_that_goes_as_it_was_told_a_while_ago_and_turns_at_once():
+    step = np.full((1, 6), 0.1)
+    node = np.cumsum(np.concatenate([[0.0], step[0]]))[None]
+    left, right = np.array([[0.1, 0.2, 0.2, 0.0, 0.0, 0.0]]), np.array([[0.1, 0.1, 0.1, 0.1, 0.0, 0.0]])
+    grid = Grid(step, node, left, right, np.zeros((1, 0), dtype=np.int64))
+
+    def moved(now, on):
+        return body_motion(Model(0.1).with_active(formula_effect("late", f"k * (ago(0.2, 0.3) - {now})", on), (1.0,)), grid)
+
+    plain, both, ahead, turn = body_motion(Model(0.1), grid), moved("u", "wheels"), moved("v", "v"), moved("w", "w")
+    np.testing.assert_allclose(ahead.forward_m_s, both.forward_m_s, atol=1e-12)
+    np.testing.assert_array_equal(ahead.yaw_rad_s, plain.yaw_rad_s)
+    np.testing.assert_allclose(turn.yaw_rad_s, both.yaw_rad_s, atol=1e-12)
+    np.testing.assert_array_equal(turn.forward_m_s, plain.forward_m_s)
+
+
 @pytest.mark.parametrize(
     ("term", "on", "said"),
     [
@@ -57,7 +73,7 @@ def test_a_wheel_that_does_what_it_was_told_a_while_ago():
         ("k * ago(a, 0.2)", "left", "two times in seconds"),
         ("k * ago(0.2)", "wheels", "ago takes 2"),
         ("k * ago", "wheels", "ago is a function"),
-        ("k * ago(0.1, 0.2)", "v", "it needs on: wheels, left, right, not v"),
+        ("k * ago(0.1, 0.2)", "s", "it needs on: wheels, left, right, v, w, not s"),
     ],
 )
 def test_what_is_no_window(term, on, said):

@@ -170,8 +170,6 @@ def import_(options: argparse.Namespace) -> int:
 def compare(options: argparse.Namespace) -> int:
     """Errors of a model as it is; of a run's networks also why they are wrong."""
     from bns.api.compare import compare as held_against
-    from bns.diagnose.report.figures import comparison_figure
-    from bns.diagnose.report.network_text import network_errors_figure
 
     model, log = model_of(options), log_of(options)
     with ticking("comparing") as tick:
@@ -182,21 +180,32 @@ def compare(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     print(json.dumps(seen.to_json()) if options.json else seen.summary())
-    _drawn(options, lambda folder: comparison_figure(seen.comparison, folder / "comparison"))
     causes = seen.causes
-    if causes is not None:
-        _drawn(options, lambda folder: network_errors_figure(causes, folder / "network-errors"))
+
+    def draw(folder: Path) -> Iterator[Path]:
+        from bns.diagnose.report.figures import comparison_figure
+        from bns.diagnose.report.network_figure import network_errors_figure
+
+        yield comparison_figure(seen.comparison, folder / "comparison")
+        if causes is not None:
+            yield network_errors_figure(causes, folder / "network-errors")
+
+    _drawn(options, draw)
     return 0
 
 
 def diagnose(options: argparse.Namespace) -> int:
     """The verdict on what a model lacks."""
-    from bns.diagnose.report.figures import diagnosis_figure
-
     found = diagnosed(options)
     print(json.dumps(found.to_json()) if options.json else found.summary())
-    if found.diagnosis.selection is not None:
-        _drawn(options, lambda folder: diagnosis_figure(found.diagnosis, folder / "diagnosis"))
+
+    def draw(folder: Path) -> Iterator[Path]:
+        from bns.diagnose.report.figures import diagnosis_figure
+
+        if found.diagnosis.selection is not None:
+            yield diagnosis_figure(found.diagnosis, folder / "diagnosis")
+
+    _drawn(options, draw)
     return 0
 
 
@@ -223,7 +232,6 @@ def add(options: argparse.Namespace) -> int:
     """An extended model, as a new file."""
     from bns.api.add import add as fitted
     from bns.api.model import checked_target
-    from bns.diagnose.report.figures import error_by_step_figure
 
     checked_target(options.output)
     model, log = model_of(options), log_of(options)
@@ -242,7 +250,13 @@ def add(options: argparse.Namespace) -> int:
     print(json.dumps(result.to_json()) if options.json else result.summary())
     if not options.json:
         print(f"written to {options.output}; the old model is unchanged ({options.model})")
-    _drawn(options, lambda folder: error_by_step_figure(result.extended, folder / "ladder"))
+
+    def draw(folder: Path) -> Iterator[Path]:
+        from bns.diagnose.report.figures import error_by_step_figure
+
+        yield error_by_step_figure(result.extended, folder / "ladder")
+
+    _drawn(options, draw)
     return 0
 
 
@@ -274,10 +288,12 @@ def _say_thinned(ready: Prepared) -> None:
         print(ready.thinned, file=sys.stderr)
 
 
-def _drawn(options: argparse.Namespace, draw: Callable[[Path], Path]) -> None:
+def _drawn(options: argparse.Namespace, draw: Callable[[Path], Iterator[Path]]) -> None:
+    """Figures only where they are asked for: matplotlib takes half a second to load."""
     if options.figures is not None:
         options.figures.mkdir(parents=True, exist_ok=True)
-        print(f"figure: {draw(options.figures)}", file=sys.stderr)
+        for figure in draw(options.figures):
+            print(f"figure: {figure}", file=sys.stderr)
 
 
 @contextmanager

@@ -1,8 +1,9 @@
 """How much a tracked pose scatters, from the tracks alone: at rest, and at high frequency. No model has a say in it.
 
 Poses of a robot that stands, after commands of zero, scatter by the tracker's noise alone, slow wander of the picture
-included. While it drives under one command, a parabola through a few frames follows it and the rest is noise, white noise at
-least: slow noise follows the parabola, so this is a lower bound where the robot never stands.
+included. A robot that creeps instead, down a slope for example, leaves a line, about which they scatter. While it drives under
+one command, a parabola through a few frames follows it and the rest is noise, white noise at least: slow noise
+follows the parabola, so this is a lower bound where the robot never stands.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from bns.diagnose.settings import DEFAULTS
 
 SETTLED_S = DEFAULTS.data.settled_s
 FEWEST_AT_REST = DEFAULTS.data.fewest_at_rest
+DRIFTS = DEFAULTS.data.drift_at_rest
 WIDTH = DEFAULTS.data.parabola_frames
 ORDER = DEFAULTS.data.parabola_order
 SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
@@ -47,13 +49,14 @@ def tracking_noise(tracks: Tracks) -> TrackingNoise | None:
     if not (tracks.left_m_s.any() or tracks.right_m_s.any()):
         return None  # no wheels, or a robot that was never told to move
     rest = list(_at_rest(tracks))
-    if sum(map(len, rest)) >= FEWEST_AT_REST:
-        return _pooled(rest, "at rest")
+    if sum(len(t_s) for t_s, _ in rest) >= FEWEST_AT_REST:
+        still, creeping = (_pooled([_about(t_s, pose, order) for t_s, pose in rest], "at rest") for order in (0, 1))
+        return creeping if creeping.position_m < DRIFTS * still.position_m else still
     return _high_frequency(tracks)
 
 
-def _at_rest(tracks: Tracks) -> Iterator[Array]:
-    """Deviations (n, 3) of the poses of each rest from their mean, as far as they tell of noise."""
+def _at_rest(tracks: Tracks) -> Iterator[tuple[Array, Array]]:
+    """Times (n,) and poses (n, 3) of each rest, headings unwrapped, as far as they tell of noise."""
     for trial, (a, b) in enumerate(pairwise(tracks.first)):
         t_s, ends = tracks.t_s[a:b], np.cumsum(tracks.duration_s[trial])
         still = (tracks.left_m_s[trial] == 0) & (tracks.right_m_s[trial] == 0)
@@ -61,13 +64,15 @@ def _at_rest(tracks: Tracks) -> Iterator[Array]:
             begin = ends[k] - tracks.duration_s[trial][k] + SETTLED_S
             inside = (t_s >= begin) & (t_s <= ends[k])
             if inside.sum() >= 5:  # fewer share their mean with their noise
-                yield _centred(tracks.pose[a:b][inside])
+                pose = tracks.pose[a:b][inside]
+                yield t_s[inside], np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
 
 
-def _centred(pose: Array) -> Array:
-    values = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
-    spare = np.sqrt(len(values) / (len(values) - 1))
-    out: Array = (values - values.mean(axis=0)) * spare
+def _about(t_s: Array, pose: Array, order: int) -> Array:
+    """Deviations from a polynomial in time, of the size that independent noise has."""
+    powers = np.vander(t_s - t_s.mean(), order + 1)
+    spare = np.sqrt(len(pose) / (len(pose) - 1 - order))
+    out: Array = (pose - powers @ np.linalg.lstsq(powers, pose, rcond=None)[0]) * spare
     return out
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.clocks.trial_clocks import ReducedJacobian, eliminate_clocks, with_initial_clocks
@@ -72,7 +72,7 @@ class Fit:
     def interval(self, index: int, share: float = 0.95) -> tuple[float, float]:
         """Student's interval with as many degrees of freedom as there are trials to spare, within the number's bounds."""
         freedom = max(len(self.losses) - len(self.free), 1)
-        half = float(student.ppf((1 + share) / 2, freedom)) * self.se(index)
+        half = float(stdtrit(freedom, (1 + share) / 2)) * self.se(index)
         value, p = float(self.values[index]), self.free[index].parameter
         return max(value - half, min(p.low, value)), min(value + half, max(p.high, value))
 
@@ -257,7 +257,7 @@ class Problem:
         new = [j for j in new if np.abs(added.jacobian[..., j]).max() > 0]
         if not new or elpd_diff <= 0:
             return PairedComparison(elpd_diff, dse, 1.0)
-        columns = self._chords(added, new)
+        columns = _reaching(added.whitened - base.whitened, self._chords(added, new))
         joint = np.concatenate([base.jacobian, columns], axis=2)
         return PairedComparison(
             elpd_diff, dse, chance(self.normal_equations(joint, base.whitened), base.jacobian.shape[2])
@@ -311,6 +311,19 @@ class Problem:
         changed = moved_by(at.model, free, by * np.eye(len(free))[j])
         slope: Array = (self.whitened(changed) - at.whitened) / by
         return slope
+
+
+def _reaching(way: Array, columns: Array) -> Array:
+    """Directions (frames, 3, k) with the one most like ``way`` (frames, 3) replaced by it: they then lead to where the fit is.
+
+    Near the base, and beside its numbers, this spans the same. Far from it the way is no sum of slopes: where a delay of 0.2 s
+    gives way to one of 0.1 s with a lag, a box of speed goes, which the slope of neither can draw.
+    """
+    flat = columns.reshape(-1, columns.shape[-1])
+    alike = np.abs(way.ravel() @ flat) / np.maximum(np.linalg.norm(flat, axis=0), 1e-30)
+    out = columns.copy()
+    out[..., int(np.argmax(alike))] = way
+    return out
 
 
 def chance(joint: NormalEquations, base_numbers: int) -> float:

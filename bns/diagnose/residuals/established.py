@@ -2,10 +2,10 @@
 
 What is left biases all that is fitted without it, and listed effects are accepted because they imitate it. So the search is
 done again with flexible terms (`grammar`) as candidates beside the accepted effects, on equal terms: whatever predicts trials
-held out best comes in first; an effect is preferred to a free curve only if the curve is not better for certain. In the end every
-effect must predict held-out trials significantly better beside the terms, at the level that all candidates share. A curve
-that can reproduce an effect leaves it nothing to explain, even if the effect is real: where an effect explains nearly all that
-its term does, the effect is kept.
+held out best comes in first; an effect is preferred to a free curve only if the curve is not better for certain. In the end
+the model with the terms must predict held-out trials significantly better with each effect, at the level that all candidates
+share. A curve that can reproduce an effect leaves it nothing to explain, even if the effect is real: where an effect explains
+nearly all that its term does, the effect is kept.
 """
 
 from __future__ import annotations
@@ -303,7 +303,8 @@ def _pruned(predictor: Predictor, state: _State, level: float, alone: Mapping[st
         worth = {name: state.problem.paired_comparison(one, state.fit) for name, one in lacking.items()}
         kept = {n: worth[n].elpd_diff / max(alone[n], 1e-9) if alone else worth[n].elpd_diff for n in state.names}
         least = min(kept, key=lambda name: kept[name])
-        if _earns(worth[least], lacking[least], level) and not (alone and kept[least] < KEPT):
+        # as asked of a term: a model that lacks much may be off by so much in single trials that few are certain
+        if _term_earns(worth[least], lacking[least], level) and not (alone and kept[least] < KEPT):
             break
         state = state.without(predictor, least, lacking[least])
     while state.terms and (absurd := next((name for name in state.names if implausible(state.fit, name)), "")):

@@ -26,6 +26,7 @@ from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, formula_effect
 
 NAME = "unlisted"
 RESPONSE = "response of each wheel in time"
+RESPONSE_OF = {"v": "response of the forward velocity in time", "w": "response of the turning velocity in time"}
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 SPEED_THERE = "forward speed at a place"
 CHANCE = DEFAULTS.residuals.chance
@@ -114,7 +115,8 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     yield Family(
         "changes of speed of each wheel", WHEELS, ("fresh", "max(fresh, 0)", "fresh * abs(fresh)", "fresh * abs(u)")
     )
-    yield Family(RESPONSE, WHEELS, tuple(f"(ago({a:g}, {b:g}) - u)" for a, b in pairwise(RESPONSE_KNOTS_S)))
+    for signal, on, now in ((RESPONSE, WHEELS, "u"), *((signal, on, on) for on, signal in RESPONSE_OF.items())):
+        yield Family(signal, on, tuple(f"(ago({a:g}, {b:g}) - {now})" for a, b in pairwise(RESPONSE_KNOTS_S)))
     if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0:
         ways = [share * wheelbase_m for share in REVERSAL_KNOTS]
         yield Family("distance since each wheel reversed", WHEELS, tuple(f"u * {h}" for h in _hats("since", ways)[:-1]))

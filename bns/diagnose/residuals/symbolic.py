@@ -13,7 +13,6 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from sklearn.linear_model import orthogonal_mp
 
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import weights
@@ -92,6 +91,8 @@ def _tried(problem: Problem, fit: Fit, pattern: ResidualDependence) -> list[Form
 
 def _sparse(problem: Problem, fit: Fit, on: str, terms: Sequence[str]) -> Formula | None:
     """The one to three terms that orthogonal matching pursuit takes; as many as still earn something held out."""
+    from sklearn.linear_model import orthogonal_mp  # noqa: PLC0415  # slow to load
+
     usable, columns = [], []
     for term in terms:
         effect = formula_effect(NAME, f"k * {term}", on)

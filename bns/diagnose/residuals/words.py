@@ -8,7 +8,7 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_KNOTS_S
+from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_KNOTS_S, RESPONSE_OF
 from bns.diagnose.residuals.symbolic import Formula
 from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, value_of
 
@@ -120,18 +120,22 @@ def _changes(term: Formula, _: Predictor) -> str:
     return f"just after a change of speed, {share} of it is {'missing' if rest < 0 else 'added'}, fading within 0.15 s"
 
 
+_RESPONDS = {"wheels": ("u", "a wheel"), "v": ("v", "the robot's forward motion"), "w": ("w", "the robot's turning")}
+
+
 def _response(term: Formula, _: Predictor) -> str:
-    """From the wheel's speed after a step of its command from 0 to 1."""
+    """From the speed after a step of its command from 0 to 1."""
+    now, what = _RESPONDS[term.on]
     grid = np.linspace(0.0, 2.0 * RESPONSE_KNOTS_S[-1], 10 * _POINTS)
 
     def ago(from_s: float, to_s: float) -> Array:
         return np.clip((grid - from_s) / (to_s - from_s), 0.0, 1.0)
 
-    speed = 1.0 + value_of(term.term, {**term.values, "u": np.ones_like(grid), "ago": ago})
+    speed = 1.0 + value_of(term.term, {**term.values, now: np.ones_like(grid), "ago": ago})
     end = float(speed[-1])
     if end <= 0.0 or float(speed.max()) >= 2.0 * end:  # no linear drive without zeros overshoots by a whole step
         return (
-            f"the speed of each wheel depends on its commands of the last {RESPONSE_KNOTS_S[-1]:g} s, but not as the response "
+            f"{_VELOCITIES[term.on]} depends on its commands of the last {RESPONSE_KNOTS_S[-1]:g} s, but not as the response "
             "of a drive to a step does"
         )
     half = float(grid[np.argmax(speed >= end / 2.0)])
@@ -139,7 +143,7 @@ def _response(term: Formula, _: Predictor) -> str:
     over = float(speed.max()) / end - 1.0
     beyond = f", goes beyond it by {over:.0%} after {grid[int(speed.argmax())]:.2g} s" if over > 0.02 else ""
     return (
-        f"after a change of its command a wheel has half of the new speed after {half:.2g} s{beyond}, and stays within 5% of it "
+        f"after a change of its command {what} has half of the new speed after {half:.2g} s{beyond}, and stays within 5% of it "
         f"from {settled:.2g} s on"
     )
 
@@ -173,4 +177,5 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("speed in steps", "wheels"): _steps,
     ("changes of speed of each wheel", "wheels"): _changes,
     (RESPONSE, "wheels"): _response,
+    **{(signal, on): _response for on, signal in RESPONSE_OF.items()},
 }

@@ -21,13 +21,14 @@ MEDIAN_OF = DEFAULTS.select.least_fall_windows
 _ALL = "all"
 
 
-def negligible(selection: SelectionResult) -> tuple[str, ...]:
+def negligible(selection: SelectionResult, fewest: int = 1) -> tuple[str, ...]:
     """Accepted effects without which no held-out error is higher by `least_fall`, at any horizon; the least first.
 
-    Each is judged beside all that are kept, so of two that can stand for one another one is kept.
+    Each is judged beside all that are kept, so of two that can stand for one another one is kept. The last ``fewest`` are not
+    judged: an effect alone has been, by the errors of the model as given.
     """
     dropped: tuple[str, ...] = ()
-    while len(kept := tuple(name for name in selection.accepted if name not in dropped)) > 1:
+    while len(kept := tuple(name for name in selection.accepted if name not in dropped)) > fewest:
         errors = _without_each(selection, dropped, kept)
         falls = {name: _largest_fall(errors, name, _ALL) for name in kept}
         least = min(falls, key=lambda name: falls[name])

@@ -43,7 +43,10 @@ MOST = DEFAULTS.select.most_effects
 
 
 class StepwiseSelection:
-    """A search for the effects that ``model`` lacks, on the tracks of a predictor."""
+    """A search for the effects that ``model`` lacks, on the tracks of a predictor.
+
+    ``own_clocks``: may each trial have a clock of its own?
+    """
 
     def __init__(
         self,
@@ -53,9 +56,10 @@ class StepwiseSelection:
         tick: Callable[[str], None] = lambda _: None,
         barred: Collection[str] = (),
         alone: Callable[[Candidate], None] = lambda _: None,
+        own_clocks: bool = True,
     ) -> None:
         self.predictor, self.model, self.tick, self.alone = predictor, model.arranged(), tick, alone
-        self._extra, self._barred = extra, barred
+        self._barred, self._own_clocks = barred, own_clocks
         self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
@@ -76,7 +80,7 @@ class StepwiseSelection:
     def _run(self) -> SelectionResult:
         """The search; again with a clock for each trial where these differ, since that hides what else is wrong."""
         plain = self._select()
-        clocks = fit_trial_clocks(plain.problem, plain.fit)
+        clocks = fit_trial_clocks(plain.problem, plain.fit) if self._own_clocks else None
         if clocks is None or _per_trial_effect(clocks.fit.model) in self._barred:
             return plain
         if not self._clocks_earned(clocks, plain.fit):

@@ -174,6 +174,12 @@ class Data:
         "The noise is estimated from poses at rest only if there are at least this many; its standard deviation is "
         "then known to within 13 %.",
     )
+    drift_at_rest: float = setting(
+        0.5,
+        "1",
+        "If poses at rest scatter about a line by less than this fraction of their scatter about their mean, the robot creeps, "
+        "and the line is its own motion: white noise of a tracker keeps all of it, a random walk 0.63.",
+    )
     parabola_frames: int = setting(
         7,
         "frames",

@@ -6,10 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bns.errors import ModelError
-from bns.robots.snake.gait import joint_angles
+from bns.robots.snake.gait import COMMANDS_A_CYCLE, joint_angles
 
-COMMANDS_A_CYCLE = 13
-"""Angle sets of a cycle, t = 0..12: the first and the last are the same (section 5.3.2)."""
 PARAMETERS = ("a_lat_rad", "a_vert_rad", "omega_rad", "alpha_rad")
 
 

@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike
 JOINTS = 12
 GAMMA_RAD = 2.0 * np.pi / 12.0
 """Temporal step γ: one period of the sine in a cycle."""
+COMMANDS_A_CYCLE = 13
+"""Angle sets of a cycle, t = 0..12: the first and the last are the same (section 5.3.2)."""
 
 
 def joint_angles(cycles: ArrayLike, t: ArrayLike = 0, joints: int = JOINTS, switched: bool = False) -> np.ndarray:

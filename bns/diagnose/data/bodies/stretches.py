@@ -16,8 +16,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.jointed.drives import RUN_UP_S, Drive, at_times, through_postures
 from bns.physics.jointed.mechanism import Mechanism
-from bns.physics.snake.gait import COMMANDS_A_CYCLE
-from bns.robots.snake.gait import joint_angles
+from bns.robots.snake.gait import COMMANDS_A_CYCLE, joint_angles
 from bns.robots.snake.table import GAIT
 
 _LASTS_S = DEFAULTS.data.stretch_s
