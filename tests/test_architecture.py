@@ -160,3 +160,8 @@ def test_imports_of_every_form_are_seen(source, rooms):
 def test_an_upward_import_is_reported_with_its_line():
     found = upward("engine/snn.py", imported("import os\nfrom bns.bootstrap.loop import run", ("bns", "engine")))
     assert found == ["bns/engine/snn.py:2 imports bootstrap"]
+
+
+def test_what_follows_a_widget_on_the_page_goes_to_the_browser_under_one_lock():
+    watching = [path for path in (PACKAGE / "app").rglob("*.py") if ".param.watch(" in path.read_text()]
+    assert [path.name for path in watching] == ["parts.py"]  # `on_change`, which says why

@@ -43,7 +43,11 @@ def together() -> AbstractContextManager[None]:
 
 
 def on_change(widget: Any, act: Callable[[], object], what: str = "value") -> None:
-    """``act`` whenever the user, or the page itself, changes something of a widget."""
+    """``act`` whenever the user, or the page itself, changes something of a widget.
+
+    Everything that changes with a widget goes through here: where a click follows at once on what was typed, Panel tells what was
+    typed before Bokeh has locked the page, and a picture changed then, outside `together`, is refused.
+    """
 
     def changed(_event: Any) -> None:
         with together():

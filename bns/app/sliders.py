@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import panel as pn
 
-from bns.app.parts import WIDE, together
+from bns.app.parts import WIDE, on_change
 
 _UNTITLED = ".bk-slider-title { display: none; }"
 _IN_A_LINE = ".bk-input-group { flex-direction: row; align-items: center; gap: 8px; } label { white-space: nowrap; }"
@@ -69,7 +69,7 @@ class NumberSlider:
             stylesheets=[_UNTITLED], **WIDE,
         )  # fmt: skip
         for widget in (self._box, self._slider):
-            widget.param.watch(lambda event: self._told(event.new), "value")
+            on_change(widget, lambda widget=widget: self._told(widget.value))
         self.view: Any = pn.Column(self._box, self._slider, margin=(0, 8, 4, 30), **WIDE)
 
     def show(self, value: float) -> None:
@@ -83,6 +83,5 @@ class NumberSlider:
 
     def _told(self, value: float | None) -> None:
         if not self._quiet and value is not None:
-            with together():
-                self.show(float(value))
-                self._moved(float(value))
+            self.show(float(value))
+            self._moved(float(value))

@@ -14,7 +14,7 @@ from bns.app.figures.paths import LogFigure
 from bns.app.log import roles
 from bns.app.log.preview import preview
 from bns.app.log.roles import BY_COLUMN, COMMANDED, CUTS, ROLES, RUNNING, WHOLE, Mapped, Menus
-from bns.app.parts import WIDE, Problem, beside, button, download, drawn, heading, html, row
+from bns.app.parts import WIDE, Problem, beside, button, download, drawn, heading, html, on_change, row
 from bns.app.tab import mapping_of
 from bns.errors import DataError
 
@@ -183,7 +183,7 @@ class ColumnsPart:
 
     def _watch(self) -> None:
         def on(widget: Any, act: Callable[[], None]) -> None:
-            widget.param.watch(lambda _event: None if self._quiet or self._menus is None else act(), "value")
+            on_change(widget, lambda: None if self._quiet or self._menus is None else act())
 
         for role, menu in self._columns.items():
             on(menu, partial(self._pick, role))
@@ -196,7 +196,7 @@ class ColumnsPart:
         on(self._trials, self._cut)
         on(self._seconds, self._cut)
         on(self._text, self._edited)
-        self._advanced.param.watch(lambda event: setattr(self._text, "visible", event.new), "value")
+        on_change(self._advanced, lambda: setattr(self._text, "visible", self._advanced.value))
 
     def _run(self) -> None:
         if self._running.value in RUNNING:

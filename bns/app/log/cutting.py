@@ -10,7 +10,7 @@ import panel as pn
 
 from bns.app.figures.time_axis import Stretch, TimeAxisFigure
 from bns.app.log.part import Part
-from bns.app.parts import WIDE, button, drawn, heading, offer, row
+from bns.app.parts import WIDE, button, drawn, heading, offer, on_change, row
 from bns.app.tab import Tab
 
 
@@ -27,9 +27,9 @@ class CutPart:
         self._whole = button("Keep the whole trial", lambda: self._to_part(None))
         self._place = pn.Column(**WIDE)
         self._log: object = None
-        self._trial.param.watch(lambda _event: self._show(), "value")
+        on_change(self._trial, self._show)
         for end in (self._from, self._to):
-            end.param.watch(lambda _event: self._picture.keep(self._typed()), "value")
+            on_change(end, lambda: self._picture.keep(self._typed()))
         ends = row(self._trial, self._from, self._to, self._keep, self._whole, align_items="end")
         self.view = pn.Column(heading("Cut a trial: brush the part to keep"), ends, self._place, visible=False, **WIDE)
 

@@ -9,7 +9,7 @@ from typing import Any
 import panel as pn
 
 from bns.app.log.part import Part
-from bns.app.parts import WIDE, html
+from bns.app.parts import WIDE, html, on_change
 from bns.app.tab import Tab
 from bns.diagnose.data.checks import Finding
 
@@ -25,7 +25,7 @@ class FindingsPart:
         self._tab, self._changed, self._quiet = tab, changed, False
         self._said = html()
         self._boxes = pn.widgets.CheckBoxGroup(options={}, stylesheets=[_WRAPPED], **WIDE)
-        self._boxes.param.watch(lambda event: None if self._quiet else self._checked(event.new), "value")
+        on_change(self._boxes, lambda: None if self._quiet else self._checked(self._boxes.value))
         self.view = pn.Column(self._said, self._boxes, visible=False, **WIDE)
 
     def enter(self) -> None:

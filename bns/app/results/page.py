@@ -8,7 +8,7 @@ import panel as pn
 
 from bns.app.design import template
 from bns.app.figures.runs import CurveFigure, ParallelFigure, RunsFigure
-from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row, together
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, on_change, row, together
 from bns.app.results.hovered import HoveredRun
 from bns.app.results.one_run import OneRun
 from bns.app.results.study import CURVES, OUTCOMES, PARAMETERS, Study
@@ -45,13 +45,13 @@ class ResultsScreen:
         self._dots, self._parallel, self._curves = RunsFigure(self._pick, self._hover), ParallelFigure(), CurveFigure()
         self._runs, self._hovered = [OneRun(study, letter) for letter in "AB"], HoveredRun(study)
         for menu in self._filters.values():
-            menu.param.watch(lambda _event: self._draw(), "value")
+            on_change(menu, self._draw)
         for axis in (self._x, self._y):
-            axis.param.watch(lambda _event: self._draw(), "value")
+            on_change(axis, self._draw)
         for which, name in enumerate(self._names):
-            name.param.watch(lambda event, which=which: self._show_run(which, event.new), "value")
-        self._curve.param.watch(lambda _event: self._draw_curves(), "value")
-        self._live.param.watch(lambda event: self._watch(event.new), "value")
+            on_change(name, lambda which=which, name=name: self._show_run(which, name.value))
+        on_change(self._curve, self._draw_curves)
+        on_change(self._live, lambda: self._watch(self._live.value))
         self.view = self._laid_out()
         self._fill_menus()
         self._draw()

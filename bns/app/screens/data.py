@@ -17,7 +17,7 @@ from bns.app.log.cutting import CutPart
 from bns.app.log.findings import MOST, FindingsPart, in_words
 from bns.app.log.part import Part
 from bns.app.log.roles import Mapped, Menus
-from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, row
+from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, on_change, row
 from bns.app.session import is_session, opened
 from bns.app.tab import Tab
 from bns.diagnose.data.mapping import mapping_beside
@@ -48,7 +48,7 @@ class DataScreen:
         self._left_out = pn.widgets.MultiSelect(name="Trials excluded", options=[], size=8, width=200)
         self._leave = button("Exclude these", self._leave_out)
         self._brushed = button("Exclude the selection in the picture", self._leave_selected)
-        self._file.param.watch(lambda _event: self._read_uploaded(), "value")
+        on_change(self._file, self._read_uploaded)
         self._open_log = pn.Column(**WIDE)
         self.view = self._laid_out()
 

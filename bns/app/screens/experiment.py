@@ -12,7 +12,7 @@ from bns.api.propose import ProposeResult, checked_minutes, proposed
 from bns.app.background import Tell
 from bns.app.figures.floor import ArenaFigure, PowerFigure, Sides
 from bns.app.html import table
-from bns.app.parts import WIDE, Problem, beside, download, drawn, heading, html, offer, row
+from bns.app.parts import WIDE, Problem, beside, download, drawn, heading, html, offer, on_change, row
 from bns.app.screens.working import Working
 from bns.app.tab import Tab
 from bns.app.workbench import Workbench
@@ -35,13 +35,13 @@ class ExperimentPart:
         )
         self._sides = [pn.widgets.FloatInput(name=name, value=0.0, step=0.1, width=95) for name in _SIDES]
         for side in self._sides:
-            side.param.watch(lambda _event: self._picture.arena(self._arena()), "value")
+            on_change(side, lambda: self._picture.arena(self._arena()))
         self._trial = pn.widgets.Select(name="Proposed trial", options=[], width=140)
         self._time = pn.widgets.Player(
             name="Time", start=0, end=1, value=0, interval=40, loop_policy="loop", show_loop_controls=False, width=260
         )
-        self._trial.param.watch(lambda _event: self._show_trial(), "value")
-        self._time.param.watch(lambda event: self._picture.at(self._frame_s * event.new), "value")
+        on_change(self._trial, self._show_trial)
+        on_change(self._time, lambda: self._picture.at(self._frame_s * self._time.value))
         self._table, self._save, self._floor = html(), html(), pn.Column(**WIDE)
         self._work = Working("Propose the next experiment", self._begin, lambda: tab.experiment, self._show)
         self._found = pn.Column(**WIDE)  # a picture that is hidden has no size to begin with, which Bokeh complains of

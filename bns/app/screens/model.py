@@ -11,7 +11,7 @@ import panel as pn
 
 from bns.api.model import Model
 from bns.app.jobs import Jobs
-from bns.app.parts import WIDE, Problem, beside, button, heading, html
+from bns.app.parts import WIDE, Problem, beside, button, heading, html, on_change
 from bns.app.tab import Tab
 from bns.diagnose.predict.saved_networks import OF_ROBOT
 from bns.physics.jointed.model_files import SNAKE
@@ -36,7 +36,7 @@ class ModelScreen:
             name="Or a differential drive: wheelbase (m)", value=0.1, start=0.001, end=10, step=0.001, **WIDE
         )
         self._suggestion = html()
-        self._file.param.watch(lambda _event: self._take_uploaded(), "value")
+        on_change(self._file, self._take_uploaded)
         left = pn.Column(
             heading("Take a model"),
             self._name,
