@@ -51,6 +51,25 @@ class Parameter:
     resolution: float = 0.0
     """A small change that is still visible in data; 0: a thousandth of the plausible range."""
 
+    @property
+    def is_multiple(self) -> bool:
+        """Does it multiply something, neutral at 1? Then a half and a double are equal changes."""
+        return self.neutral == 1.0 and self.unit == "1" and self.plausible[0] > 0
+
+    def part_way(self, share: float, upwards: bool) -> float:
+        """A value so far from neutral to an end of the plausible range, as a share; of a multiple by ratio. Not beyond a bound.
+
+        Where the range ends at neutral on that side, a quarter of the whole range takes the end's place.
+        """
+        end, bound = (self.plausible[1], self.high) if upwards else (self.plausible[0], self.low)
+        if end == self.neutral:
+            end += (0.25 if upwards else -0.25) * (self.plausible[1] - self.plausible[0])
+        if self.is_multiple and end > 0:
+            value = float(end**share)
+        else:
+            value = self.neutral + share * (end - self.neutral)
+        return min(value, bound) if upwards else max(value, bound)
+
     def within(self, diagonal_m: float) -> Parameter:
         """The parameter, bounded to its `floor_share` of a floor with this diagonal."""
         if not self.floor_share:

@@ -35,6 +35,11 @@ def weights(whitened: Array) -> Array:
     return HUBER / np.maximum(length, HUBER)
 
 
+def within(whitened: Array, farthest: float) -> Array:
+    """The same, none longer than ``farthest``: how far beyond it one is says nothing, since something else happened there."""
+    return whitened * (farthest / np.maximum(_length(whitened), farthest))[:, None]
+
+
 def _length(whitened: Array) -> Array:
     return np.sqrt(np.asarray(np.einsum("kc,kc->k", whitened, whitened), dtype=np.float64))
 

@@ -2,7 +2,7 @@
 
 A body's simulation costs seconds, and a search asks for hundreds of models. So every number of an effect has a curve: how far all
 that is seen moves when this number alone leaves neutral, simulated at a few values when they are first needed, straight in
-between. A model is read as the nearest one that was simulated whole (an anchor), plus what the curves say of the difference.
+between. The nodes of a multiple are spaced by ratio. A model is read as the nearest one that was simulated whole (an anchor), plus what the curves say of the difference.
 Wherever noise and numbers are settled (`anchor`), the model itself is simulated: what the curves miss, because effects act on
 each other, is then made good.
 """
@@ -148,9 +148,8 @@ class Responses:
 
     def _planned(self, p: Parameter, side: float) -> list[float]:
         """Nodes on one side of neutral that are simulated when they are first needed."""
-        end, bound = (p.plausible[1], p.high) if side > 0 else (p.plausible[0], p.low)
-        room, width = abs(bound - p.neutral), abs(end - p.neutral) or (p.plausible[1] - p.plausible[0]) / 4
-        return [p.neutral + side * min(share * width, room) for share in self._shares if room > 0]
+        values = [p.part_way(share, side > 0) for share in self._shares]
+        return [value for value in values if value != p.neutral]
 
     def _node(self, number: Number, effect: Effect, p: Parameter, value: float) -> Array:
         known = self._curves[number]

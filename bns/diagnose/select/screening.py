@@ -47,7 +47,14 @@ def worth_a_fit(found: Sequence[Screened]) -> list[Effect]:
 
 
 def _scored(few: Problem, base: Fit, effect: Effect) -> Screened:
-    columns = np.stack([_column(few, base, effect, index) for index in range(len(effect.parameters))], axis=2)
+    """Of a multiple both ways: a servo of half the stiffness does not do the opposite of what one of twice the stiffness does."""
+    ways = (False, True) if any(p.is_multiple and p.plausible[0] < 1 < p.plausible[1] for p in effect.parameters) else (None,)
+    return max((_scored_one_way(few, base, effect, upwards) for upwards in ways), key=lambda s: s.gain)
+
+
+def _scored_one_way(few: Problem, base: Fit, effect: Effect, upwards: bool | None) -> Screened:
+    numbers = range(len(effect.parameters))
+    columns = np.stack([_column(few, base, effect, index, upwards) for index in numbers], axis=2)
     columns = columns[..., np.abs(columns).max(axis=(0, 1)) > 0]
     if not columns.shape[2]:
         return Screened(effect, 0.0, 1.0)
@@ -57,11 +64,15 @@ def _scored(few: Problem, base: Fit, effect: Effect) -> Screened:
     return Screened(effect, gain, chance(equations, base.jacobian.shape[2]))
 
 
-def _column(few: Problem, base: Fit, effect: Effect, index: int) -> Array:
-    """What a unit of one number changes in the whitened innovations, from neutral to well inside of what is plausible."""
+def _column(few: Problem, base: Fit, effect: Effect, index: int, upwards: bool | None) -> Array:
+    """What a unit of one number changes in the whitened innovations, from neutral to well inside of what is plausible.
+
+    ``upwards``: to which side; None: where it may go further.
+    """
     p = effect.parameters[index]
-    ends = [p.plausible[1] - p.neutral, p.plausible[0] - p.neutral]
-    change = _SHARE * max(ends, key=abs)
+    if upwards is None:
+        upwards = p.plausible[1] - p.neutral >= p.neutral - p.plausible[0]
+    change = p.part_way(_SHARE, upwards) - p.neutral
     values = tuple(q.neutral + (change if q is p else 0.0) for q in effect.parameters)
     moved: Array = (few.whitened(base.model.with_active(effect, values)) - base.whitened) / change
     return moved

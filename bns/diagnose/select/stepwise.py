@@ -163,6 +163,8 @@ class StepwiseSelection:
         left = self._worth_a_fit(problem, fit, accepted)
         tried = each(partial(self._tried, problem, fit), [*DECOYS, *left])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
+        if self.predictor.screening is not None:
+            tried[len(DECOYS) :] = self._worked_out(problem, fit, tried[len(DECOYS) :])
         ranking = sorted(tried[len(DECOYS) :], key=lambda c: -c.paired_comparison.elpd_diff)
         passed_over: list[Candidate] = []
         for index, candidate in enumerate(ranking):
@@ -189,6 +191,23 @@ class StepwiseSelection:
             self._worth |= {effect.name: effect for effect in worth_a_fit(screened(problem, fit, left))}
         return [effect for name, effect in self._worth.items() if name not in accepted]
 
+    def _worked_out(self, problem: Problem, fit: Fit, tried: Sequence[Candidate]) -> list[Candidate]:
+        """Where models are worked out roughly: those that come near the best one worked out well, each at its own numbers.
+
+        The curves between which a rough answer is read are of uneven quality, and only like can be compared with like.
+        """
+        best = max((fit.loss - c.fit.loss for c in tried), default=0.0)
+        out = []
+        for candidate in tried:
+            if fit.loss - candidate.fit.loss >= BEHIND * best > 0 and self.predictor.anchor(candidate.fit.model):
+                again = Problem(self.predictor, problem.pose_filter, self.predictor.counted)
+                candidate = self._candidate(again, fit, again.fit(candidate.fit.model), candidate.name)
+            out.append(candidate)
+        return out
+
+    def _candidate(self, problem: Problem, fit: Fit, added: Fit, name: str) -> Candidate:
+        return Candidate(name, added, problem.paired_comparison(fit, added), self._rejected(added, name))
+
     def _rejected(self, fit: Fit, name: str, bounds: bool = True) -> str:
         """Why an effect may not be taken; where all numbers are believed, only for one at a bound."""
         why = implausible(fit, name, bounds)
@@ -197,7 +216,7 @@ class StepwiseSelection:
     def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
         self.tick(effect.name)
         added = fit_with(problem, fit, effect)
-        found = Candidate(effect.name, added, problem.paired_comparison(fit, added), self._rejected(added, effect.name))
+        found = self._candidate(problem, fit, added, effect.name)
         if len(added.model.effects) == len(self.model.effects) + 1 and effect.name in self.catalogue:
             self.alone(found)
         return found

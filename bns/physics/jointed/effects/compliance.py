@@ -24,6 +24,6 @@ EFFECT = Effect(
     lookalikes=("torque-limit", "supply-sag", "dead-band"),
     sentence="the joints are softer or stiffer than the model's",
     measurement="hang a known weight on an arm that a servo holds level, and measure how far it sinks",
-    starts=((0.86,), (0.58,), (1.4,), (2.2,)),
+    starts=((0.79,), (0.49,), (1.25,), (1.93,)),
     apply=apply,
 )

@@ -26,6 +26,6 @@ EFFECT = Effect(
     lookalikes=("torque-limit", "servo-delay", "compliance"),
     sentence="the servos turn more slowly than commanded",
     measurement="let one servo turn freely from end to end and measure the time",
-    starts=((0.86,), (0.58,), (0.3,)),
+    starts=((0.79,), (0.49,), (0.3,)),
     apply=apply,
 )

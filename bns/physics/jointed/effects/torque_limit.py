@@ -26,6 +26,6 @@ EFFECT = Effect(
     lookalikes=("compliance", "supply-sag", "servo-speed-limit"),
     sentence="the servos' highest torque differs from the model's",
     measurement="hang weights on a servo's arm, and note the torque at which it yields",
-    starts=((0.82,), (0.46,), (0.1,)),
+    starts=((0.63,), (0.25,), (0.1,)),
     apply=apply,
 )
