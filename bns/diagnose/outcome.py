@@ -176,9 +176,8 @@ def _relative(errors: PairedErrors) -> float:
 
 
 def _negligible(selection: SelectionResult) -> tuple[str, ...]:
-    """As `negligible`; not asked where a fit is costly, or trials have clocks of their own."""
-    costly = selection.problem.predictor.screening is not None
-    return () if costly or selection.fit.model.per_trial_effect is not None else negligible(selection)
+    """As `negligible`; not asked where trials have clocks of their own."""
+    return () if selection.fit.model.per_trial_effect is not None else negligible(selection)
 
 
 def _established(
