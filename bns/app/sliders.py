@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
 import panel as pn
@@ -69,7 +70,7 @@ class NumberSlider:
             stylesheets=[_UNTITLED], **WIDE,
         )  # fmt: skip
         for widget in (self._box, self._slider):
-            on_change(widget, lambda widget=widget: self._told(widget.value))
+            on_change(widget, partial(self._moved_to, widget))
         self.view: Any = pn.Column(self._box, self._slider, margin=(0, 8, 4, 30), **WIDE)
 
     def show(self, value: float) -> None:
@@ -81,7 +82,8 @@ class NumberSlider:
         self._box.value = value
         self._quiet = False
 
-    def _told(self, value: float | None) -> None:
+    def _moved_to(self, widget: Any) -> None:
+        value: float | None = widget.value
         if not self._quiet and value is not None:
             self.show(float(value))
             self._moved(float(value))

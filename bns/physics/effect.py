@@ -64,10 +64,8 @@ class Parameter:
         end, bound = (self.plausible[1], self.high) if upwards else (self.plausible[0], self.low)
         if end == self.neutral:
             end += (0.25 if upwards else -0.25) * (self.plausible[1] - self.plausible[0])
-        if self.is_multiple and end > 0:
-            value = float(end**share)
-        else:
-            value = self.neutral + share * (end - self.neutral)
+        by_ratio = self.is_multiple and end > 0
+        value = float(end**share) if by_ratio else self.neutral + share * (end - self.neutral)
         return min(value, bound) if upwards else max(value, bound)
 
     def within(self, diagonal_m: float) -> Parameter:

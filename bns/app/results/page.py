@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import panel as pn
@@ -49,7 +50,7 @@ class ResultsScreen:
         for axis in (self._x, self._y):
             on_change(axis, self._draw)
         for which, name in enumerate(self._names):
-            on_change(name, lambda which=which, name=name: self._show_run(which, name.value))
+            on_change(name, partial(self._show_run, which, name))
         on_change(self._curve, self._draw_curves)
         on_change(self._live, lambda: self._watch(self._live.value))
         self.view = self._laid_out()
@@ -116,8 +117,8 @@ class ResultsScreen:
                 self._hovered.show(run_id, words)
                 self._draw_curves()
 
-    def _show_run(self, which: int, run_id: str) -> None:
-        self._runs[which].show(run_id or "")
+    def _show_run(self, which: int, menu: Any) -> None:
+        self._runs[which].show(menu.value or "")
         self._draw_curves()
 
     def _draw_curves(self) -> None:

@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.clocks.trial_clocks import ReducedJacobian, eliminate_clocks, with_initial_clocks
-from bns.diagnose.estimate.noise import Whitening, huber, within
+from bns.diagnose.estimate.noise import Whitening, gathered, huber
 from bns.diagnose.estimate.normal_equations import (
     NormalEquations,
     innovations_after,
@@ -37,7 +37,6 @@ _LATELY = 16
 _ROUNDS = DEFAULTS.estimate.fit_rounds
 _SETTLED = DEFAULTS.estimate.fit_settled
 _TRUSTED = DEFAULTS.estimate.fit_trusted
-_FARTHEST = DEFAULTS.estimate.stretch_farthest
 
 
 @dataclass(frozen=True)
@@ -135,7 +134,7 @@ class Problem:
     def _worked_out(self, model: Model) -> Array:
         whitened = self.pose_filter.whitened(self.predictor.tracks, self.predictor.steps(model))
         if self.predictor.luck is not None:
-            whitened = within(whitened, _FARTHEST)
+            whitened = gathered(whitened)
         return whitened if self._counted is None else whitened * self._counted
 
     @property

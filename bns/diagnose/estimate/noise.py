@@ -21,26 +21,33 @@ _ENOUGH = DEFAULTS.estimate.noise_trials
 _GUESS = np.array(DEFAULTS.estimate.noise_guess)
 _LOW = np.array(DEFAULTS.estimate.noise_low)
 _HIGH = np.array(DEFAULTS.estimate.noise_high)
+_FARTHEST = DEFAULTS.estimate.stretch_farthest
 
 
 def huber(whitened: Array) -> Array:
     """Loss of every frame: half the squared length, linear beyond `HUBER`; (frames,)."""
-    length = _length(whitened)
-    return np.where(length <= HUBER, length * length / 2, HUBER * length - HUBER * HUBER / 2)
+    far = length(whitened)
+    return np.where(far <= HUBER, far * far / 2, HUBER * far - HUBER * HUBER / 2)
 
 
 def weights(whitened: Array) -> Array:
     """What a frame counts in a step of least squares under `huber`; (frames,), at most 1."""
-    length = _length(whitened)
-    return HUBER / np.maximum(length, HUBER)
+    return HUBER / np.maximum(length(whitened), HUBER)
 
 
-def within(whitened: Array, farthest: float) -> Array:
-    """The same, none longer than ``farthest``: how far beyond it one is says nothing, since something else happened there."""
-    return whitened * (farthest / np.maximum(_length(whitened), farthest))[:, None]
+def gathered(whitened: Array) -> Array:
+    """The same, none much longer than the others: how far one is beyond that says nothing, since something else happened there.
+
+    Others: half of the frames, or noise alone where that is longer.
+    """
+    far = length(whitened)
+    of_others = float(np.median(far[far > 0])) if (far > 0).any() else 0.0
+    farthest = _FARTHEST * max(np.sqrt(whitened.shape[1]), of_others)
+    return np.asarray(whitened * (farthest / np.maximum(far, farthest))[:, None])
 
 
-def _length(whitened: Array) -> Array:
+def length(whitened: Array) -> Array:
+    """Of the innovations of every frame, (frames,)."""
     return np.sqrt(np.asarray(np.einsum("kc,kc->k", whitened, whitened), dtype=np.float64))
 
 

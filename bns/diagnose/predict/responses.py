@@ -2,7 +2,8 @@
 
 A body's simulation costs seconds, and a search asks for hundreds of models. So every number of an effect has a curve: how far all
 that is seen moves when this number alone leaves neutral, simulated at a few values when they are first needed, straight in
-between. The nodes of a multiple are spaced by ratio. A model is read as the nearest one that was simulated whole (an anchor), plus what the curves say of the difference.
+between. The nodes of a multiple are spaced by ratio. A model is read as the nearest one that was simulated whole (an anchor),
+plus what the curves say of the difference.
 Wherever noise and numbers are settled (`anchor`), the model itself is simulated: what the curves miss, because effects act on
 each other, is then made good.
 """

@@ -6,7 +6,7 @@ or beyond what is plausible is rejected with its reason.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 
@@ -201,8 +201,9 @@ class StepwiseSelection:
         for candidate in tried:
             if fit.loss - candidate.fit.loss >= BEHIND * best > 0 and self.predictor.anchor(candidate.fit.model):
                 again = Problem(self.predictor, problem.pose_filter, self.predictor.counted)
-                candidate = self._candidate(again, fit, again.fit(candidate.fit.model), candidate.name)
-            out.append(candidate)
+                out.append(self._candidate(again, fit, again.fit(candidate.fit.model), candidate.name))
+            else:
+                out.append(candidate)
         return out
 
     def _candidate(self, problem: Problem, fit: Fit, added: Fit, name: str) -> Candidate:

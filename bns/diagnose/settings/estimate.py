@@ -63,10 +63,11 @@ class Estimate:
         (0.3, 0.5, 0.5, 0.5, 3.0), _NOISE_UNITS, f"Upper bounds of the noise estimate; {BY_HAND}."
     )
     stretch_farthest: float = setting(
-        6.0,
-        "standard deviations",
-        "A cycle or stretch of a body that is predicted worse than this counts as if it were this bad: the body rolled over, "
-        "in the simulation or on the floor. With the true stiffness, 1 of 64 cycles alone raised the loss from 75 to 416.",
+        4.0,
+        "1",
+        "A frame of a body whose prediction is worse than half of the others, or than noise alone makes it, by more than this "
+        "factor counts as if it were this bad: the body rolled over, in the simulation or on the floor. With the true "
+        "stiffness, 1 of 64 cycles alone raised the loss from 75 to 416.",
     )
     stretch_guess: tuple[float, ...] = setting(
         (2e-3, 8e-3, 2e-3, 6e-3),

@@ -1,0 +1,93 @@
+"""What of a body is tried at all, and how rough answers become comparable."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bns.diagnose.estimate.fit import Problem
+from bns.diagnose.estimate.noise import gathered, huber, length
+from bns.diagnose.predict.responses import Responses
+from bns.diagnose.select import screening, stepwise
+from bns.diagnose.select.result import Candidate
+from bns.physics.effect import Effect, Parameter
+from bns.physics.jointed.model_files import load_body
+
+SNAKE = load_body("snake")
+TRIALS, FRAMES = 24, 6
+
+
+def test_one_cycle_gone_astray_counts_little_and_a_model_that_is_wrong_everywhere_in_full():
+    whitened = np.random.default_rng(0).normal(size=(400, 3))
+    astray = whitened.copy()
+    astray[7] = (300.0, -400.0, 0.0)
+    assert huber(gathered(astray)).sum() < huber(whitened).sum() + 4 * 4**2
+    assert length(gathered(astray))[7] == pytest.approx(4 * np.sqrt(3))
+    np.testing.assert_array_equal(np.delete(gathered(astray), 7, axis=0), np.delete(whitened, 7, axis=0))
+    np.testing.assert_array_equal(gathered(whitened + 50), whitened + 50)
+    np.testing.assert_array_equal(gathered(np.zeros((5, 3))), np.zeros((5, 3)))
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "upwards", "value"),
+    [
+        ("torque-limit", 0.5, False, 0.1**0.5),
+        ("compliance", 0.6, True, 3.0**0.6),
+        ("compliance", 1.2, False, 0.3**1.2),
+        ("torque-limit", 1.2, False, 0.1**1.2),
+        ("torque-limit", 9.0, False, 0.05),
+        ("weak-joint-joint5", 0.6, False, 0.4),
+        ("joint-zero-joint5", 0.5, False, -0.2),
+        ("servo-delay", 0.5, True, 0.2),
+        ("dead-band", 0.2, False, -0.2 * 0.15 / 4),
+    ],
+)
+def test_multiples_are_stepped_by_ratio_and_everything_else_by_difference(name, share, upwards, value):
+    parameter = SNAKE.catalogue()[name].parameters[0]
+    assert parameter.part_way(share, upwards) == pytest.approx(value)
+
+
+def test_the_nodes_of_a_limit_lie_where_it_begins_to_bind():
+    parameter = SNAKE.catalogue()["torque-limit"].parameters[0]
+    nodes = Responses(lambda _model: np.zeros(1), SNAKE, None, (0.2, 0.6, 1.2))._planned(parameter, -1.0)
+    assert nodes == pytest.approx([0.631, 0.251, 0.063], abs=1e-3)
+
+
+def one_sided(which):
+    """A problem whose residuals are what a multiple below 1 does; above 1 it does something else."""
+    rng = np.random.default_rng(1)
+    below, above = rng.normal(size=(2, TRIALS * FRAMES, 3))
+    first = np.arange(TRIALS + 1) * FRAMES
+    problem = Problem.__new__(Problem)
+    problem.predictor = SimpleNamespace(tracks=SimpleNamespace(first=first))
+    lost = 0.3 * below + 0.1 * rng.normal(size=below.shape)
+
+    def whitened(model):
+        value = model.effects[-1].values[0]
+        return lost + ((1 - value) * below if value < 1 else (value - 1) * above)
+
+    problem.whitened = whitened
+    base = SimpleNamespace(model=SNAKE, whitened=lost, jacobian=np.zeros((*lost.shape, 0)))
+    parameter = Parameter("x", "1", 0.05, 9.0, which, 1.0, "")
+    return problem, base, Effect("multiple", "mechanics", (parameter,), "", "", (), lambda plant, x: plant)
+
+
+def test_a_multiple_is_screened_both_ways():
+    problem, base, effect = one_sided((0.3, 4.0))  # upwards it may go further, so one way alone would be that way
+    upwards = screening._scored_one_way(problem, base, effect, True)
+    both = screening._scored(problem, base, effect)
+    assert both.gain > 10 * upwards.gain
+    assert both.p_value < 1e-3
+
+
+@pytest.mark.parametrize("far", [0.2, 0.9])
+def test_what_comes_near_the_best_is_worked_out_before_it_is_compared(monkeypatch, far):
+    asked = []
+    search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
+    search.predictor = SimpleNamespace(anchor=lambda model: asked.append(model) or True, counted=None)
+    monkeypatch.setattr(stepwise, "Problem", lambda *_: SimpleNamespace(fit=lambda model: SimpleNamespace(loss=1.0, model=model)))
+    search._candidate = lambda _problem, _fit, added, name: Candidate(name, added, None)
+    rough = [Candidate(name, SimpleNamespace(loss=loss, model=name), None) for name, loss in (("a", 10.0), ("b", 100 - 90 * far))]
+    out = search._worked_out(SimpleNamespace(pose_filter=None), SimpleNamespace(loss=100.0), rough)
+    assert asked == (["a", "b"] if far > stepwise.BEHIND else ["a"])
+    assert [c.fit.loss for c in out] == ([1.0, 1.0] if far > stepwise.BEHIND else [1.0, 100 - 90 * far])
