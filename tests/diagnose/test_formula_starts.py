@@ -1,5 +1,7 @@
 """A formula that the diagnosis offers can be added in the time of one fit, however many numbers it has."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,26 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import _starts, fit_with
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.settings import DEFAULTS
+from bns.physics.effect import Effect, Parameter
 from bns.physics.formula import formula_effect
 from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+SHARES = DEFAULTS.estimate.start_shares
+
+
+def in_numbers(count):
+    numbers = tuple(Parameter(f"x{i}", "m", -9.0, 9.0, (-1.0 - i, 2.0 + i), 0.0, "") for i in range(count))
+    return Effect("mine", "mechanics", numbers, "", "", (), lambda plant, **_: plant)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_one_number_starts_on_a_grid_two_along_their_axes_and_three_where_those_cross(count):
+    grids = [[share * end for end in (-1.0 - i, 2.0 + i) for share in SHARES] for i in range(count)]
+    along = {tuple(x if i == axis else 0.0 for i in range(count)) for axis in range(count) for x in grids[axis]}
+    cross = set(product(*grids))
+    crossing = count != 2 and len(cross) <= DEFAULTS.estimate.start_most
+    assert set(_starts(in_numbers(count), None, None)) == (cross if crossing else along)
 
 
 @pytest.mark.parametrize(

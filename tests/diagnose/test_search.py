@@ -15,6 +15,7 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.decoys import DECOYS
+from bns.physics.effects import effect_named
 from bns.physics.formula import formula_effect
 from bns.physics.model import ActiveEffect
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -87,6 +88,17 @@ def test_too_little_is_said_to_be_so(change, message):
     found = diagnose(WheelPredictor(tracks_of(change(measured(NOMINAL, trials=12)))), NOMINAL)
     assert found.verdict == "insufficient-data"
     assert any(re.search(message, note) for note in found.notes)
+
+
+def test_a_search_with_the_trials_clocks_starts_from_the_model_given():
+    clock = effect_named("clock-offset")
+    given = NOMINAL.with_effect("speed-gain", gain=0.9)
+    fitted = given.with_effect("wheelbase", factor=1.1)
+    fitted = replace(fitted, effects=(*fitted.effects, ActiveEffect(clock, (0.15,), per_trial=True, trial_values=(0.1, 0.2))))
+    assert fitted.per_trial_effect is not None
+    bare = StepwiseSelection._bare_with_clocks(fitted, given)
+    assert {active.effect.name for active in bare.effects} == {"speed-gain", "clock-offset"}
+    assert {active.effect.name for active in StepwiseSelection._bare_with_clocks(given, given).effects} == {"speed-gain"}
 
 
 def test_decoys_move_the_robot_but_mean_nothing():

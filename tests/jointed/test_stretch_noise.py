@@ -4,8 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from bns.diagnose.estimate.stretch_noise import (
+    _apart_scatter,
+    _Sums,
     errors_since_begin,
     estimate_stretch_noise,
     predicted_since_begin,
@@ -87,6 +90,25 @@ def test_whitened_errors_have_the_length_that_their_covariance_gives_them():
         z = (errors[rows] / pose_filter.scale).ravel()
         exact = z @ np.linalg.solve(np.eye(FRAMES * 4) + a @ a.T, z)
         assert (whitened[rows] ** 2).sum() == pytest.approx(exact)
+
+
+def test_the_surprise_at_a_noise_is_that_of_the_normal_distribution_with_its_covariance():
+    predictor, steps = driven(5, seed=1)
+    luck, pose = predictor.luck, predictor.tracks.pose
+    sums = _Sums.of(luck, pose, steps, _apart_scatter(steps))
+    errors, surprises = errors_since_begin(luck, pose, steps), []
+    for noise in (NOISE, 1.5 * NOISE, NOISE * [1, 1, 2, 1, 1, 3]):
+        pose_filter = stretch_filter(predictor, steps, noise)
+        exact = 0.0
+        for stretch in range(5):
+            inner = slice(stretch * FRAMES + 1, (stretch + 1) * FRAMES)
+            a = pose_filter.columns[inner].reshape((FRAMES - 1) * 4, -1)
+            root = np.diag(np.tile(pose_filter.scale, FRAMES - 1))
+            covariance = root @ (np.eye(len(a)) + a @ a.T) @ root
+            exact -= multivariate_normal(cov=covariance).logpdf(errors[inner].ravel())
+        surprises.append((sums.surprise(luck, noise), exact))
+    found, exact = np.array(surprises).T
+    assert np.diff(found) == pytest.approx(np.diff(exact))
 
 
 def test_the_noise_that_was_put_in_is_estimated_and_leaves_unit_errors():

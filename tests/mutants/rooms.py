@@ -14,12 +14,13 @@ ROOMS: dict[str, tuple[str, str]] = {
     "estimate": (
         "bns/diagnose/estimate/*.py",
         "tests/diagnose/test_held_out.py tests/diagnose/test_evidence.py tests/diagnose/test_clocks.py "
-        "tests/diagnose/test_normal.py tests/diagnose/test_formula_starts.py tests/jointed/test_stretch_noise.py",
+        "tests/diagnose/test_normal.py tests/diagnose/test_formula_starts.py tests/jointed/test_stretch_noise.py "
+        "tests/jointed/test_screening.py",
     ),
     "select": (
         "bns/diagnose/select/*.py",
         "tests/diagnose/test_alike.py tests/diagnose/test_negligible.py tests/diagnose/test_equivalents.py "
-        "tests/diagnose/test_search.py",
+        "tests/diagnose/test_search.py tests/jointed/test_screening.py",
     ),
     "safety": (
         "bns/hardware/safety.py",

@@ -12,6 +12,7 @@ import pytest
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store import Writer, compact, finished
+from bns.store.disk.lock import ShardLock, SweepLock, SweepLockedError
 
 from .synthetic import record, records
 
@@ -27,6 +28,17 @@ def test_second_writer_is_refused_at_once_and_told_who_holds_the_sweep(tmp_path)
     with Writer(tmp_path, "s"):
         pass
     assert len(finished(tmp_path, "s")) == len(finished(tmp_path, "t")) == 1
+
+
+def test_shards_of_one_sweep_are_written_side_by_side_and_the_whole_is_not(tmp_path):
+    one, other = (ShardLock(tmp_path, "s", shard) for shard in "ab")
+    one.acquire()
+    other.acquire()
+    with pytest.raises(SweepLockedError):
+        SweepLock(tmp_path, "s").acquire()
+    with pytest.raises(SweepLockedError):
+        ShardLock(tmp_path, "s", "a").acquire()
+    ShardLock(tmp_path, "t", "a").acquire()
 
 
 def test_writer_in_another_process_is_named(tmp_path):

@@ -29,7 +29,8 @@ _NORMAL = 0.6745
 
 @dataclass(frozen=True)
 class TrackingNoise:
-    """Standard deviation of one tracked pose: each of x and y (m), and the heading (rad). ``basis``: at rest, high frequency."""
+    """Standard deviation of one tracked pose: each of x and y (m), and the heading (rad). ``basis``: at rest, high frequency,
+    distances between tracked points."""
 
     position_m: float
     heading_rad: float

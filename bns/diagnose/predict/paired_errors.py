@@ -192,7 +192,7 @@ def noise_json(errors: PairedErrors) -> dict[str, float | str] | None:
 
 def _noise_of(predictor: Predictor) -> TrackingNoise | None:
     if predictor.tracking is not None:
-        return TrackingNoise(*predictor.tracking, "as the tracks tell")
+        return TrackingNoise(*predictor.tracking, "distances between tracked points")
     return tracking_noise(predictor.tracks)
 
 

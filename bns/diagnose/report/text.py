@@ -117,8 +117,8 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
         yield "  (noise not known: the poses are too far apart in time)"
     else:
         pose_mm, basis = 1e3 * errors.noise.position_m, errors.noise.basis
-        basis = basis if basis.startswith("at ") else f"at {basis}"
-        yield f"  (noise: error that the tracking alone causes; {pose_mm:.2f} mm per pose, estimated from poses {basis})"
+        of = {"at rest": "poses at rest", "high frequency": "poses at high frequency"}.get(basis, basis)
+        yield f"  (noise: error that the tracking alone causes; {pose_mm:.2f} mm per pose, estimated from {of})"
 
 
 def _change(c: Change) -> tuple[str, str]:

@@ -356,6 +356,28 @@ def test_stop_on_a_dead_line_does_not_raise(chain):
     assert stop.problem
 
 
+@pytest.mark.parametrize(("steps", "stands"), [(0, True), (1, True), (-1, True), (2, False)])
+def test_a_joint_stands_still_within_one_step_between_two_looks(chain, steps, stands):
+    """A reading may jump by the servo's resolution, one step of 0.29 degrees."""
+    driver, bus, _ = chain()
+    servo, places = bus.servos[0], {}
+    servo.put("torque_enable", 0)
+    assert driver._not_still(1, places)  # one look says nothing
+    places[1] += steps
+    assert (driver._not_still(1, places) == "") is stands
+
+
+def test_a_port_that_cannot_even_be_closed_is_opened_anew(chain, monkeypatch):
+    driver, _, _ = chain()
+    port, opened = driver._port, []
+    monkeypatch.setattr(port, "closePort", lambda: (_ for _ in ()).throw(OSError("gone")))
+    driver._lose(OSError("unplugged"))
+    monkeypatch.undo()
+    monkeypatch.setattr(port, "setBaudRate", lambda rate: opened.append(rate) or True)
+    driver._reopen()
+    assert opened == [1_000_000]
+
+
 def test_the_table_does_not_overlap():
     taken = [r.address + i for r in REGISTERS.values() for i in range(r.size)]
     assert len(taken) == len(set(taken))

@@ -7,8 +7,10 @@ from bns.errors import HardwareError
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.link.serial_link import SerialLink
+from bns.hardware.platforms.khepera import WHEELS as KHEPERA_WHEELS
 from bns.hardware.wheels.khepera import ATTEMPTS, STILL_M_S, check_battery, firmware
 from bns.hardware.wheels.wheel_drive import RobotLostError
+from bns.physics.model import load_model
 
 
 def test_golden_bytes(bench):
@@ -206,3 +208,7 @@ def test_a_flat_battery_is_refused():
     check_battery(7.4)
     with pytest.raises(HardwareError, match=r"battery is at 5.1 V; charge it above 6 V"):
         check_battery(5.1)
+
+
+def test_the_robot_driven_and_the_robot_modelled_have_the_same_wheelbase():
+    assert KHEPERA_WHEELS.wheelbase_m == load_model("khepera").wheelbase_m == pytest.approx(0.0884)
