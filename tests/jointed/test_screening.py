@@ -74,10 +74,24 @@ def one_sided(which):
 
 def test_a_multiple_is_screened_both_ways():
     problem, base, effect = one_sided((0.3, 4.0))  # upwards it may go further, so one way alone would be that way
-    upwards = screening._scored_one_way(problem, base, effect, True)
+    upwards = screening._scored_at(problem, base, effect, (4.0**0.6,))
     both = screening._scored(problem, base, effect)
     assert both.gain > 10 * upwards.gain
     assert both.p_value < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "ways"),
+    [
+        ("compliance", [0.3**0.6, 3.0**0.6]),
+        ("torque-limit", [0.1**0.6]),
+        ("joint-zero-joint5", [0.24]),
+        ("weak-joint-joint5", [0.4, 0.0]),
+        ("servo-delay", [0.24]),
+    ],
+)
+def test_effects_are_screened_well_inside_of_what_is_plausible_and_where_robots_reach_a_bound(name, ways):
+    assert [way for (way,) in screening._ways(SNAKE.catalogue()[name])] == pytest.approx(ways)
 
 
 @pytest.mark.parametrize("far", [0.2, 0.9])

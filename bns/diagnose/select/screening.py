@@ -6,7 +6,7 @@ it, and how rarely luck pulls so hard (Rao's score test, with the sign flips of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,14 +47,29 @@ def worth_a_fit(found: Sequence[Screened]) -> list[Effect]:
 
 
 def _scored(few: Problem, base: Fit, effect: Effect) -> Screened:
-    """Of a multiple both ways: a servo of half the stiffness does not do the opposite of what one of twice the stiffness does."""
-    ways = (False, True) if any(p.is_multiple and p.plausible[0] < 1 < p.plausible[1] for p in effect.parameters) else (None,)
-    return max((_scored_one_way(few, base, effect, upwards) for upwards in ways), key=lambda s: s.gain)
+    return max((_scored_at(few, base, effect, values) for values in _ways(effect)), key=lambda s: s.gain)
 
 
-def _scored_one_way(few: Problem, base: Fit, effect: Effect, upwards: bool | None) -> Screened:
-    numbers = range(len(effect.parameters))
-    columns = np.stack([_column(few, base, effect, index, upwards) for index in numbers], axis=2)
+def _ways(effect: Effect) -> Iterator[tuple[float, ...]]:
+    """Values of the numbers, each to be tried alone: well inside of what is plausible, to the side where that reaches further.
+
+    Of a multiple to both sides: a servo of half the stiffness does not do the opposite of what one of twice the stiffness does.
+    And where robots reach a bound, there: a joint without torque moves in another way than a weak one.
+    """
+    numbers = effect.parameters
+    both = any(p.is_multiple and p.plausible[0] < 1 < p.plausible[1] for p in numbers)
+    if both:
+        for upwards in (False, True):
+            yield tuple(p.part_way(_SHARE, upwards) for p in numbers)
+    else:
+        yield tuple(p.part_way(_SHARE, p.plausible[1] - p.neutral >= p.neutral - p.plausible[0]) for p in numbers)
+    if len(numbers) == 1:
+        for bound in numbers[0].reached:
+            yield (bound,)
+
+
+def _scored_at(few: Problem, base: Fit, effect: Effect, values: Sequence[float]) -> Screened:
+    columns = np.stack([_column(few, base, effect, index, value) for index, value in enumerate(values)], axis=2)
     columns = columns[..., np.abs(columns).max(axis=(0, 1)) > 0]
     if not columns.shape[2]:
         return Screened(effect, 0.0, 1.0)
@@ -64,15 +79,9 @@ def _scored_one_way(few: Problem, base: Fit, effect: Effect, upwards: bool | Non
     return Screened(effect, gain, chance(equations, base.jacobian.shape[2]))
 
 
-def _column(few: Problem, base: Fit, effect: Effect, index: int, upwards: bool | None) -> Array:
-    """What a unit of one number changes in the whitened innovations, from neutral to well inside of what is plausible.
-
-    ``upwards``: to which side; None: where it may go further.
-    """
+def _column(few: Problem, base: Fit, effect: Effect, index: int, value: float) -> Array:
+    """What a unit of one number changes in the whitened innovations, from neutral to that value."""
     p = effect.parameters[index]
-    if upwards is None:
-        upwards = p.plausible[1] - p.neutral >= p.neutral - p.plausible[0]
-    change = p.part_way(_SHARE, upwards) - p.neutral
-    values = tuple(q.neutral + (change if q is p else 0.0) for q in effect.parameters)
-    moved: Array = (few.whitened(base.model.with_active(effect, values)) - base.whitened) / change
+    values = tuple(value if q is p else q.neutral for q in effect.parameters)
+    moved: Array = (few.whitened(base.model.with_active(effect, values)) - base.whitened) / (value - p.neutral)
     return moved
