@@ -11,13 +11,16 @@ import pytest
 import bns
 from bns.api.common.prepared import prepared
 from bns.cli.main import main
+from bns.diagnose import outcome
 from bns.diagnose.data.bodies.cycles import checked_cycles, cycle_tracks
 from bns.diagnose.data.bodies.stretches import apart, poses_of, stretches_of_cycles
 from bns.diagnose.design.competing_models import competing_models_of
 from bns.diagnose.design.power import PastTrials
 from bns.diagnose.design.repeats import RepeatPlanner
 from bns.diagnose.estimate.plausibility import at_bound, implausible
+from bns.diagnose.predict import paired_errors
 from bns.diagnose.predict.responses import Responses
+from bns.diagnose.report.text import error_lines
 from bns.errors import DataError, ModelError
 from bns.physics.effect import Effect, Parameter
 from bns.physics.jointed.model_files import load_body
@@ -135,6 +138,22 @@ def arm(tmp_path_factory):
 def test_a_sound_arm_lacks_nothing(arm):
     found = bns.diagnose(log(12, seed=1), bns.Model(arm))
     assert (found.verdict, found.effects) == ("none", ())
+
+
+def test_the_noise_of_a_body_is_said_to_come_from_distances():
+    tracked = SimpleNamespace(tracking=(0.0015, 0.007))
+    noise = paired_errors._noise_of(tracked)
+    said = list(error_lines(paired_errors.PairedErrors({}, noise, 1)))[-1]
+    assert "1.50 mm per pose, estimated from distances between tracked points" in said
+
+
+@pytest.mark.parametrize("clocks", [False, True])
+def test_effects_of_a_body_may_be_negligible(monkeypatch, clocks):
+    monkeypatch.setattr(outcome, "negligible", lambda selection: ("floor-slope",))
+    body = SimpleNamespace(screening=64, luck=object())
+    model = SimpleNamespace(per_trial_effect="clock-offset" if clocks else None)
+    selection = SimpleNamespace(fit=SimpleNamespace(model=model), problem=SimpleNamespace(predictor=body), predictor=body)
+    assert outcome._negligible(selection) == (() if clocks else ("floor-slope",))
 
 
 @pytest.fixture(scope="module")

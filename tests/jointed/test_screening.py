@@ -105,3 +105,31 @@ def test_what_comes_near_the_best_is_worked_out_before_it_is_compared(monkeypatc
     out = search._worked_out(SimpleNamespace(pose_filter=None), SimpleNamespace(loss=100.0), rough)
     assert asked == (["a", "b"] if far > stepwise.BEHIND else ["a"])
     assert [c.fit.loss for c in out] == ([1.0, 1.0] if far > stepwise.BEHIND else [1.0, 100 - 90 * far])
+
+
+def test_a_step_of_the_search_compares_what_was_worked_out(monkeypatch):
+    search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
+    search.predictor = SimpleNamespace(screening=64)
+    gain = {"a": 100.0, "b": 90.0}
+
+    def candidate(name, elpd):
+        return Candidate(name, None, SimpleNamespace(elpd_diff=elpd))
+
+    monkeypatch.setattr(search, "_worth_a_fit", lambda *_: list(gain), raising=False)
+    monkeypatch.setattr(search, "_tried", lambda _problem, _fit, name: candidate(name, gain.get(name, 0.0)), raising=False)
+    monkeypatch.setattr(search, "_earned", lambda *_: False, raising=False)
+    well = {"a": 50.0, "b": 95.0}
+    monkeypatch.setattr(search, "_worked_out", lambda _problem, _fit, tried: [candidate(c.name, well[c.name]) for c in tried])
+    step, _, _ = search._forward_step(None, None, ())
+    assert [(c.name, c.paired_comparison.elpd_diff) for c in step.ranking] == [("b", 95.0), ("a", 50.0)]
+
+
+@pytest.mark.parametrize("body", [True, False])
+def test_frames_gone_astray_are_bounded_for_a_body_alone(body):
+    whitened = np.ones((40, 4))
+    whitened[7] = 100.0
+    problem = Problem.__new__(Problem)
+    problem.predictor = SimpleNamespace(tracks=None, steps=lambda model: None, luck=object() if body else None)
+    problem.pose_filter = SimpleNamespace(whitened=lambda tracks, steps: whitened)
+    problem._counted = None
+    assert np.abs(problem._worked_out(SNAKE)[7]).max() == (pytest.approx(4.0) if body else 100.0)

@@ -308,7 +308,6 @@ class Problem:
             out[..., j] = min(slopes, key=lambda slope: float((slope**2).sum()))
         return eliminate_clocks(self, at.model, at.whitened, out)
 
-
     def _slope(self, at: _Point, free: Sequence[FreeParameter], j: int, by: float) -> Array:
         changed = moved_by(at.model, free, by * np.eye(len(free))[j])
         slope: Array = (self.whitened(changed) - at.whitened) / by

@@ -51,7 +51,8 @@ class Select:
         0.5,
         "1",
         "Such an effect is dropped if, when fitted, it misses more than this fraction of the other's gain and also more "
-        f"than `behind_loss`; {BY_HAND}.",
+        "than `behind_loss`. For a body, also: effects whose gain is at least this fraction of the best one's are simulated "
+        f"at their own parameters before they are compared; {BY_HAND}.",
     )
     behind_loss: float = setting(
         20.0,
