@@ -5,27 +5,36 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from analysis.figure_result import FigureResult
-from analysis.intervals import INTERVALS, wilson
+from analysis.intervals import FEWEST_SEEDS, INTERVALS, band, resampled, wilson
 from analysis.labels import counted, task_title
 from analysis.results import NoDataError, Results
-from analysis.robot_time import LASTING, minutes_until_lasting, success_by_minute, survival
-from bns.plotting.style import OKABE_ITO, lettered, note, panels, style
+from analysis.robot_time import (
+    LASTING,
+    LATEST,
+    minutes_until_lasting,
+    of_latest,
+    restricted_mean,
+    success_by_minute,
+    survival,
+)
+from analysis.selection import APPROACHES, in_order
+from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, TEXT_PT, lettered, note, style
 
 NAME = "approaches"
 PAPER = "section 2.6, its approaches compared with BNS"
-SWEEPS = "approaches"
-"""Names of the sweeps that compare approaches begin so."""
 MINUTES = 60
+_ACROSS = 3
 _LINES = ("-", "--")
 
 
 def draw(store: Results) -> list[FigureResult]:
     runs = store.query(
-        f"""SELECT sweep, run_id, robot, task, world, approach, evaluation, robot_s, success, evaluated_fitness_error
-        FROM evals SEMI JOIN (SELECT run_id, sweep FROM runs WHERE status = 'ok') AS done USING (run_id, sweep)
-        WHERE starts_with(sweep, '{SWEEPS}') ORDER BY sweep, robot, task, world, approach, run_id, evaluation"""
+        f"""SELECT sweep, run_id, robot, task, world, approach, evaluation, robot_s, evals.success, evaluated_fitness_error, cpu_s
+        FROM evals JOIN (SELECT run_id, sweep, cpu_s FROM runs WHERE status = 'ok') AS done USING (run_id, sweep)
+        WHERE starts_with(sweep, '{APPROACHES}') ORDER BY sweep, robot, task, world, approach, run_id, evaluation"""
     )
     if runs.approach.nunique() < 2:
         raise NoDataError("no sweep has runs of two approaches; run bns sweep approaches-small")
@@ -35,33 +44,51 @@ def draw(store: Results) -> list[FigureResult]:
 @style()
 def _draw(evals: pd.DataFrame) -> FigureResult:
     first = evals.iloc[0]
-    approaches = list(dict.fromkeys(evals.approach))
+    approaches = in_order(evals.approach)
     looks = {name: {"color": OKABE_ITO[i % 7], "linestyle": _LINES[i // 7 % 2]} for i, name in enumerate(approaches)}
-    figure, axes = panels(3, 3.4)
-    tables = []
-    for approach, own in evals.groupby("approach", sort=False):
-        by_evaluation, by_minute, until = _numbers(own)
-        _curve(axes[0, 0], by_evaluation.evaluation, by_evaluation, looks[approach], approach)
-        _curve(axes[1, 0], by_minute.minute, by_minute, looks[approach], approach)
+    rows = -(-len(approaches) // _ACROSS)
+    figure = Figure(figsize=(PAGE_IN, 3.4 + 1.5 * rows))
+    above, below = figure.subfigures(2, 1, height_ratios=(3.4, 1.5 * rows))
+    axes = above.subplots(1, 3)
+    singles = below.subplots(rows, _ACROSS, sharex=True, sharey=True, squeeze=False).ravel()
+    numbers = {name: _numbers(evals[evals.approach == name]) for name in approaches}
+    horizon = float(evals.groupby("approach").robot_s.max().min()) / 60
+    for name, ax in zip(approaches, singles, strict=False):
+        by_evaluation, by_minute, until = numbers[name]
+        _curve(axes[0], by_evaluation.evaluation, by_evaluation, looks[name], name)
+        _curve(axes[1], by_minute.minute, by_minute, looks[name], name)
         times, share = survival(until.minutes, until.ended)
-        axes[2, 0].step([*times, until.minutes.max()], [*(100 * share), 100 * share[-1]], where="post", **looks[approach])
-        tables.append(_row(approach, own, by_evaluation, until))
-    axes[0, 0].set(xlabel="evaluation in the world", ylabel="successful runs (%)")
-    axes[1, 0].set(xlabel="robot time (min)")
-    axes[2, 0].set(xlabel="robot time (min)", ylabel="runs without lasting success (%)")
+        axes[2].step([*times, until.minutes.max()], [*(100 * share), 100 * share[-1]], where="post", **looks[name])
+        _single(ax, by_minute, numbers[approaches[0]][1], looks[name])
+        ax.set_title(name)
+    for blank in singles[len(approaches) :]:
+        blank.set_axis_off()
+    axes[0].set(xlabel="evaluation in the world", ylabel="successful runs (%)")
+    axes[1].set(xlabel="robot time (min)")
+    axes[2].set(xlabel="robot time (min)", ylabel="runs without lasting success (%)")
     for number, title in enumerate(("by evaluation", "by robot time", "until success lasts")):
-        axes[number, 0].set_title(lettered(number, 3, title))
-        axes[number, 0].set(ylim=(-2, 102))
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+        axes[number].set_title(lettered(number, 3, title))
+    for ax in (*axes, singles[0]):
+        ax.set(ylim=(-2, 102))
+    below.supxlabel("robot time (min)", fontsize=TEXT_PT)
+    below.supylabel("successful runs (%)", fontsize=TEXT_PT)
+    above.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     n, least = evals.run_id.nunique(), int(evals.groupby("approach").run_id.nunique().min())
     where = f"{task_title(first.robot, first.task)}, world {first.world}"
-    note(figure, f"{where}; {counted(n, 'run')}, {least} at least of each approach; bands: {INTERVALS}.")
+    note(
+        figure,
+        f"{where}; {counted(n, 'run')}, {least} at least of each approach. Curves: mean of the latest {LATEST} evaluations; "
+        f"bands: {INTERVALS}; grey: {approaches[0]}.",
+    )
     shows = (
         f"Task {where}, {first.sweep}. (a, b) Fraction of runs whose fittest controller completes the task after so many "
-        f"evaluations, and robot minutes (all drives counted, with the spec's overhead). (c) Fraction of runs in which {LASTING} "
-        f"successes in a row have not begun yet (Kaplan-Meier). n = {n} runs, {least} at least of each approach; {INTERVALS}."
+        f"evaluations, and robot minutes (all drives counted, with the spec's overhead), mean of the latest {LATEST}; "
+        f"below, each approach alone with its interval, and {approaches[0]} in grey. (c) Fraction of runs in which {LASTING} "
+        "successes in a row have not begun yet (Kaplan-Meier). Mean minutes until lasting success: restricted to the first "
+        f"{horizon:.0f} min, which every approach was driven, with 95 % bootstrap intervals over runs. n = {n} runs, {least} at "
+        f"least of each approach; {INTERVALS}."
     )
-    table = pd.DataFrame(tables)
+    table = pd.DataFrame([_row(name, evals[evals.approach == name], numbers[name], horizon) for name in approaches])
     name = f"{NAME}-{first.sweep}-{first.robot}-{first.task}-{str(first.world).split('/')[-1].removesuffix('.yaml')}"
     return FigureResult(
         name, f"Approaches compared: {where}", figure, shows, n, (str(first.sweep),), data=table, table=table
@@ -70,32 +97,52 @@ def _draw(evals: pd.DataFrame) -> FigureResult:
 
 def _numbers(own: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """Success by evaluation and by minute, and minutes until it lasts, of one approach."""
-    counts = own.groupby("evaluation").success.agg(runs="count", successes="sum").reset_index()
+    latest = own.assign(success=of_latest(own))
+    counts = latest.groupby("evaluation").success.agg(runs="count", successes="sum").reset_index()
     low, high = wilson(counts.successes, counts.runs)
     last = own.groupby("run_id").robot_s.max().min() / 60
     return (
         counts.assign(low=low, high=high),
-        success_by_minute(own, np.linspace(0, last, MINUTES)),
+        success_by_minute(latest, np.linspace(0, last, MINUTES)),
         minutes_until_lasting(own),
     )
 
 
 def _curve(ax: Axes, x: pd.Series, rows: pd.DataFrame, look: dict[str, str], label: str) -> None:
-    ax.fill_between(x, 100 * rows.low, 100 * rows.high, color=look["color"], alpha=0.08, linewidth=0)
     ax.plot(x, 100 * rows.successes / rows.runs, label=label, **look)
 
 
-def _row(approach: str, own: pd.DataFrame, by_evaluation: pd.DataFrame, until: pd.DataFrame) -> dict[str, object]:
-    """What the table says of an approach."""
+def _single(ax: Axes, rows: pd.DataFrame, reference: pd.DataFrame, look: dict[str, str]) -> None:
+    """One approach by robot time, with its band, before the reference."""
+    ax.plot(reference.minute, 100 * reference.successes / reference.runs, color=GREY, linewidth=0.8)
+    ax.fill_between(rows.minute, 100 * rows.low, 100 * rows.high, color=look["color"], alpha=0.2, linewidth=0)
+    _curve(ax, rows.minute, rows, look, "")
+
+
+def _row(
+    approach: str, own: pd.DataFrame, numbers: tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame], horizon: float
+) -> dict[str, object]:
+    """What the table says of an approach; ``horizon``: robot minutes to which the mean until lasting success is restricted."""
+    by_evaluation, _, until = numbers
     last = by_evaluation.iloc[-1]
     return {
         "approach": approach,
         "runs": int(last.runs),
-        "success at the end (%)": round(100 * last.successes / last.runs),
+        f"success in the last {LATEST} evaluations (%)": round(100 * last.successes / last.runs),
         "low (%)": round(100 * last.low),
         "high (%)": round(100 * last.high),
         "lasting success (runs)": int(until.ended.sum()),
-        "median minutes until it": round(float(until.minutes[until.ended].median()), 1) if until.ended.any() else None,
+        f"mean minutes until it, within {horizon:.0f}": _minutes(until, horizon),
         "robot minutes of a run": round(float(own.groupby("run_id").robot_s.max().median() / 60), 1),
         "error of fitness of the driven, median (1/m)": round(float(own.evaluated_fitness_error.median()), 3),
+        "CPU seconds of a run, median": float(f"{own.groupby('run_id').cpu_s.first().median():.2g}"),
     }
+
+
+def _minutes(until: pd.DataFrame, horizon: float) -> str:
+    """The restricted mean with its interval, from enough runs on."""
+    at = float(restricted_mean(until.minutes, until.ended, horizon)[0])
+    if len(until) < FEWEST_SEEDS:
+        return f"{at:.1f}"
+    low, high = band(restricted_mean(until.minutes, until.ended, horizon, resampled(len(until))))
+    return f"{at:.1f} ({low:.1f} to {high:.1f})"

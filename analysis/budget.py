@@ -13,7 +13,7 @@ from analysis.coverage import coverage
 from analysis.figure_result import FigureResult
 from analysis.intervals import mean_interval
 from analysis.labels import each, task_order, task_title
-from analysis.results import NoDataError, Results
+from analysis.results import FROM_RUNS, NoDataError, Results
 from bns.plotting.style import note, ordered_styles, panels, style
 
 NAME = "budget"
@@ -55,6 +55,8 @@ def draw(store: Results) -> list[FigureResult]:
     rows = cells(store)
     if rows.empty:
         raise NoDataError(f"no finished run of the sweep {SWEEP!r}; run bns sweep budget")
+    if store.archived and rows.cpu_s.isna().all():
+        raise NoDataError(f"an archive does not hold what this is drawn from (cpu_s); {FROM_RUNS}")
     tasks = sorted(set(zip(rows.robot, rows.task, strict=True)), key=lambda pair: task_order(*pair))
     looks = dict(zip(sorted(rows.iterations.unique()), ordered_styles(rows.iterations.nunique()), strict=True))
     columns = sorted(rows.generations.unique())

@@ -98,7 +98,7 @@ class Results:
         only = "true" if self.run is None else among("run_id", [self.run])
         for table in OF_RUNS[:2] if self.archived else OF_RUNS:
             rows = f"memory.main.{table}"
-            rows = f"({rounded_evals(rows)})" if table == "evals" else rows
+            rows = f"({rounded_evals(rows)})" if table == "evals" and not self.archived else rows
             connection.execute(f"CREATE TEMP VIEW {table} AS SELECT * FROM {rows} WHERE {only}")
         for name, sql in self._tables.items():
             connection.execute(f"CREATE TABLE {name} AS {sql}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,8 @@ CONFIRMING = confirmed_name("")
 """Ending of the sweeps that rerun the best combinations of another on fresh seeds: they confirm, and compare nothing."""
 READINGS = "readings"
 """Names of the sweeps that compare readings of the dissertation begin so: at settings of their own, whatever else they vary."""
+APPROACHES = "approaches"
+"""Names of the sweeps that compare approaches begin so."""
 SETTING = (
     *("approach", "world", "world_digest", "training_algorithm", "evaluations", "min_commands", "max_commands"),
     *("generations_per_evaluation", "training_iterations_per_evaluation", "engine"),
@@ -124,3 +126,8 @@ def failures(store: Results, sweeps: Sequence[str]) -> int:
         store.query(f"""SELECT count(*) AS n FROM (SELECT run_id FROM runs WHERE {among("sweep", sweeps)}
         GROUP BY run_id HAVING count(*) FILTER (status = 'ok') = 0)""").n[0]
     )
+
+
+def in_order(approaches: Iterable[str]) -> list[str]:
+    """By name, BNS and its options first."""
+    return sorted(set(approaches), key=lambda name: (name.split("+")[0] != "bns", name))

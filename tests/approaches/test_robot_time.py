@@ -3,8 +3,10 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import CensoredData, ecdf
 
-from analysis.robot_time import minutes_until_lasting, success_by_minute, survival
+from analysis.intervals import resampled
+from analysis.robot_time import minutes_until_lasting, of_latest, restricted_mean, success_by_minute, survival
 
 
 def evals(run, minutes, success):
@@ -33,3 +35,30 @@ def test_survival_is_that_of_kaplan_and_meier():
     assert times.tolist() == [0, 2, 3, 5]
     assert share.tolist() == pytest.approx([1, 4 / 5, 4 / 5 * 3 / 4, 4 / 5 * 3 / 4 * 1 / 2])
     assert survival([4, 4], [False, False])[1].tolist() == [1]
+
+
+def test_success_of_the_latest_evaluations_is_averaged_within_a_run():
+    both = pd.concat([evals("a", [1, 2, 3, 4], [1, 0, 0, 1]), evals("b", [1, 2], [0, 1])], ignore_index=True)
+    assert of_latest(both, 2).tolist() == [1, 0.5, 0, 0.5, 0, 0.5]
+    shuffled = both.iloc[[4, 0, 1, 5, 2, 3]]
+    assert of_latest(shuffled, 2).tolist() == of_latest(both, 2)[shuffled.index].tolist()
+    assert success_by_minute(both.assign(success=of_latest(both, 2)), [2.0]).successes.tolist() == [1.0]
+
+
+def test_the_restricted_mean_is_the_area_below_scipy_s_curve():
+    random = np.random.default_rng(1)
+    minutes, ended = random.integers(1, 12, 30).astype(float), random.random(30) < 0.6
+    curve = ecdf(CensoredData(minutes[ended], right=minutes[~ended])).sf
+    fine = np.arange(0, 9, 0.001) + 0.0005
+    area = 0.001 * curve.evaluate(fine).sum()
+    assert restricted_mean(minutes, ended, 9.0)[0] == pytest.approx(area, abs=0.002)
+    assert restricted_mean([3.0, 5.0], [False, False], 4.0)[0] == 4.0
+
+
+def test_a_bootstrap_sample_of_the_restricted_mean_is_that_of_its_runs():
+    minutes, ended = np.array([2.0, 3.0, 3.0, 5.0, 8.0]), np.array([True, True, False, True, False])
+    weights = resampled(5, 20)
+    drawn = restricted_mean(minutes, ended, 6.0, weights)
+    for row, area in zip(weights.astype(int), drawn, strict=True):
+        own = np.repeat(np.arange(5), row)
+        assert area == pytest.approx(restricted_mean(minutes[own], ended[own], 6.0)[0])

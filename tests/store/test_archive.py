@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from bns.cli.main import main
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store import Writer, connect
-from bns.store.archive.kept import DECIMALS, EVAL_COLUMNS, RUN_COLUMNS, rounded_evals
+from bns.store.archive.kept import COMPARED, COMPARED_RUN, DECIMALS, EVAL_COLUMNS, RUN_COLUMNS, rounded_evals
 from bns.store.archive.read import archives, connect_archives, described
 from bns.store.archive.write import archive
 from bns.sweep.expand.grid import parse_sweep
@@ -126,3 +127,38 @@ def test_runs_of_an_archive_beside_the_results_count_as_done_and_are_kept(tmp_pa
     joined = archive(second, tmp_path / "joined.parquet")
     assert joined.runs == whole.runs == 2
     assert described(joined.path)["spec_hashes"] == described(whole.path)["spec_hashes"]
+
+
+def test_sweeps_of_several_approaches_keep_what_they_are_compared_by(tmp_path):
+    results, comparing = tmp_path / "results", [RunSpec(approach=name, evaluations=4) for name in ("bns", "on-robot")]
+    plain = archive_of(results, "grid", records(3, evaluations=3), tmp_path)
+    assert not {*COMPARED, *COMPARED_RUN} & set(pq.read_schema(plain).names)
+    both = archive_of(results, "approaches", [record(spec) for spec in comparing], tmp_path)
+    with connect(results) as there, connect_archives([both, plain]) as back:
+        columns = ("run_id", "evaluation", *COMPARED)
+        kept = of(back, "evals WHERE sweep = 'approaches'", columns, "run_id, evaluation")
+        exact = of(there, f"({rounded_evals('evals')}) WHERE sweep = 'approaches'", columns, "run_id, evaluation")
+        pd.testing.assert_frame_equal(kept, exact, check_dtype=False, check_exact=True)
+        assert of(back, "evals WHERE sweep = 'grid'", COMPARED, "run_id").isna().all(axis=None)
+        assert len(of(back, "evals WHERE sweep = 'grid'", ("run_id",), "run_id")) == 9
+        cpu = dict(back.sql("SELECT sweep, any_value(cpu_s) FROM runs GROUP BY sweep").fetchall())
+        assert cpu == {"approaches": 1.25, "grid": None}
+
+
+def test_approaches_that_lie_in_an_archive_and_in_the_results_are_compared_together(tmp_path):
+    results, (one, other) = tmp_path / "results", [RunSpec(approach=name, evaluations=4) for name in ("bns", "on-robot")]
+    third = RunSpec(approach="precomputed", evaluations=4)
+    former = archive_of(tmp_path / "there", "approaches", [record(one), record(third)], tmp_path)
+    (results / "archived").mkdir(parents=True)
+    former.rename(results / "archived" / "former.parquet")
+    path = archive_of(results, "approaches", [record(other)], tmp_path)
+    with connect_archives([path]) as back:
+        assert not of(back, "evals", ("robot_s", "approach"), "approach").isna().any(axis=None)
+        assert back.sql("SELECT count(DISTINCT approach) FROM runs WHERE cpu_s = 1.25").fetchall() == [(3,)]
+
+
+def archive_of(results, sweep, runs, folder):
+    with Writer(results, sweep) as writer:
+        for one in runs:
+            writer.append(one)
+    return archive(results, folder / f"{sweep}.parquet").path

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 from bns.errors import StoreError
-from bns.store.archive.kept import DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE
+from bns.store.archive.kept import COMPARED, COMPARED_RUN, DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE
 from bns.store.disk.digest import is_intact, is_sealed
 from bns.store.disk.parquet import READ_FAULTS
 from bns.store.read.reader import finished
@@ -94,25 +94,28 @@ def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:
     connection = duckdb.connect()
     connection.execute("SET TimeZone = 'UTC'")
     files = ", ".join(pattern(path) for path in paths)
-    connection.execute(f"""CREATE TABLE archived AS SELECT * FROM read_parquet([{files}])
+    connection.execute(f"""CREATE TABLE archived AS SELECT * FROM read_parquet([{files}], union_by_name = true)
         QUALIFY row_number() OVER (PARTITION BY sweep, run_id ORDER BY status <> 'ok') = 1""")
-    connection.execute(f"CREATE VIEW runs AS SELECT {', '.join(RUN_COLUMNS)} FROM archived")
-    connection.execute(f"CREATE VIEW evals AS {_evals()}")
+    there = set(connection.table("archived").columns)
+    columns = (*RUN_COLUMNS, *(name for name in COMPARED_RUN if name in there))
+    connection.execute(f"CREATE VIEW runs AS SELECT {', '.join(columns)} FROM archived")
+    measures = DECIMALS | {name: decimals for name, decimals in COMPARED.items() if name in there}
+    connection.execute(f"CREATE VIEW evals AS {_evals(measures)}")
     connection.register("plans", pd.DataFrame(plans, columns=list(_SPECS)).astype(dict.fromkeys(_SPECS[:4], str)))
     connection.execute("CREATE TABLE specs AS SELECT DISTINCT * REPLACE (written_at::TIMESTAMPTZ AS written_at) FROM plans")
     return connection
 
 
-def _evals() -> str:
-    """SELECT of a row an evaluation."""
+def _evals(decimals: Mapping[str, int]) -> str:
+    """SELECT of a row an evaluation; ``decimals`` of the measures that the archives have."""
     parameters = ", ".join(PARAMETERS)
-    lists = ", ".join(f"unnest({name}) AS {name}" for name in (*WHOSE, *DECIMALS))
+    lists = ", ".join(f"unnest({name}) AS {name}" for name in (*WHOSE, *decimals))
     successes = [
         _bit(column, place, f"{prefix}{name}", known=not place)
         for column, prefix in WHOSE.items()
         for place, name in enumerate(("success", *NEAR))
     ]
-    measures = [f"{name} / {10**decimals}.0 AS {name}" for name, decimals in DECIMALS.items()]
+    measures = [f"{name} / {10**places}.0 AS {name}" for name, places in decimals.items()]
     return f"""SELECT run_id, sweep, robot, task, {parameters}, evaluation::INTEGER AS evaluation,
         {", ".join((*successes, *measures))} FROM (
             SELECT run_id, sweep, robot, task, {parameters}, radii,

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import duckdb
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from bns.errors import StoreError, unknown_name
-from bns.store.archive.kept import DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE, bits, whole
+from bns.store.archive.kept import COMPARED, COMPARED_RUN, DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE, bits, whole
 from bns.store.archive.read import connect_archives, stored_archives
 from bns.store.disk.digest import BLANK, FIELD, sealed
 from bns.store.disk.files import publish
@@ -53,7 +55,8 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
 
     Kept of every run: parameters, seed, spec, versions, commit and, for every evaluation, successes at all radii (of the
     fittest, the evaluated, and so far), diversity, fitness error and fitness in the world of the fittest (to 0.001 per
-    metre) and the length of its list. Paths, probes, times and everything else stay in the results.
+    metre) and the length of its list; of sweeps with several approaches also the robot's time (to 0.1 s), the error of the
+    evaluated's fitness and the CPU time of runs. Paths, probes, other times and everything else stay in the results.
 
     Raises:
         StoreError: there are no results, no such sweep, or the file cannot be written.
@@ -68,7 +71,8 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
                 raise StoreError(unknown_name(f"sweep in {results}", name, there))
         chosen = sorted(set(sweeps or there))
         connection.execute("CREATE TEMP TABLE chosen AS SELECT unnest(?::VARCHAR[]) AS sweep", [chosen])
-        table = connection.sql(_select()).to_arrow_table()
+        comparing = _comparing(connection, chosen, stored_archives(results))
+        table = connection.sql(_select(comparing)).to_arrow_table()
         plans = connection.sql("SELECT * FROM specs SEMI JOIN chosen USING (sweep) ORDER BY ALL").to_arrow_table().to_pylist()
     if former := stored_archives(results):
         table, plans = _with_former(table, plans, former, chosen)
@@ -96,14 +100,29 @@ def _with_former(
     return both.select(table.column_names).cast(table.schema), sorted(plans, key=lambda plan: (plan["sweep"], plan["spec_hash"]))
 
 
-def _select() -> str:
+def _comparing(connection: duckdb.DuckDBPyConnection, chosen: Sequence[str], former: Sequence[Path]) -> list[str]:
+    """Sweeps with several approaches, in the results and their archives together."""
+    sql = "SELECT DISTINCT sweep, approach FROM runs WHERE list_contains(?, sweep)"
+    pairs = set(connection.execute(sql, [list(chosen)]).fetchall())
+    if former:
+        with connect_archives(former) as older:
+            pairs |= set(older.execute(sql, [list(chosen)]).fetchall())
+    return sorted(sweep for sweep, count in Counter(sweep for sweep, _ in pairs).items() if count > 1)
+
+
+def _select(comparing: Sequence[str]) -> str:
     """SELECT of one row a run, with a list of each thing that is kept of its evaluations."""
     lists = {column: f"({bits(prefix)})::UTINYINT" for column, prefix in WHOSE.items()}
     lists |= {name: whole(name) for name in DECIMALS}
-    listed = ", ".join(f"list({value} ORDER BY evaluation) AS {name}" for name, value in lists.items())
+    more = {name: whole(name) for name in COMPARED} if comparing else {}
+    listed = ", ".join(f"list({value} ORDER BY evaluation) AS {name}" for name, value in (lists | more).items())
+    names = ", ".join("'" + name.replace("'", "''") + "'" for name in comparing)
+    added = [f"runs.{name}" for name in COMPARED_RUN if comparing] + [f"kept.{name}" for name in more]
+    of_these = (f", CASE WHEN sweep IN ({names}) THEN {name} END AS {name.partition('.')[2]}" for name in added)
     return f"""
         SELECT {", ".join(f"runs.{name}" for name in RUN_COLUMNS)}, coalesce(radii, false) AS radii,
                {", ".join(f"coalesce(kept.{name}, []) AS {name}" for name in lists)}
+               {"".join(of_these)}
         FROM runs SEMI JOIN chosen USING (sweep)
         LEFT JOIN (SELECT run_id, sweep, count({NEAR[0]}) > 0 AS radii, {listed}
                    FROM evals SEMI JOIN chosen USING (sweep) GROUP BY run_id, sweep) AS kept USING (run_id, sweep)
@@ -111,7 +130,7 @@ def _select() -> str:
 
 
 def _file_bytes(table: pa.Table, plans: list[dict[str, Any]]) -> bytes:
-    measures = list(DECIMALS)
+    measures = [name for name in (*DECIMALS, *COMPARED) if name in table.column_names]
     sink = pa.BufferOutputStream()
     pq.write_table(
         table.replace_schema_metadata({METADATA_KEY: _metadata(table, plans)}),

@@ -1,0 +1,161 @@
+"""Approaches two by two: the probability that a run of one does better than a run of another, with tests of all pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+
+from analysis.figure_result import FigureResult
+from analysis.intervals import FEWEST_SEEDS, band
+from analysis.multiple_tests import holm
+from analysis.results import NoDataError, Results
+from analysis.robot_time import LASTING, minutes_until_lasting
+from analysis.selection import APPROACHES, in_order
+from bns.plotting.style import lettered, note, panels, style
+
+NAME = "approach-pairs"
+PAPER = "section 2.6, its approaches compared with BNS"
+LATE = 2 / 3
+"""Evaluations beyond this share of a run count as late."""
+DRAWS = 5000
+LEVEL = 0.05
+MEASURES = {"late": "more success, late", "minutes": "sooner to lasting success"}
+_STREAM = 20260201
+"""Seed of bootstrap and permutations: the same results give the same table."""
+
+
+def draw(store: Results) -> list[FigureResult]:
+    evals = store.query(
+        f"""SELECT sweep, run_id, robot, task, world, approach, seed, evaluation, evaluations, robot_s, evals.success
+        FROM evals JOIN (SELECT run_id, sweep, evaluations FROM runs WHERE status = 'ok' AND starts_with(sweep, '{APPROACHES}'))
+             AS done USING (run_id, sweep) ORDER BY sweep, robot, world, approach, task, seed, run_id, evaluation"""
+    )
+    if evals.approach.nunique() < 2:
+        raise NoDataError("no sweep has runs of two approaches; run bns sweep approaches-small")
+    drawn = [_draw(own) for _, own in evals.groupby(["sweep", "robot", "world"])]
+    if not (some := [one for one in drawn if one is not None]):
+        raise NoDataError(f"no two approaches have {FEWEST_SEEDS} runs each on the same task and seeds; run bns sweep approaches")
+    return some
+
+
+def scores(evals: pd.DataFrame) -> pd.DataFrame:
+    """A row a run: approach, task, seed, ``late`` (share of late evaluations with success) and ``minutes`` (of robot time until
+    success lasts, negative, so that more is better; minus infinity if it never does)."""
+    late = evals[evals.evaluation > LATE * evals.evaluations].groupby("run_id").success.mean().rename("late")
+    until = minutes_until_lasting(evals).set_index("run_id")
+    heads = evals.groupby("run_id")[["approach", "task", "seed"]].first()
+    return heads.join(late).assign(minutes=-until.minutes.where(until.ended, np.inf)).reset_index()
+
+
+def improvement(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Probability that a run of ``one`` is better than a run of ``other``, ties counted half: (..., n) and (..., m) give (...).
+
+    Divided by n times m it is the statistic of Mann and Whitney (1947); averaged over tasks it is the probability of improvement
+    of Agarwal et al., "Deep Reinforcement Learning at the Edge of the Statistical Precipice" (2021).
+    """
+    a, b = one[..., :, None], other[..., None, :]
+    return ((a > b).mean(axis=(-2, -1)) + (a == b).mean(axis=(-2, -1)) / 2).astype(float)
+
+
+def compared(by_task: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict[str, float]:
+    """Probability of improvement, averaged over tasks, its interval and p-value.
+
+    Args:
+        by_task: scores of both approaches on each task, (runs,) each; the same place is the same seed.
+
+    Returns:
+        ``probability``; ``low``, ``high``: 95 % percentile bootstrap, runs drawn within tasks, as Agarwal et al. do; ``p``: of
+        the two-sided test that exchanges the two runs of a seed at random.
+    """
+    random = np.random.default_rng(_STREAM)
+    at = float(np.mean([improvement(a, b) for a, b in by_task.values()]))
+    boot, exchanged = np.zeros(DRAWS), np.zeros(DRAWS)
+    for a, b in by_task.values():
+        drawn = [scores[random.integers(0, len(scores), (DRAWS, len(scores)))] for scores in (a, b)]
+        boot += improvement(*drawn) / len(by_task)
+        swap = random.random((DRAWS, len(a))) < 0.5  # a fair coin
+        exchanged += improvement(np.where(swap, b, a), np.where(swap, a, b)) / len(by_task)
+    extreme = np.count_nonzero(np.abs(exchanged - 0.5) >= abs(at - 0.5) - 1e-12)
+    low, high = band(boot)
+    return {"probability": at, "low": float(low), "high": float(high), "p": (1 + extreme) / (1 + DRAWS)}
+
+
+def pairs(runs: pd.DataFrame) -> pd.DataFrame:
+    """A row a pair of approaches: one, other, runs (of each), and for each measure the columns of `compared` and ``p_holm``."""
+    rows = list(_pairs(runs))
+    table = pd.DataFrame(rows)
+    for measure in MEASURES if rows else ():
+        table[f"{measure}_p_holm"] = holm(table[f"{measure}_p"])
+    return table
+
+
+def _pairs(runs: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    for one, other in combinations(in_order(runs.approach), 2):
+        both = runs[runs.approach == one].merge(runs[runs.approach == other], on=["task", "seed"], suffixes=("", "_other"))
+        least = both.groupby("task").seed.nunique().min() if len(both) else 0
+        if least < FEWEST_SEEDS:
+            continue
+        row: dict[str, Any] = {"one": one, "other": other, "runs": len(both)}
+        for measure in MEASURES:
+            by_task = {task: (own[measure].to_numpy(), own[f"{measure}_other"].to_numpy()) for task, own in both.groupby("task")}
+            row |= {f"{measure}_{name}": value for name, value in compared(by_task).items()}
+        yield row
+
+
+@style()
+def _draw(evals: pd.DataFrame) -> FigureResult | None:
+    first, runs = evals.iloc[0], scores(evals)
+    table = pairs(runs)
+    if table.empty:
+        return None
+    names = in_order({*table.one, *table.other})
+    figure, axes = panels(2, 0.9 + 0.36 * len(names))
+    for number, (measure, title) in enumerate(MEASURES.items()):
+        _matrix(axes[number, 0], table, names, measure)
+        axes[number, 0].set_title(lettered(number, 2, title))
+        axes[number, 0].set_yticks(range(len(names)), [f"{i} {name}" for i, name in enumerate(names, 1)] if not number else [])
+    n, tasks = len(runs), sorted(set(runs.task))
+    each = int(table.runs.min())
+    where = f"{first.robot}, tasks {', '.join(tasks)}, world {first.world}"
+    means = "Numbers: the probability (%) that a run of the row does better than a run of the column"
+    note(figure, f"{where}. {means}; bold: certainly not 50 (adjusted p < {LEVEL}); {each} runs at least on each side.")
+    shows = (
+        f"{where}, sweep {first.sweep}. {means}, ties counted half, averaged over tasks. (a) Score: share of successes among the "
+        f"evaluations of the last third. (b) Score: robot time until the first of {LASTING} successes in a row. Bold: p < "
+        f"{LEVEL} when the two runs of a seed are exchanged at random ({DRAWS:,} times), adjusted for all pairs (Holm). "
+        f"n = {n} runs."
+    )
+    world = str(first.world).split("/")[-1].removesuffix(".yaml")
+    return FigureResult(
+        f"{NAME}-{first.sweep}-{first.robot}-{world}", f"Approaches two by two: {where}", figure, shows, n, (str(first.sweep),),
+        data=table, table=_in_words(table),
+    )  # fmt: skip
+
+
+def _matrix(ax: Axes, table: pd.DataFrame, names: list[str], measure: str) -> None:
+    """A square of percentages, the row against the column."""
+    shares = np.full((len(names), len(names)), np.nan)
+    for row in table.to_dict("records"):
+        i, j, share = names.index(row["one"]), names.index(row["other"]), 100 * row[f"{measure}_probability"]
+        shares[i, j], shares[j, i] = share, 100 - share
+        bold = {"fontweight": "bold"} if row[f"{measure}_p_holm"] < LEVEL else {}
+        for y, x in ((i, j), (j, i)):
+            ax.text(x, y, f"{shares[y, x]:.0f}", ha="center", va="center", **bold)
+    ax.imshow(np.ma.masked_invalid(shares), cmap="PuOr", vmin=-40, vmax=140, aspect="auto")
+    ax.set_xticks(range(len(names)), [str(number) for number in range(1, len(names) + 1)])
+    ax.grid(visible=False)
+
+
+def _in_words(table: pd.DataFrame) -> pd.DataFrame:
+    """The pairs as the page shows them."""
+    said: dict[str, Any] = {"approach": table.one, "against": table.other, "runs of each": table.runs}
+    for measure, title in MEASURES.items():
+        ends = zip(*(100 * table[f"{measure}_{name}"] for name in ("probability", "low", "high")), strict=True)
+        said[f"{title} (%)"] = [f"{at:.0f} ({low:.0f} to {high:.0f})" for at, low, high in ends]
+        said[f"{title}: adjusted p"] = [f"{p:.2g}" for p in table[f"{measure}_p_holm"]]
+    return pd.DataFrame(said)
