@@ -1,7 +1,7 @@
 """How near to the edges of the goals final controllers pass, and how often they succeed with and without the world's noise.
 
-`python -m analysis.margins --results DIR [--out FILE.csv]`: of runs with paths in the substitute world, the fittest controller of
-the last evaluation is driven by the static simulator as it is, and under its noise many times.
+`python -m analysis.margins --results DIR [--sweep NAME] [--out FILE.csv]`: of runs with paths in the substitute world, the
+fittest controller of the last evaluation is driven by the static simulator as it is, and under its noise many times.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ from bns.worlds.substitute import SubstituteWorld
 
 DRIVES = 40
 """Of each controller under noise."""
+_SETTING = ["task", "approach", "mutation_rate", "population_size", "generations", "longest"]
 _SNN = ["snn_x_m", "snn_y_m"]
 
 
 def margins(store: Results, sweep: str = READINGS) -> pd.DataFrame:
-    """A row a run: task, mutation_rate, population_size, generations, longest, seed, whether the networks see success
+    """A row a run: task, approach, mutation_rate, population_size, generations, longest, seed, whether the networks see success
     (``simulated``), share of successes without (``quiet``) and with noise (``noisy``), and the distance in simulation at which
     each goal counts as reached, ``goal_1`` ... (m).
 
@@ -39,14 +40,14 @@ def margins(store: Results, sweep: str = READINGS) -> pd.DataFrame:
         NoDataError: no run of the sweep has paths.
     """
     found = store.query(f"""
-        SELECT r.run_id, r.robot, r.task, r.mutation_rate, r.population_size, r.generations_per_evaluation AS generations,
-               r.max_commands AS longest, r.seed, r.root_seed,
+        SELECT r.run_id, r.robot, r.task, r.approach, r.mutation_rate, r.population_size,
+               r.generations_per_evaluation AS generations, r.max_commands AS longest, r.seed, r.root_seed,
                p.step, p.left_units, p.right_units, p.duration_ms, p.snn_x_m, p.snn_y_m
         FROM paths AS p JOIN runs AS r USING (run_id, sweep)
         WHERE sweep = '{sweep}' AND r.status = 'ok' AND p.who = 'fittest' AND p.step > 0 AND p.evaluation = r.evaluations
-        ORDER BY r.task, r.mutation_rate, r.population_size, r.seed, r.run_id, p.step""")
+        ORDER BY r.task, r.approach, r.mutation_rate, r.population_size, r.seed, r.run_id, p.step""")
     if found.empty:
-        raise NoDataError(f"no run of the sweep {sweep} has paths; run bns sweep sweeps/{READINGS}.yaml")
+        raise NoDataError(f"no run of the sweep {sweep} has paths; run one with record: paths, as bns sweep {READINGS}")
     return pd.DataFrame(list(_rows(found)))
 
 
@@ -55,7 +56,7 @@ def _rows(found: pd.DataFrame) -> Iterator[dict[str, object]]:
     noisy, quiet = SubstituteWorld(robot), SubstituteWorld(robot)
     still = load_static_simulator(robot.name)
     quiet._simulator = replace(still, noise_sd=np.zeros_like(still.noise_sd))
-    columns = ["task", "mutation_rate", "population_size", "generations", "longest", "seed"]
+    columns = [*_SETTING, "seed"]
     for _, run in found.groupby("run_id", sort=False):
         head, task = run.iloc[0], load_task("khepera", run.task.iloc[0])
         commands = run[list(robot.command_columns)].to_numpy(np.float32)
@@ -80,20 +81,17 @@ def passing(places_m: np.ndarray, task: Task, radius_m: float) -> list[float]:
 
 
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
-    """By task, mutation rate and setting: runs, distances of all goals but the last and of the last in cm (medians), and per
-    cent of success in simulation, without and with noise, with 95 % bootstrap intervals over runs."""
-    columns = ["task", "mutation_rate", "population_size", "generations", "longest"]
-    return pd.DataFrame(
-        [dict(zip(columns, key, strict=True)) | _summed(own) for key, own in rows.groupby(columns, sort=True)]
-    )
+    """By task, approach, mutation rate and setting: runs, distances of all goals but the last and of the last in cm (medians),
+    and per cent of success in simulation, without and with noise, with 95 % bootstrap intervals over runs."""
+    return pd.DataFrame([dict(zip(_SETTING, key, strict=True)) | _summed(own) for key, own in rows.groupby(_SETTING, sort=True)])
 
 
 def _summed(own: pd.DataFrame) -> dict[str, object]:
     goals = own[[name for name in own if name.startswith("goal_")]].dropna(axis=1, how="all").to_numpy()
     row: dict[str, object] = {
         "runs": len(own),
-        "first_goals_cm": round(100 * float(np.nanmedian(goals[:, :-1])), 1),
-        "last_goal_cm": round(100 * float(np.nanmedian(goals[:, -1])), 1),
+        "first_goals_cm": _median_cm(goals[:, :-1]),
+        "last_goal_cm": _median_cm(goals[:, -1:]),
     }
     for name in ("simulated", "quiet", "noisy"):
         values = own[name].to_numpy(float)
@@ -104,14 +102,21 @@ def _summed(own: pd.DataFrame) -> dict[str, object]:
     return row
 
 
+def _median_cm(distances: np.ndarray) -> float:
+    """NaN where no goal was reached."""
+    known = distances[np.isfinite(distances)]
+    return round(100 * float(np.median(known)), 1) if len(known) else float("nan")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the summary, and write it where it is asked for; 0, or 2 with one line on stderr."""
     parser = argparse.ArgumentParser(prog="python -m analysis.margins", description=__doc__.split("\n\n", maxsplit=1)[0])
     parser.add_argument("--results", type=Path, default=Path("results"), help="folder of the results (results)")
+    parser.add_argument("--sweep", default=READINGS, help=f"name of the sweep ({READINGS})")
     parser.add_argument("--out", type=Path, help="CSV file to write the summary into")
     wanted = parser.parse_args(arguments)
     try:
-        table = summary(margins(Results(wanted.results)))
+        table = summary(margins(Results(wanted.results), wanted.sweep))
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return fault.exit_code

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from figure_helpers import with_evals, written
 from store.synthetic import record
@@ -69,6 +70,12 @@ def test_a_drive_without_noise_is_the_static_simulators_and_under_noise_fails_mo
     assert set(rows.quiet) <= {0.0, 1.0}
     table = margins.summary(rows.assign(goal_1=0.065, goal_2=0.01, simulated=True))
     assert (table.first_goals_cm[0], table.last_goal_cm[0], table.simulated[0], table.runs[0]) == (6.5, 1.0, 100, 5)
+    with pytest.raises(NoDataError, match="no run of the sweep margin has paths"):
+        margins.margins(Results(tmp_path), "margin")
+    narrow = [RunSpec(seed=seed, evaluations=3, record="paths", approach="bns+margin=0.03") for seed in range(2)]
+    written(tmp_path, "margin", [record(spec, ("evals", "paths")) for spec in [*narrow, specs[0]]])
+    assert margins.main(["--results", str(tmp_path), "--sweep", "margin", "--out", str(tmp_path / "m.csv")]) == 0
+    assert pd.read_csv(tmp_path / "m.csv")[["approach", "runs"]].to_numpy().tolist() == [["bns", 1], ["bns+margin=0.03", 2]]
 
 
 @pytest.mark.slow
