@@ -31,7 +31,7 @@ $(STAMP): pyproject.toml setup.py constraints.txt
 	@touch $@
 
 test: setup ## the tests, all but the slow ones
-	$(BIN)/python -m pytest -n 2 --dist worksteal -q -m "not slow"
+	$(BIN)/python -m pytest -n 3 --dist worksteal -q -m "not slow"
 
 test-slow: setup ## the tests that go end to end or over many cases; with make test these are all
 	$(BIN)/python -m pytest -n 2 --dist worksteal -q -m slow

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy.stats import mannwhitneyu
 
-from analysis import approach_pairs, approaches
+from analysis import approach_pairs, approach_summary, approaches
 from analysis.approach_pairs import compared, improvement, pairs, scores
 from analysis.results import NoDataError, Results
 from bns.spec import RunSpec
@@ -98,3 +98,30 @@ def test_few_runs_are_drawn_by_time_and_not_compared(store):
     results.query("CREATE OR REPLACE TEMP VIEW runs AS SELECT * FROM few")
     with pytest.raises(NoDataError, match="no two approaches have 5 runs each"):
         approach_pairs.draw(results)
+
+
+def test_the_table_counts_tasks_and_seeds_that_every_approach_has(store, tmp_path):
+    written(store, "approaches-two", [with_evals(RunSpec(approach="bns", seed=9, evaluations=9), success=np.zeros(9, bool))])
+    path = archive(store, tmp_path / "two.parquet").path
+    for results in (Results(store), Results(path, archived=True)):
+        (drawn,) = approach_summary.draw(results)
+        first, second = drawn.data.to_dict("records")
+        assert (first["approach"], first["runs"], first["seeds"]) == ("bns", 6, 6)
+        assert (first["success_late"], first["success_late_low"], first["success_early"]) == (100, 100, pytest.approx(100 / 3))
+        assert (second["success_late"], second["robot_min"], second["cpu_s"]) == (0, 7.5, 1.25)
+        assert drawn.table.iloc[0]["within 7 cm, late"] == "100 % (100–100)"
+        assert "n = 12 runs" in drawn.shows
+
+
+def test_a_stopped_sweep_without_a_whole_seed_has_no_table(tmp_path):
+    runs = [with_evals(RunSpec(approach=name, seed=seed, evaluations=3)) for seed, name in enumerate(("bns", "on-robot"))]
+    written(tmp_path, "approaches-two", runs)
+    with pytest.raises(NoDataError, match="no seed has a run of every approach"):
+        approach_summary.draw(Results(tmp_path))
+    with pytest.raises(NoDataError, match="no sweep has runs of two approaches"):
+        approach_summary.draw(of_one(tmp_path / "one"))
+
+
+def of_one(results):
+    written(results, "approaches-one", [with_evals(RunSpec(seed=seed, evaluations=3)) for seed in range(2)])
+    return Results(results)

@@ -68,6 +68,7 @@ def test_a_curve_that_predicts_better_for_certain_comes_before_an_effect_that_im
     assert [term.signal for term in following.terms] == ["time in the trial"]
 
 
+@pytest.mark.slow
 def test_an_effect_that_keeps_little_of_its_gain_beside_the_term_is_out():
     predictor = predictor_of(hidden(backlash={"gap_m": 0.005}), speeds=BOTH_WAYS, commands=8, trials=30)
     found = stands(predictor, "motor-lag")
@@ -148,6 +149,7 @@ def test_a_patch_of_floor_keeps_its_numbers_where_it_is_weighed_against_effects(
     assert re.match(said, in_words(found.terms[0], predictor))
 
 
+@pytest.mark.slow
 def test_a_patch_that_slows_forward_motion_alone_is_described():
     """Turns there are as commanded: a share of all motion does not describe it."""
     patch = formula_effect("patch", "-0.4 * v / (1 + (((x - 0.1)**2 + (y + 0.05)**2) / 0.2**2)**8) * k", "v")

@@ -147,6 +147,7 @@ def test_an_explanation_is_not_driven_apart_from_itself(narrow):
     assert found[(0, 1)][0].each().max() < 1e-3
 
 
+@pytest.mark.slow
 def test_an_experiment_decides_in_half_the_time_of_random_commands(narrow):
     d, predictor = narrow
     assert d.verdict == "tie"

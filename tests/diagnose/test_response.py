@@ -99,6 +99,7 @@ def test_a_free_response_is_tried_only_where_no_effect_was_accepted(monkeypatch)
     assert asked == [True, False]
 
 
+@pytest.mark.slow
 def test_a_robot_that_goes_ahead_more_slowly_than_it_turns_is_described_beside_its_lag():
     predictor = two_lags()
     accepted = {name: listed(NOMINAL, None, predictor.tracks)[name] for name in ("motor-lag", "turn-slip")}

@@ -1,0 +1,45 @@
+"""What docs/approaches.md says of the comparison is what its published archive gives."""
+
+from pathlib import Path
+
+from analysis import approach_pairs, approach_summary
+from analysis.results import Results
+
+ROOT = Path(__file__).parents[2]
+ARCHIVE = ROOT / "results" / "published" / "approaches.parquet"
+TEXT = (ROOT / "docs" / "approaches.md").read_text()
+
+
+def test_the_tables_are_those_of_the_archive():
+    drawn = approach_summary.draw(Results(ARCHIVE, archived=True))
+    assert [(one.data.runs.min(), one.n) for one in drawn] == [(24, 216), (24, 216), (21, 105)]
+    for one in drawn:
+        rows = [one.table.columns, *one.table.to_numpy().tolist()]
+        assert "\n".join(f"| {' | '.join(row)} |" for row in (rows[1:])) in TEXT
+        assert f"| {' | '.join(rows[0])} |" in TEXT
+
+
+def test_what_is_said_of_pairs_is_what_the_archive_gives():
+    figures = approach_pairs.draw(Results(ARCHIVE, archived=True))
+    drawn = {one.name.removeprefix("approach-pairs-approaches-"): one.data for one in figures}
+
+    def p(world, one, other, measure="late"):
+        own = drawn[world]
+        here = own[own[["one", "other"]].isin([one, other]).all(axis=1)]
+        return float(here[f"{measure}_p_holm"].iloc[0])
+
+    on_models = ["anytime+window=60", "back-to-reality", "estimation-exploration+tests=0.15", "transferability+every=2"]
+    all_of_them = {"bns", "on-robot", "precomputed", "then-on-robot+data=0.5", *on_models}
+    assert "with adjusted p below 0.01" in " ".join(TEXT.split())
+    for world in ("khepera-physics", "khepera-substitute"):
+        assert max(p(world, "bns+margin=0.03", other) for other in all_of_them) < 0.01
+        assert min(p(world, "bns", other) for other in on_models) > approach_pairs.LEVEL
+        assert p(world, "bns", "precomputed") <= 0.014
+        alike = {other for other in all_of_them - {"on-robot"} if p(world, "on-robot", other) > approach_pairs.LEVEL}
+        assert alike == ({"precomputed"} if world == "khepera-physics" else {"back-to-reality"})
+    for one in ("bns", "bns+margin=0.03"):
+        for other in ("precomputed", "then-on-robot+data=0.5"):
+            assert p("snake-snake-substitute", one, other, "minutes") < 0.01
+    snake = drawn["snake-snake-substitute"]
+    certain = snake[snake.late_p_holm < approach_pairs.LEVEL]
+    assert certain[["one", "other"]].to_numpy().tolist() == [["bns+margin=0.03", "precomputed"]]
