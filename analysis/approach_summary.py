@@ -67,7 +67,7 @@ def in_words(table: pd.DataFrame) -> pd.DataFrame:
     titles = {"success_late": "within 7 cm, late", "near_late": "within 10 cm, late", "near_early": "within 10 cm, early"}
     if table.near_late.isna().all():
         titles = {"success_late": "success, late", "success_early": "success, early"}
-    said: dict[str, list[str]] = {"approach": [f"`{name}`" for name in table.approach]}
+    said: dict[str, list[str]] = {"approach": list(table.approach)}
     for name, title in titles.items():
         said[title] = [_share(row[name], row[f"{name}_low"], row[f"{name}_high"]) for row in table.to_dict("records")]
     said["robot min"] = [f"{minutes:.0f}" for minutes in table.robot_min]

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.intervals import FEWEST_SEEDS, band, resampled
-from analysis.results import NoDataError, Results
+from analysis.results import NoDataError, Results, among
 from analysis.selection import READINGS
 from bns.engine.philox import Key, Purpose
 from bns.errors import BnsError
@@ -44,7 +44,7 @@ def margins(store: Results, sweep: str = READINGS) -> pd.DataFrame:
                r.generations_per_evaluation AS generations, r.max_commands AS longest, r.seed, r.root_seed,
                p.step, p.left_units, p.right_units, p.duration_ms, p.snn_x_m, p.snn_y_m
         FROM paths AS p JOIN runs AS r USING (run_id, sweep)
-        WHERE sweep = '{sweep}' AND r.status = 'ok' AND p.who = 'fittest' AND p.step > 0 AND p.evaluation = r.evaluations
+        WHERE {among('sweep', [sweep])} AND r.status = 'ok' AND p.who = 'fittest' AND p.step > 0 AND p.evaluation = r.evaluations
         ORDER BY r.task, r.approach, r.mutation_rate, r.population_size, r.seed, r.run_id, p.step""")
     if found.empty:
         raise NoDataError(f"no run of the sweep {sweep} has paths; run one with record: paths, as bns sweep {READINGS}")
