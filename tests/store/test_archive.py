@@ -162,3 +162,16 @@ def archive_of(results, sweep, runs, folder):
         for one in runs:
             writer.append(one)
     return archive(results, folder / f"{sweep}.parquet").path
+
+
+def test_a_sweep_that_lies_in_an_archive_alone_stays_in_the_next(tmp_path):
+    former = archive_of(tmp_path / "there", "grid", records(3, evaluations=3), tmp_path)
+    (tmp_path / "results" / "archived").mkdir(parents=True)
+    former.rename(tmp_path / "results" / "archived" / "former.parquet")
+    with Writer(tmp_path / "results", "other") as writer:
+        writer.append(record(RunSpec(evaluations=4)))
+    made = archive(tmp_path / "results", tmp_path / "both.parquet")
+    assert made.sweeps == {"grid": 3, "other": 1}
+    assert archive(tmp_path / "results", tmp_path / "one.parquet", ["grid"]).sweeps == {"grid": 3}
+    with pytest.raises(StoreError, match=r"unknown sweep in .* 'gird'\. Did you mean 'grid'"):
+        archive(tmp_path / "results", tmp_path / "none.parquet", ["gird"])

@@ -64,17 +64,18 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
     path = Path(output)
     if path.suffix != ".parquet":
         raise StoreError(f"the archive is {str(path)!r}; it must be a file that ends in .parquet, for example study.parquet.")
+    former = stored_archives(results)
     with connect(results) as connection:
-        there = [row[0] for row in connection.execute("SELECT DISTINCT sweep FROM runs ORDER BY sweep").fetchall()]
+        there = sorted({sweep for sweep, _ in _approaches(connection, former)})
         for name in sweeps or ():
             if name not in there:
                 raise StoreError(unknown_name(f"sweep in {results}", name, there))
         chosen = sorted(set(sweeps or there))
         connection.execute("CREATE TEMP TABLE chosen AS SELECT unnest(?::VARCHAR[]) AS sweep", [chosen])
-        comparing = _comparing(connection, chosen, stored_archives(results))
+        comparing = _comparing(_approaches(connection, former), chosen)
         table = connection.sql(_select(comparing)).to_arrow_table()
         plans = connection.sql("SELECT * FROM specs SEMI JOIN chosen USING (sweep) ORDER BY ALL").to_arrow_table().to_pylist()
-    if former := stored_archives(results):
+    if former:
         table, plans = _with_former(table, plans, former, chosen)
     data = _file_bytes(table, plans)
     publish(data, path.with_name(f".{path.name}.part"), path)
@@ -100,14 +101,19 @@ def _with_former(
     return both.select(table.column_names).cast(table.schema), sorted(plans, key=lambda plan: (plan["sweep"], plan["spec_hash"]))
 
 
-def _comparing(connection: duckdb.DuckDBPyConnection, chosen: Sequence[str], former: Sequence[Path]) -> list[str]:
-    """Sweeps with several approaches, in the results and their archives together."""
-    sql = "SELECT DISTINCT sweep, approach FROM runs WHERE list_contains(?, sweep)"
-    pairs = set(connection.execute(sql, [list(chosen)]).fetchall())
+def _approaches(connection: duckdb.DuckDBPyConnection, former: Sequence[Path]) -> set[tuple[str, str]]:
+    """(sweep, approach) of all runs in the results and their archives together."""
+    sql = "SELECT DISTINCT sweep, approach FROM runs"
+    pairs = set(connection.execute(sql).fetchall())
     if former:
         with connect_archives(former) as older:
-            pairs |= set(older.execute(sql, [list(chosen)]).fetchall())
-    return sorted(sweep for sweep, count in Counter(sweep for sweep, _ in pairs).items() if count > 1)
+            pairs |= set(older.execute(sql).fetchall())
+    return pairs
+
+
+def _comparing(pairs: set[tuple[str, str]], chosen: Sequence[str]) -> list[str]:
+    """Sweeps with several approaches."""
+    return sorted(sweep for sweep, count in Counter(sweep for sweep, _ in pairs).items() if count > 1 and sweep in chosen)
 
 
 def _select(comparing: Sequence[str]) -> str:
