@@ -1,5 +1,6 @@
 """Servos of the X series: driver, guard, and a whole snake of them."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
 from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.dynamixel import DynamixelChain
-from bns.hardware.servos.packets import WIRES
+from bns.hardware.servos.packets import BROADCAST, WIRES
 from bns.hardware.servos.servo_chain import ServoError
 from bns.hardware.servos.snake_settings import snake_settings
 from bns.hardware.servos.x430_table import X430, XL430_W250, XM430_W350
@@ -159,6 +160,22 @@ def test_a_servo_that_keeps_its_torque_leaves_the_stop_unconfirmed(chain):
     driver.arm()
     bus.servos[1].write = lambda *_: 0  # deaf to the order
     stop = driver.stop(patience_s=0.5)
+    assert (stop.confirmed, stop.problem) == (False, "servo 2 still has its torque on")
+
+
+def test_an_order_to_all_that_is_heard_late_ends_no_other_question(chain):
+    driver, bus, _ = chain()
+    driver.arm()
+    bus.servos[1].write = lambda *_: 0
+    receive = bus.receive
+
+    def slowly(data):
+        if data[4:5] == bytes([BROADCAST]):
+            time.sleep(0.02)  # the next question is under way meanwhile
+        return receive(data)
+
+    bus.receive = slowly
+    stop = driver.stop(patience_s=0.3)
     assert (stop.confirmed, stop.problem) == (False, "servo 2 still has its torque on")
 
 

@@ -29,6 +29,14 @@ _REFUSED = {1: (INSTRUCTION, CHECKSUM, RANGE), 2: (2, 3, 7)}
 """Protocol -> error bytes for an instruction that is unknown, one whose checksum is wrong, a register that is not there."""
 
 
+def _asks(packet: Packet) -> bool:
+    """Whether somebody waits for an answer: not to an order to all.
+
+    Else its silence, on a busy computer counted only when the next question is under way, would pass for that question's.
+    """
+    return packet.number != BROADCAST or packet.kind in {PING, READ}
+
+
 class Bus:
     """The far end of the line: servos that hear everything and answer what is meant for them."""
 
@@ -49,12 +57,13 @@ class Bus:
         with self._lock:
             answers, spoken = b"", {servo.kind.protocol for servo in self.servos}
             found = {protocol: self._packets(protocol, data) for protocol in WIRES}
-            if not any(found[protocol] for protocol in spoken) and any(found.values()):
+            unheard = [packet for packets in found.values() for packet in packets]
+            if not any(found[protocol] for protocol in spoken) and any(map(_asks, unheard)):
                 self._fall_silent()  # nobody here speaks that
             for protocol in spoken:
                 for packet in found[protocol]:
                     answer = b"" if self._lost() else self._carried_out(packet, protocol)
-                    if not answer:
+                    if not answer and _asks(packet):
                         self._fall_silent()
                     answers += answer
             return data + answers if self.echoes else answers
