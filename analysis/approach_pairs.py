@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from analysis.approach_summary import of_each_run, on_the_same_seeds
 from analysis.figure_result import FigureResult
 from analysis.intervals import FEWEST_SEEDS, band
 from analysis.multiple_tests import holm
@@ -20,8 +21,6 @@ from bns.plotting.style import lettered, note, panels, style
 
 NAME = "approach-pairs"
 PAPER = "section 2.6, its approaches compared with BNS"
-LATE = 2 / 3
-"""Evaluations beyond this share of a run count as late."""
 DRAWS = 5000
 LEVEL = 0.05
 MEASURES = {"late": "more success, late", "minutes": "sooner to lasting success"}
@@ -30,32 +29,36 @@ _STREAM = 20260201
 
 
 def draw(store: Results) -> list[FigureResult]:
-    evals = store.query(
-        f"""SELECT sweep, run_id, robot, task, world, approach, seed, evaluation, evaluations, robot_s, evals.success
-        FROM evals JOIN (SELECT run_id, sweep, evaluations FROM runs WHERE status = 'ok' AND starts_with(sweep, '{APPROACHES}'))
-             AS done USING (run_id, sweep) ORDER BY sweep, robot, world, approach, task, seed, run_id, evaluation"""
-    )
-    if evals.approach.nunique() < 2:
+    runs = of_each_run(store)
+    if runs.approach.nunique() < 2:
         raise NoDataError("no sweep has runs of two approaches; run bns sweep approaches-small")
-    drawn = [_draw(own) for _, own in evals.groupby(["sweep", "robot", "world"])]
+    evals = store.query(
+        f"""SELECT sweep, run_id, robot_s, success FROM evals
+        WHERE starts_with(sweep, '{APPROACHES}') ORDER BY sweep, run_id, evaluation"""
+    )
+    drawn = []
+    for (sweep, *_), own in runs.groupby(["sweep", "robot", "world"]):
+        alike = on_the_same_seeds(own)
+        drawn.append(_draw(scores(alike, evals[(evals.sweep == sweep) & evals.run_id.isin(alike.run_id)])))
     if not (some := [one for one in drawn if one is not None]):
         raise NoDataError(f"no two approaches have {FEWEST_SEEDS} runs each on the same task and seeds; run bns sweep approaches")
     return some
 
 
-def scores(evals: pd.DataFrame) -> pd.DataFrame:
-    """A row a run: approach, task, seed, ``late`` (share of late evaluations with success) and ``minutes`` (of robot time until
-    success lasts, negative, so that more is better; minus infinity if it never does)."""
-    late = evals[evals.evaluation > LATE * evals.evaluations].groupby("run_id").success.mean().rename("late")
-    until = minutes_until_lasting(evals).set_index("run_id")
-    heads = evals.groupby("run_id")[["approach", "task", "seed"]].first()
-    return heads.join(late).assign(minutes=-until.minutes.where(until.ended, np.inf)).reset_index()
+def scores(runs: pd.DataFrame, evals: pd.DataFrame) -> pd.DataFrame:
+    """The runs with ``late`` (share of late evaluations with success) and ``minutes`` (of robot time until success lasts,
+    negative, so that more is better; minus infinity if it never does).
+
+    ``runs``: as `of_each_run` gives them; ``evals``: their run_id, robot_s and success, in the order of the evaluations.
+    """
+    until = minutes_until_lasting(evals).set_index("run_id").reindex(runs.run_id)
+    return runs.assign(late=runs.success_late, minutes=-until.minutes.where(until.ended, np.inf).to_numpy())
 
 
 def improvement(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Probability that a run of ``one`` is better than a run of ``other``, ties counted half: (..., n) and (..., m) give (...).
 
-    Divided by n times m it is the statistic of Mann and Whitney (1947); averaged over tasks it is the probability of improvement
+    Times n and m it is the statistic of Mann and Whitney (1947); averaged over tasks it is the probability of improvement
     of Agarwal et al., "Deep Reinforcement Learning at the Edge of the Statistical Precipice" (2021).
     """
     a, b = one[..., :, None], other[..., None, :]
@@ -108,11 +111,11 @@ def _pairs(runs: pd.DataFrame) -> Iterator[dict[str, Any]]:
 
 
 @style()
-def _draw(evals: pd.DataFrame) -> FigureResult | None:
-    first, runs = evals.iloc[0], scores(evals)
+def _draw(runs: pd.DataFrame) -> FigureResult | None:
     table = pairs(runs)
     if table.empty:
         return None
+    first = runs.iloc[0]
     names = in_order({*table.one, *table.other})
     figure, axes = panels(2, 0.9 + 0.36 * len(names))
     for number, (measure, title) in enumerate(MEASURES.items()):

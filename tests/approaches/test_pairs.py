@@ -47,12 +47,10 @@ def test_chance_is_called_certain_as_often_as_the_level_says():
 
 
 def test_a_run_scores_its_late_successes_and_when_success_began_to_last():
-    rows = pd.DataFrame({"run_id": "r", "evaluations": 6, "evaluation": range(1, 7)})
-    rows = rows.assign(approach="bns", task="circle", seed=0, robot_s=60.0 * rows.evaluation)
-    rows["success"] = [False, True, True, True, False, True]
-    assert scores(rows)[["late", "minutes"]].iloc[0].tolist() == [0.5, -2.0]
-    never = scores(rows.assign(success=False))
-    assert never[["late", "minutes"]].iloc[0].tolist() == [0.0, -np.inf]
+    runs = pd.DataFrame({"run_id": ["b", "a"], "success_late": [0.25, 0.5]})
+    rows = pd.DataFrame({"run_id": ["a"] * 6 + ["b"] * 6, "robot_s": 60.0 * np.tile(range(1, 7), 2)})
+    rows["success"] = [False, True, True, True, False, True, *[False] * 6]
+    assert scores(runs, rows)[["late", "minutes"]].to_numpy().tolist() == [[0.25, -np.inf], [0.5, -2.0]]
 
 
 def test_only_seeds_that_both_have_are_compared_and_five_are_needed():
@@ -118,6 +116,8 @@ def test_a_stopped_sweep_without_a_whole_seed_has_no_table(tmp_path):
     written(tmp_path, "approaches-two", runs)
     with pytest.raises(NoDataError, match="no seed has a run of every approach"):
         approach_summary.draw(Results(tmp_path))
+    with pytest.raises(NoDataError, match="no two approaches have 5 runs each"):
+        approach_pairs.draw(Results(tmp_path))
     with pytest.raises(NoDataError, match="no sweep has runs of two approaches"):
         approach_summary.draw(of_one(tmp_path / "one"))
 

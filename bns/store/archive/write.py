@@ -66,14 +66,14 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
         raise StoreError(f"the archive is {str(path)!r}; it must be a file that ends in .parquet, for example study.parquet.")
     former = stored_archives(results)
     with connect(results) as connection:
-        there = sorted({sweep for sweep, _ in _approaches(connection, former)})
+        approaches = _approaches(connection, former)
+        there = sorted({sweep for sweep, _ in approaches})
         for name in sweeps or ():
             if name not in there:
                 raise StoreError(unknown_name(f"sweep in {results}", name, there))
         chosen = sorted(set(sweeps or there))
         connection.execute("CREATE TEMP TABLE chosen AS SELECT unnest(?::VARCHAR[]) AS sweep", [chosen])
-        comparing = _comparing(_approaches(connection, former), chosen)
-        table = connection.sql(_select(comparing)).to_arrow_table()
+        table = connection.sql(_select(_comparing(approaches, chosen))).to_arrow_table()
         plans = connection.sql("SELECT * FROM specs SEMI JOIN chosen USING (sweep) ORDER BY ALL").to_arrow_table().to_pylist()
     if former:
         table, plans = _with_former(table, plans, former, chosen)
