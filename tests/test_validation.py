@@ -59,7 +59,32 @@ def test_every_trial_is_driven_three_times_and_kept(quick, tmp_path):
     validation.write_table(table, place)
     pd.testing.assert_frame_equal(pd.read_parquet(place), table)
     assert [one.name for one in place.parent.iterdir()] == [place.name]
-    assert validation.describe(table).count("trial") == 2
+    assert validation.describe(table, len(TASK.goals_m)).count("trial") == 2
+
+
+def test_a_second_set_is_of_other_controllers_and_leaves_the_first_as_it_was(quick):
+    world = build_world("substitute", ROBOT)
+    one, two = validation.validate(ROBOT, TASK, world), validation.validate(ROBOT, TASK, world, sets=2)
+    pd.testing.assert_frame_equal(two[two.trial <= 2].reset_index(drop=True), one)
+    assert sorted(two.trial.unique()) == [1, 2, 3, 4]
+    ends = two[two.repeat == -1].groupby("trial").last()[["x_m", "y_m"]]
+    assert not np.allclose(ends.loc[1], ends.loc[3])
+
+
+def test_each_set_says_how_many_drives_were_complete_and_how_many_controllers_good(quick):
+    goals = 3
+    reached = {1: (3, 3, 3), 2: (3, 2, 2), 3: (2, 2, 2), 4: (0, 0, 0)}  # 9, 7, 6 and 0 of 9
+    rows = [
+        {"trial": trial, "repeat": repeat, "goals_reached": n, "outcome": "all goals" if n == goals else "missed a goal"}
+        for trial, met in reached.items()
+        for repeat, n in zip((-1, 1, 2, 3), (goals, *met), strict=True)
+        for _ in range(2)  # as many rows as poses
+    ]
+    by_set = validation.of_each_set(pd.DataFrame(rows), goals)
+    assert by_set.index.tolist() == [1, 2]  # `quick`: two trials a set
+    assert by_set.complete.tolist() == [4, 0]
+    assert by_set.good.tolist() == [2, 0]
+    assert by_set.goals.tolist() == pytest.approx([16 / 18, 6 / 18])
 
 
 def test_the_mean_error_at_the_end_is_that_of_the_same_step(quick):

@@ -28,18 +28,22 @@ RANDOM = 100
 ROUND, MOST_ROUNDS = 100, 5
 """Generations between two looks at whether the fittest finishes the task in simulation, and how many such rounds at most."""
 COMMANDS, TOURNAMENT = 4, 20 / 400
+GOOD = 7 / 9 - 1e-9
+"""Fraction of goals, over a controller's drives, that the worst of the dissertation's three good controllers reached (78 %)."""
 OUTCOMES = ("left the surface", "rolled over", "unstable cycle", "missed a goal", "all goals")
 """What can become of a drive; the first that applies counts."""
 
 
 def validate(
-    robot: Robot, task: Task, world: World, progress: Callable[[int, int], None] = lambda done, of: None
+    robot: Robot, task: Task, world: World, progress: Callable[[int, int], None] = lambda done, of: None, sets: int = 1
 ) -> pd.DataFrame:
     """One row a pose of every trial: columns trial, repeat (-1: in simulation, without noise), step, the robot's poses, and
-    those of its drive: commands, generations, goals_reached, final_error_m, outcome. Same simulator, same rows."""
-    simulator, rows = load_static_simulator(robot.name), []
-    for trial in range(TRIALS):
-        progress(trial, TRIALS)
+    those of its drive: commands, generations, goals_reached, final_error_m, outcome. Same simulator, same rows.
+
+    Each of ``sets`` has `TRIALS` trials, numbered on; every trial has a seed of its own."""
+    simulator, rows, trials = load_static_simulator(robot.name), [], sets * TRIALS
+    for trial in range(trials):
+        progress(trial, trials)
         evolver = _evolved(robot, task, trial, simulator.weights)
         planned = evolver.plan(evolver.fittest(), NetworkSimulator(evolver.robot, task, simulator.weights))
         outputs = predict(simulator.weights, robot.inputs(planned), robot.sigmoid_output)
@@ -49,7 +53,7 @@ def validate(
         for repeat in range(REPEATS):
             driven = world.drive(planned, evolver.key, Purpose.WORLD_EVALUATED, repeat + 1)
             rows.append(_rows(robot, task, driven, simulated, about | {"repeat": repeat + 1}))
-    progress(TRIALS, TRIALS)
+    progress(trials, trials)
     return pd.concat(rows, ignore_index=True)
 
 
@@ -132,8 +136,23 @@ def write_table(table: pd.DataFrame, path: Path) -> None:
         raise StoreError(f"cannot write {path}: {error.strerror}; name another folder with --results DIR.") from error
 
 
-def describe(table: pd.DataFrame) -> str:
-    """A line a trial: cycles, generations, goals, error at the end and outcome of each drive."""
+def of_each_set(table: pd.DataFrame, goals: int) -> pd.DataFrame:
+    """One row a set of `TRIALS` trials: complete (drives that reached all ``goals``), good (trials whose three drives reached at
+    least 7 of 9 goals, as the dissertation's best three of twelve did), goals (fraction reached, over all drives)."""
+    drives = table[table.repeat > 0].drop_duplicates(["trial", "repeat"])
+    number = ((drives.trial - 1) // TRIALS + 1).rename("set")
+    reached = drives.goals_reached.groupby([number, drives.trial]).sum() / (REPEATS * goals)
+    return pd.DataFrame(
+        {
+            "complete": (drives.outcome == OUTCOMES[-1]).groupby(number).sum(),
+            "good": (reached >= GOOD).groupby("set").sum(),
+            "goals": reached.groupby("set").mean(),
+        }
+    )
+
+
+def describe(table: pd.DataFrame, goals: int) -> str:
+    """A line a trial: cycles, generations, goals, error at the end and outcome of each drive; then one a set."""
     lines = []
     for trial, rows in table[table.repeat > 0].groupby("trial"):
         drives = rows.drop_duplicates("repeat")
@@ -142,4 +161,9 @@ def describe(table: pd.DataFrame) -> str:
             f"{', '.join(map(str, drives.goals_reached))}, error at the end "
             f"{', '.join(f'{100 * error:.0f}' for error in drives.final_error_m)} cm: {'; '.join(drives.outcome.unique())}"
         )
+    lines += [
+        f"set {number}: {row.complete:.0f} of {TRIALS * REPEATS} drives reached all goals, {row.good:.0f} of {TRIALS} controllers "
+        f"at least 7 of 9; {100 * row.goals:.0f} % of the goals"
+        for number, row in of_each_set(table, goals).iterrows()
+    ]
     return "\n".join(lines)

@@ -18,6 +18,7 @@ def add_commands(command: Adder) -> None:
     )
     planned.add_argument("--robot", default="snake")
     planned.add_argument("--task", help="goal task (default: the last task of that robot's study)")
+    planned.add_argument("--sets", type=positive, default=1, metavar="N", help="sets of twelve controllers (default: 1)")
     add_results(planned)
     ready = command("precompute", precompute, "train the static simulator of a robot and write it to a file")
     ready.add_argument("--robot", default="khepera")
@@ -26,7 +27,7 @@ def add_commands(command: Adder) -> None:
 
 
 def validate(options: argparse.Namespace) -> int:
-    """Twelve trials of trajectory planning, and what became of each."""
+    """Trials of trajectory planning, twelve a set, and what became of each."""
     from bns.console import counting
     from bns.robots import load_robot
     from bns.static_simulator.transfer_trials import describe, measurements_path, random_drives, table_path, write_table
@@ -38,9 +39,9 @@ def validate(options: argparse.Namespace) -> int:
     name = options.task or max(task_names(robot.name), key=lambda one: load_task(robot.name, one).source)
     task, path = load_task(robot.name, name), table_path(options.results, options.robot, name)
     with counting(f"trials of {robot.name} on {task.title}") as progress:
-        table = trials(robot, task, build_world("physics", robot), progress)
+        table = trials(robot, task, build_world("physics", robot), progress, options.sets)
     write_table(table, path)
-    print(f"{describe(table)}\nwritten to {path}")
+    print(f"{describe(table, len(task.goals_m))}\nwritten to {path}")
     beside = measurements_path(options.results, robot.name)
     if not beside.is_file():
         with counting(f"random controllers of {robot.name}") as progress:
