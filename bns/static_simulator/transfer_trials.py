@@ -162,8 +162,8 @@ def describe(table: pd.DataFrame, goals: int) -> str:
             f"{', '.join(f'{100 * error:.0f}' for error in drives.final_error_m)} cm: {'; '.join(drives.outcome.unique())}"
         )
     lines += [
-        f"set {number}: {row.complete:.0f} of {TRIALS * REPEATS} drives reached all goals, {row.good:.0f} of {TRIALS} controllers "
-        f"at least 7 of 9; {100 * row.goals:.0f} % of the goals"
+        f"set {number}: {row.complete:.0f} of {TRIALS * REPEATS} drives reached all goals, {row.good:.0f} of {TRIALS} "
+        f"controllers at least 7 of 9; {100 * row.goals:.0f} % of the goals"
         for number, row in of_each_set(table, goals).iterrows()
     ]
     return "\n".join(lines)
