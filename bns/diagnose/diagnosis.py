@@ -219,12 +219,12 @@ def _diagnosed(
     alone: Callable[[Candidate], None],
     before: SelectionResult | None = None,
 ) -> Diagnosis:
-    """One search, and what it leaves; ``before``: a search on nearly the same, whose numbers may be the better start."""
+    """One search, and what it leaves; ``before``: a search on nearly the same, whose end or numbers may serve here too."""
     search = StepwiseSelection(predictor, model, extra, tick, barred, alone)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
-    found = outcome_of(_from_better_numbers(search.run(), before), predictor, model, tick)
+    found = outcome_of(_from_better_numbers(search.run(before), before), predictor, model, tick)
     if found.own_clocks and model.per_trial_effect is None and found.rest.any:
         shared = StepwiseSelection(predictor, model, extra, tick, barred, own_clocks=False)
         without = outcome_of(_from_better_numbers(shared.run(), before), predictor, model, tick)

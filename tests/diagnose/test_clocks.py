@@ -59,7 +59,7 @@ def test_beside_something_left_clocks_stand_only_if_the_error_is_lower_at_every_
     asked = []
 
     class Search(diagnosis.StepwiseSelection):
-        def run(self):
+        def run(self, before=None):
             asked.append(self._own_clocks)
             return self._own_clocks
 

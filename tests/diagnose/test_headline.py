@@ -22,7 +22,7 @@ def found_with(monkeypatch, predictor, name):
     """The diagnosis of a search that accepts this effect, whatever the tracks say."""
     honest = StepwiseSelection.run
 
-    def run(self):
+    def run(self, before=None):
         problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named(name)])
         return replace(honest(self), problem=problem, fit=fit, accepted=(name,))
 

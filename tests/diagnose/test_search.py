@@ -191,3 +191,64 @@ def test_the_same_effects_take_the_numbers_that_fit_better():
     assert _from_better_numbers(ends[1], ends[0]).fit is right
     assert _from_better_numbers(ends[0], replace(ends[1], accepted=("motor-lag",))).fit is off
     assert _from_better_numbers(ends[0], None).fit is off
+
+
+def searched(table, *left_out):
+    predictor = WheelPredictor(tracks_of(table))
+    return StepwiseSelection(predictor.not_counting(left_out) if left_out else predictor, NOMINAL)
+
+
+@pytest.fixture(scope="module")
+def with_a_gain():
+    table = measured(hidden(speed_gain={"gain": 0.96}), trials=20, seed=11)
+    search = searched(table)
+    return table, search, search.run()
+
+
+def test_the_end_of_a_search_stands_without_one_trial(with_a_gain):
+    table, _, end = with_a_gain
+    again = searched(table, 3)
+    stood, anew = again.stands(end), searched(table, 3).run()
+    assert stood.accepted == anew.accepted == end.accepted == ("speed-gain",)
+    np.testing.assert_allclose(stood.fit.values, anew.fit.values, rtol=1e-5)
+    assert stood.competing_models == anew.competing_models
+    assert [step.selected for step in stood.steps] == [step.selected for step in anew.steps]
+    assert stood.fit.losses[3] == 0.0
+    assert end.fit.losses[3] > 0.0
+
+
+def test_an_end_does_not_stand_where_an_effect_would_go_come_or_be_exchanged(with_a_gain, monkeypatch):
+    table, search, end = with_a_gain
+
+    def ended(*names):
+        problem, fit = end.problem, end.nominal
+        for name in names:
+            fit = fit_with(problem, fit, search.catalogue[name])
+        return replace(end, accepted=names, fit=fit)
+
+    assert searched(table).stands(ended("speed-gain")) is not None
+    assert searched(table).stands(ended("speed-gain", "warm-up")) is None
+    assert searched(table).stands(ended("wheel-mismatch")) is None
+    two = measured(hidden(speed_gain={"gain": 0.96}, wheelbase={"factor": 1.05}), trials=20, seed=11)
+    assert searched(two).stands(ended("speed-gain")) is None
+    assert searched(table).stands(replace(end, accepted=())) is None
+    exchanging = searched(table)
+    monkeypatch.setattr(exchanging, "_exchange_step", lambda problem, fit, _: (problem, fit, ("warm-up",)))
+    assert exchanging.stands(end) is None
+
+
+def test_what_could_stand_in_place_of_the_newest_effect_is_known_from_the_round_in_which_it_came(with_a_gain, monkeypatch):
+    _, search, end = with_a_gain
+    fits = {}
+    for known in (True, False):
+        search._exchanged = None
+        with monkeypatch.context() as patched:
+            if known:  # no start is looked for again
+                patched.setattr("bns.diagnose.select.stepwise.best_start", lambda *_: pytest.fail("looked for"))
+            else:
+                patched.setattr(search, "_entry", None)
+            found = search._exchanges(end.problem, end.fit, end.accepted)
+        fits[known] = {name: fit.loss for _, name, fit in found}
+    assert set(fits[False]) <= set(fits[True])
+    assert fits[False]
+    assert {name: fits[True][name] for name in fits[False]} == pytest.approx(fits[False], rel=1e-3)

@@ -7,7 +7,7 @@ or beyond what is plausible is rejected with its reason.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 from bns.diagnose.data.tracks import Array
@@ -42,6 +42,25 @@ CLOCKS_CHANCE = DEFAULTS.select.clocks_chance
 MOST = DEFAULTS.select.most_effects
 
 
+@dataclass(frozen=True)
+class _Entry:
+    """A round in which an effect came in: the problem and the fit before it, what was accepted then, and the round."""
+
+    problem: Problem
+    base: Fit
+    accepted: tuple[str, ...]
+    step: SelectionStep
+
+    def of(self, name: str, accepted: Collection[str]) -> bool:
+        """Did ``name`` come in then, beside what else is accepted now?"""
+        return name == self.step.selected and {*self.accepted, name} == set(accepted)
+
+    @property
+    def fits(self) -> dict[str, Fit]:
+        """Of every candidate of the round."""
+        return {c.name: c.fit for c in self.step.ranking}
+
+
 class StepwiseSelection:
     """A search for the effects that ``model`` lacks, on the tracks of a predictor.
 
@@ -63,13 +82,17 @@ class StepwiseSelection:
         self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
         self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
+        self._entry: _Entry | None = None
         self._all_believed = False
         self._least_z = MIN_Z if predictor.luck is None else MIN_Z_STRETCHES
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 
-    def run(self) -> SelectionResult:
-        """The search; again with implausible numbers allowed where one was passed over, if that predicts better for certain."""
-        result = self._run()
+    def run(self, before: SelectionResult | None = None) -> SelectionResult:
+        """The search; again with implausible numbers allowed where one was passed over, if that predicts better for certain.
+
+        ``before``: the end of a search on nearly the same tracks, which is the end of this one too if it `stands` here.
+        """
+        result = self._run(before)
         if not any(step.passed_over for step in result.steps):
             return result
         believed, self._all_believed, self._exchanged = result, True, None
@@ -77,9 +100,9 @@ class StepwiseSelection:
         self._all_believed = False
         return bold if bold.accepted and predicts_better(believed, bold) else believed
 
-    def _run(self) -> SelectionResult:
+    def _run(self, before: SelectionResult | None = None) -> SelectionResult:
         """The search; again with a clock for each trial where these differ, since that hides what else is wrong."""
-        plain = self._select()
+        plain = (self.stands(before) if before else None) or self._select()
         clocks = fit_trial_clocks(plain.problem, plain.fit) if self._own_clocks else None
         if clocks is None or _per_trial_effect(clocks.fit.model) in self._barred:
             return plain
@@ -133,16 +156,41 @@ class StepwiseSelection:
         steps: list[SelectionStep] = []
         tried: set[frozenset[str]] = set()
         while len(accepted) < MOST:
+            before = problem, fit
             step, problem, fit = self._forward_step(problem, fit, accepted)
             steps.append(step)
             if not step.selected:
                 break
+            self._entry = _Entry(*before, accepted, step)
             accepted = (*accepted, step.selected)
             problem, fit, accepted = self._exchange_step(problem, fit, accepted)
             problem, fit, accepted = self._backward_step(problem, fit, accepted)
             if frozenset(accepted) in tried:
                 break
             tried.add(frozenset(accepted))
+        return self._ended(problem, fit, accepted, steps)
+
+    def stands(self, before: SelectionResult) -> SelectionResult | None:
+        """The end of another search as the end of this one, if it is one here as well; else None.
+
+        It is where no effect comes in, none goes and none is exchanged, the conditions on which `_select` ends.
+        """
+        accepted, model = before.accepted, before.fit.model
+        if not accepted or model.per_trial_effect is not None or any(step.passed_over for step in before.steps):
+            return None
+        problem, fit = self._refit_with_noise(model, before.problem.pose_filter.noise)
+        if any(self._rejected(fit, name, bounds=False) for name in accepted):
+            return None
+        if not all(self._earned_over(problem, without(problem, fit, name), fit, name) for name in accepted):
+            return None
+        if self._exchange_step(problem, fit, accepted)[2] != accepted:
+            return None
+        step = self._forward_step(problem, fit, accepted)[0] if len(accepted) < MOST else before.steps[-1]
+        return None if step.selected else self._ended(problem, fit, accepted, [*before.steps[:-1], step])
+
+    def _ended(
+        self, problem: Problem, fit: Fit, accepted: tuple[str, ...], steps: Sequence[SelectionStep]
+    ) -> SelectionResult:
         competing_models = self._competing_models(problem, fit, accepted)
         simplest = min(competing_models, key=lambda r: len(r[1].free), default=None)
         if simplest is not None and len(simplest[1].free) < len(fit.free):
@@ -277,28 +325,42 @@ class StepwiseSelection:
             return self._exchanged[2]
         result = []
         for name in accepted:
-            model = fit.model.without(name)
-            loose = problem_for(self.predictor, model)
-            lacking, reached = loose.fit(model), loose.loss(fit.model)
             others = [effect for other, effect in self._worth.items() if other not in accepted]
-            fits = each(partial(self._in_place, problem, fit, loose, lacking, reached), others)
+            entry = self._entry if self._entry and self._entry.of(name, accepted) else None
+            if entry and self.predictor.screening is None:  # tried already, when it was chosen among them
+                loose, lacking, known = entry.problem, entry.base, entry.fits
+            else:
+                model, known = fit.model.without(name), {}
+                loose = problem_for(self.predictor, model)
+                lacking = loose.fit(model)
+            reached = loose.loss(fit.model)
+            fits = each(partial(self._in_place, problem, fit, loose, lacking, reached, known), others)
             result += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
         self._exchanged = (problem, accepted, result)
         return result
 
     def _in_place(
-        self, problem: Problem, fit: Fit, loose: Problem, lacking: Fit, reached: float, effect: Effect
+        self,
+        problem: Problem,
+        fit: Fit,
+        loose: Problem,
+        lacking: Fit,
+        reached: float,
+        known: Mapping[str, Fit],
+        effect: Effect,
     ) -> Fit | None:
         """The fit with the effect in the place of one that was taken away (``lacking``); None if it does too little of its work.
 
         First under the noise of the model without either (``loose``): under the small noise of a good model, one that is far off
-        pulls on nothing. ``reached``: the loss there with what was taken away.
+        pulls on nothing. ``reached``: the loss there with what was taken away; ``known``: fits there.
         """
-        start = best_start(loose, lacking, effect)
-        if lacking.loss - start.loss < SCREEN * (lacking.loss - reached):
-            return None
-        self.tick(effect.name)
-        fitted = loose.fit(start.model, nearby=start.jacobian_by_parameter)
+        fitted = known.get(effect.name)
+        if fitted is None:
+            start = best_start(loose, lacking, effect)
+            if lacking.loss - start.loss < SCREEN * (lacking.loss - reached):
+                return None
+            self.tick(effect.name)
+            fitted = loose.fit(start.model, nearby=start.jacobian_by_parameter)
         if fitted.loss - reached > max(BEHIND * (lacking.loss - reached), BEHIND_LOSS):
             return None
         return problem.fit(fitted.model, nearby=fit.jacobian_by_parameter)

@@ -15,6 +15,7 @@ from scipy.special import i0e, i1e
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
+from bns.physics.wheels.lagged_fit import lagged_rest, lagged_sums, led_to
 
 _RIDGE = 1e-9
 _RANGE, _TURNS = (0.33, 5.0), 72
@@ -31,9 +32,9 @@ _WAVES = 4
 
 def apply(wheels: Wheels, left_share: float, right_share: float, turn_m: float) -> Wheels:
     """Each wheel's speed times 1 + share·cos(2·pi·distance/``turn_m`` + phase)."""
-    angles = [_angle(speed, wheels.step_s, turn_m) for speed in (wheels.left_m_s, wheels.right_m_s)]
+    angles = _angles(wheels, turn_m)
     if wheels.conditions.seen is None or (left_share == 0.0 and right_share == 0.0):
-        waves = [np.cos(angle) for angle in angles]
+        waves = np.cos(angles)
     else:
         waves = _waves(wheels, wheels.conditions.seen[..., 2], angles)
     speeds = wheels.left_m_s, wheels.right_m_s
@@ -44,28 +45,31 @@ def apply(wheels: Wheels, left_share: float, right_share: float, turn_m: float) 
     )
 
 
-def _angle(speed: Array, step_s: Array, turn_m: float) -> Array:
-    """In the middle of each step."""
-    way = speed * step_s
-    angle: Array = (np.cumsum(way, axis=1) - way / 2.0) * (2.0 * np.pi / turn_m)
-    return angle
+def _angles(wheels: Wheels, turn_m: float) -> Array:
+    """Of the left and the right wheel in the middle of each step, (2, trials, steps)."""
+    way = np.stack([wheels.left_m_s, wheels.right_m_s]) * wheels.step_s
+    angles: Array = (np.cumsum(way, axis=2) - way / 2.0) * (2.0 * np.pi / turn_m)
+    return angles
 
 
-def _waves(wheels: Wheels, heading: Array, angles: list[Array]) -> list[Array]:
-    """cos(angle + phase) of both wheels, the phase of each half of a trial as its other half asks for.
+def _waves(wheels: Wheels, heading: Array, angles: Array) -> Array:
+    """cos(angle + phase) of both wheels (2, trials, steps), the phase of each half of a trial as its other half asks for.
 
     The wave is multiplied by the expected cosine of its phase's error, I1(k)/I0(k) of a von Mises distribution (Mardia and Jupp,
     Directional Statistics, section 3.5.4): without that, or with more, the fitted share is biased.
     """
-    columns = _waves_of(wheels, angles)
+    wave = np.stack([np.cos(angles), np.sin(angles)])
+    steady = np.broadcast_to(np.arange(heading.shape[1], dtype=np.float64), heading.shape)
+    columns = _columns(wheels, wave, steady[None])
     off = heading - _until((wheels.right_m_s - wheels.left_m_s) / wheels.wheelbase_m, wheels.step_s)
     seen, known = np.isfinite(heading), wheels.trial_s
     last = np.where(seen, known, -np.inf).max(axis=1, keepdims=True)
     early = known < last / 2.0
     lag = _lag(wheels, angles)
     pairs = [_pairs(columns, np.where(seen, off, 0.0), seen & half, lag) for half in (~early, early)]
-    pair = np.where(early[..., None], pairs[0][:, None], pairs[1][:, None])
-    return [pair[..., 2 * w] * np.cos(angle) + pair[..., 2 * w + 1] * np.sin(angle) for w, angle in enumerate(angles)]
+    pair = np.where(early, *(np.moveaxis(one, 1, 0)[:, :, None] for one in pairs))  # (4, trials, steps)
+    out: Array = pair[::2] * wave[0] + pair[1::2] * wave[1]
+    return out
 
 
 def _until(rate: Array, step_s: Array) -> Array:
@@ -75,9 +79,9 @@ def _until(rate: Array, step_s: Array) -> Array:
     return out
 
 
-def _lag(wheels: Wheels, angles: list[Array]) -> int:
+def _lag(wheels: Wheels, angles: Array) -> int:
     """Steps in which a wheel usually does a third of a turn."""
-    turned = np.abs(np.diff(np.concatenate(angles), axis=1))
+    turned = np.abs(np.diff(angles, axis=2))
     turned = turned[turned > 0]
     usual = float(np.median(turned)) if len(turned) else np.pi
     return int(np.clip(round(2.0 * np.pi / 3.0 / usual), 1, max(wheels.step_s.shape[1] // 8, 1)))
@@ -99,42 +103,32 @@ def _fitted(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> _F
 
     So a heading that wanders with the motors' scatter does not pass for a wave.
     """
-    used = used[:, lag:] & used[:, :-lag]
-    design = (columns[:, lag:] - columns[:, :-lag]) * used[..., None]
-    off = (off[:, lag:] - off[:, :-lag]) * used
-    across = design.swapaxes(1, 2)
-    gram, target = across @ design, (across @ off[..., None])[..., 0]
+    gram, target, count = lagged_sums(columns, off, used, lag)
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", gram), 1e-30))
     inverse = np.linalg.inv(gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(columns.shape[2]))
     values = (inverse @ (target / scale)[..., None])[..., 0] / scale
-    rest = off - (design @ values[..., None])[..., 0]
-    left, independent = (rest**2).sum(axis=1), used.sum(axis=1) / _repeated(rest, used, lag)
+    left, *products = lagged_rest(columns, off, used, lag, values, lag + lag // 2)
+    independent = count / _repeated(*products, lag)
     spare = np.maximum(independent - columns.shape[2], 1)
     return _Fitted(values, np.einsum("nii->ni", inverse) * (left / spare)[:, None] / scale**2, left, independent)
 
 
-def _repeated(rest: Array, used: NDArray[np.bool_], lag: int) -> float:
-    """By how much neighbours raise the variance of a wave's amplitude: the spectrum of ``rest`` at the wave over the mean one.
+def _repeated(product: Array, pairs: Array, lag: int) -> float:
+    """By how much neighbours raise the variance of a wave's amplitude: the spectrum of the rest at the wave over the mean one.
 
     The sum of the autocorrelation times the wave's own, over half a turn: 1.5 where tracking noise is white from pose to pose,
     2/3 of ``lag`` where the heading wanders.
     """
-    most = lag + lag // 2
-    size = rest.shape[1] + most
-    product, pairs = (
-        np.fft.irfft((np.abs(np.fft.rfft(x, size)) ** 2).sum(axis=0), size)[: most + 1] for x in (rest, used.astype(float))
-    )
     covariance = product / np.maximum(pairs, 1.0)
     if covariance[0] <= 0.0:
         return float(lag)
-    wave = np.cos(np.arange(1, most + 1) * (2.0 * np.pi / 3.0 / lag))
+    wave = np.cos(np.arange(1, len(product)) * (2.0 * np.pi / 3.0 / lag))
     return max(1.0 + 2.0 * float(covariance[1:] @ wave) / float(covariance[0]), _LEAST_REPEATED)
 
 
 def _pairs(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> Array:
-    """Cosine and sine part of each wheel's wave, (trials, 4): least squares beside a drift, then of length 1 or less."""
-    steady = np.broadcast_to(np.arange(off.shape[1], dtype=np.float64)[:, None], (*off.shape, 1))
-    fitted = _fitted(np.concatenate([columns, steady], axis=2), off, used, lag)
+    """Cosine and sine of each wheel's wave, (trials, 4): least squares beside the other columns, then of length 1 or less."""
+    fitted = _fitted(columns, off, used, lag)
     pair = fitted.values[:, :_WAVES]
     length2, unsure = (
         np.repeat(v[:, ::2] + v[:, 1::2], 2, axis=1) for v in (pair**2, fitted.variance[:, :_WAVES])
@@ -167,12 +161,12 @@ def _explained(wheels: Wheels, heading: Array, turn_m: float) -> tuple[float, Ar
 
     Whatever makes the speed of a wheel, the wheelbase or the heading's rate wrong is fitted as well, and is no wave.
     """
-    angles = [_angle(speed, wheels.step_s, turn_m) for speed in (wheels.left_m_s, wheels.right_m_s)]
+    angles = _angles(wheels, turn_m)
     ways = [_until(speed, wheels.step_s) / wheels.wheelbase_m for speed in (wheels.left_m_s, wheels.right_m_s)]
     used, lag = np.isfinite(heading), _lag(wheels, angles)
     off = np.where(used, heading - (ways[1] - ways[0]), 0.0)
-    slow = np.stack([*ways, wheels.trial_s], axis=2)
-    columns = np.concatenate([_waves_of(wheels, angles), slow], axis=2)
+    columns = _columns(wheels, np.stack([np.cos(angles), np.sin(angles)]), np.stack([*ways, wheels.trial_s]))
+    slow = np.ascontiguousarray(columns[..., _WAVES:])
     without, fitted = _fitted(slow, off, used, lag), _fitted(columns, off, used, lag)
     known = fitted.independent > columns.shape[2] + 1
     if not known.any():
@@ -182,11 +176,14 @@ def _explained(wheels: Wheels, heading: Array, turn_m: float) -> tuple[float, Ar
     return float(gain[known].sum()) / 2.0, np.sqrt(np.maximum(square[::2] + square[1::2], 0.0))
 
 
-def _waves_of(wheels: Wheels, angles: list[Array]) -> Array:
-    """What a share of 1 adds to the heading, (trials, steps, 4): cosine and sine of the left, then of the right wheel."""
-    rates = [-wheels.left_m_s / wheels.wheelbase_m, wheels.right_m_s / wheels.wheelbase_m]
-    parts = [rate * wave for rate, angle in zip(rates, angles, strict=True) for wave in (np.cos(angle), np.sin(angle))]
-    return np.stack([_until(part, wheels.step_s) for part in parts], axis=2)
+def _columns(wheels: Wheels, wave: Array, others: Array) -> Array:
+    """What a share of 1 adds to the heading: cosine and sine of the left, then of the right wheel; then ``others``.
+
+    ``wave`` (2, 2, trials, steps): cosine and sine of the angle of each wheel. ``others`` (m, trials, steps).
+    """
+    rates = np.stack([-wheels.left_m_s, wheels.right_m_s])[:, None] / wheels.wheelbase_m * wave.swapaxes(0, 1)
+    out: Array = led_to(rates.reshape(-1, *others.shape[1:]), others, wheels.step_s)
+    return out
 
 
 EFFECT = Effect(
