@@ -64,7 +64,7 @@ def lagged_rest(
 
 @exact
 def led_to(rates: Array, others: Array, step_s: Array) -> Array:
-    """What rates (k, trials, steps) have led to in the middle of each step, and m ``others`` as they are: (trials, steps, k + m)."""
+    """What rates (k, trials, steps) lead to in the middle of each step, and m ``others`` as they are: (trials, steps, k + m)."""
     k, trials, steps = rates.shape
     out = np.empty((trials, steps, k + others.shape[0]))
     for row in range(trials):
