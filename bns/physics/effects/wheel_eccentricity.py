@@ -107,8 +107,8 @@ def _fitted(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> _F
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", gram), 1e-30))
     inverse = np.linalg.inv(gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(columns.shape[2]))
     values = (inverse @ (target / scale)[..., None])[..., 0] / scale
-    left, *products = lagged_rest(columns, off, used, lag, values, lag + lag // 2)
-    independent = count / _repeated(*products, lag)
+    left, product, pairs = lagged_rest(columns, off, used, lag, values, lag + lag // 2)
+    independent = count / _repeated(product, pairs, lag)
     spare = np.maximum(independent - columns.shape[2], 1)
     return _Fitted(values, np.einsum("nii->ni", inverse) * (left / spare)[:, None] / scale**2, left, independent)
 
