@@ -7,10 +7,13 @@ import subprocess
 import sys
 import tempfile
 
+import hypothesis
 import matplotlib as mpl
 import pytest
 
 mpl.use("Agg")
+hypothesis.settings.register_profile("any machine", deadline=None)  # how long an example takes says how busy the machine is
+hypothesis.settings.load_profile("any machine")
 os.environ["BNS_CACHE"] = "off"  # a test that changes a number in memory must not be answered from before
 ANSWERS = "BNS_TEST_ANSWERS"
 """The folder in which processes of their own, whose program is the one on disk, remember what this run of the tests asked."""

@@ -83,14 +83,17 @@ def is_private(folder: Path) -> bool:
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 
+MANY_REGISTERS = bool(llvm.get_host_cpu_features().get("avx512f"))
+"""Whether the processor has 32 vector registers rather than 16: where that matters, a kernel comes in two forms."""
+
+
 def _configure() -> None:
     """Left alone where the user has chosen otherwise through numba's environment variables."""
     if not _config.CACHE_DIR:
         _config.CACHE_DIR = str(cache_folder())
-    features = llvm.get_host_cpu_features()
-    if _config.CPU_FEATURES is None and features.get("avx512f"):
+    if _config.CPU_FEATURES is None and MANY_REGISTERS:
         # LLVM uses half of a 512-bit register unless told otherwise; training is a quarter faster with all of it.
-        _config.CPU_FEATURES = features.flatten() + ",-prefer-256-bit"
+        _config.CPU_FEATURES = llvm.get_host_cpu_features().flatten() + ",-prefer-256-bit"
 
 
 _configure()

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from bns.engine.backward import backward, share, write
 from bns.engine.jit import exact, fast, inline
-from bns.engine.snn import BLOCK, GROUP, PER_NEURON, forward4, hidden_count, sigmoid
+from bns.engine.snn import BLOCK, PER_NEURON, forward, hidden_count, last_input_is_absent, sigmoid
 
 INITIAL_STEP, LARGEST_STEP, SMALLEST_STEP = 0.1, 50.0, 1e-6
 GROW, SHRINK = 1.2, 0.5
@@ -82,50 +83,6 @@ class Rprop:
 
 
 @inline
-def share(g: Any, d: Any, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any) -> Any:
-    """The input sums of a hidden neuron (6,) with one more pattern, whose error reaches it as d."""
-    return g[0] + d * x0, g[1] + d * x1, g[2] + d * x2, g[3] + d * x3, g[4] + d * x4, g[5] + d
-
-
-@inline
-def _write(gradient: Any, w: Any, k: Any, g: Any, to_output: Any) -> None:
-    v = w[k + 6]
-    gradient[k] += v * g[0]
-    gradient[k + 1] += v * g[1]
-    gradient[k + 2] += v * g[2]
-    gradient[k + 3] += v * g[3]
-    gradient[k + 4] += v * g[4]
-    gradient[k + 5] += v * g[5]
-    gradient[k + 6] += to_output
-
-
-@fast
-def _backward4(X, w, first, hidden_out, error, gradient, a, b):  # type: ignore[no-untyped-def]  # compiled
-    x0, x1, x2, x3, x4 = X[0, a:b], X[1, a:b], X[2, a:b], X[3, a:b], X[4, a:b]
-    h0, h1 = hidden_out[first, : b - a], hidden_out[first + 1, : b - a]
-    h2, h3 = hidden_out[first + 2, : b - a], hidden_out[first + 3, : b - a]
-    zero = _ZERO
-    g0 = g1 = g2 = g3 = (zero, zero, zero, zero, zero, zero)
-    o0 = o1 = o2 = o3 = zero
-    for p in range(error.size):
-        e, v0, v1, v2, v3, v4 = error[p], x0[p], x1[p], x2[p], x3[p], x4[p]
-        e0, e1, e2, e3 = e * h0[p], e * h1[p], e * h2[p], e * h3[p]
-        o0 += e0
-        o1 += e1
-        o2 += e2
-        o3 += e3
-        g0 = share(g0, e0 - e0 * h0[p], v0, v1, v2, v3, v4)
-        g1 = share(g1, e1 - e1 * h1[p], v0, v1, v2, v3, v4)
-        g2 = share(g2, e2 - e2 * h2[p], v0, v1, v2, v3, v4)
-        g3 = share(g3, e3 - e3 * h3[p], v0, v1, v2, v3, v4)
-    k = first * PER_NEURON
-    _write(gradient, w, k, g0, o0)
-    _write(gradient, w, k + PER_NEURON, g1, o1)
-    _write(gradient, w, k + 2 * PER_NEURON, g2, o2)
-    _write(gradient, w, k + 3 * PER_NEURON, g3, o3)
-
-
-@inline
 def residual(out: Any, target: Any) -> Any:
     """Derivative of half the squared error by what goes into a linear output."""
     return out - target
@@ -178,7 +135,7 @@ def _lift(X, w, error, gradient, flat, a, b):  # type: ignore[no-untyped-def]  #
     for p in range(error.size):
         g = share(g, flat * error[p], X[0, a + p], X[1, a + p], X[2, a + p], X[3, a + p], X[4, a + p])
     for k in range(0, w.size - 1, PER_NEURON):
-        _write(gradient, w, k, g, zero)
+        write(gradient, w, k, g, zero)
 
 
 @fast
@@ -201,20 +158,17 @@ def _errors(out, target, counts, bias, squashed, flat, error):  # type: ignore[n
 
 
 @fast
-def gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squashed, flat):  # type: ignore[no-untyped-def]  # compiled
-    """Gradient of half the summed squared error over patterns 0..n, into gradient (W,)."""
-    hidden = (w.size - 1) // PER_NEURON
+def gradient_into(w, X, target, counts, n, absent, gradient, hidden_out, out, error, squashed, flat):  # type: ignore[no-untyped-def]  # compiled
+    """Gradient of half the summed squared error over patterns 0..n, into gradient (W,); absent: see `last_input_is_absent`."""
     gradient[:] = _ZERO
     block = -(-n // -(-n // BLOCK))
     for a in range(0, n, block):
         b = min(a + block, n)
         o, e = out[: b - a], error[: b - a]
         o[:] = _ZERO
-        for first in range(0, hidden, GROUP):
-            forward4(X, w, first, hidden_out, o, a, b)
+        forward(X, w, hidden_out, o, a, b, absent)
         gradient[w.size - 1] += _errors(o, target[a:b], counts[a:b], w[w.size - 1], squashed, flat, e)
-        for first in range(0, hidden, GROUP):
-            _backward4(X, w, first, hidden_out, e, gradient, a, b)
+        backward(X, w, hidden_out, e, gradient, a, b, absent)
         if flat > _ZERO:
             _lift(X, w, e, gradient, flat, a, b)
 
@@ -254,8 +208,9 @@ def train_network(w, step, last_gradient, last_change, X, target, counts, n, ite
     out = np.empty(BLOCK, np.float32)
     error = np.empty(BLOCK, np.float32)
     gradient = np.empty(w.size, np.float32)
+    absent = last_input_is_absent(X, n)
     for _ in range(iterations):
-        gradient_into(w, X, target, counts, n, gradient, hidden_out, out, error, squashed, flat)
+        gradient_into(w, X, target, counts, n, absent, gradient, hidden_out, out, error, squashed, flat)
         _update(w, step, last_gradient, last_change, gradient, backtrack)
 
 
@@ -276,6 +231,7 @@ def gradient(
         target,
         _ALL_ALIKE if counts is None else counts,
         X.shape[1],
+        last_input_is_absent(X, X.shape[1]),
         result,
         np.empty((hidden, BLOCK), np.float32),
         np.empty(BLOCK, np.float32),

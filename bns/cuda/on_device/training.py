@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numba import cuda, float32
 
-from bns.engine.rprop import INITIAL_STEP, changed, residual, share, squashed_residual
+from bns.engine.backward import share
+from bns.engine.rprop import INITIAL_STEP, changed, residual, squashed_residual
 from bns.engine.snn import PER_NEURON, activation, neuron, weight_count
 
 WARP = 32

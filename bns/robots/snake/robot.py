@@ -14,7 +14,7 @@ from bns.errors import SpecError
 from bns.robots.base import RandomStream, Scores, StagedTraining, rotate
 from bns.robots.snake import cycles, path, posture, table
 from bns.robots.snake.options import BEYOND, READINGS, Options
-from bns.robots.snake.rollout import evaluate
+from bns.robots.snake.rollout import evaluate, lanes_of, needed
 from bns.robots.snake.rules import (
     BOUNDS,
     HALF,
@@ -30,6 +30,8 @@ from bns.robots.snake.rules import (
     SUBSTITUTE_SD_M,
 )
 from bns.tasks import Task
+
+_NO_CHANGES = np.empty((5, 0))
 
 
 class Snake:
@@ -159,19 +161,14 @@ class Snake:
         if weights is None:
             return in_full
         moved = self.displacements(predict(weights, self.inputs(in_full), self.sigmoid_output))
-        if stream is None or "cut-without-noise" in self._options:
-            return in_full[: self._needed(moved, in_full, task)[1]]
-        needed = []
-        for noise in self._noise(stream, len(in_full)):
-            noisy = moved.copy()
-            noisy[:, :4] += noise
-            needed.append(self._needed(noisy, in_full, task))
-        return in_full[: max((used for done, used in needed if done), default=len(in_full))]
+        noise = self._noise(None if "cut-without-noise" in self._options else stream, len(in_full))
+        return in_full[: self._needed(moved, in_full, task, noise) or len(in_full)]
 
-    def _needed(self, moved: np.ndarray, in_full: np.ndarray, task: Task) -> tuple[bool, int]:
-        """Whether a simulated path finishes the task, and after how many cycles."""
-        _, goals, used = path.evaluate_path(self.poses(moved, in_full), task, self.start_m)
-        return goals == len(task.goals_m), used
+    def _needed(self, moved: np.ndarray, in_full: np.ndarray, task: Task, noise: np.ndarray) -> int:
+        """Cycles until simulated paths finish the task, the most of all rows of noise that do; 0 where none does."""
+        changes = np.ascontiguousarray(self.changes(in_full).T) if self.with_changes else _NO_CHANGES
+        path_of = self.start_m, np.ascontiguousarray(moved.T), changes, self.rigid
+        return int(needed(*path_of, lanes_of(noise), len(noise), task.goals_m, task.region_m / 2))
 
     def score(
         self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,
@@ -192,15 +189,17 @@ class Snake:
         fitness, reached, used = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int32)
         half = (task.region_m / 2, task.surface_m[0] / 2, task.surface_m[1] / 2)
         noise = self._noise(stream, length * MOST_REPEATS)
+        lanes = lanes_of(noise), len(noise)
         repeats = np.ascontiguousarray(commands[..., REPEATS])
         moved = self._population_changes(commands)
-        failures = evaluate(self.start_m, moves, moved, self.rigid, repeats, noise, task.goals_m, *half, fitness, reached, used)
+        found = fitness, reached, used
+        failures = evaluate(self.start_m, moves, moved, self.rigid, repeats, *lanes, task.goals_m, *half, *found)
         return Scores(fitness, reached, int(failures), used)
 
     def _population_changes(self, commands: np.ndarray) -> np.ndarray:
         """Changes into all cycles of a population (n, cycles, 5), (5, n * cycles); (5, 0) where they are ignored."""
         if not self.with_changes:
-            return np.empty((5, 0))
+            return _NO_CHANGES
         n, length, _ = commands.shape
         before = np.arange(-1, n * length - 1)
         before[::length] = -1
