@@ -16,6 +16,8 @@ CONFIRMING = confirmed_name("")
 """Ending of the sweeps that rerun the best combinations of another on fresh seeds: they confirm, and compare nothing."""
 READINGS = "readings"
 """Names of the sweeps that compare readings of the dissertation begin so: at settings of their own, whatever else they vary."""
+WORLDS = "worlds"
+"""Names of the sweeps that run the same combinations in several worlds begin so."""
 APPROACHES = "approaches"
 """Names of the sweeps that compare approaches begin so."""
 SETTING = (
@@ -77,7 +79,7 @@ def comparing(store: Results, parameter: str | None = None) -> list[str]:
         row.sweep
         for row in rows.itertuples()
         if not row.sweep.endswith(CONFIRMING)
-        and not row.sweep.startswith(READINGS)
+        and not row.sweep.startswith((READINGS, WORLDS))
         and (row.several or (row.sweep in store.plans and store.plans[row.sweep].varied & {*names}))
     ]
 

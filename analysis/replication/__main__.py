@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
+from analysis import advice, worlds
 from analysis.__main__ import figures
 from analysis.intervals import FEWEST_SEEDS
 from analysis.readings import compared, in_words
@@ -19,8 +20,8 @@ from bns.errors import BnsError
 from bns.store.archive.read import archives, described
 from bns.store.disk.files import publish
 
-READINGS = "readings.parquet"
-"""The archive of the paired runs, beside that of the study."""
+READINGS, WORLDS = "readings.parquet", "worlds.parquet"
+"""The archives of the paired runs and of the runs in two worlds, beside that of the study."""
 _CHAPTER = {"khepera": "4", "snake": "5"}
 
 
@@ -33,7 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         found = studies(store)
         pictures = drawn(store, found, wanted.out.parent / "figures" / "replication", wanted.out.parent)
         paired = _readings(wanted.results if wanted.fresh else archive.with_name(READINGS), fresh=wanted.fresh)
-        text = page(found, paired, pictures, _origin(store, archive, fresh=wanted.fresh))
+        elsewhere = _worlds(wanted.results if wanted.fresh else archive.with_name(WORLDS), fresh=wanted.fresh)
+        costs = [one.table for one in _of_the_archive(advice, store) if one.table is not None]
+        text = page(found, paired, elsewhere, costs, pictures, _origin(store, archive, fresh=wanted.fresh))
         publish(text.encode(), wanted.out.with_name(f".{wanted.out.name}.part"), wanted.out)
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -88,6 +91,16 @@ def _readings(place: Path, *, fresh: bool):  # type: ignore[no-untyped-def]  # a
         return None
     enough = rows[rows.n >= FEWEST_SEEDS]
     return pd.DataFrame([in_words(row) for row in enough.to_dict("records")]) if len(enough) else None
+
+
+def _worlds(place: Path, *, fresh: bool):  # type: ignore[no-untyped-def]  # tables, one a robot
+    if not place.exists():
+        return []
+    try:
+        rows = worlds.influences(worlds.of_each_run(Results(place, archived=not fresh)))
+    except NoDataError:
+        return []
+    return [worlds.table(own) for _, own in rows.groupby("robot")]
 
 
 def _origin(store: Results, archive: Path, *, fresh: bool) -> list[str]:

@@ -17,12 +17,21 @@ TEMPLATE = Path(__file__).with_name("page.md")
 ROBOTS = {"khepera": "Khepera", "snake": "Snake"}
 
 
-def page(studies: Sequence[Study], readings: pd.DataFrame | None, pictures: Mapping[str, str], origin: Sequence[str]) -> str:
+def page(
+    studies: Sequence[Study],
+    readings: pd.DataFrame | None,
+    worlds: Sequence[pd.DataFrame],
+    advice: Sequence[pd.DataFrame],
+    pictures: Mapping[str, str],
+    origin: Sequence[str],
+) -> str:
     """The whole page.
 
     Args:
         studies: one a robot.
         readings: table of the paired runs; None if there are none.
+        worlds: tables of the influence of parameters in two worlds, one a robot; empty if there are no runs.
+        advice: tables of what the dissertation's advice costs, one a robot; empty if there are too few runs.
         pictures: "figure 4.7" -> path of a picture, relative to the page.
         origin: lines that say where the numbers come from.
     """
@@ -30,6 +39,8 @@ def page(studies: Sequence[Study], readings: pd.DataFrame | None, pictures: Mapp
         "LOOK": "\n\n".join(_look(one) for one in studies),
         "FINDINGS": "\n\n".join(_findings(one, pictures) for one in studies),
         "READINGS": "There are no runs of other readings yet." if readings is None else table(readings),
+        "WORLDS": "\n\n".join(map(table, worlds)) or "There are no runs of two worlds yet.",
+        "ADVICE": "\n\n".join(map(table, advice)) or "There are too few runs yet.",
         "ORIGIN": "\n".join(f"- {line}" for line in origin),
     }
     text = TEMPLATE.read_text(encoding="utf-8")
