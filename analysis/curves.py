@@ -17,15 +17,21 @@ from analysis.results import Results
 from analysis.selection import Selection, selections
 from bns.plotting.style import lettered, note, ordered_styles, panels, style
 
+WHOSE = {
+    "success": ("Success", "whose fittest controller, driven in the world after each evaluation, {what}"),
+    "ever_success": ("Success so far", "in which a fittest controller, driven after this or an earlier evaluation, {what}"),
+}
+"""Column of evals -> what the figure is called, and of which runs it shows the fraction."""
 
-def success_by(store: Results, parameter: str, name: str) -> list[FigureResult]:
-    """One figure a robot; NoDataError where no sweep compares values of ``parameter``."""
-    return [_draw(store, chosen, parameter, name) for chosen in selections(store, parameter)]
+
+def success_by(store: Results, parameter: str, name: str, success: str = "success") -> list[FigureResult]:
+    """One figure a robot; NoDataError where no sweep compares values of ``parameter``. ``success``: a column of `WHOSE`."""
+    return [_draw(store, chosen, parameter, name, success) for chosen in selections(store, parameter)]
 
 
 @style()
-def _draw(store: Results, chosen: Selection, parameter: str, name: str) -> FigureResult:
-    rows, thin, least = enough_runs(by_value(store, chosen, parameter))
+def _draw(store: Results, chosen: Selection, parameter: str, name: str, success: str) -> FigureResult:
+    rows, thin, least = enough_runs(by_value(store, chosen, parameter, success))
     rows = rows.assign(**dict(zip(("low", "high"), wilson(rows.successes, rows.runs), strict=True)))
     tasks, n = [task for task in chosen.tasks if task in set(rows.task)], chosen.n - thin
     looks = dict(zip(sorted(rows.value.unique()), ordered_styles(rows.value.nunique()), strict=True))
@@ -39,14 +45,15 @@ def _draw(store: Results, chosen: Selection, parameter: str, name: str) -> Figur
     said, what = coverage(store, chosen.sweeps, n), criterion(store, chosen)
     too_few = (f"{counted(thin, 'run')} in curves of fewer than {least} not drawn",) if thin else ()
     note(figure, "; ".join((f"Success: {what}", *said.sentences, *too_few, f"bands: {INTERVALS}")) + ".")
+    title, whose = WHOSE[success]
     shows = (
-        f"Fraction of runs whose fittest controller, driven in the world after each evaluation, {what}, by {TITLES[parameter]}; "
+        f"Fraction of runs {whose.format(what=what)}, by {TITLES[parameter]}; "
         f"all other parameters pooled. n = {n:,} runs of {', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals "
         f"({INDEPENDENCE})."
     )
     return FigureResult(
         f"{name}-{chosen.robot}",
-        f"Success by {TITLES[parameter]}",
+        f"{title} by {TITLES[parameter]}",
         figure,
         shows,
         n,

@@ -59,11 +59,11 @@ def criterion(store: Results, chosen: Selection) -> str:
     return f"visits all goals within {near[0]} cm" if near else "visits all goals"
 
 
-def by_value(store: Results, chosen: Selection, parameter: str) -> pd.DataFrame:
-    """Runs and successes of each task, value of ``parameter`` and evaluation."""
+def by_value(store: Results, chosen: Selection, parameter: str, success: str = "success") -> pd.DataFrame:
+    """Runs and successes (`success` or `ever_success`) of each task, value of ``parameter`` and evaluation."""
     return store.query(f"""
-        SELECT task, {parameter} AS value, evaluation, count(success) AS runs, count(*) FILTER (success) AS successes
-        FROM {outcomes(store, chosen)} WHERE success IS NOT NULL GROUP BY ALL ORDER BY ALL""")
+        SELECT task, {parameter} AS value, evaluation, count({success}) AS runs, count(*) FILTER ({success}) AS successes
+        FROM {outcomes(store, chosen)} WHERE {success} IS NOT NULL GROUP BY ALL ORDER BY ALL""")
 
 
 def at_the_end(store: Results, chosen: Selection) -> pd.DataFrame:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -15,7 +17,7 @@ from analysis.outcomes import by_seed, radii_cm
 from analysis.ranking import any_of, by_seed_array, extremes, ranking
 from analysis.results import NoDataError, Results
 from analysis.selection import Selection, selections
-from bns.plotting.style import GREY, note, ordered_styles, panels, style
+from bns.plotting.style import GREY, lettered, note, ordered_styles, panels, style
 
 NAME = "potential-success"
 PAPER = "figure 4.16"
@@ -38,6 +40,12 @@ def curve(store: Results, chosen: Selection, task: str, cells: pd.DataFrame) -> 
     return pd.DataFrame({"task": task, "evaluation": evaluations, "share": share, "low": low, "high": high})
 
 
+def each_curve(store: Results, chosen: Selection, task: str, cells: pd.DataFrame) -> pd.DataFrame:
+    """The same share of each combination: combination (its place in the ranking, from 1), evaluation, share."""
+    curves = [curve(store, chosen, task, cells.iloc[[place]]).assign(combination=place + 1) for place in range(len(cells))]
+    return pd.concat(curves)[["combination", "evaluation", "share"]]
+
+
 @style()
 def _draw(store: Results, chosen: Selection) -> FigureResult:
     rows = ranking(store, chosen)
@@ -45,15 +53,20 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     if not tops:
         raise NoDataError("no task has two combinations with enough runs; run bns sweep khepera-small")
     lines = {task: curve(store, chosen, task, cells) for task, cells in tops.items()}
-    figure, axes = panels(1, 3.4)
-    _panel(axes[0, 0], chosen, lines)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    singles = {task: each_curve(store, chosen, task, cells) for task, cells in tops.items()}
+    figure, axes = panels(len(tops), 2.6)
+    for number, (look, task) in enumerate(zip(ordered_styles(len(tops)), tops, strict=True)):
+        title = lettered(number, len(tops), task_title(chosen.robot, task))
+        _panel(axes[number, 0], lines[task], singles[task], look, title)
+    axes[0, 0].set_ylabel(f"runs within {RADIUS_CM} cm (%)")
     n, said = int(sum(cells.runs.sum() for cells in tops.values())), coverage(store, chosen.sweeps, chosen.n)
-    note(figure, "; ".join((f"{n:,} runs in the best combinations", *said.missing, f"bands: {BOOTSTRAP}")) + ".")
+    thin = "thin: each combination; thick: all of them"
+    note(figure, "; ".join((f"{n:,} runs in the best combinations", thin, *said.missing, f"bands: {BOOTSTRAP}")) + ".")
     shows = (
         f"Fraction of runs whose fittest controller visits all goals within {RADIUS_CM} cm, of the best "
-        f"{max(map(len, tops.values()))} combinations of each task; bands are {BOOTSTRAP}. n = {n:,} runs of "
-        f"{', '.join(chosen.sweeps)}. The best are picked by success at the last evaluation, so their success is overestimated."
+        f"{max(map(len, tops.values()))} combinations of each task, each by itself and all together; bands are {BOOTSTRAP}. "
+        f"n = {n:,} runs of {', '.join(chosen.sweeps)}. The best are picked by success at the last evaluation, so their success "
+        "is overestimated."
     )
     see = " ".join(_half(task_title(chosen.robot, task), line) for task, line in lines.items())
     return FigureResult(
@@ -62,16 +75,13 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     )  # fmt: skip
 
 
-def _panel(ax: Axes, chosen: Selection, lines: dict[str, pd.DataFrame]) -> None:
-    for look, (task, line) in zip(ordered_styles(len(lines)), lines.items(), strict=True):
-        every = max(1, len(line) // 6)
-        ax.fill_between(line.evaluation, 100 * line.low, 100 * line.high, color=look["color"], alpha=0.18, linewidth=0)
-        label = task_title(chosen.robot, task)
-        ax.plot(line.evaluation, 100 * line.share, **look, markevery=(every // 2, every), label=label)
+def _panel(ax: Axes, line: pd.DataFrame, singles: pd.DataFrame, look: dict[str, Any], title: str) -> None:
+    for _, single in singles.groupby("combination"):
+        ax.plot(single.evaluation, 100 * single.share, color=look["color"], linewidth=0.6, alpha=0.45, label="_each")
+    ax.fill_between(line.evaluation, 100 * line.low, 100 * line.high, color=look["color"], alpha=0.18, linewidth=0)
+    ax.plot(line.evaluation, 100 * line.share, color=look["color"], linewidth=2, label="all of them")
     ax.axhline(50, color=GREY, linewidth=0.8)
-    longest = max(line.evaluation.max() for line in lines.values())
-    ax.set(ylim=(-2, 102), xlim=(0, longest + 1), xlabel="evaluation in the world")
-    ax.set_ylabel(f"runs within {RADIUS_CM} cm (%)")
+    ax.set(ylim=(-2, 102), xlim=(0, line.evaluation.max() + 1), xlabel="evaluation in the world", title=title)
     ax.xaxis.set_major_locator(MaxNLocator(6, integer=True, steps=[1, 2, 5, 10]))
 
 

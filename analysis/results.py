@@ -15,7 +15,7 @@ from analysis.labels import CELL
 from bns import store as results_store
 from bns.errors import BnsError, SpecError, StoreError
 from bns.spec import FIELDS
-from bns.store.archive.kept import rounded_evals
+from bns.store.archive.kept import NEAR, rounded_evals
 from bns.store.archive.read import archives, connect_archives
 from bns.sweep.expand.grid import parse_sweep
 
@@ -26,6 +26,7 @@ PUBLISHED = Path("published") / "study.parquet"
 """The archive in the repository, below the folder of the results."""
 FROM_RUNS = "carry out the sweep and draw it from the runs"
 _TRIES = 5
+_EVER = ", ".join(f"ever_{name} AS {name}" for name in ("success", *NEAR))
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -53,14 +54,17 @@ class Results:
     """The results in one folder as they are now: all figures of one call show the same runs; with ``run``, that run alone.
 
     The same from an archive (`bns archive`), which has fewer tables and columns. Measures of ``evals`` are rounded to what an
-    archive keeps, so both give the same numbers.
+    archive keeps, so both give the same numbers. With ``so_far`` each success is that of any fittest controller up to then:
+    another reading of section 4.5's "a trial run which developed a controller".
 
     Raises:
         StoreError: there is no run at all, or not this one; the message says what to do.
     """
 
-    def __init__(self, results: Path | str, run: str | None = None, *, archived: bool = False) -> None:
-        self.results, self.run, self.archived = Path(results), run, archived
+    def __init__(
+        self, results: Path | str, run: str | None = None, *, archived: bool = False, so_far: bool = False
+    ) -> None:
+        self.results, self.run, self.archived, self.so_far = Path(results), run, archived, so_far
         self._tables: dict[str, str] = {}
         self.memory: dict[tuple[Any, ...], Any] = {}
         written = archived or any((self.results / name).is_dir() for name in ("runs", "journal"))
@@ -99,6 +103,7 @@ class Results:
         for table in OF_RUNS[:2] if self.archived else OF_RUNS:
             rows = f"memory.main.{table}"
             rows = f"({rounded_evals(rows)})" if table == "evals" and not self.archived else rows
+            rows = f"(SELECT * REPLACE ({_EVER}) FROM {rows})" if table == "evals" and self.so_far else rows
             connection.execute(f"CREATE TEMP VIEW {table} AS SELECT * FROM {rows} WHERE {only}")
         for name, sql in self._tables.items():
             connection.execute(f"CREATE TABLE {name} AS {sql}")

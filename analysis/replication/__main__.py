@@ -13,7 +13,7 @@ from analysis import advice, worlds
 from analysis.__main__ import figures
 from analysis.intervals import FEWEST_SEEDS
 from analysis.readings import compared, in_words
-from analysis.replication.numbers import Study, studies
+from analysis.replication.numbers import Study, by_either_reading, studies
 from analysis.replication.page import page
 from analysis.results import PUBLISHED, NoDataError, Results
 from bns.errors import BnsError
@@ -32,11 +32,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         store = Results(wanted.results) if wanted.fresh else Results(archive, archived=True)
         found = studies(store)
+        either = _either(found, Results(store.results, archived=store.archived, so_far=True))
         pictures = drawn(store, found, wanted.out.parent / "figures" / "replication", wanted.out.parent)
         paired = _readings(wanted.results if wanted.fresh else archive.with_name(READINGS), fresh=wanted.fresh)
         elsewhere = _worlds(wanted.results if wanted.fresh else archive.with_name(WORLDS), fresh=wanted.fresh)
         costs = [one.table for one in _of_the_archive(advice, store) if one.table is not None]
-        text = page(found, paired, elsewhere, costs, pictures, _origin(store, archive, fresh=wanted.fresh))
+        text = page(found, either, paired, elsewhere, costs, pictures, _origin(store, archive, fresh=wanted.fresh))
         publish(text.encode(), wanted.out.with_name(f".{wanted.out.name}.part"), wanted.out)
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -91,6 +92,13 @@ def _readings(place: Path, *, fresh: bool):  # type: ignore[no-untyped-def]  # a
         return None
     enough = rows[rows.n >= FEWEST_SEEDS]
     return pd.DataFrame([in_words(row) for row in enough.to_dict("records")]) if len(enough) else None
+
+
+def _either(found: Sequence[Study], so_far: Results):  # type: ignore[no-untyped-def]  # a table, or None
+    """The Khepera's findings by either reading of success; the snake's is said to be that of the fittest (section 5.8)."""
+    now = next((one for one in found if one.chosen.robot == "khepera"), None)
+    other = next((one for one in studies(so_far) if one.chosen.robot == "khepera"), None)
+    return None if now is None or other is None else by_either_reading(now, other)
 
 
 def _worlds(place: Path, *, fresh: bool):  # type: ignore[no-untyped-def]  # tables, one a robot

@@ -47,6 +47,17 @@ def studies(store: Results) -> list[Study]:
     ]
 
 
+def by_either_reading(now: Study, so_far: Study) -> pd.DataFrame:
+    """Findings that depend on whose success is meant: task, where, "the dissertation", then numbers and verdicts of either.
+
+    so_far: the same runs seen with `Results(so_far=True)`. That success is lost again can only be said of success now.
+    """
+    keys = ["task", "where", "the dissertation"]
+    both = now.findings.merge(so_far.findings, on=keys, suffixes=("", " so far"), validate="one_to_one")
+    differ = (both["these results"] != both["these results so far"]) & ~both["the dissertation"].str.contains("lost and regained")
+    return both[differ].reset_index(drop=True)
+
+
 def _tasks(store: Results, chosen: Selection) -> pd.DataFrame:
     cells = ", ".join(CELL)
     rows = store.query(f"""

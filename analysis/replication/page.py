@@ -19,6 +19,7 @@ ROBOTS = {"khepera": "Khepera", "snake": "Snake"}
 
 def page(
     studies: Sequence[Study],
+    either: pd.DataFrame | None,
     readings: pd.DataFrame | None,
     worlds: Sequence[pd.DataFrame],
     advice: Sequence[pd.DataFrame],
@@ -29,6 +30,7 @@ def page(
 
     Args:
         studies: one a robot.
+        either: findings by either reading of success (`by_either_reading`); None if there are none.
         readings: table of the paired runs; None if there are none.
         worlds: tables of the influence of parameters in two worlds, one a robot; empty if there are no runs.
         advice: tables of what the dissertation's advice costs, one a robot; empty if there are too few runs.
@@ -38,6 +40,7 @@ def page(
     parts = {
         "LOOK": "\n\n".join(_look(one) for one in studies),
         "FINDINGS": "\n\n".join(_findings(one, pictures) for one in studies),
+        "EITHER": "There are no such findings yet." if either is None or either.empty else _either(either),
         "READINGS": "There are no runs of other readings yet." if readings is None else table(readings),
         "WORLDS": "\n\n".join(map(table, worlds)) or "There are no runs of two worlds yet.",
         "ADVICE": "\n\n".join(map(table, advice)) or "There are too few runs yet.",
@@ -53,6 +56,22 @@ def table(rows: pd.DataFrame) -> str:
     """Rows as a table in Markdown."""
     lines = [list(map(str, rows.columns)), ["---"] * rows.shape[1], *rows.astype(str).to_numpy().tolist()]
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
+
+
+def _either(rows: pd.DataFrame) -> str:
+    """How many verdicts there are by either reading, and a row a finding."""
+    counts = pd.DataFrame(
+        {"success": ["now", "so far"]}
+        | {word: [int((rows[column] == word).sum()) for column in ("verdict", "verdict so far")] for word in VERDICTS.values()}
+    )
+    shown = pd.DataFrame({
+        "task": rows.task, "where": rows["where"], "the dissertation": rows["the dissertation"],
+        "success now": [f"{ours}; **{word}**" for ours, word in zip(rows["these results"], rows.verdict, strict=True)],
+        "success so far": [
+            f"{ours}; **{word}**" for ours, word in zip(rows["these results so far"], rows["verdict so far"], strict=True)
+        ],
+    })  # fmt: skip
+    return f"{table(counts)}\n\n{table(shown)}"
 
 
 def _look(one: Study) -> str:

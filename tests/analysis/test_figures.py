@@ -58,6 +58,7 @@ def test_every_figure_is_drawn_from_a_real_store_legibly_and_says_how_many_runs(
         "paths-khepera-infinity": 2,
         "potential-success-khepera": 10,
         "success-by-diversity-khepera": 20,
+        "success-so-far-by-mutation-khepera": 20,
         "success-by-mutation-khepera": 20,
         "success-so-far-khepera": 20,
         "trials-khepera": 2,

@@ -74,10 +74,15 @@ def test_potential_success_is_what_pandas_counts(study):
     best, _ = extremes(ranking(store, selections(store)[0]), "infinity")
     drawn = potential_success.draw(store)[0]
     own = load(study, "evals", where={"task": "infinity"}).merge(best[list(CELL)], on=list(CELL))
-    x, y = curves(drawn.figure)["infinity sign"]
+    place = next(number for number, ax in enumerate(drawn.figure.axes) if "infinity sign" in ax.get_title())
+    x, y = curves(drawn.figure, place)["all of them"]
     assert y == pytest.approx(100 * own.groupby("evaluation").success_20cm.mean().to_numpy(float))
     half = list(x)[int(np.argmax(y >= 50))]
     assert f"infinity sign: half of the runs by evaluation {half}." in drawn.see
+    thin = [line.get_ydata() for line in drawn.figure.axes[place].get_lines() if line.get_label() == "_each"]
+    first = own[(own[list(CELL)] == best[list(CELL)].iloc[0]).all(axis=1)]
+    assert len(thin) == len(best)
+    assert thin[0] == pytest.approx(100 * first.groupby("evaluation").success_20cm.mean().to_numpy(float))
 
 
 def test_confirmed_shares_are_of_fresh_seeds_alone_and_stand_beside_the_swept(tmp_path):

@@ -7,6 +7,8 @@ from figure_helpers import with_evals, written
 
 from analysis import advice, worlds
 from analysis.labels import CELL
+from analysis.replication.numbers import Study, by_either_reading
+from analysis.replication.page import page
 from analysis.results import NoDataError, Results
 from analysis.selection import comparing
 from bns.spec import RunSpec
@@ -91,3 +93,30 @@ def test_without_seeds_or_choice_there_is_no_regret():
     assert advice.regret(cells, sums[:4], counts[:4], "circle") is None
     assert advice.regret(cells.assign(population_size=50), sums, counts, "circle") is None
     assert advice.regret(cells, sums, np.where(np.arange(10)[:, None] < 7, 0.0, counts), "circle") is None  # 3 whole seeds
+
+
+def test_success_so_far_is_that_of_any_earlier_evaluation_in_every_radius(tmp_path):
+    now = np.arange(EVALUATIONS) == 3
+    spec = RunSpec(seed=1, evaluations=EVALUATIONS)
+    ever = {"ever_success": np.cumsum(now) > 0, "ever_success_14cm": np.ones(EVALUATIONS, bool)}
+    written(tmp_path, "mine", [with_evals(spec, success=now, success_14cm=now, **ever)])
+    for so_far, wanted, wide in ((False, 1, 1), (True, 7, 10)):
+        found = Results(tmp_path, so_far=so_far).query(
+            "SELECT count(*) FILTER (success) AS own, count(*) FILTER (success_14cm) AS wide FROM evals"
+        )
+        assert (found.own[0], found.wide[0]) == (wanted, wide)
+
+
+def test_findings_that_depend_on_whose_success_is_meant_stand_side_by_side():
+    def study(ours, verdict):
+        claims = zip(("gap", "diversity"), ours, verdict, strict=True)
+        rows = [("1, circle", "figure 4.7", *more) for more in claims]
+        rows.append(("1, circle", "section 4.4", "success is lost and regained in some runs", ours[0], verdict[0]))
+        return Study(None, None, pd.DataFrame(rows, columns=["task", "where", "the dissertation", "these results", "verdict"]))
+
+    rows = by_either_reading(study(["22", "4"], ["differs", "differs"]), study(["46", "4"], ["replicates", "differs"]))
+    assert rows["the dissertation"].tolist() == ["gap"]
+    text = page([], rows, None, [], [], {}, [])
+    assert "| 1, circle | figure 4.7 | gap | 22; **differs** | 46; **replicates** |" in text
+    assert "| now | 0 | 1 | 0 |" in text
+    assert "| so far | 1 | 0 | 0 |" in text
