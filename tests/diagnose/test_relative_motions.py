@@ -63,6 +63,18 @@ def log(tmp_path):
     return path
 
 
+def test_a_sensor_that_hangs_upside_down_is_not_taken_for_another_robot(tmp_path):
+    """Its motions are mirrored: they turn the other way than the wheels. Trials are shorter than the windows of this check."""
+    path = tmp_path / "laser.csv"
+    applied(motions().assign(sm_1=lambda log: -log.sm_1, sm_2=lambda log: -log.sm_2), MAPPING).to_csv(path, index=False)
+    with pytest.raises(DataError, match="turns opposite to the wheels"):
+        load_measured(path)
+    upright = MAPPING["columns"] | {"y_m": {"from": "sm_1", "scale": -1}, "heading_rad": {"from": "sm_2", "clockwise": True}}
+    mirrored = motions().assign(sm_1=lambda log: -log.sm_1, sm_2=lambda log: -log.sm_2)
+    applied(mirrored, MAPPING | {"columns": upright}).to_csv(path, index=False)
+    assert load_measured(path).tracks.trial[-1] == 299
+
+
 def test_each_row_becomes_a_trial_of_two_poses():
     table = applied(motions(3), MAPPING)
     assert table.groupby("trial").size().tolist() == [2, 2, 2]

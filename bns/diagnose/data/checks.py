@@ -357,7 +357,10 @@ def _ratio(commanded: np.ndarray, seen: np.ndarray) -> float:
 
 
 def _driven(table: pd.DataFrame) -> np.ndarray:
-    """For windows of about a second (windows, 4): way and turn commanded (base of 1 m), way and turn seen."""
+    """For windows of about a second (windows, 4): way and turn commanded (base of 1 m), way and turn seen.
+
+    A trial that is shorter than that, such as a single motion of a sensor, is a window.
+    """
     times, commands, poses = table["t_s"].to_numpy(), table[list(COMMANDS)].to_numpy(), table[list(POSE)].to_numpy()
     found = [np.zeros((0, 4))]
     for _, at in rows_by_trial(table):
@@ -370,6 +373,7 @@ def _driven(table: pd.DataFrame) -> np.ndarray:
         if not len(seen):
             continue
         marks = seen[np.unique(np.searchsorted(t[seen], np.arange(t[0], t[-1] + 1e-9, 1.0)).clip(max=len(seen) - 1))]
+        marks = seen[[0, -1]] if len(marks) < 2 and len(seen) > 1 else marks
         heading = np.zeros(len(t))
         heading[seen] = np.unwrap(pose[seen, 2])
         a, b = marks[:-1], marks[1:]
