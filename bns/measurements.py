@@ -9,12 +9,15 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from bns.errors import ModelError
+
+if TYPE_CHECKING:  # half a second to load, and a run needs no table
+    import pandas as pd
 
 COMMANDS = ("left_m_s", "right_m_s")
 POSE = ("x_m", "y_m", "heading_rad")
@@ -47,6 +50,8 @@ def trial_table(trial: int, commands: ArrayLike, poses: ArrayLike) -> pd.DataFra
     speeds = np.vstack([given[:, :2], [[np.nan, np.nan]]])
     times = np.concatenate([[0.0], np.cumsum(given[:, 2])])
     numbers = np.column_stack([times, speeds, tracked])
+    import pandas as pd  # noqa: PLC0415  # as above
+
     table = pd.DataFrame(numbers, columns=list(COLUMNS[1:]))
     table.insert(0, "trial", trial)
     return table

@@ -57,6 +57,18 @@ def test_help_loads_no_library():
     assert {name.split(".")[0] for name in done.stdout.split()} & slow == set()
 
 
+def test_a_run_and_a_sweep_do_not_wait_for_pandas(tmp_path):
+    """It takes as long to load as all else that a worker needs together. (Where kernels have to be compiled, numba loads it.)"""
+    code = "import sys, bns.sweep.runner\nfrom bns.spec import RunSpec\nfrom bns.sweep.jobs.job import run_job\n"
+    code += "record = run_job(RunSpec(evaluations=1, population_size=4, generations_per_evaluation=1))\n"
+    code += "assert record.run['status'] == 'ok', record.run['error']\nprint(*sys.modules)"
+    for _ in range(2):  # the second time kernels lie compiled on the disk
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
+    loaded = set(done.stdout.split())
+    assert "numba" in loaded
+    assert not {"pandas", "matplotlib"} & loaded
+
+
 def test_a_diagnosis_loads_nothing_that_only_figures_and_formulas_need():
     """Each takes half a second, of the four that a diagnosis of sixty trials takes."""
     code = "import sys, bns.api.add, bns.api.compare, bns.api.diagnose, bns.cli.commands.diagnose\nprint(*sys.modules)"

@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
-import pandas as pd
 
 from bns.tasks import Task
+
+if TYPE_CHECKING:  # half a second to load, and a run needs no table
+    import pandas as pd
 
 if TYPE_CHECKING:  # whoever only asks for the robots' names does not wait for the compiler
     from bns.engine.evolution import CommandBounds, Population

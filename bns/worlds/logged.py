@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-import pandas as pd
 
 from bns.engine.philox import Key, Purpose
 from bns.measurements import write_measurements
 from bns.robots.base import Robot
 from bns.worlds.base import RenderableWorld, World
+
+if TYPE_CHECKING:  # half a second to load, and a run needs no table
+    import pandas as pd
 
 
 class LoggedWorld:
@@ -41,4 +43,6 @@ class LoggedWorld:
 
     def write(self, path: Path) -> None:
         """All trials so far, as .csv or .parquet."""
+        import pandas as pd  # noqa: PLC0415  # as above
+
         write_measurements(pd.concat(self._trials, ignore_index=True), path, self._robot.measured_columns)

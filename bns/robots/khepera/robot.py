@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from bns.engine.breeding import breed
 from bns.engine.evolution import CommandBounds, Population, diversity, random_population
@@ -29,6 +29,9 @@ from bns.robots.khepera.rules import (
     START,
 )
 from bns.tasks import Task
+
+if TYPE_CHECKING:  # half a second to load, and a run needs no table
+    import pandas as pd
 
 UNITS_PER_M_S = 144_010.0
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from bns.engine.evolution import Population, diversity
 from bns.engine.philox import Key, Purpose, normals
@@ -30,6 +30,9 @@ from bns.robots.snake.rules import (
     SUBSTITUTE_SD_M,
 )
 from bns.tasks import Task
+
+if TYPE_CHECKING:  # half a second to load, and a run needs no table
+    import pandas as pd
 
 _NO_CHANGES = np.empty((5, 0))
 

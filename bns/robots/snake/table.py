@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
 
 from bns.robots.snake import cycles
 from bns.robots.snake.path import STABLE
+
+if TYPE_CHECKING:  # half a second to load, and a run needs no table
+    import pandas as pd
 
 GAIT = cycles.COLUMNS[:4]
 """What is in force from a row's time on; empty where no cycle is."""
@@ -31,6 +35,8 @@ def cycle_table(
     rows[:, 0, 2:6] = driven[:, :4]
     rows[:, :, 6:10] = observations[:, :8].reshape(n, 2, 4)
     rows[:, 1, 10] = observations[:, STABLE]
+    import pandas as pd  # noqa: PLC0415  # as above
+
     table = pd.DataFrame(rows.reshape(2 * n, -1), columns=list(COLUMNS[1:]))
     table.insert(0, "trial", trial)
     return table

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import duckdb
-import pandas as pd
 import pyarrow.parquet as pq
 
 from bns.errors import StoreError
@@ -18,6 +17,9 @@ from bns.store.disk.parquet import READ_FAULTS
 from bns.store.read.reader import finished
 from bns.store.read.views import pattern
 from bns.store.schema import METADATA_KEY, PARAMETERS
+
+if TYPE_CHECKING:  # half a second to load, and a run needs no table
+    import pandas as pd
 
 ARCHIVED = "archived"
 """Folder in the results: archives whose runs count as done."""
@@ -73,6 +75,8 @@ def archived(results: Path | str, sweep: str) -> pd.DataFrame:
     columns = "run_id, status, task, world, world_digest"
     files = stored_archives(results)
     if not files:
+        import pandas as pd  # noqa: PLC0415  # as above
+
         return pd.DataFrame(columns=columns.split(", "), dtype=str)
     with connect_archives(files) as connection:
         return connection.execute(f"SELECT {columns} FROM runs WHERE sweep = ? ORDER BY run_id", [sweep]).df()
@@ -101,6 +105,8 @@ def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:
     connection.execute(f"CREATE VIEW runs AS SELECT {', '.join(columns)} FROM archived")
     measures = DECIMALS | {name: decimals for name, decimals in COMPARED.items() if name in there}
     connection.execute(f"CREATE VIEW evals AS {_evals(measures)}")
+    import pandas as pd  # noqa: PLC0415  # as above
+
     connection.register("plans", pd.DataFrame(plans, columns=list(_SPECS)).astype(dict.fromkeys(_SPECS[:4], str)))
     connection.execute("CREATE TABLE specs AS SELECT DISTINCT * REPLACE (written_at::TIMESTAMPTZ AS written_at) FROM plans")
     return connection

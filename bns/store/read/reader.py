@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import duckdb
-import pandas as pd
 import pyarrow as pa
 
 from bns.errors import StoreError, unknown_name
@@ -15,6 +14,9 @@ from bns.store.read.question import answer, damage_hint
 from bns.store.read.snapshot import Snapshot, full_snapshot, snapshot
 from bns.store.read.views import connect_views
 from bns.store.schema import SCHEMAS, SORT_KEYS, read_columns
+
+if TYPE_CHECKING:  # half a second to load, and a run needs no table
+    import pandas as pd
 
 Where = str | Mapping[str, Any] | None
 _T = TypeVar("_T")
@@ -147,6 +149,8 @@ def _literal(value: Any) -> str:
 
 def _frame(table: pa.Table) -> pd.DataFrame:
     # Arrow gives truth values with gaps as objects, which neither average nor fit in memory.
+    import pandas as pd  # noqa: PLC0415  # as above
+
     frame: pd.DataFrame = table.to_pandas(types_mapper={pa.bool_(): pd.BooleanDtype()}.get)
     certain = [
         field.name
