@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from figure_helpers import with_evals, written
 
-from analysis import advice, worlds
+from analysis import advice, random_behaviour, worlds
 from analysis.labels import CELL
 from analysis.replication.numbers import Study, by_either_reading
 from analysis.replication.page import page
@@ -120,3 +120,18 @@ def test_findings_that_depend_on_whose_success_is_meant_stand_side_by_side():
     assert "| 1, circle | figure 4.7 | gap | 22; **differs** | 46; **replicates** |" in text
     assert "| now | 0 | 1 | 0 |" in text
     assert "| so far | 1 | 0 | 0 |" in text
+
+
+def test_simulators_are_compared_on_random_behaviour_by_seed():
+    draws = np.random.default_rng(0)
+    luck = draws.normal(0.3, 0.1, 8)
+    rows = [("circle", pre, seed, 40, luck[seed] + (0.0 if pre else 0.05)) for seed in range(8) for pre in (False, True)]
+    rows.append(("circle", True, 99, 40, 5.0))  # a seed without its partner
+    runs = pd.DataFrame(rows, columns=["task", "precomputed", "seed", "evaluations", "distance_m"])
+    row = random_behaviour.compared(runs).iloc[0]
+    assert (row.seeds, row.drives) == (8, 40)
+    assert [row.difference, row.difference_low, row.difference_high] == pytest.approx([0.05] * 3)
+    assert row.bns_low < row.bns < row.bns_high
+    assert random_behaviour.table(pd.DataFrame([row]))["difference (cm)"][0] == "5.0 (5.0 to 5.0)"
+    with pytest.raises(NoDataError, match="no seed of the sweep random-behaviour has both"):
+        random_behaviour.compared(runs[runs.precomputed])
