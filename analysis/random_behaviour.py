@@ -22,9 +22,10 @@ def draw(store: Results) -> list[FigureResult]:
     runs = of_each_run(store)
     data = compared(runs)
     shows = (
-        "Distance between where ten random controllers of five commands end in the simulator at the end of a run and in the world, "
-        "mean of the ten, then over runs: networks of Bootstrapped Neuro-Simulation, and networks trained once on as many random "
-        f"drives. 95 % bootstrap intervals over seeds, from {FEWEST_SEEDS} on; the difference is paired by seed. n = {len(runs)} runs."
+        "Distance between where ten random controllers of five commands end in the simulator at the end of a run and in the "
+        "world, mean of the ten, then over runs: networks of Bootstrapped Neuro-Simulation, and networks trained once on as many "
+        f"random drives. 95 % bootstrap intervals over seeds, from {FEWEST_SEEDS} on; the difference is paired by seed. "
+        f"n = {len(runs)} runs."
     )
     title = "Simulators on random behaviour"
     return [FigureResult(NAME, title, None, shows, len(runs), (NAME,), data=data, table=table(data))]
