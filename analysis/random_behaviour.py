@@ -1,10 +1,14 @@
 """Section 6.4: is a simulator that develops with its controllers worse on random behaviour than a pre-computed one?
 
-`sweeps/random-behaviour.yaml` makes the runs: BNS, and networks that are trained once on as many random drives. Both are asked
+`python -m analysis.random_behaviour` writes down what the page of what replicates shows of it. `sweeps/random-behaviour.yaml`
+makes the runs: BNS, and networks that are trained once on as many random drives. Both are asked
 where ten random controllers of five commands end (as in figure 4.17b). The same seeds have the same ten controllers.
 """
 
 from __future__ import annotations
+
+import argparse
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -77,3 +81,16 @@ def table(rows: pd.DataFrame) -> pd.DataFrame:
             for value, low, high in zip(rows[name], rows[f"{name}_low"], rows[f"{name}_high"], strict=True)
         ]
     return pd.DataFrame(said)
+
+
+def main() -> None:
+    """A row a run, distances to a tenth of a millimetre."""
+    parser = argparse.ArgumentParser(prog="python -m analysis.random_behaviour", description=__doc__)
+    parser.add_argument("--results", type=Path, default=Path("results"))
+    parser.add_argument("--out", type=Path, default=Path("results/published/random-behaviour.csv"))
+    wanted = parser.parse_args()
+    of_each_run(Results(wanted.results)).round({"distance_m": 4}).to_csv(wanted.out, index=False)
+
+
+if __name__ == "__main__":
+    main()

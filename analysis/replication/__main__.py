@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
-from analysis import advice, worlds
+from analysis import advice, random_behaviour, worlds
 from analysis.__main__ import figures
 from analysis.intervals import FEWEST_SEEDS
 from analysis.readings import compared, in_words
@@ -22,6 +22,8 @@ from bns.store.disk.files import publish
 
 READINGS, WORLDS = "readings.parquet", "worlds.parquet"
 """The archives of the paired runs and of the runs in two worlds, beside that of the study."""
+RANDOM = "random-behaviour.csv"
+"""What `python -m analysis.random_behaviour` has written down of the runs: an archive keeps no probes."""
 _CHAPTER = {"khepera": "4", "snake": "5"}
 
 
@@ -37,7 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         paired = _readings(wanted.results if wanted.fresh else archive.with_name(READINGS), fresh=wanted.fresh)
         elsewhere = _worlds(wanted.results if wanted.fresh else archive.with_name(WORLDS), fresh=wanted.fresh)
         costs = [one.table for one in _of_the_archive(advice, store) if one.table is not None]
-        text = page(found, either, paired, elsewhere, costs, pictures, _origin(store, archive, fresh=wanted.fresh))
+        random = _random(wanted.results, fresh=wanted.fresh)
+        origin = _origin(store, archive, fresh=wanted.fresh)
+        text = page(found, either, paired, elsewhere, costs, random, pictures, origin)
         publish(text.encode(), wanted.out.with_name(f".{wanted.out.name}.part"), wanted.out)
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
@@ -99,6 +103,17 @@ def _either(found: Sequence[Study], so_far: Results):  # type: ignore[no-untyped
     now = next((one for one in found if one.chosen.robot == "khepera"), None)
     other = next((one for one in studies(so_far) if one.chosen.robot == "khepera"), None)
     return None if now is None or other is None else by_either_reading(now, other)
+
+
+def _random(results: Path, *, fresh: bool):  # type: ignore[no-untyped-def]  # a table, or None
+    import pandas as pd  # noqa: PLC0415
+
+    place = (results / PUBLISHED).with_name(RANDOM)
+    try:
+        runs = random_behaviour.of_each_run(Results(results)) if fresh else pd.read_csv(place)
+        return random_behaviour.table(random_behaviour.compared(runs))
+    except (NoDataError, FileNotFoundError):
+        return None
 
 
 def _worlds(place: Path, *, fresh: bool):  # type: ignore[no-untyped-def]  # tables, one a robot

@@ -23,6 +23,7 @@ def page(
     readings: pd.DataFrame | None,
     worlds: Sequence[pd.DataFrame],
     advice: Sequence[pd.DataFrame],
+    random: pd.DataFrame | None,
     pictures: Mapping[str, str],
     origin: Sequence[str],
 ) -> str:
@@ -34,6 +35,7 @@ def page(
         readings: table of the paired runs; None if there are none.
         worlds: tables of the influence of parameters in two worlds, one a robot; empty if there are no runs.
         advice: tables of what the dissertation's advice costs, one a robot; empty if there are too few runs.
+        random: table of simulators on random behaviour; None if there are no runs.
         pictures: "figure 4.7" -> path of a picture, relative to the page.
         origin: lines that say where the numbers come from.
     """
@@ -44,6 +46,7 @@ def page(
         "READINGS": "There are no runs of other readings yet." if readings is None else table(readings),
         "WORLDS": "\n\n".join(map(table, worlds)) or "There are no runs of two worlds yet.",
         "ADVICE": "\n\n".join(map(table, advice)) or "There are too few runs yet.",
+        "RANDOM": "There are no runs of this yet." if random is None else table(random),
         "ORIGIN": "\n".join(f"- {line}" for line in origin),
     }
     text = TEMPLATE.read_text(encoding="utf-8")
