@@ -17,7 +17,7 @@ from analysis.figure_result import FigureResult
 from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
 from analysis.labels import CELL, counted, task_title
 from analysis.multiple_tests import holm
-from analysis.outcomes import criterion
+from analysis.outcomes import NEAR, criterion
 from analysis.ranking import TEN, in_words, ranking, varied
 from analysis.results import Results
 from analysis.selection import CONFIRMING, Selection, selections
@@ -38,11 +38,13 @@ def draw(store: Results) -> list[FigureResult]:
 
 
 def confirmed(store: Results, chosen: Selection, task: str) -> pd.DataFrame:
-    """Runs and successes at the last evaluation of each combination that was rerun on fresh seeds."""
+    """Of each combination that was rerun on fresh seeds, at the last evaluation: confirm_runs, confirm_successes, and successes
+    within each radius, confirm_success_7cm and so on."""
     rerun = chosen.of([sweep + CONFIRMING for sweep in chosen.sweeps])
     # A seed that took part in picking the best confirms nothing.
     return store.query(f"""
-        SELECT {", ".join(CELL)}, count(*) AS confirm_runs, count(*) FILTER (success) AS confirm_successes
+        SELECT {", ".join(CELL)}, count(*) AS confirm_runs, count(*) FILTER (success) AS confirm_successes,
+               {", ".join(f"count(*) FILTER ({name}) AS confirm_{name}" for name in NEAR)}
         FROM evals JOIN ({rerun}) AS rerun USING (run_id, sweep)
         WHERE task = '{task}' AND evaluation = evaluations AND run_id NOT IN (SELECT run_id FROM ({chosen.sql}))
         GROUP BY ALL""")

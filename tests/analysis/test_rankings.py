@@ -9,6 +9,7 @@ import pytest
 from figure_helpers import MUTATION, carry_out, curves, with_evals, written
 
 from analysis import best_combinations, diversity_of_extremes, potential_success
+from analysis.checks import best_combination
 from analysis.labels import CELL
 from analysis.ranking import extremes, in_words, ranking
 from analysis.results import NoDataError, Results
@@ -98,6 +99,12 @@ def test_confirmed_shares_are_of_fresh_seeds_alone_and_stand_beside_the_swept(tm
     assert "100 % as swept and 25 % on fresh seeds" in drawn.see
     assert "8 runs on fresh seeds" in drawn.shows
     assert not any("confirm" in text for text in drawn.missing)
+    store = Results(tmp_path)
+    said = best_combination(store, selections(store)[0], "circle", "success", 76)
+    assert said.ours.startswith("25 (7 to 59) % of 8 runs on fresh seeds, the best of 1 that were rerun")
+    assert said.verdict == "differs"
+    wide = best_combination(store, selections(store)[0], "circle", "success_20cm", 25)
+    assert "8 runs on fresh seeds" in wide.ours
 
 
 def test_a_confirming_sweep_is_not_pooled_with_what_it_confirms(tmp_path):
