@@ -47,18 +47,27 @@ class Rest:
 
 
 class Simulator:
-    """Drives of one mechanism. Rows are simulated longest first, so that those that go on stand together."""
+    """Drives of one mechanism. Rows are simulated longest first, so that those that go on stand together.
 
-    def __init__(self, machine: Machine, drives: Sequence[Drive], threads: int) -> None:
+    ``told_rad_s``: the fastest that servos are told to move; where it is not given, in these drives.
+    """
+
+    def __init__(
+        self, machine: Machine, drives: Sequence[Drive], threads: int, told_rad_s: float | None = None
+    ) -> None:
         self.machine, self._threads = machine, threads
         self.drives = tuple(drives)
         self._lasts = np.array([int(d.frames[-1]) for d in drives])
         self._order = np.argsort(-self._lasts, kind="stable")
         self._dt_s = float(machine.model.opt.timestep)
-        self._told_rad_s = told_speed_rad_s(drives, self._dt_s)
+        self._told_rad_s = told_speed_rad_s(drives, self._dt_s) if told_rad_s is None else told_rad_s
         self.counts = np.array([len(d.frames) for d in drives])
         self.simulated = 0
         """Rows simulated so far."""
+
+    def only(self, chosen: NDArray[np.int64]) -> Simulator:
+        """Some of the drives, by servos as fast as those of all."""
+        return Simulator(self.machine, [self.drives[i] for i in chosen], self._threads, self._told_rad_s)
 
     def at_rest(self) -> Rest:
         """Every body come to rest in the first posture of its drive; then driven once for where it is first seen."""
@@ -173,7 +182,8 @@ class _Servos:
         self, machine: Machine, plant: Plant, set_points: Sequence[Array], dt_s: float, told_rad_s: float
     ) -> None:
         p, m = plant, machine
-        self._wanted = _delayed(set_points, max(0.0, (m.mechanism.delay_s + p.delay_s) / dt_s)) + p.zero_rad
+        heard = [np.clip(told, *m.told.T) for told in set_points]
+        self._wanted = _delayed(heard, max(0.0, (m.mechanism.delay_s + p.delay_s) / dt_s)) + p.zero_rad
         self._band = m.mechanism.dead_band_rad + p.dead_band_rad
         self._stiffness = p.stiffness
         self._furthest = m.torque_n_m * p.torque / m.stiffness_n_m_rad
