@@ -92,7 +92,7 @@ class JointedPredictor:
         if wild.any() and not wild.all():
             kept = np.flatnonzero(~wild)
             simulations, far_m = simulations.only(kept), far_m[kept]
-        self._exactly = simulations.exactly()
+        self._exactly = simulations.exactly(bare)
         self._setup(simulations, bare)
         chance = _Chance(self._luck(), far_m)
         self._foresee(chance)
@@ -106,15 +106,15 @@ class JointedPredictor:
         light.near, light.horizons, light._tracking_m = self.near, self.horizons, self._tracking_m
         light.left_out, light.not_taken = 0, 0
         light._exactly = self._exactly[self._simulations.looks_of(chosen)]
-        light._setup(self._simulations.only(chosen), self._bare)
+        light._setup(self._simulations.only(chosen), self._bare, finely=False)
         own = chance.only(chosen, self._frames_of(chosen), light._stretches)
         light._foresee(own)
         light.screening = light._light(own, cycles[1:]) if len(cycles) > 1 and len(chosen) > cycles[1] else None
         return light
 
-    def _setup(self, simulations: Simulations, bare: JointedModel) -> None:
+    def _setup(self, simulations: Simulations, bare: JointedModel, finely: bool = True) -> None:
         self._simulations, self._bare = simulations, bare
-        self._responses = Responses(simulations.seen, bare, self._exactly, _SHARES)
+        self._responses = Responses(simulations.seen, bare, self._exactly, _SHARES, simulations.exactly if finely else None)
         self._stretches = simulations.tracks
         self.tracks: Tracks = self._stretches
         self._measured_apart = apart(self._stretches.points_m)

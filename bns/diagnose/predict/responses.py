@@ -39,12 +39,18 @@ class Responses:
 
     ``simulate`` gives what is seen of a model, any shape; ``bare``: the model without effects; ``exactly``: the same simulated
     more finely, to which differences are added. ``shares``: nodes, as shares of the way from neutral to what is plausible.
+    ``finely``: simulates anchors finely, too; without it they are as coarse as the nodes, and differ from ``exactly`` as these.
     """
 
     def __init__(
-        self, simulate: Callable[[Model], Array], bare: Model, exactly: Array | None, shares: tuple[float, ...]
+        self,
+        simulate: Callable[[Model], Array],
+        bare: Model,
+        exactly: Array | None,
+        shares: tuple[float, ...],
+        finely: Callable[[Model], Array] | None = None,
     ) -> None:
-        self._simulate, self._bare, self._shares = simulate, bare, shares
+        self._simulate, self._bare, self._shares, self._finely = simulate, bare, shares, finely
         self._sound = simulate(bare)
         self._anchors = [_Anchor({}, self._sound if exactly is None else exactly)]
         self._curves: dict[Number, dict[float, Array]] = {}
@@ -84,9 +90,14 @@ class Responses:
             refined = [self._refined(number, value) for number, value in wanted.items()]
             if min(self._distance(a.values, wanted) for a in self._anchors) <= _NEAR:
                 return any(refined)
-            change = self._simulate(model) - self._sound
-            self._anchors.append(_Anchor(wanted, self._anchors[0].seen + change))
+            self._anchors.append(_Anchor(wanted, self._whole(model)))
             return True
+
+    def _whole(self, model: Model) -> Array:
+        """What is seen of a model, all its numbers acting on each other."""
+        if self._finely is not None:
+            return self._finely(model)
+        return self._anchors[0].seen + self._simulate(model) - self._sound
 
     def _refined(self, number: Number, value: float) -> bool:
         """Simulate a curve close to a value, on either side, where it is not known there; not closer: such slopes are chance."""

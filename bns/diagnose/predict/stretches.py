@@ -15,7 +15,7 @@ from bns.physics.jointed.drives import Drive
 from bns.physics.jointed.mechanism import Mechanism, machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.jointed.plant import Plant, Sighting
-from bns.physics.jointed.simulate import Simulator, replace_state
+from bns.physics.jointed.simulate import Rest, Simulator, joined, replace_state
 from bns.physics.model import Model
 from bns.sweep.jobs.cores import cores
 
@@ -31,23 +31,16 @@ class _Known:
     done: NDArray[np.bool_]
 
 
-class _Body:
-    """All stretches at two step lengths. No stretch is simulated twice with the same plant, whoever asks for it.
+class _Level:
+    """All stretches in steps of one length. None is simulated twice with the same plant, whoever asks for it.
 
-    ``tracks`` of all stretches; ``first`` (stretches + 1,): where the looks of each begin.
+    ``first`` (stretches + 1,): where the looks of each begin.
     """
 
-    def __init__(self, tracks: StretchTracks, mechanism: Mechanism) -> None:
-        fine_s = float(machine(mechanism).model.opt.timestep)
-        looks = _looks(tracks, fine_s)
-        self.fine, self._coarse = (
-            Simulator(machine(mechanism, dt_s), _drives(tracks, dt_s, looks), cores())
-            for dt_s in (fine_s, _COARSER * fine_s)
-        )
-        self.first = np.concatenate([[0], np.cumsum(self.fine.counts)]).astype(np.int64)
-        self.plant = self._coarse.machine.plant
-        self._rest = self._coarse.at_rest()
+    def __init__(self, simulator: Simulator, first: NDArray[np.int64]) -> None:
+        self.simulator, self.first = simulator, first
         self._known: dict[bytes, _Known] = {}
+        self._rests: dict[int, Rest] = {}
         self._lock = RLock()
 
     def looks_of(self, stretches: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -55,7 +48,7 @@ class _Body:
         return np.concatenate([np.arange(self.first[i], self.first[i + 1]) for i in stretches])
 
     def seen(self, plant: Plant, stretches: NDArray[np.int64]) -> Array:
-        """What is seen of a plant in some stretches, in long steps; (looks, 3, sites, 2)."""
+        """What is seen of a plant in some stretches; (looks, 3, sites, 2)."""
         with self._lock:
             known = self._known.setdefault(plant.key, self._nothing())
             new = stretches[~known.done[stretches]]
@@ -64,20 +57,38 @@ class _Body:
                 known.done[new] = True
             return known.seen[self.looks_of(stretches)]
 
-    def exactly(self, stretches: NDArray[np.int64]) -> Array:
-        """The same of the sound plant in the model's own steps."""
-        fine = self.fine.only(stretches)
-        return _stacked(fine.sightings(fine.machine.plant, fine.at_rest()))
-
     def _nothing(self) -> _Known:
-        sites = len(self.fine.machine.mechanism.sites)
+        sites = len(self.simulator.machine.mechanism.sites)
         return _Known(np.zeros((self.first[-1], 3, sites, 2)), np.zeros(len(self.first) - 1, dtype=bool))
 
     def _simulated(self, plant: Plant, stretches: NDArray[np.int64]) -> Array:
-        coarse, rest = self._coarse.only(stretches), self._rest.only(stretches)
+        simulator, rest = self.simulator.only(stretches), self._rest(stretches)
         if (np.minimum(plant.stiffness, plant.torque) < 1).any():  # a servo that gives no torque did not bring its joint anywhere
-            rest = replace_state(rest, coarse.settled(plant))
-        return _stacked(coarse.sightings(plant, rest))
+            rest = replace_state(rest, simulator.settled(plant))
+        return _stacked(simulator.sightings(plant, rest))
+
+    def _rest(self, stretches: NDArray[np.int64]) -> Rest:
+        """Where the sound body begins some stretches."""
+        new = [i for i in stretches.tolist() if i not in self._rests]
+        if new:
+            found = self.simulator.only(np.array(new)).at_rest()
+            self._rests |= {i: found.only(np.array([k])) for k, i in enumerate(new)}
+        return joined([self._rests[i] for i in stretches.tolist()])
+
+
+class _Body:
+    """All stretches, in the model's own steps and in longer ones."""
+
+    def __init__(self, tracks: StretchTracks, mechanism: Mechanism) -> None:
+        fine_s = float(machine(mechanism).model.opt.timestep)
+        looks = _looks(tracks, fine_s)
+        simulators = [
+            Simulator(machine(mechanism, dt_s), _drives(tracks, dt_s, looks), cores())
+            for dt_s in (fine_s, _COARSER * fine_s)
+        ]
+        first = np.concatenate([[0], np.cumsum(simulators[0].counts)]).astype(np.int64)
+        self.fine, self.coarse = (_Level(simulator, first) for simulator in simulators)
+        self.plant = simulators[0].machine.plant
 
 
 class Simulations:
@@ -88,10 +99,11 @@ class Simulations:
 
     def __init__(self, body: _Body, tracks: StretchTracks, chosen: NDArray[np.int64]) -> None:
         self.tracks, self._body, self._chosen = tracks, body, chosen
-        self._counts = body.fine.counts[chosen]
+        simulator = body.fine.simulator
+        self._counts = simulator.counts[chosen]
         self._first = np.concatenate([[0], np.cumsum(self._counts)])
-        step_s = float(body.fine.machine.model.opt.timestep)
-        drives = [body.fine.drives[i] for i in chosen]
+        step_s = float(simulator.machine.model.opt.timestep)
+        drives = [simulator.drives[i] for i in chosen]
         self._look_s = np.concatenate([(d.frames - d.frames[0]) * step_s for d in drives])
 
     @classmethod
@@ -110,18 +122,19 @@ class Simulations:
         """Some of the stretches."""
         return Simulations(self._body, self.tracks.of(chosen), self._chosen[chosen])
 
-    def exactly(self) -> Array:
-        """What is seen of the model without effects, simulated finely: (looks, 3, sites, 2)."""
-        return self._body.exactly(self._chosen)
+    def exactly(self, model: Model) -> Array:
+        """What is seen of a model, simulated finely; (looks, 3, sites, 2)."""
+        assert isinstance(model, JointedModel)
+        return self._body.fine.seen(model.plant, self._chosen)
 
     def seen(self, model: Model) -> Array:
-        """What is seen of a model, simulated coarsely; (looks, 3, sites, 2)."""
+        """The same, simulated coarsely."""
         assert isinstance(model, JointedModel)
         return self.seen_of(model.plant)
 
     def seen_of(self, plant: Plant) -> Array:
         """The same of a plant."""
-        return self._body.seen(plant, self._chosen)
+        return self._body.coarse.seen(plant, self._chosen)
 
     @property
     def plant(self) -> Plant:

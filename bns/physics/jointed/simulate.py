@@ -6,7 +6,7 @@ What a servo does within a step (dead band, delay, limits, sag) is worked out fo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -86,7 +86,7 @@ class Simulator:
     def settled(self, plant: Plant) -> Array:
         """States (drives, n) of every body put down in the first posture of its drive and come to rest.
 
-        A joint is put down as far from its rest position to its set point as its servo is strong: one that gives no torque has
+        A joint is put down as near its set point as its servo brings it against its own friction: one that gives no torque has
         not moved there.
         """
         hold = round(SETTLE_S / self._dt_s)
@@ -112,19 +112,29 @@ class Simulator:
         return Sighting(moved[:, :, 0], moved[:, :, 1], moved[:, :, 2])
 
     def _put_down(self, plant: Plant) -> Array:
-        """States with every joint at its first set point, as far as its servo is strong; the lowest geom just above the floor."""
-        m, strength = self.machine, np.clip(np.minimum(plant.stiffness, plant.torque), 0.0, 1.0)
+        """States with every joint as near its first set point as its servo brings it; the lowest geom just above the floor."""
+        m, short = self.machine, self._short_rad(plant)
         data, model = mujoco.MjData(m.model), m.model
         rows = np.zeros((len(self.drives), mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
         for row, drive in zip(rows, self.drives, strict=True):
             qpos = model.qpos0.copy()
-            qpos[m.joint_at] += strength * (drive.set_points[0] - qpos[m.joint_at])
+            way = drive.set_points[0] - qpos[m.joint_at]
+            qpos[m.joint_at] += np.sign(way) * np.maximum(np.abs(way) - short, 0.0)
             if m.free:
                 data.qpos[:] = qpos
                 mujoco.mj_kinematics(model, data)
                 qpos[2] -= _lowest_m(model, data) - _CLEAR_M
             row[1 : 1 + model.nq] = qpos
         return rows
+
+    def _short_rad(self, plant: Plant) -> Array:
+        """How far short of its set point friction stops each joint, (joints,), beyond where it stops one with a sound servo."""
+        m, strength = self.machine, np.clip(np.minimum(plant.stiffness, plant.torque), 0.0, 1.0)
+        friction = m.model.dof_frictionloss[m.model.jnt_dofadr[m.model.actuator_trnid[:, 0]]]
+        short: Array = np.full(len(strength), np.inf)
+        moves = strength > 0
+        short[moves] = (friction / m.stiffness_n_m_rad)[moves] * (1 / strength[moves] - 1)
+        return short
 
     def _stepped(self, plant: Plant, rest: Rest) -> tuple[Array, Array]:
         """Sensors in every frame (frames, n), and the states at the ends of the drives (drives, n)."""
@@ -168,6 +178,11 @@ class Simulator:
             seen[row] = np.array(frames)
         back = np.argsort(order)
         return np.concatenate([seen[i] for i in back]), state[back]
+
+
+def joined(rests: Sequence[Rest]) -> Rest:
+    """Drives one after the other."""
+    return Rest(*(np.concatenate([getattr(rest, f.name) for rest in rests]) for f in fields(Rest)))
 
 
 def replace_state(rest: Rest, state: Array) -> Rest:
