@@ -91,6 +91,14 @@ def test_geoms_that_have_no_name_get_one():
     assert [name for name, _ in links] == ["trunk", *(f"{leg}_{part}" for leg in dog.LEGS for part in ("thigh", "calf"))]
 
 
+def test_links_of_a_robot_that_is_fixed_to_the_world_lie_on_no_floor(tmp_path):
+    file = tmp_path / "fixed.xml"
+    file.write_text(dog.xml().replace("<freejoint/>", ""))
+    fixed = load_body(str(file), sites=list(dog.SITES))
+    assert machine(fixed.mechanism).on_the_floor
+    assert not [name for name in fixed.catalogue() if "friction" in name]
+
+
 @pytest.mark.slow
 def test_the_strength_of_a_knee_is_found(file, tmp_path):
     added = bns.add(dog.log(10, seed=3, strength=0.4), "weak-joint-FR_calf_joint", bns.Model(file, sites=list(dog.SITES)))

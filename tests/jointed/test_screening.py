@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bns.diagnose import diagnosis
 from bns.diagnose.estimate.fit import Problem
 from bns.diagnose.estimate.noise import gathered, huber, length
 from bns.diagnose.predict.responses import Responses
 from bns.diagnose.select import screening, stepwise
-from bns.diagnose.select.result import Candidate
+from bns.diagnose.select.result import Candidate, SelectionStep
 from bns.physics.effect import Effect, Parameter
 from bns.physics.jointed.model_files import load_body
 
@@ -187,3 +188,12 @@ def test_what_numbers_of_the_base_gain_on_few_tracks_is_no_effect_s_gain():
     problem_of = problem.whitened
     problem.whitened = lambda model: problem_of(model) + 0.5 * given[..., 0]
     assert screening._scored_at(problem, pulled, effect, (0.4,)).gain == pytest.approx(plain.gain, rel=0.2)
+
+
+@pytest.mark.parametrize(("of_how_many", "hinted"), [(2, True), (55, False)])
+def test_a_sign_of_too_few_trials_is_judged_by_all_effects_that_were_screened(of_how_many, hinted):
+    earned = SimpleNamespace(p_value=0.02, z=3.0, elpd_diff=1.0)
+    candidate = SimpleNamespace(rejected_because="", paired_comparison=earned)
+    step = SelectionStep((candidate, candidate), 0.1, "", of=of_how_many)
+    found = SimpleNamespace(accepted=(), steps=(step,), nominal=SimpleNamespace(losses=np.ones(9)))
+    assert (diagnosis._hint(found, 9) is candidate) is hinted
