@@ -76,9 +76,10 @@ def one_sided(which):
 def test_a_multiple_is_screened_both_ways():
     problem, base, effect = one_sided((0.3, 4.0))  # upwards it may go further, so one way alone would be that way
     upwards = screening._scored_at(problem, base, effect, (4.0**0.6,))
-    both = screening._scored(problem, base, effect)
+    both = screening._scored(problem, base, effect, tuple(screening._ways(effect)))
     assert both.gain > 10 * upwards.gain
     assert both.p_value < 1e-3
+    assert both.values == (pytest.approx(0.3**0.6),)
 
 
 @pytest.mark.parametrize(
@@ -159,9 +160,11 @@ def test_all_effects_are_screened_on_the_fewest_tracks_and_the_better_ones_on_mo
     last = SimpleNamespace(screening=None, size=21, anchor=lambda model: True, steps=lambda model: None)
     light = SimpleNamespace(screening=last, size=64, anchor=lambda model: True, steps=lambda model: None)
 
-    def scored(few, _base, effect):
+    def scored(few, _base, effect, ways):
         asked[few.predictor.size].append(effect.name)
-        return of(effect.name, gains[effect.name], 0.3 if effect.name == "e58" and few.predictor.size == 64 else 0.01)
+        assert ways == (((0.5,), (2.0,)) if few.predictor.size == 21 else ((0.5,),))  # later at the values that did best
+        chance = 0.3 if effect.name == "e58" and few.predictor.size == 64 else 0.01
+        return screening.Screened(effect, gains[effect.name], chance, (0.5,))
 
     def problem(predictor, *_):
         noise = SimpleNamespace(noise=None)
@@ -170,6 +173,7 @@ def test_all_effects_are_screened_on_the_fewest_tracks_and_the_better_ones_on_mo
         )
 
     monkeypatch.setattr(screening, "_scored", scored)
+    monkeypatch.setattr(screening, "_ways", lambda _effect: [(0.5,), (2.0,)])
     monkeypatch.setattr(screening, "problem_with_noise", problem)
     effects = [SimpleNamespace(name=name) for name in gains]
     whole = problem(SimpleNamespace(screening=light, size=142))

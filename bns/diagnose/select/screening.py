@@ -28,25 +28,32 @@ _SHARE = DEFAULTS.select.screen_share
 
 @dataclass(frozen=True)
 class Screened:
-    """An effect, by how much its numbers could lower the loss to first order, and the chance of such a pull by luck."""
+    """An effect, by how much its numbers could lower the loss to first order, and the chance of such a pull by luck.
+
+    ``values``: at which this was found, of those that are tried.
+    """
 
     effect: Effect
     gain: float
     p_value: float
+    values: tuple[float, ...] = ()
 
 
 def screened(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> list[Screened]:
     """Effects on the tracks of a predictor, the one that could lower the loss most first.
 
-    A predictor that has fewer tracks to screen on tries all effects on those, and on all of its own only the better ones.
+    A predictor that has fewer tracks to screen on tries all effects on those, and on all of its own only the better ones, each
+    at the values that did best.
     """
+    ways = {effect.name: tuple(_ways(effect)) for effect in effects}
     light = problem.predictor.screening
     if light is not None:
         light.anchor(fit.model)
         few = problem_with_noise(light, light.steps(fit.model), problem.pose_filter.noise)
         found = screened(few, few.fit(fit.model, rounds=0), effects)
-        effects = [s.effect for s in (_first(found) if light.screening is None else _likely(found, CHANCE))]
-    return sorted((_scored(problem, fit, effect) for effect in effects), key=lambda s: -s.gain)
+        kept = _first(found) if light.screening is None else _likely(found, CHANCE)
+        effects, ways = [s.effect for s in kept], {s.effect.name: (s.values,) for s in kept}
+    return sorted((_scored(problem, fit, effect, ways[effect.name]) for effect in effects), key=lambda s: -s.gain)
 
 
 def worth_a_fit(found: Sequence[Screened]) -> list[Effect]:
@@ -71,8 +78,8 @@ def _near_the_best(found: Sequence[Screened]) -> Sequence[Screened]:
     return [s for s in found if s.gain >= _BEHIND * best]
 
 
-def _scored(few: Problem, base: Fit, effect: Effect) -> Screened:
-    return max((_scored_at(few, base, effect, values) for values in _ways(effect)), key=lambda s: s.gain)
+def _scored(few: Problem, base: Fit, effect: Effect, ways: Sequence[tuple[float, ...]]) -> Screened:
+    return max((_scored_at(few, base, effect, values) for values in ways), key=lambda s: s.gain)
 
 
 def _ways(effect: Effect) -> Iterator[tuple[float, ...]]:
@@ -93,16 +100,16 @@ def _ways(effect: Effect) -> Iterator[tuple[float, ...]]:
             yield (bound,)
 
 
-def _scored_at(few: Problem, base: Fit, effect: Effect, values: Sequence[float]) -> Screened:
+def _scored_at(few: Problem, base: Fit, effect: Effect, values: tuple[float, ...]) -> Screened:
     columns = np.stack([_column(few, base, effect, index, value) for index, value in enumerate(values)], axis=2)
     columns = columns[..., np.abs(columns).max(axis=(0, 1)) > 0]
     if not columns.shape[2]:
-        return Screened(effect, 0.0, 1.0)
+        return Screened(effect, 0.0, 1.0, values)
     equations = few.normal_equations(np.concatenate([base.jacobian, columns], axis=2), base.whitened)
     gradient, curvature = equations.gradients.sum(axis=0), equations.curvatures.sum(axis=0)
     given = base.jacobian.shape[2]  # numbers of the base gain on few tracks, too, where they were fitted to others
     gain = _gain(gradient, curvature) - _gain(gradient[:given], curvature[:given, :given])
-    return Screened(effect, gain, chance(equations, given))
+    return Screened(effect, gain, chance(equations, given), values)
 
 
 def _gain(gradient: Array, curvature: Array) -> float:
