@@ -294,7 +294,7 @@ def _hint(selection: SelectionResult, trials: int) -> Candidate | None:
     if selection.accepted or trials >= FEW_TRIALS:
         return None
     step, least = selection.steps[0], MIN_GAIN * float(selection.nominal.losses.mean())
-    level = _HINT * FALSE_ALARM / len(step.ranking)
+    level = _HINT * FALSE_ALARM / max(step.of, len(step.ranking), 1)
     near = [
         c
         for c in step.ranking

@@ -68,6 +68,20 @@ class Parameter:
         value = float(end**share) if by_ratio else self.neutral + share * (end - self.neutral)
         return min(value, bound) if upwards else max(value, bound)
 
+    def apart(self, one: float, other: float) -> float:
+        """How far two values are from one another, as a share of the plausible range; of a multiple by ratio."""
+        low, high = self.plausible
+        if self.is_multiple and min(one, other) > 0:
+            return float(abs(np.log(one / other)) / np.log(high / low))
+        return abs(one - other) / (high - low)
+
+    def beside(self, value: float, share: float) -> float:
+        """The value so far from another, up or (negative) down, in the unit of `apart`. Not beyond a bound."""
+        low, high = self.plausible
+        by_ratio = self.is_multiple and value > 0
+        moved = value * (high / low) ** share if by_ratio else value + share * (high - low)
+        return float(np.clip(moved, self.low, self.high))
+
     def within(self, diagonal_m: float) -> Parameter:
         """The parameter, bounded to its `floor_share` of a floor with this diagonal."""
         if not self.floor_share:

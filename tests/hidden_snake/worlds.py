@@ -42,7 +42,7 @@ def worlds() -> list[World]:
         single("stiffness", Hidden(stiffness=0.7), "compliance"),
         single("scale", Hidden(scale=0.03), "camera-scale"),
         single("slope", Hidden(slope_rad=(0.02, -0.01)), "floor-slope"),
-        World("sticky-link", "unlisted", Hidden(link_friction={6: 4.0}), ()),
+        single("sticky-link", Hidden(link_friction={6: 4.0}), "link-friction-link6"),
         World("none-b", "none", Hidden(), ()),
         single("torque", Hidden(torque=0.3), "torque-limit"),
         single("marker", Hidden(marker_m={"green": (0.012, 0.008)}), "marker-offset-green"),
@@ -63,6 +63,13 @@ def worlds() -> list[World]:
         single("weak-joint-2", Hidden(strength={2: 0.3}), "weak-joint-joint2"),
         single("weak-joint-8", Hidden(strength={8: 0.5}), "weak-joint-joint8"),
         World("none-c", "none", Hidden(), ()),
+        World("none-d", "none", Hidden(), ()),
+        single("weak-joint-3", Hidden(strength={3: 0.6}), "weak-joint-joint3"),
+        single("weak-joint-4", Hidden(strength={4: 0.5}), "weak-joint-joint4"),
+        single("weak-joint-7", Hidden(strength={7: 0.3}), "weak-joint-joint7"),
+        single("weak-joint-9", Hidden(strength={9: 0.45}), "weak-joint-joint9"),
+        single("weak-joint-1", Hidden(strength={1: 0.4}), "weak-joint-joint1"),
+        World("scale-and-weak", "two", Hidden(scale=0.03, strength={6: 0.5}), ("camera-scale", "weak-joint-joint6")),
     ]
 
 

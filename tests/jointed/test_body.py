@@ -120,6 +120,15 @@ def same(one, other):
     return all(np.array_equal(np.asarray(a), np.asarray(b)) for a, b in zip(bounded[::2], bounded[1::2], strict=True))
 
 
+def test_one_link_that_grips_holds_the_body_there(sound):
+    plant = machine(SNAKE.mechanism).plant
+    effect = SNAKE.effect_named("link-friction-link6")
+    assert "link6" in effect.sentence
+    held = effect.apply(plant, factor=4.0)
+    assert held.grip.tolist() == [4.0 if n == 6 else 1.0 for n in range(13)]
+    assert np.abs(moved(simulated(held)) - moved(sound))[:, :2].max() > 5e-3
+
+
 def test_a_slope_pulls_downhill_in_the_world_s_frame(sound):
     plant = machine(SNAKE.mechanism).plant
     tilted = simulated(SNAKE.effect_named("floor-slope").apply(plant, east_rad=0.0, north_rad=0.05))
@@ -202,5 +211,7 @@ def test_a_joint_without_torque_is_not_put_where_its_servo_was_told_to_bring_it(
     silent = body.plant.with_joint("torque", body.plant.joints[joint], 0.0)
     told = drive.set_points[0, joint]
     assert abs(told) > 0.2
+    half = simulator._put_down(body.plant.with_joint("torque", body.plant.joints[joint], 0.4))
+    assert half[0, at] == pytest.approx(told, abs=0.03)  # a weak one has brought it there all the same
     assert simulator.settled(body.plant)[0, at] == pytest.approx(told, abs=0.05)
     assert abs(simulator.settled(silent)[0, at]) < 0.1

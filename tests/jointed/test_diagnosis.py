@@ -81,16 +81,39 @@ def test_a_model_of_one_number_that_was_simulated_bends_its_curve():
         return abs(responses.seen(model)[1] - bent(model)[1])
 
     straight, refined = Responses(bent, bare, None, (0.5, 1.0)), Responses(bent, bare, None, (0.5, 1.0))
-    for value in (0.6, 0.75, 0.9):
+    for value in (0.7, 0.75, 0.8):
         assert off(straight, value) > 1e-6
     assert refined.anchor(replace(bare, effects=(ActiveEffect(A, (0.75,)),)))
     assert off(refined, 0.75) == pytest.approx(0.0, abs=1e-12)
-    for value in (0.6, 0.9):
-        assert off(refined, value) < 0.7 * off(straight, value)
+    for value in (0.7, 0.8):
+        assert off(refined, value) < 0.3 * off(straight, value)
     before = set(refined._curves["a", "x"])
-    assert 0.75 in before
-    refined.anchor(replace(bare, effects=(ActiveEffect(A, (0.85,)),)))
-    assert set(refined._curves["a", "x"]) == before  # too near to another for its slope to mean anything
+    assert {0.65, 0.85} <= before  # a twentieth of what is plausible to either side
+    refined.anchor(replace(bare, effects=(ActiveEffect(A, (0.77,)),)))
+    assert set(refined._curves["a", "x"]) == before  # too near to others for its slope to mean anything
+    assert off(refined, 0.77) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_distances_of_multiples_go_by_ratio():
+    stiffness, offset = (SNAKE.catalogue()[name].parameters[0] for name in ("compliance", "joint-zero-joint5"))
+    assert stiffness.apart(0.3, 3.0) == pytest.approx(1.0)
+    assert stiffness.apart(0.6, 0.3) == pytest.approx(stiffness.apart(1.0, 2.0))
+    assert offset.apart(-0.4, 0.4) == pytest.approx(1.0)
+    assert offset.apart(0.1, 0.3) == pytest.approx(offset.apart(0.2, 0.0))
+    for p, value in ((stiffness, 0.7), (offset, 0.1)):
+        for share in (0.05, -0.05):
+            there = p.beside(value, share)
+            assert p.apart(value, there) == pytest.approx(0.05)
+            assert (there > value) == (share > 0)
+    assert stiffness.beside(5.9, 0.5) == 6.0
+
+
+@pytest.mark.parametrize(("value", "nodes"), [(0.02, 1), (-0.75, 2), (9.97, 1)])
+def test_curves_are_not_refined_across_neutral_or_beyond_a_bound(value, nodes):
+    bent.calls = 0
+    refined = Responses(bent, replace(SNAKE, effects=()), None, (0.5, 1.0))
+    refined.anchor(replace(SNAKE, effects=(ActiveEffect(A, (value,)),)))
+    assert len(refined._curves["a", "x"]) == nodes
 
 
 def test_a_silent_joint_may_be_found_and_other_bounds_stay_bounds():

@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bns.diagnose import diagnosis
 from bns.diagnose.estimate.fit import Problem
 from bns.diagnose.estimate.noise import gathered, huber, length
 from bns.diagnose.predict.responses import Responses
 from bns.diagnose.select import screening, stepwise
-from bns.diagnose.select.result import Candidate
+from bns.diagnose.select.result import Candidate, SelectionStep
 from bns.physics.effect import Effect, Parameter
 from bns.physics.jointed.model_files import load_body
 
@@ -75,9 +76,10 @@ def one_sided(which):
 def test_a_multiple_is_screened_both_ways():
     problem, base, effect = one_sided((0.3, 4.0))  # upwards it may go further, so one way alone would be that way
     upwards = screening._scored_at(problem, base, effect, (4.0**0.6,))
-    both = screening._scored(problem, base, effect)
+    both = screening._scored(problem, base, effect, tuple(screening._ways(effect)))
     assert both.gain > 10 * upwards.gain
     assert both.p_value < 1e-3
+    assert both.values == (pytest.approx(0.3**0.6),)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +111,7 @@ def test_what_comes_near_the_best_is_worked_out_before_it_is_compared(monkeypatc
 
 def test_a_step_of_the_search_compares_what_was_worked_out(monkeypatch):
     search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
-    search.predictor = SimpleNamespace(screening=64)
+    search.predictor, search.catalogue = SimpleNamespace(screening=64), dict.fromkeys("abcde")
     gain = {"a": 100.0, "b": 90.0}
 
     def candidate(name, elpd):
@@ -122,6 +124,7 @@ def test_a_step_of_the_search_compares_what_was_worked_out(monkeypatch):
     monkeypatch.setattr(search, "_worked_out", lambda _problem, _fit, tried: [candidate(c.name, well[c.name]) for c in tried])
     step, _, _ = search._forward_step(None, None, ())
     assert [(c.name, c.paired_comparison.elpd_diff) for c in step.ranking] == [("b", 95.0), ("a", 50.0)]
+    assert step.of == 5
 
 
 @pytest.mark.parametrize("body", [True, False])
@@ -133,3 +136,68 @@ def test_frames_gone_astray_are_bounded_for_a_body_alone(body):
     problem.pose_filter = SimpleNamespace(whitened=lambda tracks, steps: whitened)
     problem._counted = None
     assert np.abs(problem._worked_out(SNAKE)[7]).max() == (pytest.approx(4.0) if body else 100.0)
+
+
+def chosen(found):
+    return [effect.name for effect in screening.worth_a_fit(found)]
+
+
+def of(name, gain, p_value=0.001):
+    return screening.Screened(SimpleNamespace(name=name), gain, p_value)
+
+
+def test_only_what_is_likely_and_near_the_best_is_fitted():
+    assert chosen([of("a", 10.0), of("b", 2.1), of("c", 1.9)]) == ["a", "b"]
+    assert chosen([of("luck", 90.0, 0.06), of("a", 10.0), of("b", 2.1)]) == ["a", "b"]
+    assert chosen([of("luck", 9.0, 0.3), of("more", 8.0, 0.4)]) == ["luck"]  # what comes nearest is shown, too
+    assert chosen([]) == []
+    assert len(chosen([of(str(n), 10.0) for n in range(20)])) == screening.MOST
+
+
+def test_all_effects_are_screened_on_the_fewest_tracks_and_the_better_ones_on_more(monkeypatch):
+    asked = {21: [], 64: [], 142: []}
+    gains = {f"e{n}": float(n) for n in range(60)}
+    last = SimpleNamespace(screening=None, size=21, anchor=lambda model: True, steps=lambda model: None)
+    light = SimpleNamespace(screening=last, size=64, anchor=lambda model: True, steps=lambda model: None)
+
+    def scored(few, _base, effect, ways):
+        asked[few.predictor.size].append(effect.name)
+        assert ways == (((0.5,), (2.0,)) if few.predictor.size == 21 else ((0.5,),))  # later at the values that did best
+        chance = 0.3 if effect.name == "e58" and few.predictor.size == 64 else 0.01
+        return screening.Screened(effect, gains[effect.name], chance, (0.5,))
+
+    def problem(predictor, *_):
+        noise = SimpleNamespace(noise=None)
+        return SimpleNamespace(
+            predictor=predictor, pose_filter=noise, fit=lambda model, rounds: SimpleNamespace(model=model)
+        )
+
+    monkeypatch.setattr(screening, "_scored", scored)
+    monkeypatch.setattr(screening, "_ways", lambda _effect: [(0.5,), (2.0,)])
+    monkeypatch.setattr(screening, "problem_with_noise", problem)
+    effects = [SimpleNamespace(name=name) for name in gains]
+    whole = problem(SimpleNamespace(screening=light, size=142))
+    found = screening.screened(whole, SimpleNamespace(model=None), effects)
+    assert len(asked[21]) == 60
+    assert asked[64] == [f"e{n}" for n in range(59, 59 - 18, -1)]  # three tenths of all
+    assert asked[142] == ["e59", *(f"e{n}" for n in range(57, 57 - 7, -1))]  # not what luck explains; at most eight
+    assert found[0].effect.name == "e59"
+
+
+def test_what_numbers_of_the_base_gain_on_few_tracks_is_no_effect_s_gain():
+    problem, base, effect = one_sided((0.3, 4.0))
+    plain = screening._scored_at(problem, base, effect, (0.4,))
+    given = np.random.default_rng(3).normal(size=(*base.whitened.shape, 1))
+    pulled = SimpleNamespace(model=base.model, whitened=base.whitened + 0.5 * given[..., 0], jacobian=-given)
+    problem_of = problem.whitened
+    problem.whitened = lambda model: problem_of(model) + 0.5 * given[..., 0]
+    assert screening._scored_at(problem, pulled, effect, (0.4,)).gain == pytest.approx(plain.gain, rel=0.2)
+
+
+@pytest.mark.parametrize(("of_how_many", "hinted"), [(2, True), (55, False)])
+def test_a_sign_of_too_few_trials_is_judged_by_all_effects_that_were_screened(of_how_many, hinted):
+    earned = SimpleNamespace(p_value=0.02, z=3.0, elpd_diff=1.0)
+    candidate = SimpleNamespace(rejected_because="", paired_comparison=earned)
+    step = SelectionStep((candidate, candidate), 0.1, "", of=of_how_many)
+    found = SimpleNamespace(accepted=(), steps=(step,), nominal=SimpleNamespace(losses=np.ones(9)))
+    assert (diagnosis._hint(found, 9) is candidate) is hinted

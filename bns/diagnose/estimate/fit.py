@@ -19,6 +19,7 @@ from scipy.special import stdtrit
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.clocks.trial_clocks import ReducedJacobian, eliminate_clocks, with_initial_clocks
+from bns.diagnose.estimate.look_around import lower_place
 from bns.diagnose.estimate.noise import Whitening, gathered, huber
 from bns.diagnose.estimate.normal_equations import (
     NormalEquations,
@@ -37,6 +38,7 @@ _LATELY = 16
 _ROUNDS = DEFAULTS.estimate.fit_rounds
 _SETTLED = DEFAULTS.estimate.fit_settled
 _TRUSTED = DEFAULTS.estimate.fit_trusted
+_LOOKS = DEFAULTS.estimate.look_rounds
 
 
 @dataclass(frozen=True)
@@ -177,25 +179,39 @@ class Problem:
         The Jacobian serves for further steps while the loss falls nearly as predicted; columns ``nearby`` serve for the first.
         """
         model = with_initial_clocks(self, model, self._trials)
-        free, at, damping = self.free(model), self._point(model), 1e-3
+        free, at = self.free(model), self._point(model)
+        most = _ROUNDS if rounds is None and (free or model.per_trial_effect) else 0
+        at, reduced, fresh = self._descended(at, free, nearby, most)
+        rough = self.predictor.luck is not None
+        for _ in range(_LOOKS if rough and rounds is None else 0):
+            there = lower_place(self.loss, at.model, free, at.loss)
+            if there is None:
+                break
+            at, reduced, fresh = self._descended(self._point(there), free, None, most)
+        if rounds is None and (rough or not fresh):
+            reduced = self._jacobian(at, free, wide=rough)
+        return self._concluded(at.model, free, at.whitened, reduced.jacobian)
+
+    def _descended(
+        self, at: _Point, free: Sequence[FreeParameter], nearby: Mapping[FreeParameter, Array] | None, most: int
+    ) -> tuple[_Point, ReducedJacobian, bool]:
+        """Where so many steps end at most, the last Jacobian, and whether that is the one of the end."""
+        damping = 1e-3
         reduced, fresh = self._jacobian(at, free, nearby), not nearby
-        for _ in range(_ROUNDS if rounds is None and (free or model.per_trial_effect) else 0):
+        for _ in range(most):
             equations = normal_equations(reduced.jacobian, at.whitened)
             predicted_decrease = _predicted_decrease(_damped_step(*equations, damping), *equations)
-            done = predicted_decrease < _SETTLED and model.per_trial_effect is None
+            done = predicted_decrease < _SETTLED and at.model.per_trial_effect is None
             lower, gain = None if done else self._lower(at, free, reduced, equations, damping), 0.0
             if lower is not None:
                 gain, at, damping = at.loss - lower[0].loss, *lower
             if gain < _SETTLED and fresh:
                 fresh = lower is None
                 break
-            fresh = lower is None or model.per_trial_effect is not None or gain < _TRUSTED * predicted_decrease
+            fresh = lower is None or at.model.per_trial_effect is not None or gain < _TRUSTED * predicted_decrease
             if fresh:
                 reduced = self._jacobian(at, free)
-        rough = self.predictor.luck is not None
-        if rounds is None and (rough or not fresh):
-            reduced = self._jacobian(at, free, wide=rough)
-        return self._concluded(at.model, free, at.whitened, reduced.jacobian)
+        return at, reduced, fresh
 
     def _point(self, model: Model) -> _Point:
         whitened = self.whitened(model)

@@ -13,7 +13,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Parameter
 from bns.physics.model import Model
 
-_WIDE = DEFAULTS.predict.node_long
+_WIDE = DEFAULTS.estimate.wide_step
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,10 @@ def increment(number: FreeParameter, value: float) -> float:
 def increments(number: FreeParameter, value: float, wide: bool = False) -> list[float]:
     """Steps for differences: `increment`; or ``wide`` ones, to both sides as far as the bounds leave room for half of one."""
     p = number.parameter
-    far = _WIDE * (p.plausible[1] - p.plausible[0])
-    if not wide or not np.isfinite(far):
+    if not wide or not np.isfinite(p.plausible).all():
         return [increment(number, value)]
-    ways = [min(far, p.high - value), -min(far, value - p.low)]
-    return [way for way in ways if abs(way) >= far / 2] or [increment(number, value)]
+    ends = [p.beside(value, share) for share in (_WIDE, -_WIDE)]
+    return [end - value for end in ends if p.apart(end, value) >= _WIDE / 2] or [increment(number, value)]
 
 
 def active_mask(model: Model, free: Sequence[FreeParameter], gradient: Array) -> NDArray[np.bool_]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -26,7 +26,6 @@ from bns.physics.signals import Body
 from bns.physics.wheels.differential_drive import taken_at
 
 _SHARES = DEFAULTS.predict.response_shares
-_LIGHT_SHARES = DEFAULTS.predict.screening_shares
 _LIGHT = DEFAULTS.predict.screening_cycles
 _MOST = DEFAULTS.predict.most_stretches
 _WILD_M = DEFAULTS.predict.wild_m
@@ -56,7 +55,7 @@ LUCK = (
 
 @dataclass(frozen=True)
 class _Chance:
-    """Luck of stretches, and how far the first nodes of `LUCK`'s curves move each one's end, (stretches,)."""
+    """Luck of stretches, and how far a little of it moves each one's end (`_far_m`), (stretches,)."""
 
     luck: Luck
     far_m: Array
@@ -86,32 +85,36 @@ class JointedPredictor:
         self.not_taken = there - len(tracks.told)
         """Stretches that were left aside for speed: of very many, some evenly chosen ones are simulated."""
         simulations, bare = Simulations.of(tracks, model.mechanism), replace(model, effects=())
-        responses = Responses(simulations.seen, bare, simulations.exactly, _SHARES)
-        self._setup(simulations, bare, responses)
-        chance = self._chance()
-        wild = chance.far_m > _WILD_M
+        far_m = _far_m(simulations, bare)
+        wild = far_m > _WILD_M
         self.left_out = int(wild.sum())
         """Stretches that nobody can foresee: a little luck moves the robot far."""
         if wild.any() and not wild.all():
             kept = np.flatnonzero(~wild)
-            looks, frames, simulations = simulations.looks_of(kept), self._frames_of(kept), simulations.only(kept)
-            self._setup(simulations, bare, responses.only(looks, simulations.seen))
-            chance = chance.only(kept, frames, self._stretches)
+            simulations, far_m = simulations.only(kept), far_m[kept]
+        self._exactly = simulations.exactly(bare)
+        self._setup(simulations, bare)
+        chance = _Chance(self._luck(), far_m)
         self._foresee(chance)
-        few = np.unique(np.linspace(0, len(simulations) - 1, min(_LIGHT, len(simulations))).round().astype(np.int64))
-        self.screening: Predictor | None = self._light(few, chance)
+        self.screening: Predictor | None = self._light(chance, _LIGHT)
 
-    def _light(self, chosen: NDArray[np.int64], chance: _Chance) -> JointedPredictor:
+    def _light(self, chance: _Chance, cycles: Sequence[int]) -> JointedPredictor:
+        """The same for so many of the stretches, which in turn has the next fewer of its own for a first look."""
+        there = len(self._simulations)
+        chosen = np.unique(np.linspace(0, there - 1, min(cycles[0], there)).round().astype(np.int64))
         light = object.__new__(JointedPredictor)
         light.near, light.horizons, light._tracking_m = self.near, self.horizons, self._tracking_m
-        light.left_out, light.not_taken, light.screening = 0, 0, None
-        simulations, frames = self._simulations.only(chosen), self._frames_of(chosen)
-        light._setup(simulations, self._bare, Responses(simulations.seen, self._bare, simulations.exactly, _LIGHT_SHARES))
-        light._foresee(chance.only(chosen, frames, light._stretches))
+        light.left_out, light.not_taken = 0, 0
+        light._exactly = self._exactly[self._simulations.looks_of(chosen)]
+        light._setup(self._simulations.only(chosen), self._bare, finely=False)
+        own = chance.only(chosen, self._frames_of(chosen), light._stretches)
+        light._foresee(own)
+        light.screening = light._light(own, cycles[1:]) if len(cycles) > 1 and len(chosen) > cycles[1] else None
         return light
 
-    def _setup(self, simulations: Simulations, bare: JointedModel, responses: Responses) -> None:
-        self._simulations, self._bare, self._responses = simulations, bare, responses
+    def _setup(self, simulations: Simulations, bare: JointedModel, finely: bool = True) -> None:
+        self._simulations, self._bare = simulations, bare
+        self._responses = Responses(simulations.seen, bare, self._exactly, _SHARES, simulations.exactly if finely else None)
         self._stretches = simulations.tracks
         self.tracks: Tracks = self._stretches
         self._measured_apart = apart(self._stretches.points_m)
@@ -203,24 +206,20 @@ class JointedPredictor:
         out[self.tracks.is_first] = 0.0
         return out
 
-    def _chance(self) -> _Chance:
+    def _luck(self) -> Luck:
         """Each piece of luck simulated once: a rougher floor, floors that fall, uneven links, and steps half as long."""
         r, known = self._responses, self._bare.catalogue()
-        exact, usual = self._tracked(r.bare), self._tracked(r.coarse)
-        pieces, far = [[usual]], np.zeros(len(self._simulations))
-        begins, ends = self.windows(self.near)
+        usual, pieces = self._tracked(r.coarse), [[self._tracked(r.bare)]]
         for kind in LUCK if LUCK[0][0].effect in known else ():
             pieces.append([])
             for one in kind:
                 near, there = _a_little(self._bare, known[one.effect], one.parameter)
-                moved = self._tracked(r.seen(near)) - exact
-                far += ((moved[ends] - moved[begins]) ** 2).sum(axis=(1, 2)) / moved.shape[1]
+                moved = self._tracked(self._simulations.seen(near)) - usual
                 pieces[-1].append(usual + one.usual / there * moved)
         if len(pieces) > 1:
             uneven = [self._tracked(self._simulations.seen_of(plant)) for plant in _uneven(self._simulations.plant)]
             pieces.append([usual + (points - usual) / np.sqrt(len(uneven)) for points in uneven])
-        pieces[0] = [exact]
-        return _Chance(luck_of(self._stretches, usual, pieces), np.sqrt(far))
+        return luck_of(self._stretches, usual, pieces)
 
     def _tracked(self, seen: Array) -> Array:
         """Tracked points (frames, sites, 2) of what was looked at."""
@@ -235,6 +234,17 @@ class JointedPredictor:
             short = width - (b - 1 - a)
             rows.append(np.concatenate([values[a : b - 1], np.full(short, values[b - 2] if fill is None else fill)]))
         return np.array(rows)
+
+
+def _far_m(simulations: Simulations, bare: JointedModel) -> Array:
+    """How far the first nodes of the curves of `LUCK` move the end of each stretch, (stretches,)."""
+    known, tracks, total = bare.catalogue(), simulations.tracks, np.zeros(len(simulations))
+    usual = simulations.at(simulations.seen(bare)[:, 0], tracks.since_s)
+    for one in (one for kind in LUCK for one in kind) if LUCK[0][0].effect in known else ():
+        near, _ = _a_little(bare, known[one.effect], one.parameter)
+        moved = simulations.at(simulations.seen(near)[:, 0], tracks.since_s) - usual
+        total += ((moved[tracks.ends] - moved[tracks.begins]) ** 2).sum(axis=(1, 2)) / moved.shape[1]
+    return np.asarray(np.sqrt(total))
 
 
 def _a_little(bare: JointedModel, effect: Effect, parameter: str) -> tuple[Model, float]:

@@ -11,13 +11,10 @@ each other, is then made good.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from copy import copy
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from threading import RLock
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.settings import DEFAULTS
@@ -26,8 +23,7 @@ from bns.physics.model import ActiveEffect, Model
 
 Number = tuple[str, str]
 """Effect and parameter."""
-_LONG = DEFAULTS.predict.node_long
-_BESIDE = DEFAULTS.predict.node_beside
+_BESIDE = DEFAULTS.predict.node_near
 _NEAR = DEFAULTS.predict.anchor_near
 _CLIPPED_M = DEFAULTS.predict.response_clipped_m
 
@@ -43,12 +39,18 @@ class Responses:
 
     ``simulate`` gives what is seen of a model, any shape; ``bare``: the model without effects; ``exactly``: the same simulated
     more finely, to which differences are added. ``shares``: nodes, as shares of the way from neutral to what is plausible.
+    ``finely``: simulates anchors finely, too; without it they are as coarse as the nodes, and differ from ``exactly`` as these.
     """
 
     def __init__(
-        self, simulate: Callable[[Model], Array], bare: Model, exactly: Array | None, shares: tuple[float, ...]
+        self,
+        simulate: Callable[[Model], Array],
+        bare: Model,
+        exactly: Array | None,
+        shares: tuple[float, ...],
+        finely: Callable[[Model], Array] | None = None,
     ) -> None:
-        self._simulate, self._bare, self._shares = simulate, bare, shares
+        self._simulate, self._bare, self._shares, self._finely = simulate, bare, shares, finely
         self._sound = simulate(bare)
         self._anchors = [_Anchor({}, self._sound if exactly is None else exactly)]
         self._curves: dict[Number, dict[float, Array]] = {}
@@ -79,7 +81,7 @@ class Responses:
             return out
 
     def anchor(self, model: Model) -> bool:
-        """Simulate this model itself, unless one was that is hardly another, and refine the curves of its numbers around it.
+        """Simulate this model itself, unless one was that is hardly another, and its numbers' curves close to it.
 
         Returns whether what is answered near it may have changed.
         """
@@ -88,28 +90,29 @@ class Responses:
             refined = [self._refined(number, value) for number, value in wanted.items()]
             if min(self._distance(a.values, wanted) for a in self._anchors) <= _NEAR:
                 return any(refined)
-            change = self._simulate(model) - self._sound
-            self._anchors.append(_Anchor(wanted, self._anchors[0].seen + change))
+            self._anchors.append(_Anchor(wanted, self._whole(model)))
             return True
 
-    def _refined(self, number: Number, value: float) -> bool:
-        """Halve the long stretches of a curve that a value lies in, or next to; not short ones, whose slopes are chance."""
-        effect, p = self._known[number]
-        long = _LONG * (p.plausible[1] - p.plausible[0])
-        nodes = sorted({p.neutral, *self._planned(p, 1.0), *self._planned(p, -1.0), *self._curves.get(number, {})})
-        reach = [(a, b) for a, b in pairwise(nodes) if a - _BESIDE * long <= value <= b + _BESIDE * long and b - a > long]
-        for low, high in reach:
-            self._curves.setdefault(number, {})
-            self._node(number, effect, p, (low + high) / 2)
-        return bool(reach)
+    def _whole(self, model: Model) -> Array:
+        """What is seen of a model, all its numbers acting on each other."""
+        if self._finely is not None:
+            return self._finely(model)
+        return self._anchors[0].seen + self._simulate(model) - self._sound
 
-    def only(self, frames: NDArray[np.int64], simulate: Callable[[Model], Array]) -> Responses:
-        """The same of some of the frames; ``simulate`` gives these alone."""
-        out = copy(self)
-        out._simulate, out._sound, out._lock = simulate, self._sound[frames], RLock()
-        out._anchors = [_Anchor(a.values, a.seen[frames]) for a in self._anchors]
-        out._curves = {n: {at: seen[frames] for at, seen in nodes.items()} for n, nodes in self._curves.items()}
-        return out
+    def _refined(self, number: Number, value: float) -> bool:
+        """Simulate a curve close to a value, on either side, where it is not known there; not closer: such slopes are chance."""
+        effect, p = self._known[number]
+        known = self._curves.setdefault(number, {})
+        found = False
+        for side in (1.0, -1.0):
+            nodes = [at for at in (p.neutral, *self._planned(p, 1.0), *self._planned(p, -1.0), *known) if side * (at - value) > 0]
+            beside = p.beside(value, side * _BESIDE)
+            if p.apart(beside, value) < _BESIDE / 2 or any(_BESIDE / 2 <= p.apart(at, value) <= 1.5 * _BESIDE for at in nodes):
+                continue
+            if (beside - p.neutral) * (value - p.neutral) > 0:
+                self._node(number, effect, p, beside)
+                found = True
+        return found
 
     def _values(self, model: Model) -> dict[Number, float]:
         """The numbers that are not neutral."""
@@ -125,8 +128,7 @@ class Responses:
         total = 0.0
         for number in {**one, **other}:
             p = self._known[number][1]
-            off = one.get(number, p.neutral) - other.get(number, p.neutral)
-            total += abs(off) / (p.plausible[1] - p.plausible[0])
+            total += p.apart(one.get(number, p.neutral), other.get(number, p.neutral))
         return total
 
     def _curve(self, number: Number, value: float) -> Array:
@@ -141,6 +143,8 @@ class Responses:
         within = sum(side * (at - value) < 0 for at in nodes)
         outer = min(within, len(nodes) - 1)
         upper = self._node(number, effect, p, nodes[outer])
+        if value == nodes[outer]:
+            return upper
         if outer == 0:
             return upper * ((value - p.neutral) / (nodes[0] - p.neutral))
         lower = self._node(number, effect, p, nodes[outer - 1])

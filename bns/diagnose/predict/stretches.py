@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from threading import RLock
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,12 +15,80 @@ from bns.physics.jointed.drives import Drive
 from bns.physics.jointed.mechanism import Mechanism, machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.jointed.plant import Plant, Sighting
-from bns.physics.jointed.simulate import Rest, Simulator, replace_state
+from bns.physics.jointed.simulate import Rest, Simulator, joined, replace_state
 from bns.physics.model import Model
 from bns.sweep.jobs.cores import cores
 
 _COARSER = DEFAULTS.predict.coarser
 _LOOK_S = DEFAULTS.predict.look_s
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What was simulated of a plant: looks of all stretches (looks, 3, sites, 2), and which stretches are done."""
+
+    seen: Array
+    done: NDArray[np.bool_]
+
+
+class _Level:
+    """All stretches in steps of one length. None is simulated twice with the same plant, whoever asks for it.
+
+    ``first`` (stretches + 1,): where the looks of each begin.
+    """
+
+    def __init__(self, simulator: Simulator, first: NDArray[np.int64]) -> None:
+        self.simulator, self.first = simulator, first
+        self._known: dict[bytes, _Known] = {}
+        self._rests: dict[int, Rest] = {}
+        self._lock = RLock()
+
+    def looks_of(self, stretches: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The looks of some stretches."""
+        return np.concatenate([np.arange(self.first[i], self.first[i + 1]) for i in stretches])
+
+    def seen(self, plant: Plant, stretches: NDArray[np.int64]) -> Array:
+        """What is seen of a plant in some stretches; (looks, 3, sites, 2)."""
+        with self._lock:
+            known = self._known.setdefault(plant.key, self._nothing())
+            new = stretches[~known.done[stretches]]
+            if len(new):
+                known.seen[self.looks_of(new)] = self._simulated(plant, new)
+                known.done[new] = True
+            return known.seen[self.looks_of(stretches)]
+
+    def _nothing(self) -> _Known:
+        sites = len(self.simulator.machine.mechanism.sites)
+        return _Known(np.zeros((self.first[-1], 3, sites, 2)), np.zeros(len(self.first) - 1, dtype=bool))
+
+    def _simulated(self, plant: Plant, stretches: NDArray[np.int64]) -> Array:
+        simulator, rest = self.simulator.only(stretches), self._rest(stretches)
+        if (np.minimum(plant.stiffness, plant.torque) < 1).any():  # a servo that gives no torque did not bring its joint anywhere
+            rest = replace_state(rest, simulator.settled(plant))
+        return _stacked(simulator.sightings(plant, rest))
+
+    def _rest(self, stretches: NDArray[np.int64]) -> Rest:
+        """Where the sound body begins some stretches."""
+        new = [i for i in stretches.tolist() if i not in self._rests]
+        if new:
+            found = self.simulator.only(np.array(new)).at_rest()
+            self._rests |= {i: found.only(np.array([k])) for k, i in enumerate(new)}
+        return joined([self._rests[i] for i in stretches.tolist()])
+
+
+class _Body:
+    """All stretches, in the model's own steps and in longer ones."""
+
+    def __init__(self, tracks: StretchTracks, mechanism: Mechanism) -> None:
+        fine_s = float(machine(mechanism).model.opt.timestep)
+        looks = _looks(tracks, fine_s)
+        simulators = [
+            Simulator(machine(mechanism, dt_s), _drives(tracks, dt_s, looks), cores())
+            for dt_s in (fine_s, _COARSER * fine_s)
+        ]
+        first = np.concatenate([[0], np.cumsum(simulators[0].counts)]).astype(np.int64)
+        self.fine, self.coarse = (_Level(simulator, first) for simulator in simulators)
+        self.plant = simulators[0].machine.plant
 
 
 class Simulations:
@@ -26,31 +97,22 @@ class Simulations:
     A body is looked at in a stretch's first and last frame, and in between so often that chords do for other times.
     """
 
-    def __init__(
-        self, tracks: StretchTracks, fine: Simulator, coarse: Simulator, rests: tuple[Rest, Rest], exactly: Array
-    ) -> None:
-        self.tracks, self._fine, self._coarse, self._rests = tracks, fine, coarse, rests
-        self.exactly = exactly
-        """What is seen of the model without effects, simulated finely: (looks, 3, sites, 2)."""
-        self._first = np.concatenate([[0], np.cumsum(fine.counts)])
-        step_s = float(fine.machine.model.opt.timestep)
-        self._look_s = np.concatenate([(d.frames - d.frames[0]) * step_s for d in fine.drives])
+    def __init__(self, body: _Body, tracks: StretchTracks, chosen: NDArray[np.int64]) -> None:
+        self.tracks, self._body, self._chosen = tracks, body, chosen
+        simulator = body.fine.simulator
+        self._counts = simulator.counts[chosen]
+        self._first = np.concatenate([[0], np.cumsum(self._counts)])
+        step_s = float(simulator.machine.model.opt.timestep)
+        drives = [simulator.drives[i] for i in chosen]
+        self._look_s = np.concatenate([(d.frames - d.frames[0]) * step_s for d in drives])
 
     @classmethod
     def of(cls, tracks: StretchTracks, mechanism: Mechanism) -> Simulations:
         """All stretches of these tracks."""
-        fine_s = float(machine(mechanism).model.opt.timestep)
-        looks = _looks(tracks, fine_s)
-        sims = [
-            Simulator(machine(mechanism, dt_s), _drives(tracks, dt_s, looks), cores())
-            for dt_s in (fine_s, _COARSER * fine_s)
-        ]
-        rests = sims[0].at_rest(), sims[1].at_rest()
-        exactly = _stacked(sims[0].sightings(sims[0].machine.plant, rests[0]))
-        return cls(tracks, sims[0], sims[1], rests, exactly)
+        return cls(_Body(tracks, mechanism), tracks, np.arange(len(tracks.told)))
 
     def __len__(self) -> int:
-        return len(self.tracks.told)
+        return len(self._chosen)
 
     def looks_of(self, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
         """The looks of some stretches."""
@@ -58,28 +120,26 @@ class Simulations:
 
     def only(self, chosen: NDArray[np.int64]) -> Simulations:
         """Some of the stretches."""
-        fine, coarse = (
-            Simulator(whole.machine, [whole.drives[i] for i in chosen], cores()) for whole in (self._fine, self._coarse)
-        )
-        rests = self._rests[0].only(chosen), self._rests[1].only(chosen)
-        return Simulations(self.tracks.of(chosen), fine, coarse, rests, self.exactly[self.looks_of(chosen)])
+        return Simulations(self._body, self.tracks.of(chosen), self._chosen[chosen])
+
+    def exactly(self, model: Model) -> Array:
+        """What is seen of a model, simulated finely; (looks, 3, sites, 2)."""
+        assert isinstance(model, JointedModel)
+        return self._body.fine.seen(model.plant, self._chosen)
 
     def seen(self, model: Model) -> Array:
-        """What is seen of a model, simulated coarsely; (looks, 3, sites, 2)."""
+        """The same, simulated coarsely."""
         assert isinstance(model, JointedModel)
         return self.seen_of(model.plant)
 
     def seen_of(self, plant: Plant) -> Array:
         """The same of a plant."""
-        rest = self._rests[1]
-        if (np.minimum(plant.stiffness, plant.torque) < 1).any():  # a servo that gives no torque did not bring its joint anywhere
-            rest = replace_state(rest, self._coarse.settled(plant))
-        return _stacked(self._coarse.sightings(plant, rest))
+        return self._body.coarse.seen(plant, self._chosen)
 
     @property
     def plant(self) -> Plant:
         """The plant with nothing wrong."""
-        return self._coarse.machine.plant
+        return self._body.plant
 
     def at(self, points_m: Array, since_s: Array) -> Array:
         """Points (frames, sites, 2) that were looked at (looks, sites, 2), at times since_s (frames,) of their stretches."""
@@ -88,7 +148,7 @@ class Simulations:
         since = np.clip(since_s, 0.0, self._look_s[last])
         # times of all stretches one after the other, so that one search finds all
         offset = np.concatenate([[0.0], np.cumsum(self._look_s[self._first[1:] - 1] + 1.0)])
-        of_look = np.repeat(np.arange(len(self)), self._fine.counts)
+        of_look = np.repeat(np.arange(len(self)), self._counts)
         at = np.searchsorted(self._look_s + offset[of_look], since + offset[stretch], side="right")
         upper = np.clip(at, first + 1, last)
         lower = upper - 1

@@ -31,6 +31,8 @@ class SelectionStep:
     selected: str
     passed_over: str = ""
     """An implausible candidate that did clearly better than what was taken; "" if there was none."""
+    of: int = 0
+    """Among how many effects these were chosen, where only promising ones were fitted; 0: all are in the ranking."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Which effects are worth a fit where a fit is costly: a score test of each on few of the tracks.
+"""Which effects are worth a fit where a fit is costly: a score test of each, on few of the tracks and then on more.
 
 Nothing is fitted: the slope of the residuals along an effect's numbers, where it does nothing, says how hard the tracks pull on
 it, and how rarely luck pulls so hard (Rao's score test, with the sign flips of `significance` for its distribution).
@@ -6,6 +6,7 @@ it, and how rarely luck pulls so hard (Rao's score test, with the sign flips of 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -19,35 +20,66 @@ from bns.physics.effect import Effect
 
 MOST = DEFAULTS.select.screen_most
 CHANCE = DEFAULTS.select.screen_chance
+CHANCE_OF_ALL = DEFAULTS.select.screen_chance_of_all
+_FIRST = DEFAULTS.select.screen_first
+_BEHIND = DEFAULTS.select.screen_behind
 _SHARE = DEFAULTS.select.screen_share
 
 
 @dataclass(frozen=True)
 class Screened:
-    """An effect, by how much its numbers could lower the loss to first order, and the chance of such a pull by luck."""
+    """An effect, by how much its numbers could lower the loss to first order, and the chance of such a pull by luck.
+
+    ``values``: at which this was found, of those that are tried.
+    """
 
     effect: Effect
     gain: float
     p_value: float
+    values: tuple[float, ...] = ()
 
 
 def screened(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> list[Screened]:
-    """Every effect on the predictor's few tracks, the one that could lower the loss most first."""
+    """Effects on the tracks of a predictor, the one that could lower the loss most first.
+
+    A predictor that has fewer tracks to screen on tries all effects on those, and on all of its own only the better ones, each
+    at the values that did best.
+    """
+    ways = {effect.name: tuple(_ways(effect)) for effect in effects}
     light = problem.predictor.screening
-    assert light is not None
-    light.anchor(fit.model)
-    few = problem_with_noise(light, light.steps(fit.model), problem.pose_filter.noise)
-    base = few.fit(fit.model, rounds=0)
-    return sorted((_scored(few, base, effect) for effect in effects), key=lambda s: -s.gain)
+    if light is not None:
+        light.anchor(fit.model)
+        few = problem_with_noise(light, light.steps(fit.model), problem.pose_filter.noise)
+        found = screened(few, few.fit(fit.model, rounds=0), effects)
+        kept = _first(found) if light.screening is None else _likely(found, CHANCE)
+        effects, ways = [s.effect for s in kept], {s.effect.name: (s.values,) for s in kept}
+    return sorted((_scored(problem, fit, effect, ways[effect.name]) for effect in effects), key=lambda s: -s.gain)
 
 
 def worth_a_fit(found: Sequence[Screened]) -> list[Effect]:
-    """The first `MOST` that luck does not explain at once."""
-    return [s.effect for s in found if s.p_value < CHANCE][:MOST]
+    """Of those screened on all tracks, the first `MOST` that luck does not explain at once, unless far behind the best.
+
+    The best one in any case: what comes nearest is shown, too.
+    """
+    return [s.effect for s in _likely(found, CHANCE_OF_ALL) or found[:1]]
 
 
-def _scored(few: Problem, base: Fit, effect: Effect) -> Screened:
-    return max((_scored_at(few, base, effect, values) for values in _ways(effect)), key=lambda s: s.gain)
+def _first(found: Sequence[Screened]) -> Sequence[Screened]:
+    """What goes on from the fewest tracks, whose p-values say little."""
+    return _near_the_best(found)[: max(MOST, math.ceil(_FIRST * len(found)))]
+
+
+def _likely(found: Sequence[Screened], chance: float) -> Sequence[Screened]:
+    return _near_the_best([s for s in found if s.p_value < chance])[:MOST]
+
+
+def _near_the_best(found: Sequence[Screened]) -> Sequence[Screened]:
+    best = max((s.gain for s in found), default=0.0)
+    return [s for s in found if s.gain >= _BEHIND * best]
+
+
+def _scored(few: Problem, base: Fit, effect: Effect, ways: Sequence[tuple[float, ...]]) -> Screened:
+    return max((_scored_at(few, base, effect, values) for values in ways), key=lambda s: s.gain)
 
 
 def _ways(effect: Effect) -> Iterator[tuple[float, ...]]:
@@ -68,15 +100,21 @@ def _ways(effect: Effect) -> Iterator[tuple[float, ...]]:
             yield (bound,)
 
 
-def _scored_at(few: Problem, base: Fit, effect: Effect, values: Sequence[float]) -> Screened:
+def _scored_at(few: Problem, base: Fit, effect: Effect, values: tuple[float, ...]) -> Screened:
     columns = np.stack([_column(few, base, effect, index, value) for index, value in enumerate(values)], axis=2)
     columns = columns[..., np.abs(columns).max(axis=(0, 1)) > 0]
     if not columns.shape[2]:
-        return Screened(effect, 0.0, 1.0)
+        return Screened(effect, 0.0, 1.0, values)
     equations = few.normal_equations(np.concatenate([base.jacobian, columns], axis=2), base.whitened)
     gradient, curvature = equations.gradients.sum(axis=0), equations.curvatures.sum(axis=0)
-    gain = float(gradient @ np.linalg.pinv(curvature, hermitian=True) @ gradient) / 2
-    return Screened(effect, gain, chance(equations, base.jacobian.shape[2]))
+    given = base.jacobian.shape[2]  # numbers of the base gain on few tracks, too, where they were fitted to others
+    gain = _gain(gradient, curvature) - _gain(gradient[:given], curvature[:given, :given])
+    return Screened(effect, gain, chance(equations, given), values)
+
+
+def _gain(gradient: Array, curvature: Array) -> float:
+    """By how much a step of least squares lowers the loss."""
+    return float(gradient @ np.linalg.pinv(curvature, hermitian=True) @ gradient) / 2
 
 
 def _column(few: Problem, base: Fit, effect: Effect, index: int, value: float) -> Array:

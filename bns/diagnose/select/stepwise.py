@@ -209,6 +209,7 @@ class StepwiseSelection:
     ) -> tuple[SelectionStep, Problem, Fit]:
         """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in."""
         left = self._worth_a_fit(problem, fit, accepted)
+        of = len(self.catalogue) - len(accepted) if self.predictor.screening is not None else 0
         tried = each(partial(self._tried, problem, fit), [*DECOYS, *left])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
         if self.predictor.screening is not None:
@@ -225,11 +226,11 @@ class StepwiseSelection:
             rejected_because = self._rejected(settled[1], candidate.name, bounds=False)
             if not rejected_because:
                 better = next((p.name for p in passed_over if not indistinguishable(candidate.fit, p.fit, fit)), "")
-                return SelectionStep(tuple(ranking), decoy_threshold, candidate.name, better), *settled
+                return SelectionStep(tuple(ranking), decoy_threshold, candidate.name, better, of), *settled
             ranking[index] = replace(candidate, rejected_because=rejected_because)
             passed_over.append(ranking[index])
         best = passed_over[0].name if passed_over else ""
-        return SelectionStep(tuple(ranking), decoy_threshold, "", best), problem, fit
+        return SelectionStep(tuple(ranking), decoy_threshold, "", best, of), problem, fit
 
     def _worth_a_fit(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[Effect]:
         """What is fitted beside the accepted effects: where fits are costly, all that the screening ever found promising."""

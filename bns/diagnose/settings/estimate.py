@@ -62,6 +62,23 @@ class Estimate:
     noise_high: tuple[float, ...] = setting(
         (0.3, 0.5, 0.5, 0.5, 3.0), _NOISE_UNITS, f"Upper bounds of the noise estimate; {BY_HAND}."
     )
+    look_reach: float = setting(
+        0.14,
+        "1",
+        "How far to either side of where a fit of a body ended lower places are looked for, as a fraction of the plausible range "
+        "(of a factor by ratio); within `wide_step`, so that nothing is simulated for it.",
+    )
+    look_steps: int = setting(
+        7, "values", "Number of values tried on each side: with one every fiftieth of the range, valleys as narrow are seen."
+    )
+    look_rounds: int = setting(3, "rounds", f"From a lower place the fit begins again, at most this often; {BY_HAND}.")
+    wide_step: float = setting(
+        0.15,
+        "1",
+        "Step of the difference quotient from which the intervals of a body's parameters follow, as a fraction of the plausible "
+        "range (of a factor by ratio): the response to a servo's strength has steps, and the slope within one of them says that "
+        f"the parameter is known far better than it is; {BY_HAND}.",
+    )
     stretch_farthest: float = setting(
         4.0,
         "1",

@@ -57,12 +57,6 @@ class Predict:
         "Nodes of a body's response curve: fractions of the distance from the neutral value to the end of the "
         f"plausible range; {BY_HAND}.",
     )
-    screening_shares: tuple[float, ...] = setting(
-        (0.6, 1.2),
-        "1",
-        "Nodes of a response curve while effects are screened, in the same unit as `response_shares`; fewer are enough "
-        f"there; {BY_HAND}.",
-    )
     response_clipped_m: float = setting(
         0.5,
         "m",
@@ -70,26 +64,24 @@ class Predict:
         f"distance; {BY_HAND}.",
     )
     anchor_near: float = setting(
-        0.03,
+        0.01,
         "1",
         "A model is not simulated again if it is this close to a simulated one (sum over its parameters, in units "
-        f"of their plausible ranges); {BY_HAND}.",
+        "of their plausible ranges, of factors by ratio). With 0.03, a stiffness of 0.7 was estimated as 0.76: between simulated "
+        "values, the loss was too high by up to a third.",
     )
-    node_long: float = setting(
-        0.15,
+    node_near: float = setting(
+        0.05,
         "1",
-        "Where parameters are determined, intervals between nodes longer than this fraction of the plausible range "
-        "are halved: an arm's servo at half its strength was estimated as 0.40 between nodes at 0.4 and 0.8, and a "
-        "second effect compensated for it.",
+        "Where parameters are determined, the response is simulated this far to either side, in the same unit, unless it is "
+        "known at a distance of half to one and a half times as much: fits stop at the bends of a curve, and a friction of 1.6 "
+        "beside a joint zero was estimated as 1.46, next to a node at 1.467.",
     )
-    node_beside: float = setting(
-        0.3,
-        "1",
-        "Intervals next to a node are halved as well if the fitted parameter is nearer to the node than this fraction of "
-        f"`node_long`: fits stop at the bends of a curve; {BY_HAND}.",
-    )
-    screening_cycles: int = setting(
-        64, "cycles", f"Number of evenly spaced cycles with which the effects of a body are screened; {BY_HAND}."
+    screening_cycles: tuple[int, ...] = setting(
+        (64, 21),
+        "cycles",
+        "Number of evenly spaced cycles with which the effects of a body are screened; and of those with which all are screened "
+        f"first, after which the worse ones are dropped (`screen_first`); {BY_HAND}.",
     )
     most_stretches: int = setting(
         200,

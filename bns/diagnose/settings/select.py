@@ -74,11 +74,26 @@ class Select:
         "effects",
         f"Where fits are costly, at most this many effects are fitted after each step of the search; {BY_HAND}.",
     )
-    screen_chance: float = setting(
+    screen_first: float = setting(
+        0.3,
+        "1",
+        "At most this fraction of all effects goes on from the screening on the fewest cycles to the one on more. In nine "
+        f"bodies, the hidden effect was the first or the second of 40; {BY_HAND}.",
+    )
+    screen_behind: float = setting(
         0.2,
         "1",
-        "Of these, only effects are fitted whose p-value in the screening, on few cycles, is below this; "
-        f"{BY_HAND}.",
+        "Only effects whose gain in a screening is at least this fraction of the best one's go on, or are fitted. In nine "
+        "bodies, the hidden effect was the best or the second best on 64 cycles, and "
+        "none that stood further behind was ever taken.",
+    )
+    screen_chance: float = setting(
+        0.2, "1", f"On few cycles, only effects go on whose p-value is below this; {BY_HAND}."
+    )
+    screen_chance_of_all: float = setting(
+        0.05,
+        "1",
+        "On all cycles, only effects whose p-value is below this are fitted: to be accepted, they need one below a thousandth.",
     )
     screen_share: float = setting(
         0.6,

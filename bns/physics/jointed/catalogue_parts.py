@@ -1,4 +1,4 @@
-"""Effects that sit at one joint, or at one tracked point: one file, as many effects as there are places."""
+"""Effects that sit at one joint, link or tracked point: one file, as many effects as there are places."""
 
 from __future__ import annotations
 
@@ -55,3 +55,11 @@ class PerSite(_Placed):
     def of(self, site: str, number: int) -> Effect:
         """The effect at that point, the ``number``-th."""
         return self._at(site, {"site": site}, {"site": number})
+
+
+class PerLink(_Placed):
+    """One for every link that may touch the floor."""
+
+    def of(self, link: str, number: int) -> Effect:
+        """The effect at that link, the ``number``-th of the body."""
+        return self._at(link, {"link": link}, {"link": number})

@@ -50,7 +50,8 @@ class Machine:
     """A compiled mechanism and the addresses of its parts.
 
     ``joints``: of each actuator, in their order; ``joint_at``: their positions in qpos; ``stiffness_n_m_rad``,
-    ``torque_n_m`` (joints,) as the model has them; ``free``: does the body lie free on a floor? ``links``: bodies that have mass.
+    ``torque_n_m`` (joints,) as the model has them; ``told`` (joints, 2): the range in which a servo follows its set points;
+    ``free``: does the body lie free on a floor? ``links``: bodies that have mass.
     """
 
     model: Any
@@ -59,8 +60,21 @@ class Machine:
     joint_at: NDArray[np.int64]
     stiffness_n_m_rad: NDArray[np.float64]
     torque_n_m: NDArray[np.float64]
+    told: NDArray[np.float64]
     free: bool
     tether: int
+
+    @property
+    def on_the_floor(self) -> tuple[tuple[str, int], ...]:
+        """Links that may touch it: name, and number among the links."""
+        links = sorted({int(link) - 1 for link in self._pair_links})
+        return tuple((self.model.body(link + 1).name or f"link-{link}", link) for link in links)
+
+    @property
+    def _pair_links(self) -> NDArray[np.int64]:
+        """The moving body of every contact pair, (pairs,)."""
+        bodies = self.model.geom_bodyid
+        return np.maximum(bodies[self.model.pair_geom1], bodies[self.model.pair_geom2]).astype(np.int64)
 
     @property
     def plant(self) -> Plant:
@@ -68,15 +82,15 @@ class Machine:
         return sound(self.joints, self.model.nbody - 1)
 
     def changed(self, plant: Plant) -> Any:
-        """The MuJoCo model with the masses and the friction of a plant."""
+        """The MuJoCo model with the masses, the friction and the servos' damping of a plant."""
         same = plant.friction_along == plant.friction_across == 1.0
-        if same and (plant.mass == 1.0).all() and (plant.grip == 1.0).all():
+        if same and all((factors == 1.0).all() for factors in (plant.mass, plant.grip, plant.damping)):
             return self.model
         model = _copy(self.model)
+        model.actuator_biasprm[:, 2] *= plant.damping
         model.body_mass[1:] *= plant.mass
         model.body_inertia[1:] *= plant.mass[:, None]
-        links = np.maximum(model.geom_bodyid[model.pair_geom1], model.geom_bodyid[model.pair_geom2])
-        grip = np.concatenate([[1.0], plant.grip])[links]
+        grip = np.concatenate([[1.0], plant.grip])[self._pair_links]
         model.pair_friction[:, 0] *= plant.friction_along * grip
         model.pair_friction[:, 1] *= plant.friction_across * grip
         mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -92,7 +106,8 @@ def machine(mechanism: Mechanism, dt_s: float | None = None) -> Machine:
     """The compiled mechanism, with steps of ``dt_s`` instead of its own; ModelError for a body that cannot be used here."""
     try:
         spec = mujoco.MjSpec.from_string(mechanism.xml)
-        plain = mujoco.MjSpec.from_string(mechanism.xml).compile()
+        _name(spec)
+        plain = spec.compile()
     except ValueError as error:
         raise ModelError(f"MuJoCo does not read the body: {error}; give an MJCF file that its viewer opens.") from error
     _track(spec, mechanism)
@@ -100,6 +115,8 @@ def machine(mechanism: Mechanism, dt_s: float | None = None) -> Machine:
     if dt_s is not None:
         spec.option.timestep = dt_s
     model = spec.compile()
+    # set points are bounded before a servo makes a torque of them: what it is given here may lie anywhere
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
     _check(model)
     at = model.actuator_trnid[:, 0]
     limits = np.abs(model.actuator_forcerange).max(axis=1)
@@ -111,9 +128,18 @@ def machine(mechanism: Mechanism, dt_s: float | None = None) -> Machine:
         model.jnt_qposadr[at].astype(np.int64),
         model.actuator_gainprm[:, 0].copy(),
         np.where(model.actuator_forcelimited.astype(bool), limits, np.inf),
+        np.where(model.actuator_ctrllimited.astype(bool)[:, None], model.actuator_ctrlrange, [-np.inf, np.inf]),
         free,
         model.body(_tether(spec, mechanism)).id,
     )
+
+
+def _name(spec: Any) -> None:
+    """Give bodies, geoms and servos without a name one: models of robots seldom name the geoms that touch the floor."""
+    for number, geom in enumerate(spec.geoms):
+        geom.name = geom.name or f"bns-geom-{number}"
+    for number, body in enumerate(body for body in spec.bodies if body is not spec.worldbody):
+        body.name = body.name or f"bns-body-{number}"
 
 
 def _track(spec: Any, mechanism: Mechanism) -> None:
@@ -137,8 +163,6 @@ def _tether(spec: Any, mechanism: Mechanism) -> str:
     bodies = [body for body in spec.bodies if body is not spec.worldbody and body.name != "world"]
     if not bodies:
         raise ModelError("The body has no links; give an MJCF file of a robot.")
-    if not bodies[0].name:
-        bodies[0].name = "bns-root"
     if mechanism.tether and mechanism.tether not in [body.name for body in bodies]:
         raise ModelError(unknown_name("link of the body", mechanism.tether, [body.name for body in bodies]))
     return mechanism.tether or str(bodies[0].name)
@@ -150,20 +174,23 @@ def _pair_with_floor(spec: Any, plain: Any) -> None:
     Of a capsule's contacts with a plane the first direction runs along the capsule.
     """
     for floor, other in _floor_pairs(plain):
-        a, b = plain.geom(floor), plain.geom(other)
-        if not a.name or not b.name:
-            raise ModelError(
-                f"Geom {other if a.name else floor} of the body has no name; name every geom that touches the floor."
-            )
-        sliding, spin, rolling = np.maximum(plain.geom_friction[floor], plain.geom_friction[other])
+        sliding, spin, rolling = _of_the_one_that_counts(plain.geom_friction, plain, floor, other)
         spec.add_pair(
-            geomname1=a.name,
-            geomname2=b.name,
-            condim=int(max(plain.geom_condim[floor], plain.geom_condim[other])),
+            geomname1=plain.geom(floor).name,
+            geomname2=plain.geom(other).name,
+            condim=int(_of_the_one_that_counts(plain.geom_condim, plain, floor, other)),
             friction=[sliding, sliding, spin, rolling, rolling],
             solref=plain.geom_solref[other],
             solimp=plain.geom_solimp[other],
         )
+
+
+def _of_the_one_that_counts(values: NDArray[Any], plain: Any, floor: int, other: int) -> Any:
+    """Of two geoms that touch, the value of the one with priority; of equals the larger one, as MuJoCo has it."""
+    first, second = plain.geom_priority[[floor, other]]
+    if first == second:
+        return np.maximum(values[floor], values[other])
+    return values[floor if first > second else other]
 
 
 def _floor_pairs(plain: Any) -> Iterator[tuple[int, int]]:

@@ -6,7 +6,7 @@ points really are. Between them the body is simulated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,13 @@ class Plant:
     """Stage ``mechanics``.
 
     Of each joint with a servo, (joints,): ``stiffness`` and ``torque`` (its limit) as factors, ``zero_rad`` (where it is when it
-    believes to be at 0), ``speed`` (its limit as a share of the fastest that it is told to move; from 1 on none). Of
-    each link, (links,): ``mass`` and ``grip`` (on the floor, all ways) as factors. ``friction_along``, ``friction_across``: of
-    links on the floor, factors along and across their own axes. ``dead_band_rad`` and ``delay_s`` come on top of the model's own.
-    ``sag``: share of stiffness and torque limit that is lost when all servos pull with all they have. ``slope``: fall of the
-    floor towards east and north, rad. ``pull_n``: force of the tether east and north; ``return_n_m``: the same a metre of way
-    from the origin, back to it; ``drag_n``: of the tether against its motion, beyond the model's own.
+    believes to be at 0), ``damping`` (of a servo that damps by itself) as a factor, ``speed`` (its limit as a share of the
+    fastest that it is told to move; from 1 on none). Of each link, (links,): ``mass`` and ``grip`` (on the floor, all ways) as
+    factors. ``friction_along``, ``friction_across``: of links on the floor, factors along and across their own axes.
+    ``dead_band_rad`` and ``delay_s`` come on top of the model's own. ``sag``: share of stiffness and torque limit that is lost
+    when all servos pull with all they have. ``slope``: fall of the floor towards east and north, rad. ``pull_n``: force of the
+    tether east and north; ``return_n_m``: the same a metre of way from the origin, back to it; ``drag_n``: of the tether against
+    its motion, beyond the model's own.
     """
 
     joints: tuple[str, ...]
@@ -32,6 +33,7 @@ class Plant:
     torque: Array
     zero_rad: Array
     speed: Array
+    damping: Array
     mass: Array
     grip: Array
     friction_along: float = 1.0
@@ -44,6 +46,12 @@ class Plant:
     return_n_m: float = 0.0
     drag_n: float = 0.0
 
+    @property
+    def key(self) -> bytes:
+        """The same for two plants alone of which nothing differs."""
+        numbers = (np.atleast_1d(np.asarray(getattr(self, f.name), dtype=np.float64)) for f in fields(self) if f.name != "joints")
+        return np.concatenate(list(numbers)).tobytes()
+
     def with_joint(self, values: str, joint: str, value: float) -> Plant:
         """One joint's entry of an array of joints multiplied by a factor; of ``zero_rad`` something added."""
         changed = getattr(self, values).copy()
@@ -51,11 +59,17 @@ class Plant:
         changed[at] = changed[at] + value if values == "zero_rad" else changed[at] * value
         return replace(self, **{values: changed})
 
+    def with_link(self, values: str, link: int, factor: float) -> Plant:
+        """One link's entry of an array of links multiplied by a factor."""
+        changed = getattr(self, values).copy()
+        changed[link] *= factor
+        return replace(self, **{values: changed})
+
 
 def sound(joints: tuple[str, ...], links: int) -> Plant:
     """The plant with nothing wrong."""
     n = len(joints)
-    return Plant(joints, np.ones(n), np.ones(n), np.zeros(n), np.full(n, np.inf), np.ones(links), np.ones(links))
+    return Plant(joints, np.ones(n), np.ones(n), np.zeros(n), np.full(n, np.inf), np.ones(n), np.ones(links), np.ones(links))
 
 
 @dataclass(frozen=True)

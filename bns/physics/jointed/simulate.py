@@ -6,7 +6,7 @@ What a servo does within a step (dead band, delay, limits, sag) is worked out fo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -47,18 +47,27 @@ class Rest:
 
 
 class Simulator:
-    """Drives of one mechanism. Rows are simulated longest first, so that those that go on stand together."""
+    """Drives of one mechanism. Rows are simulated longest first, so that those that go on stand together.
 
-    def __init__(self, machine: Machine, drives: Sequence[Drive], threads: int) -> None:
+    ``told_rad_s``: the fastest that servos are told to move; where it is not given, in these drives.
+    """
+
+    def __init__(
+        self, machine: Machine, drives: Sequence[Drive], threads: int, told_rad_s: float | None = None
+    ) -> None:
         self.machine, self._threads = machine, threads
         self.drives = tuple(drives)
         self._lasts = np.array([int(d.frames[-1]) for d in drives])
         self._order = np.argsort(-self._lasts, kind="stable")
         self._dt_s = float(machine.model.opt.timestep)
-        self._told_rad_s = told_speed_rad_s(drives, self._dt_s)
+        self._told_rad_s = told_speed_rad_s(drives, self._dt_s) if told_rad_s is None else told_rad_s
         self.counts = np.array([len(d.frames) for d in drives])
         self.simulated = 0
         """Rows simulated so far."""
+
+    def only(self, chosen: NDArray[np.int64]) -> Simulator:
+        """Some of the drives, by servos as fast as those of all."""
+        return Simulator(self.machine, [self.drives[i] for i in chosen], self._threads, self._told_rad_s)
 
     def at_rest(self) -> Rest:
         """Every body come to rest in the first posture of its drive; then driven once for where it is first seen."""
@@ -77,7 +86,7 @@ class Simulator:
     def settled(self, plant: Plant) -> Array:
         """States (drives, n) of every body put down in the first posture of its drive and come to rest.
 
-        A joint is put down as far from its rest position to its set point as its servo is strong: one that gives no torque has
+        A joint is put down as near its set point as its servo brings it against its own friction: one that gives no torque has
         not moved there.
         """
         hold = round(SETTLE_S / self._dt_s)
@@ -103,19 +112,29 @@ class Simulator:
         return Sighting(moved[:, :, 0], moved[:, :, 1], moved[:, :, 2])
 
     def _put_down(self, plant: Plant) -> Array:
-        """States with every joint at its first set point, as far as its servo is strong; the lowest geom just above the floor."""
-        m, strength = self.machine, np.clip(np.minimum(plant.stiffness, plant.torque), 0.0, 1.0)
+        """States with every joint as near its first set point as its servo brings it; the lowest geom just above the floor."""
+        m, short = self.machine, self._short_rad(plant)
         data, model = mujoco.MjData(m.model), m.model
         rows = np.zeros((len(self.drives), mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
         for row, drive in zip(rows, self.drives, strict=True):
             qpos = model.qpos0.copy()
-            qpos[m.joint_at] += strength * (drive.set_points[0] - qpos[m.joint_at])
+            way = drive.set_points[0] - qpos[m.joint_at]
+            qpos[m.joint_at] += np.sign(way) * np.maximum(np.abs(way) - short, 0.0)
             if m.free:
                 data.qpos[:] = qpos
                 mujoco.mj_kinematics(model, data)
                 qpos[2] -= _lowest_m(model, data) - _CLEAR_M
             row[1 : 1 + model.nq] = qpos
         return rows
+
+    def _short_rad(self, plant: Plant) -> Array:
+        """How far short of its set point friction stops each joint, (joints,), beyond where it stops one with a sound servo."""
+        m, strength = self.machine, np.clip(np.minimum(plant.stiffness, plant.torque), 0.0, 1.0)
+        friction = m.model.dof_frictionloss[m.model.jnt_dofadr[m.model.actuator_trnid[:, 0]]]
+        short: Array = np.full(len(strength), np.inf)
+        moves = strength > 0
+        short[moves] = (friction / m.stiffness_n_m_rad)[moves] * (1 / strength[moves] - 1)
+        return short
 
     def _stepped(self, plant: Plant, rest: Rest) -> tuple[Array, Array]:
         """Sensors in every frame (frames, n), and the states at the ends of the drives (drives, n)."""
@@ -161,6 +180,11 @@ class Simulator:
         return np.concatenate([seen[i] for i in back]), state[back]
 
 
+def joined(rests: Sequence[Rest]) -> Rest:
+    """Drives one after the other."""
+    return Rest(*(np.concatenate([getattr(rest, f.name) for rest in rests]) for f in fields(Rest)))
+
+
 def replace_state(rest: Rest, state: Array) -> Rest:
     """The same places with other states."""
     return Rest(state, rest.turn_rad, rest.origin_m, rest.begin_m)
@@ -173,7 +197,8 @@ class _Servos:
         self, machine: Machine, plant: Plant, set_points: Sequence[Array], dt_s: float, told_rad_s: float
     ) -> None:
         p, m = plant, machine
-        self._wanted = _delayed(set_points, max(0.0, (m.mechanism.delay_s + p.delay_s) / dt_s)) + p.zero_rad
+        heard = [np.clip(told, *m.told.T) for told in set_points]
+        self._wanted = _delayed(heard, max(0.0, (m.mechanism.delay_s + p.delay_s) / dt_s)) + p.zero_rad
         self._band = m.mechanism.dead_band_rad + p.dead_band_rad
         self._stiffness = p.stiffness
         self._furthest = m.torque_n_m * p.torque / m.stiffness_n_m_rad

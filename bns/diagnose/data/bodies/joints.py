@@ -96,4 +96,5 @@ def check_names(tracks: JointTracks, joints: Sequence[str], sites: Sequence[str]
             raise DataError(
                 f"The measurements lack {', '.join(name + ending for name in missing)}: the model has the {kind} {missing[0]}. "
                 f"They have {', '.join(name + ending for name in there)}."
+                + (" Name the sites that were tracked: sites: [...] in a model file." if ending == X else "")
             )

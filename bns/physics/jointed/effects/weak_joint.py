@@ -8,8 +8,10 @@ from bns.physics.jointed.plant import Plant
 
 
 def apply(plant: Plant, joint: str, strength: float) -> Plant:
-    """Stiffness and torque limit of one joint, as a fraction."""
-    return plant.with_joint("stiffness", joint, strength).with_joint("torque", joint, strength)
+    """Stiffness, torque limit and the servo's own damping of one joint, as a fraction."""
+    for values in ("stiffness", "torque", "damping"):
+        plant = plant.with_joint(values, joint, strength)
+    return plant
 
 
 EFFECT = PerJoint(
