@@ -87,9 +87,10 @@ def test_all_controllers_have_the_same_noise_and_the_next_generation_another():
 def test_the_noise_is_the_error_on_patterns_that_taught_nothing():
     X = KHEPERA.inputs(KHEPERA.random_controllers(KEY, 1, 4000).controller(0))
     patterns, off = PatternSet.empty(5, 3), np.random.default_rng(0).normal(size=(4000, 3)) * SD
-    patterns.add(X[:, :7], predict(STILL, X[:, :7]))
+    patterns.add(X[:, :7], predict(STILL, X[:, :7]) + np.float32(0.5))
     assert residual_sd(KHEPERA, STILL, patterns).tolist() == [0, 0, 0]
     patterns.add(X, KHEPERA.targets(KHEPERA.displacements(predict(STILL, X)) + off))
+    patterns.forget(7)
     np.testing.assert_allclose(residual_sd(KHEPERA, STILL, patterns), SD, rtol=0.04)
     assert FEWEST == 8
 
@@ -109,19 +110,60 @@ def test_a_run_takes_its_noise_from_its_own_drives_and_not_from_the_world_s_file
 
 
 def test_the_fittest_is_the_one_of_the_best_tenth_that_succeeds_most_often():
-    simulator = NoisySimulator(NetworkSimulator(KHEPERA, CIRCLE, STILL), SD / 3, 1)
+    wide = replace(CIRCLE, radius_m=0.2)
+    simulator = NoisySimulator(NetworkSimulator(KHEPERA, wide, STILL), SD / 3, 1)
     population = some(2000)
     order = rank(simulator.score(population, STREAM).fitness)
-    found = most_certain(simulator, population, order, CIRCLE, KEY, 5)
+    found = most_certain(simulator, population, order, wide, KEY, 5)
     elite = order[: int(ELITE * 2000)]
     assert found in elite
-    success, fitness = simulator.success(population, CIRCLE, RandomStream(KEY, 5))
-    assert success[found] == success[elite].max() > 0
+    success, fitness = simulator.success(population, wide, RandomStream(KEY, 5))
+    assert success[found] == success[elite].max() > success[order[0]]
     assert fitness[found] == fitness[elite[success[elite] == success[found]]].max()
-    noise = drawn(DRAWS, 40, SD / 3, RandomStream(KEY, 5))
     moved = KHEPERA.measured_displacements(simulator.poses(population.controller(found)))
-    driven = [KHEPERA.succeeded(KHEPERA.poses(moved + row[: len(moved)]), CIRCLE) for row in noise]
-    assert success[found] == pytest.approx(np.mean(driven), abs=1e-9)
+    noise = drawn(DRAWS, 40, SD / 3, RandomStream(KEY, 5))[:, : len(moved)]
+    slow = reference.expected_walk(moved, noise, START, wide.goals_m, 0.2, MISSED_GOAL_M)
+    assert success[found] == pytest.approx(slow[2], abs=1e-9)
+
+
+class Told:
+    """A simulator whose answers are told."""
+
+    def success(self, population, task, stream):
+        assert len(population) == 3
+        return np.array([0.5, 0.75, 0.75]), np.array([9.0, 1.0, 2.0])
+
+
+def test_the_rate_of_success_counts_before_fitness_and_of_equals_fitness():
+    order = np.arange(30)[::-1]
+    assert most_certain(Told(), some(30), order, CIRCLE, KEY, 1) == order[2]
+
+
+def test_goals_reached_are_the_rounded_mean():
+    population, simulator = some(400), NoisySimulator(NetworkSimulator(KHEPERA, replace(CIRCLE, radius_m=0.2), STILL), SD, ROWS)
+    scores = simulator.score(population, STREAM)
+    mean = KHEPERA.expected(population, scores.outputs, simulator.networks.task, SD, ROWS, STREAM).goals_reached
+    assert scores.goals_reached.dtype == np.int32
+    assert np.abs(scores.goals_reached - mean).max() <= 0.5 + 1e-9
+    assert (scores.goals_reached < mean - 0.1).any()
+    assert (scores.goals_reached > mean + 0.1).any()
+
+
+def test_each_round_judges_the_best_tenth_with_draws_of_its_own():
+    spec = RunSpec(**SMALL | {"approach": "bns+noise=2", "population_size": 200})
+    wide = replace(CIRCLE, radius_m=0.3)
+    approach, rng, differs = start_approach(KHEPERA, wide, KEY, spec), np.random.default_rng(1), 0
+    for number in range(1, 5):
+        commands = KHEPERA.random_controllers(KEY, 10, 13).controller(number)
+        approach.learn(commands, KHEPERA.poses(rng.normal(size=(13, 3)) * 0.1), number)
+        approach.advance()
+        evolver, key = approach.evolver, approach.setting.own_key("noise")
+        judged = (approach.simulator, evolver.population, evolver.order, wide, key)
+        np.testing.assert_array_equal(
+            approach.fittest(), evolver.population.controller(most_certain(*judged, evolver.generations))
+        )
+        differs += most_certain(*judged, evolver.generations) != most_certain(*judged, 0)
+    assert differs  # else the draws of a round do not matter here
 
 
 def test_no_noise_leaves_every_number_as_it_was_and_noise_goes_by_the_seed():
