@@ -24,7 +24,8 @@ from bns.errors import SpecError
 from bns.tasks import Task
 
 STEPS = 10
-"""In so many steps goals narrow by the whole margin; widening 3 and 10 times as fast did no better (five seeds, three tasks)."""
+"""In so many steps goals narrow by the whole margin, and noise grows to its full size; widening 3 and 10 times as fast did no better (five
+seeds, three tasks)."""
 
 
 class BootstrappedNeuroSimulation(NeuroSimulation):
@@ -35,9 +36,10 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     after each round whose fittest controller reaches all of them in simulation, and widen by as much after any other:
     goals that nobody reaches lead nowhere.
 
-    ``noise``: each controller is simulated so many times under noise as large as the networks' errors on what they did not learn
-    from; its fitness is that of the mean, and the fittest is the one of the best tenth that succeeds most often
-    (`bns.approaches.parts.noisy`).
+    ``noise``: each controller is simulated so many times under noise, up to as large as the networks' errors on what they did
+    not learn from; its fitness is that of the mean, and the fittest is the one of the best tenth that succeeds most often
+    (`bns.approaches.parts.noisy`). Noise grows and shrinks by tenths as the margin does: under all of it, no controller
+    reaches anything on networks that have hardly learned.
 
     ``ensemble``: so many networks for each displacement (`bns.approaches.parts.ensemble`). ``use``: evolution works on
     their mean, on the one that thinks worst of a controller, or on one of them, drawn for each round.
@@ -128,7 +130,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         self.copy()
         self._latest.append(self.weights)
         self.evolve()
-        if self.setting.options["margin"]:
+        if self.setting.options["margin"] or self.setting.options["noise"]:
             scores, best = self.evolver.scores, self.evolver.order[0]
             all_reached = scores.goals_reached[best] == len(self.setting.task.goals_m)
             self._narrowed = min(self._narrowed + 1, STEPS) if all_reached else max(self._narrowed - 1, 0)
@@ -158,7 +160,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         networks = NetworkSimulator(self.setting.robot, self.goals(), weights)
         if rows := self.setting.whole("noise"):
             sd = residual_sd(self.setting.robot, weights, self.trainer.data.validation)
-            return NoisySimulator(networks, sd, rows)
+            return NoisySimulator(networks, sd * self._narrowed / STEPS, rows)
         return networks if self._arcs is None else HybridSimulator(self._arcs.robot, self.goals(), self._arcs, networks)
 
     def goals(self) -> Task:
