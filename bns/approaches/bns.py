@@ -24,8 +24,8 @@ from bns.errors import SpecError
 from bns.tasks import Task
 
 STEPS = 10
-"""In so many steps goals narrow by the whole margin, and noise grows to its full size; widening 3 and 10 times as fast did no better (five
-seeds, three tasks)."""
+"""In so many steps goals narrow by the whole margin, and noise grows to its full size; widening 3 and 10 times as fast did no
+better (five seeds, three tasks)."""
 
 
 class BootstrappedNeuroSimulation(NeuroSimulation):
