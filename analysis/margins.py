@@ -1,7 +1,8 @@
 """How near to the edges of the goals final controllers pass, and how often they succeed with and without the world's noise.
 
-`python -m analysis.margins --results DIR [--sweep NAME] [--out FILE.csv]`: of runs with paths in the substitute world, the
-fittest controller of the last evaluation is driven by the static simulator as it is, and under its noise many times.
+`python -m analysis.margins --results DIR [--sweep NAME] [--out FILE.csv] [--rows FILE.csv]`: of runs with paths in the
+substitute world, the fittest controller of the last evaluation is driven by the static simulator as it is, and under its noise
+many times.
 """
 
 from __future__ import annotations
@@ -114,13 +115,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--results", type=Path, default=Path("results"), help="folder of the results (results)")
     parser.add_argument("--sweep", default=READINGS, help=f"name of the sweep ({READINGS})")
     parser.add_argument("--out", type=Path, help="CSV file to write the summary into")
+    parser.add_argument("--rows", type=Path, help="CSV file to write a row for each run into")
     wanted = parser.parse_args(arguments)
     try:
-        table = summary(margins(Results(wanted.results), wanted.sweep))
+        rows = margins(Results(wanted.results), wanted.sweep)
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return fault.exit_code
+    table = summary(rows)
     print(table.to_string(index=False))
+    if wanted.rows is not None:
+        rows.round(4).to_csv(wanted.rows, index=False)
     if wanted.out is not None:
         table.to_csv(wanted.out, index=False)
     return 0

@@ -16,6 +16,7 @@ from bns.approaches.parts.ensemble import USES, Ensemble, WorstSimulator
 from bns.approaches.parts.hybrid import MODELS, NO_MODEL, Arcs, HybridSimulator, arcs_of
 from bns.approaches.parts.informed import SNAPSHOTS, most_informative
 from bns.approaches.parts.neuro_simulation import NeuroSimulation
+from bns.approaches.parts.noisy import NoisySimulator, check_noise, most_certain, residual_sd
 from bns.approaches.parts.surprise import IN_A_ROW, Surprise
 from bns.bootstrap.simulators import NetworkSimulator, Simulator
 from bns.bootstrap.trainer import Learner, Trainer
@@ -23,7 +24,8 @@ from bns.errors import SpecError
 from bns.tasks import Task
 
 STEPS = 10
-"""In so many steps goals narrow by the whole margin; widening 3 and 10 times as fast did no better (five seeds, three tasks)."""
+"""In so many steps goals narrow by the whole margin, and noise grows to its full size; widening 3 and 10 times as fast did no
+better (five seeds, three tasks)."""
 
 
 class BootstrappedNeuroSimulation(NeuroSimulation):
@@ -33,6 +35,11 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     that are narrower in evolution than on the robot leave room for such errors. They narrow by a tenth of the margin
     after each round whose fittest controller reaches all of them in simulation, and widen by as much after any other:
     goals that nobody reaches lead nowhere.
+
+    ``noise``: each controller is simulated so many times under noise, up to as large as the networks' errors on what they did
+    not learn from; its fitness is that of the mean, and the fittest is the one of the best tenth that succeeds most often
+    (`bns.approaches.parts.noisy`). Noise grows and shrinks by tenths as the margin does: under all of it, no controller
+    reaches anything on networks that have hardly learned.
 
     ``ensemble``: so many networks for each displacement (`bns.approaches.parts.ensemble`). ``use``: evolution works on
     their mean, on the one that thinks worst of a controller, or on one of them, drawn for each round.
@@ -49,6 +56,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
 
     options: ClassVar[Options] = {
         "margin": Option(0.0, 0.0, 1.0, "m by which goals become narrower in evolution, all around"),
+        "noise": Option(0, 0, 1000, "simulations of each controller under noise; 0: one without"),
         "ensemble": Option(1, 1, 100, "networks for each displacement"),
         "use": Choice("mean", USES, "what evolution works on where networks are several"),
         "informed": Option(0.0, 0.0, 1.0, "fraction of the population, fittest first, of which the most informative is driven"),
@@ -65,6 +73,9 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         self._latest: deque[np.ndarray] = deque(maxlen=SNAPSHOTS)
         if setting.options["margin"]:
             self._check_margin(setting)
+        if setting.options["noise"]:
+            check_noise(setting)
+        self._chosen: tuple[int, np.ndarray] | None = None
         super().__init__(setting, trainer)
 
     @classmethod
@@ -119,7 +130,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         self.copy()
         self._latest.append(self.weights)
         self.evolve()
-        if self.setting.options["margin"]:
+        if self.setting.options["margin"] or self.setting.options["noise"]:
             scores, best = self.evolver.scores, self.evolver.order[0]
             all_reached = scores.goals_reached[best] == len(self.setting.task.goals_m)
             self._narrowed = min(self._narrowed + 1, STEPS) if all_reached else max(self._narrowed - 1, 0)
@@ -133,9 +144,23 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
             self.weights = several.drawn(self._rounds)
         return self._on(self.weights)
 
+    def fittest(self) -> np.ndarray:
+        """The best controller in simulation; under noise, the most certain one of the best."""
+        evolver, simulator = self.evolver, self.simulator
+        if not isinstance(simulator, NoisySimulator):
+            return super().fittest()
+        if self._chosen is None or self._chosen[0] != evolver.generations:
+            key, step = self.setting.own_key("noise"), evolver.generations
+            found = most_certain(simulator, evolver.population, evolver.order, self.setting.task, key, step)
+            self._chosen = step, evolver.population.controller(found)
+        return self._chosen[1].copy()
+
     def _on(self, weights: np.ndarray) -> Simulator:
-        """These networks, after the model where there is one."""
+        """These networks, after the model where there is one, and under noise where that is asked for."""
         networks = NetworkSimulator(self.setting.robot, self.goals(), weights)
+        if rows := self.setting.whole("noise"):
+            sd = residual_sd(self.setting.robot, weights, self.trainer.data.validation)
+            return NoisySimulator(networks, sd * self._narrowed / STEPS, rows)
         return networks if self._arcs is None else HybridSimulator(self._arcs.robot, self.goals(), self._arcs, networks)
 
     def goals(self) -> Task:

@@ -290,3 +290,24 @@ def displacements(poses: np.ndarray, is_first: np.ndarray) -> np.ndarray:
     way = np.diff(place, prepend=place[:1]) * np.exp(-1j * np.roll(poses[:, 2], 1))
     out = np.stack([way.real, way.imag, np.diff(poses[:, 2], prepend=poses[:1, 2])], axis=1)
     return np.where(is_first[:, None], 0.0, out)
+
+
+def expected_walk(
+    moved: np.ndarray, noise: np.ndarray, start: tuple[float, float, float], goals: np.ndarray, radius_m: float, penalty_m: float
+) -> tuple[float, float, float]:
+    """Algorithm 2 on displacements (n, 3), right, ahead and turn, under each row of noise (rows, n, 3), path by path.
+
+    Mean sum of distances with ``penalty_m`` for every goal missed, mean goals reached, share of the rows that reach all.
+    """
+    sums, reached, places = [], [], [complex(*goal) for goal in goals]
+    for row in noise:
+        position, heading, todo, total = complex(*start[:2]), start[2], list(places), 0.0
+        for right, ahead, turn in np.asarray(moved, np.float64) + row:
+            position += complex(ahead, -right) * np.exp(1j * heading)
+            heading += turn
+            if todo and abs(position - todo[0]) <= radius_m:
+                todo.pop(0)
+            total += abs(position - (todo or places[-1:])[0])
+        sums.append(total + penalty_m * len(todo))
+        reached.append(len(places) - len(todo))
+    return float(np.mean(sums)), float(np.mean(reached)), float(np.mean(np.array(reached) == len(places)))

@@ -162,7 +162,8 @@ class Fitness(Protocol):
 
     radii_m: tuple[float, ...]
     """At which success is recorded, the one that fitness counts first. A robot that heeds ``Task.radius_m`` and any
-    ``region_m`` when it scores says so by ``narrows_goals = True`` (`bns.approaches.bns` asks)."""
+    ``region_m`` when it scores says so by ``narrows_goals = True``; one that can score under noise that is told to it has
+    ``expected``, as the Khepera (`bns.approaches.bns` asks for both)."""
 
     def score(
         self, population: Population, weights: np.ndarray, task: Task, stream: RandomStream | None = None,

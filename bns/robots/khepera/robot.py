@@ -13,10 +13,11 @@ import numpy as np
 
 from bns.engine.breeding import breed
 from bns.engine.evolution import CommandBounds, Population, diversity, random_population
-from bns.engine.philox import Key, Purpose, uniforms
+from bns.engine.philox import Key, Purpose, normals, uniforms
 from bns.engine.snn import INPUTS
 from bns.measurements import COLUMNS, trial_table
 from bns.robots.base import RandomStream, Scores, rotate
+from bns.robots.khepera.noisy import Expected, expected
 from bns.robots.khepera.options import READINGS, Options
 from bns.robots.khepera.rollout import inputs, roll_out, walked
 from bns.robots.khepera.rules import (
@@ -179,6 +180,17 @@ class Khepera:
         """As `score`, from displacements (commands, 3)."""
         radius_m = task.radius_m or GOAL_RADIUS_M
         return Scores(*walked(population, self.targets(displacements), task.goals_m, self._penalty_m, radius_m))
+
+    def expected(
+        self, population: Population, outputs: np.ndarray, task: Task, sd: np.ndarray, rows: int, stream: RandomStream
+    ) -> Expected:
+        """As `score`, from the networks' outputs (3, commands), as means over ``rows`` noisy simulations.
+
+        sd (3,): standard deviations of what a command does, SI; the n-th commands of all controllers have the same noise.
+        """
+        drawn = normals(stream.key, Purpose.ROLLOUT_NOISE, stream.step, rows, int(population.lengths.max()))
+        noise = drawn[..., :3].transpose(0, 2, 1) * (sd / SCALE)[:, None]
+        return expected(population, outputs, noise, task.goals_m, self._penalty_m, task.radius_m or GOAL_RADIUS_M)
 
     def evaluate_path(self, poses: np.ndarray, task: Task) -> tuple[float, int]:
         """Fitness per metre, and goals reached, of one path; 0 where `score` would call the arithmetic failed."""

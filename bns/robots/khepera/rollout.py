@@ -146,7 +146,7 @@ def _distances(step_x, step_y, starts, lengths, goals, squared_reach, reached, d
 
 
 @exact
-def _walk(outputs, lengths, scale, goals, squared_reach, extra_m, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
+def walk_all(outputs, lengths, scale, goals, squared_reach, extra_m, fitness, reached):  # type: ignore[no-untyped-def]  # compiled
     """Algorithm 2 for every controller; how many could not be computed. extra_m: by how much the penalty is another one."""
     count, starts = outputs.shape[1], np.cumsum(lengths) - lengths
     heading, step_y, step_x = np.empty(count), np.empty(count), np.empty(count)
@@ -190,7 +190,7 @@ def _rolled_out(  # type: ignore[no-untyped-def]  # compiled
     commands, lengths, origin, known, weights, centre, per_unit, scale, goals, squared_reach, extra_m, fitness, reached
 ):
     outputs = _outputs(commands, lengths, origin, known, weights, centre, per_unit)
-    return outputs, _walk(outputs, lengths, scale, goals, squared_reach, extra_m, fitness, reached)
+    return outputs, walk_all(outputs, lengths, scale, goals, squared_reach, extra_m, fitness, reached)
 
 
 class Rollout(NamedTuple):
@@ -242,7 +242,7 @@ def walked(
     """Algorithm 2 on outputs (3, commands) that are known: fitness (n,), goals reached (n,), how many failed."""
     fitness, reached = np.empty(len(population)), np.empty(len(population), np.int32)
     reach, extra_m = squared_reach_m2(radius_m), penalty_m - MISSED_GOAL_M
-    failures = _walk(np.ascontiguousarray(outputs), population.lengths, SCALE, goals_m, reach, extra_m, fitness, reached)
+    failures = walk_all(np.ascontiguousarray(outputs), population.lengths, SCALE, goals_m, reach, extra_m, fitness, reached)
     return fitness, reached, int(failures)
 
 
