@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -31,6 +31,10 @@ _TAIL_S = DEFAULTS.predict.tail_s
 _KEPT = 500_000
 """Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
 _UNDONE = DEFAULTS.predict.picture_rounds
+_FOUND_M = DEFAULTS.predict.picture_settled_m
+_ASIDE_M = DEFAULTS.predict.picture_aside_m
+_SLOW = DEFAULTS.predict.picture_slow
+_FLAT = DEFAULTS.predict.picture_least_area
 _MOVING = ("wheel", "body")
 
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
@@ -98,9 +102,7 @@ class WheelPredictor:
             return view.poses
 
         before = np.roll(self.tracks.pose, 1, axis=0)
-        really = before
-        for _ in range(_UNDONE):
-            really = really - (picture(really) - before)
+        really = _undone(picture, before)
         cos, sin = np.cos(really[:, 2]), np.sin(really[:, 2])
         moved = [cos * body[:, 0] - sin * body[:, 1], sin * body[:, 0] + cos * body[:, 1], body[:, 2]]
         from_, to = picture(really), picture(really + np.stack(moved, axis=1))
@@ -236,6 +238,34 @@ class WheelPredictor:
             midway * time_s[:, None] + bent
         )
         return out
+
+
+def _undone(picture: Callable[[Array], Array], seen: Array) -> Array:
+    """Poses (frames, 3) whose picture is ``seen``: Newton's steps, with new slopes where those from before lead on slowly.
+
+    Where a picture stretches by more than the places are off, plain repetition would lead away. Headings follow the places.
+    """
+    really, last, slopes = seen, np.inf, None
+    off = picture(seen) - seen
+    for _ in range(_UNDONE):
+        slopes = _slopes(picture, really, off + seen) if slopes is None else slopes
+        east, north, area = slopes
+        x, y = off[:, 0], off[:, 1]
+        back = [(x * north[:, 1] - y * north[:, 0]) / area, (y * east[:, 0] - x * east[:, 1]) / area, off[:, 2]]
+        really = really - np.stack(back, axis=1)
+        farthest = max(float(np.abs(way).max(initial=0.0)) for way in back)
+        if farthest < _FOUND_M:
+            break
+        slopes = None if farthest > _SLOW * last else slopes
+        off, last = picture(really) - seen, farthest
+    return really
+
+
+def _slopes(picture: Callable[[Array], Array], at: Array, seen: Array) -> tuple[Array, Array, Array]:
+    """How a picture changes with a step east and north, (frames, 2) each, and what it makes of an area, (frames,)."""
+    east, north = ((picture(at + _ASIDE_M * np.eye(3)[i]) - seen)[:, :2] / _ASIDE_M for i in (0, 1))
+    area = east[:, 0] * north[:, 1] - east[:, 1] * north[:, 0]
+    return east, north, np.where(np.abs(area) < _FLAT, _FLAT, area)
 
 
 def _chain(model: Model, stages: Sequence[str]) -> Chain:

@@ -1,6 +1,6 @@
 """A round patch of floor on which the robot is slower: the edge of a carpet, oil, a wet spot.
 
-The transition at its rim is a tenth of its radius wide.
+The rim is sharp: a step that crosses it is slowed for the part of its time that it is inside.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import numpy as np
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Body, Wheels
 
-_RIM = 0.1
+_CHORD_ROUNDS = 3
+"""How far a step leads depends on how much of it is inside: each round adds a power of the loss."""
 _PIECE_S, _FEWEST = 0.4, 50
 """Long enough that a pose's noise is small against the way, short enough to lie at one place."""
 _SIDE, _RADII, _TRIED = 13, (0.06, 0.1, 0.15, 0.22, 0.3), 4
@@ -21,9 +22,26 @@ def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float) -> B
     """All velocities times 1 - ``loss`` within ``radius_m`` of the centre."""
     if body.place is None:
         return body  # first round of a simulation: nobody knows yet where the robot goes
-    away = np.hypot(body.place[..., 0] - x_m, body.place[..., 1] - y_m)
-    inside = np.clip((radius_m - away) / (_RIM * radius_m) + 0.5, 0.0, 1.0)
+    east, north, heading = body.place[..., 0] - x_m, body.place[..., 1] - y_m, body.place[..., 2]
+    half = np.zeros_like(east) if body.step_s is None else body.forward_m_s * body.step_s / 2.0
+    inside = np.zeros_like(east)
+    near = np.hypot(east, north) < radius_m + np.abs(half) * max(1.0 - loss, 1.0)
+    east, north, heading, half = east[near], north[near], heading[near], half[near]
+    part = np.ones_like(east)
+    for _ in range(_CHORD_ROUNDS):
+        part = _time_inside(east, north, heading, half * (1.0 - loss * part), radius_m, loss)
+    inside[near] = part
     return body.scaled(1.0 - loss * inside)
+
+
+def _time_inside(east: Array, north: Array, heading: Array, half: Array, radius_m: float, loss: float) -> Array:
+    """The part of steps' time within a disc about (0, 0). ``east``, ``north``: their middles; ``half``: half of their ways."""
+    along, off = east * np.cos(heading) + north * np.sin(heading), east**2 + north**2 - radius_m**2
+    root = np.sqrt(np.maximum(along**2 - off, 0.0))
+    long = np.maximum(np.abs(half), 1e-12)
+    enters, leaves = (np.clip((edge - along * np.sign(half)) / long, -1.0, 1.0) for edge in (-root, root))
+    way: Array = np.where(np.abs(half) < 1e-9, off < 0.0, (leaves - enters) / 2.0)
+    return way / (way + (1.0 - loss) * (1.0 - way))  # what is slower takes longer
 
 
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
@@ -70,9 +88,20 @@ EFFECT = Effect(
     name="floor-patch",
     stage="body",
     parameters=(
-        Parameter("x_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, east", resolution=2e-3),
-        Parameter("y_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, north", resolution=2e-3),
-        Parameter("radius_m", "m", 5e-3, 1e3, (0.02, 100.0), 0.2, "radius of the patch", floor_share=0.33, resolution=2e-3),
+        Parameter("x_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, east", resolution=2e-3, jagged=True),
+        Parameter("y_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, north", resolution=2e-3, jagged=True),
+        Parameter(
+            "radius_m",
+            "m",
+            5e-3,
+            1e3,
+            (0.02, 100.0),
+            0.2,
+            "radius of the patch",
+            floor_share=0.33,
+            resolution=2e-3,
+            jagged=True,
+        ),
         Parameter("loss", "1", -1.0, 0.99, (-0.5, 0.95), 0.0, "fraction of speed lost on it (negative: gained)"),
     ),
     equation="v, s, omega times 1 - k where (x - px)^2 + (y - py)^2 < r^2",
@@ -81,6 +110,7 @@ EFFECT = Effect(
     sentence="the robot is slower on one patch of the floor",
     measurement="inspect the floor there, or repeat trials from a start moved by twice the diameter of the patch",
     apply=apply,
+    revision=2,
     needs="track",
     needs_place=True,
     starts_from=starts_from,
