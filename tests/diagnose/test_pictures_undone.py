@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bns.diagnose.predict.wheels import _undone
+from bns.diagnose.predict.pictures import undone
 from bns.physics.effects import effect_named
 from bns.physics.signals import View
 
@@ -25,6 +25,6 @@ def test_strong_distortions_are_undone_at_the_edge_of_the_floor(name, values):
     def picture(poses):
         return effect_named(name).apply(View(poses), **values).poses
 
-    found = _undone(picture, picture(REALLY))
+    found = undone(picture, picture(REALLY))
     np.testing.assert_allclose(found[:, :2], REALLY[:, :2], atol=1e-4)
     np.testing.assert_allclose(found[:, 2], REALLY[:, 2], atol=2e-3)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -15,6 +15,7 @@ from bns.diagnose.data.tracks import Array, Tracks, slimmed
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import HORIZONS, windows
 from bns.diagnose.predict.luck import Luck
+from bns.diagnose.predict.pictures import pictured, undone
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
 from bns.physics.effect import Effect
@@ -31,10 +32,6 @@ _TAIL_S = DEFAULTS.predict.tail_s
 _KEPT = 500_000
 """Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
 _UNDONE = DEFAULTS.predict.picture_rounds
-_FOUND_M = DEFAULTS.predict.picture_settled_m
-_ASIDE_M = DEFAULTS.predict.picture_aside_m
-_SLOW = DEFAULTS.predict.picture_slow
-_FLAT = DEFAULTS.predict.picture_least_area
 _MOVING = ("wheel", "body")
 
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
@@ -67,6 +64,7 @@ class WheelPredictor:
         # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
         kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
         self._wheels = lru_cache(kept)(self._turned)
+        self._where = lru_cache(kept)(self._found)
         self._body, self._at = lru_cache(kept)(self._driven), lru_cache(kept)(self._followed)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -94,21 +92,21 @@ class WheelPredictor:
 
     def _pictured(self, body: Array, placed: Sequence[ActiveEffect]) -> Array:
         """Displacements (frames, 3) as they look where the robot was seen: the picture is undone there, and made again."""
-
-        def picture(poses: Array) -> Array:
-            view = View(poses)
-            for active in placed:
-                view = active.effect.apply(view, **active.by_name)
-            return view.poses
-
-        before = np.roll(self.tracks.pose, 1, axis=0)
-        really = _undone(picture, before)
+        really, from_ = self._where(tuple((a.effect, a.values, a.trial_values) for a in placed))
         cos, sin = np.cos(really[:, 2]), np.sin(really[:, 2])
         moved = [cos * body[:, 0] - sin * body[:, 1], sin * body[:, 0] + cos * body[:, 1], body[:, 2]]
-        from_, to = picture(really), picture(really + np.stack(moved, axis=1))
+        to = pictured(placed, really + np.stack(moved, axis=1))
         way, cos, sin = to - from_, np.cos(from_[:, 2]), np.sin(from_[:, 2])
         ahead, left = cos * way[:, 0] + sin * way[:, 1], cos * way[:, 1] - sin * way[:, 0]
         return np.where(self.tracks.is_first[:, None], 0.0, np.stack([ahead, left, way[:, 2]], axis=1))
+
+    def _found(self, chain: Chain) -> tuple[Array, Array]:
+        """Where the robot was at the frame before each, by the effects of a picture, and what they show of it; read-only."""
+        placed = _model_of(1.0, chain).effects
+        really = undone(partial(pictured, placed), np.roll(self.tracks.pose, 1, axis=0))
+        shown = pictured(placed, really)
+        really.flags.writeable = shown.flags.writeable = False
+        return really, shown
 
     def _turned(self, wheelbase_m: float, chain: Chain) -> Body:
         return replace(wheel_motion(_model_of(wheelbase_m, chain), self.grid, self.conditions), place=self._place)
@@ -238,34 +236,6 @@ class WheelPredictor:
             midway * time_s[:, None] + bent
         )
         return out
-
-
-def _undone(picture: Callable[[Array], Array], seen: Array) -> Array:
-    """Poses (frames, 3) whose picture is ``seen``: Newton's steps, with new slopes where those from before lead on slowly.
-
-    Where a picture stretches by more than the places are off, plain repetition would lead away. Headings follow the places.
-    """
-    really, last, slopes = seen, np.inf, None
-    off = picture(seen) - seen
-    for _ in range(_UNDONE):
-        slopes = _slopes(picture, really, off + seen) if slopes is None else slopes
-        east, north, area = slopes
-        x, y = off[:, 0], off[:, 1]
-        back = [(x * north[:, 1] - y * north[:, 0]) / area, (y * east[:, 0] - x * east[:, 1]) / area, off[:, 2]]
-        really = really - np.stack(back, axis=1)
-        farthest = max(float(np.abs(way).max(initial=0.0)) for way in back)
-        if farthest < _FOUND_M:
-            break
-        slopes = None if farthest > _SLOW * last else slopes
-        off, last = picture(really) - seen, farthest
-    return really
-
-
-def _slopes(picture: Callable[[Array], Array], at: Array, seen: Array) -> tuple[Array, Array, Array]:
-    """How a picture changes with a step east and north, (frames, 2) each, and what it makes of an area, (frames,)."""
-    east, north = ((picture(at + _ASIDE_M * np.eye(3)[i]) - seen)[:, :2] / _ASIDE_M for i in (0, 1))
-    area = east[:, 0] * north[:, 1] - east[:, 1] * north[:, 0]
-    return east, north, np.where(np.abs(area) < _FLAT, _FLAT, area)
 
 
 def _chain(model: Model, stages: Sequence[str]) -> Chain:

@@ -1,6 +1,6 @@
 """A round patch of floor on which the robot is slower: the edge of a carpet, oil, a wet spot.
 
-The rim is sharp: a step that crosses it is slowed for the part of its time that it is inside.
+A step that crosses the rim is slowed for the part of its time that it is inside.
 """
 
 from __future__ import annotations
@@ -10,7 +10,10 @@ import numpy as np
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Body, Wheels
 
-_CHORD_ROUNDS = 3
+_RIM = 0.03
+"""Half the width of the rim, in wheelbases: about half the length of a wheel's contact with the floor. A sharper rim would make
+the loss jagged, since a robot that turns on the spot there is inside or outside by the tracker's noise."""
+_ROUNDS = 3
 """How far a step leads depends on how much of it is inside: each round adds a power of the loss."""
 _PIECE_S, _FEWEST = 0.4, 50
 """Long enough that a pose's noise is small against the way, short enough to lie at one place."""
@@ -23,25 +26,15 @@ def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float) -> B
     if body.place is None:
         return body  # first round of a simulation: nobody knows yet where the robot goes
     east, north, heading = body.place[..., 0] - x_m, body.place[..., 1] - y_m, body.place[..., 2]
-    half = np.zeros_like(east) if body.step_s is None else body.forward_m_s * body.step_s / 2.0
-    inside = np.zeros_like(east)
-    near = np.hypot(east, north) < radius_m + np.abs(half) * max(1.0 - loss, 1.0)
-    east, north, heading, half = east[near], north[near], heading[near], half[near]
-    part = np.ones_like(east)
-    for _ in range(_CHORD_ROUNDS):
-        part = _time_inside(east, north, heading, half * (1.0 - loss * part), radius_m, loss)
-    inside[near] = part
+    away = np.hypot(east, north)
+    half = np.zeros_like(away) if body.step_s is None else body.forward_m_s * body.step_s / 2.0
+    outwards = half * (east * np.cos(heading) + north * np.sin(heading)) / np.maximum(away, 1e-9)
+    inside, rim = np.ones_like(away), _RIM * body.wheelbase_m
+    for _ in range(_ROUNDS):
+        reach = np.hypot(outwards * (1.0 - loss * inside), rim)
+        way = np.clip((radius_m - away) / (2.0 * reach) + 0.5, 0.0, 1.0)
+        inside = way / (way + (1.0 - loss) * (1.0 - way))  # what is slower takes longer
     return body.scaled(1.0 - loss * inside)
-
-
-def _time_inside(east: Array, north: Array, heading: Array, half: Array, radius_m: float, loss: float) -> Array:
-    """The part of steps' time within a disc about (0, 0). ``east``, ``north``: their middles; ``half``: half of their ways."""
-    along, off = east * np.cos(heading) + north * np.sin(heading), east**2 + north**2 - radius_m**2
-    root = np.sqrt(np.maximum(along**2 - off, 0.0))
-    long = np.maximum(np.abs(half), 1e-12)
-    enters, leaves = (np.clip((edge - along * np.sign(half)) / long, -1.0, 1.0) for edge in (-root, root))
-    way: Array = np.where(np.abs(half) < 1e-9, off < 0.0, (leaves - enters) / 2.0)
-    return way / (way + (1.0 - loss) * (1.0 - way))  # what is slower takes longer
 
 
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
