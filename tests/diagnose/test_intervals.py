@@ -1,12 +1,15 @@
 """Intervals: the jackknife over trials, and numbers along which the loss has steps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate.fit import jackknife_covariance
-from bns.diagnose.estimate.jagged import _drawn, _middle_of_least, with_jagged
+from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.jagged import _drawn, _middle_of_least, _searched, with_jagged
 from bns.diagnose.estimate.normal_equations import normal_equations
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
@@ -64,6 +67,44 @@ def test_a_threshold_lies_midway_between_the_commands_next_to_it(dead_band):
     assert high > above - 0.1 * (above - below)
     assert high - low < 0.01, "and is known well all the same"
     assert found.se(0) == pytest.approx((high - low) / 2 / 1.96, rel=1e-3)
+
+
+def test_fits_of_sets_of_effects_search_for_thresholds(dead_band):
+    """`diagnose` and `add` both end there."""
+    problem, fit, _, _ = dead_band
+    effect = fit.model.effects[0].effect
+    assert fit_set(problem.predictor, NOMINAL, [effect], known=fit.model)[1].spans
+
+
+@pytest.fixture(scope="module")
+def gain():
+    """A smooth number that says that it is jagged: problem and fit."""
+    predictor = predictor_of(hidden(speed_gain={"gain": 0.95}), trials=30)
+    effect = listed(NOMINAL, None, predictor.tracks)["speed-gain"]
+    jagged = replace(effect, parameters=(replace(effect.parameters[0], jagged=True),))
+    problem = problem_for(predictor, NOMINAL.with_active(effect, (0.95,)))
+    return problem, problem.fit(NOMINAL.with_active(jagged, (0.95,)))
+
+
+def test_of_a_smooth_number_the_search_says_what_the_slopes_say(gain):
+    problem, fit = gain
+    value, (low, high) = _searched(problem, fit, 0)
+    assert value == pytest.approx(fit.values[0], abs=0.3 * fit.se(0))
+    assert high - low == pytest.approx(4 * fit.se(0), rel=0.35)
+
+
+def test_an_interval_is_not_narrower_than_that_of_the_slopes(gain, monkeypatch):
+    problem, fit = gain
+    monkeypatch.setattr("bns.diagnose.estimate.jagged._searched", lambda *_: (0.95, (0.9499, 0.9501)))
+    found = with_jagged(problem, fit)
+    low, high = replace(found, spans={}).interval(0)
+    assert found.interval(0) == (min(low, 0.9499), max(high, 0.9501))
+    assert high - low > 2e-4
+
+
+def test_a_step_lies_between_the_values_that_are_good_and_the_next_ones():
+    losses = np.where(np.abs(np.arange(9.0) - 4.0) < 1.5, 0.0, 10.0)[:, None] * np.ones(5)
+    assert _drawn(np.arange(9.0), losses) == (2.0, 6.0)
 
 
 def test_smooth_numbers_are_left_as_they_are():

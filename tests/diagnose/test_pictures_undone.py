@@ -26,5 +26,5 @@ def test_strong_distortions_are_undone_at_the_edge_of_the_floor(name, values):
         return effect_named(name).apply(View(poses), **values).poses
 
     found = undone(picture, picture(REALLY))
-    np.testing.assert_allclose(found[:, :2], REALLY[:, :2], atol=1e-4)
-    np.testing.assert_allclose(found[:, 2], REALLY[:, 2], atol=2e-3)
+    np.testing.assert_allclose(found[:, :2], REALLY[:, :2], atol=1e-5)
+    np.testing.assert_allclose(found[:, 2], REALLY[:, 2], atol=1e-5)

@@ -167,6 +167,21 @@ def test_where_a_wheel_stood_is_read_from_the_other_half_of_the_trial():
     assert 0.5 <= shares[0, 0] < 1.0
 
 
+def test_a_wave_is_as_large_as_it_is_though_wheels_do_not_run_as_told():
+    """A wheel that is off by 2 % of its way in each command carries its phase along: the share must not come out smaller."""
+    rng = np.random.default_rng(5)
+    trials, step = 60, np.full((60, 200), 0.04)
+    left, right = (np.repeat(rng.uniform(0.05, 0.2, (trials, 4)), 50, axis=1) for _ in range(2))
+    driven = left * (1 + 0.03 * np.repeat(rng.normal(size=(trials, 4)), 50, axis=1))
+    wave = 0.2 * np.cos(rng.uniform(0, 2 * np.pi, (trials, 1)) + 2 * np.pi * np.cumsum(driven * step, axis=1) / 0.13)
+    rate = (right - driven * (1 + wave)) / B * step
+    heading = np.cumsum(rate, axis=1) - rate / 2 + rng.normal(0, 0.004, rate.shape)
+    wheels = Wheels(step, left, right, B, Conditions(seen=np.stack([0 * heading, 0 * heading, heading], axis=2)))
+    turned = effect_named("wheel-eccentricity").apply(wheels, left_share=1.0, right_share=0.0, turn_m=0.13)
+    unit = turned.left_m_s - left
+    assert float((unit * left * wave).sum() / (unit**2).sum()) == pytest.approx(0.2, rel=0.04)
+
+
 def test_a_wheels_turn_is_found_though_the_wheelbase_and_a_wheels_size_are_wrong():
     """Such errors of the heading are much larger than the wave, and follow the commands."""
     rng = np.random.default_rng(3)
