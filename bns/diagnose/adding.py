@@ -146,9 +146,10 @@ def _step(
         written = _written(written, effect.name, how)
         if per_trial and effect.per_trial_allowed:
             written = with_trial_clocks(written, effect.name)
-    if per_trial:
-        problem = problem_for(predictor, written, problem.pose_filter.noise)
-    return problem, problem.fit(written, rounds=None if per_trial else 0)
+    if not per_trial:
+        return problem, replace(fit, model=written)
+    problem = problem_for(predictor, written, problem.pose_filter.noise)
+    return problem, problem.fit(written)
 
 
 def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], errors: PairedErrors) -> Iterator[str]:

@@ -50,6 +50,8 @@ class Parameter:
     """Bounds at which a fit may end, because real robots reach them: the strength of a servo without torque."""
     resolution: float = 0.0
     """A small change that is still visible in data; 0: a thousandth of the plausible range."""
+    jagged: bool = False
+    """Whether the likelihood has steps or kinks along it, at commands, ticks or poses: its interval needs a search."""
 
     @property
     def is_multiple(self) -> bool:
@@ -134,6 +136,8 @@ class Effect:
     """One of `NEEDS`."""
     needs_place: bool = False
     """Whether it depends on the position of the robot (`Body.place`, or the place in a `View`)."""
+    revision: int = 1
+    """Raised whenever the same values would give other numbers; part of the digest of models that have the effect."""
     per_trial_allowed: bool = False
     """Whether its one parameter may have another value in each trial. Only effects of the stage ``clock`` may."""
 

@@ -183,6 +183,8 @@ class Model:
         numbers: dict[str, Any] = {field: getattr(self, field) for field in LIMITS}
         listed = [[a.effect.name, a.by_name, *([dict(a.written)] if a.written else [])] for a in self.effects]
         numbers |= {"base": self.base, "effects": listed}
+        if revised := {a.effect.name: a.effect.revision for a in self.effects if a.effect.revision > 1}:
+            numbers |= {"revisions": revised}
         return json.dumps(numbers, sort_keys=True, separators=(",", ":"))
 
     @property

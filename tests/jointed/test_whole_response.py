@@ -61,7 +61,11 @@ def test_wide_steps_stay_within_the_bounds(value, signs):
 def test_an_interval_ends_at_the_bounds_of_its_number():
     parameter = load_body("snake").catalogue()["weak-joint-joint5"].parameters[0]
     fit = SimpleNamespace(
-        free=(FreeParameter("weak-joint-joint5", parameter),), values=np.array([0.02]), losses=np.zeros(20), se=lambda _: 0.1
+        free=(FreeParameter("weak-joint-joint5", parameter),),
+        values=np.array([0.02]),
+        losses=np.zeros(20),
+        se=lambda _: 0.1,
+        spans={},
     )
     low, high = Fit.interval(fit, 0)
     assert low == 0.0

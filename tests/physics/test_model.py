@@ -1,6 +1,7 @@
 """Model files, and models changed one effect at a time."""
 
 import pickle
+from dataclasses import replace
 from importlib import resources
 
 import pytest
@@ -94,6 +95,15 @@ def test_effects_switch_on_and_off_in_place():
     assert [a.effect.name for a in changed.without("motor-lag").effects] == ["speed-gain"]
     with pytest.raises(ModelError, match="Did you mean 'motor-lag'"):
         model.without("motor-lagg")
+
+
+def test_digest_follows_the_revision_of_an_effect():
+    """Where the same values give other numbers than before, results of both must not pass for the same."""
+    model = Model(wheelbase_m=0.1).with_effect("motor-lag", tau_s=0.1)
+    assert "revisions" not in model.canonical_json()
+    (lag,) = model.effects
+    revised = replace(model, effects=(replace(lag, effect=replace(lag.effect, revision=2)),))
+    assert revised.digest != model.digest
 
 
 def test_digest_follows_numbers_and_not_words(tmp_path):

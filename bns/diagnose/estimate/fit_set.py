@@ -11,6 +11,7 @@ from functools import partial
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.jagged import with_jagged
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.parallel import each
@@ -78,7 +79,7 @@ def fit_set(
         other = problem.fit(known)
         if other.loss < fit.loss - BETTER:
             problem, fit = _settled(predictor, problem, other)
-    return problem, fit, tuple(effect.name for effect in order)
+    return problem, with_jagged(problem, fit), tuple(effect.name for effect in order)
 
 
 def _begun_again(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> Fit:

@@ -15,6 +15,7 @@ from bns.diagnose.data.tracks import Array, Tracks, slimmed
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.predict.horizons import HORIZONS, windows
 from bns.diagnose.predict.luck import Luck
+from bns.diagnose.predict.pictures import pictured, undone
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
 from bns.physics.effect import Effect
@@ -63,6 +64,7 @@ class WheelPredictor:
         # a slope of what a camera does asks for the same drive again, and one of a clock for the same motion
         kept = 1 + _KEPT // max(zero.size, len(tracks.t_s))
         self._wheels = lru_cache(kept)(self._turned)
+        self._where = lru_cache(kept)(self._found)
         self._body, self._at = lru_cache(kept)(self._driven), lru_cache(kept)(self._followed)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -90,23 +92,21 @@ class WheelPredictor:
 
     def _pictured(self, body: Array, placed: Sequence[ActiveEffect]) -> Array:
         """Displacements (frames, 3) as they look where the robot was seen: the picture is undone there, and made again."""
-
-        def picture(poses: Array) -> Array:
-            view = View(poses)
-            for active in placed:
-                view = active.effect.apply(view, **active.by_name)
-            return view.poses
-
-        before = np.roll(self.tracks.pose, 1, axis=0)
-        really = before
-        for _ in range(_UNDONE):
-            really = really - (picture(really) - before)
+        really, from_ = self._where(tuple((a.effect, a.values, a.trial_values) for a in placed))
         cos, sin = np.cos(really[:, 2]), np.sin(really[:, 2])
         moved = [cos * body[:, 0] - sin * body[:, 1], sin * body[:, 0] + cos * body[:, 1], body[:, 2]]
-        from_, to = picture(really), picture(really + np.stack(moved, axis=1))
+        to = pictured(placed, really + np.stack(moved, axis=1))
         way, cos, sin = to - from_, np.cos(from_[:, 2]), np.sin(from_[:, 2])
         ahead, left = cos * way[:, 0] + sin * way[:, 1], cos * way[:, 1] - sin * way[:, 0]
         return np.where(self.tracks.is_first[:, None], 0.0, np.stack([ahead, left, way[:, 2]], axis=1))
+
+    def _found(self, chain: Chain) -> tuple[Array, Array]:
+        """Where the robot was at the frame before each, by the effects of a picture, and what they show of it; read-only."""
+        placed = _model_of(1.0, chain).effects
+        really = undone(partial(pictured, placed), np.roll(self.tracks.pose, 1, axis=0))
+        shown = pictured(placed, really)
+        really.flags.writeable = shown.flags.writeable = False
+        return really, shown
 
     def _turned(self, wheelbase_m: float, chain: Chain) -> Body:
         return replace(wheel_motion(_model_of(wheelbase_m, chain), self.grid, self.conditions), place=self._place)

@@ -159,6 +159,27 @@ class Estimate:
         "All combinations of start values are tried up to this number (three ordinary parameters); beyond it, one "
         "parameter at a time is varied: four parameters would have 1,296 combinations, seven 280,000.",
     )
+    jagged_points: int = setting(
+        61,
+        "values",
+        "Values of a jagged parameter (a threshold, a period, the rim of a patch) at which the loss is computed: half of its "
+        f"interval, at least a quarter of their range to one side, then has at least 7 of them; {BY_HAND}.",
+    )
+    jagged_rounds: int = setting(
+        6, "rounds", f"Ranges of these values that are tried, each three times as wide or as narrow as the one before; {BY_HAND}."
+    )
+    jagged_equal: float = setting(
+        0.05,
+        "log-likelihood",
+        "Values of a jagged parameter whose loss differs by less are equally good: between two commands a threshold changes "
+        f"nothing; {BY_HAND}.",
+    )
+    jagged_ranges: tuple[float, float, float] = setting(
+        (3.0, 0.8, 0.25),
+        "1",
+        "The range is made this many times wider if the interval reaches beyond the second of these fractions of it, and as "
+        f"many times narrower if it stays within the third; {BY_HAND}.",
+    )
     clock_blocks: int = setting(
         8,
         "blocks",

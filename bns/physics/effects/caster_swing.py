@@ -10,7 +10,7 @@ import numpy as np
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import CREEP_M_S, Body
-from bns.physics.wheels.scans import trailing
+from bns.physics.wheels.scans import swung
 
 
 def apply(body: Body, loss: float, trail_m: float) -> Body:
@@ -18,10 +18,9 @@ def apply(body: Body, loss: float, trail_m: float) -> Body:
     left, right = body.left_m_s, body.right_m_s
     ahead, side = (left + right) / 2.0, (right - left) / 2.0  # of a pivot half a wheelbase before the axle
     speed = np.hypot(ahead, side)
-    step_s = np.diff(body.session_s, axis=1, prepend=body.session_s[:, :1])
+    step_s = np.diff(body.session_s, axis=1, prepend=body.session_s[:, :1]) if body.step_s is None else body.step_s
     way = np.where(speed > CREEP_M_S, speed * step_s, 0.0)
-    off = trailing(np.arctan2(side, ahead), way, trail_m)
-    return body.scaled(1.0 - loss * (1.0 - np.cos(off)) / 2.0)
+    return body.scaled(1.0 - loss * swung(np.arctan2(side, ahead), way, trail_m))
 
 
 EFFECT = Effect(
@@ -38,6 +37,7 @@ EFFECT = Effect(
     sentence="the caster slows the robot until it has swung round",
     measurement="film the caster after a reversal, or replace it with a sliding button and repeat some trials",
     apply=apply,
+    revision=2,
     needs="track",
     starts=tuple((loss, trail) for loss in (0.05, 0.3) for trail in (0.005, 0.02, 0.06)),
 )

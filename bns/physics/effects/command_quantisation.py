@@ -25,7 +25,17 @@ EFFECT = Effect(
     name="command-quantisation",
     stage="wheel",
     parameters=(
-        Parameter("step_m_s", "m/s", 1e-4, 2.0, (1e-3, 0.5), 0.02, "difference between neighbouring speeds", resolution=2e-5),
+        Parameter(
+            "step_m_s",
+            "m/s",
+            1e-4,
+            2.0,
+            (1e-3, 0.5),
+            0.02,
+            "difference between neighbouring speeds",
+            resolution=2e-5,
+            jagged=True,
+        ),
         Parameter("share", "1", 0.0, 2.0, (0.5, 1.5), 0.0, "fraction of the rounding that acts (1: all)"),
     ),
     equation="u' = u + a·(step·round(u/step) - u) for each wheel, a = 1",

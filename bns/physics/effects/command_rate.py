@@ -33,6 +33,7 @@ EFFECT = Effect(
             0.0,
             "time between two updates of the command",
             resolution=1e-4,
+            jagged=True,
         ),
     ),
     equation="u'(t) = u(period·floor(t/period))",

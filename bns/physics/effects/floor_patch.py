@@ -1,6 +1,6 @@
 """A round patch of floor on which the robot is slower: the edge of a carpet, oil, a wet spot.
 
-The transition at its rim is a tenth of its radius wide.
+A step that crosses the rim is slowed for the part of its time that it is inside.
 """
 
 from __future__ import annotations
@@ -10,7 +10,11 @@ import numpy as np
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Body, Wheels
 
-_RIM = 0.1
+_RIM = 0.03
+"""Half the width of the rim, in wheelbases: about half the length of a wheel's contact with the floor. A sharper rim would make
+the loss jagged, since a robot that turns on the spot there is inside or outside by the tracker's noise."""
+_ROUNDS = 3
+"""How far a step leads depends on how much of it is inside: each round adds a power of the loss."""
 _PIECE_S, _FEWEST = 0.4, 50
 """Long enough that a pose's noise is small against the way, short enough to lie at one place."""
 _SIDE, _RADII, _TRIED = 13, (0.06, 0.1, 0.15, 0.22, 0.3), 4
@@ -21,8 +25,15 @@ def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float) -> B
     """All velocities times 1 - ``loss`` within ``radius_m`` of the centre."""
     if body.place is None:
         return body  # first round of a simulation: nobody knows yet where the robot goes
-    away = np.hypot(body.place[..., 0] - x_m, body.place[..., 1] - y_m)
-    inside = np.clip((radius_m - away) / (_RIM * radius_m) + 0.5, 0.0, 1.0)
+    east, north, heading = body.place[..., 0] - x_m, body.place[..., 1] - y_m, body.place[..., 2]
+    away = np.hypot(east, north)
+    half = np.zeros_like(away) if body.step_s is None else body.forward_m_s * body.step_s / 2.0
+    outwards = half * (east * np.cos(heading) + north * np.sin(heading)) / np.maximum(away, 1e-9)
+    inside, rim = np.ones_like(away), _RIM * body.wheelbase_m
+    for _ in range(_ROUNDS):
+        reach = np.hypot(outwards * (1.0 - loss * inside), rim)
+        way = np.clip((radius_m - away) / (2.0 * reach) + 0.5, 0.0, 1.0)
+        inside = way / (way + (1.0 - loss) * (1.0 - way))  # what is slower takes longer
     return body.scaled(1.0 - loss * inside)
 
 
@@ -70,9 +81,20 @@ EFFECT = Effect(
     name="floor-patch",
     stage="body",
     parameters=(
-        Parameter("x_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, east", resolution=2e-3),
-        Parameter("y_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, north", resolution=2e-3),
-        Parameter("radius_m", "m", 5e-3, 1e3, (0.02, 100.0), 0.2, "radius of the patch", floor_share=0.33, resolution=2e-3),
+        Parameter("x_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, east", resolution=2e-3, jagged=True),
+        Parameter("y_m", "m", -1e4, 1e4, (-1e3, 1e3), 0.0, "centre of the patch, north", resolution=2e-3, jagged=True),
+        Parameter(
+            "radius_m",
+            "m",
+            5e-3,
+            1e3,
+            (0.02, 100.0),
+            0.2,
+            "radius of the patch",
+            floor_share=0.33,
+            resolution=2e-3,
+            jagged=True,
+        ),
         Parameter("loss", "1", -1.0, 0.99, (-0.5, 0.95), 0.0, "fraction of speed lost on it (negative: gained)"),
     ),
     equation="v, s, omega times 1 - k where (x - px)^2 + (y - py)^2 < r^2",
@@ -81,6 +103,7 @@ EFFECT = Effect(
     sentence="the robot is slower on one patch of the floor",
     measurement="inspect the floor there, or repeat trials from a start moved by twice the diameter of the patch",
     apply=apply,
+    revision=2,
     needs="track",
     needs_place=True,
     starts_from=starts_from,

@@ -26,6 +26,12 @@ _SHARES = 0.03, 0.6
 """Starts have shares between these; at 0 a share has no slope that would lead away."""
 _LEAST_REPEATED = 0.1
 """Of the spectrum at the wave: an estimate below that is luck."""
+_UNKNOWN = 1.0
+"""So many trials' worth of belief that phases stay: where no wave is seen, nothing is known of their drift."""
+_BEYOND = 1.25
+"""A random walk's variance from one half's mean to a moment of the other, over that from mean to mean: 5/6 to 2/3."""
+_LEAST_KEPT = 0.5
+"""Phases that agree less (60 degrees) show no wave; its share still needs a slope."""
 _WAVES = 4
 """Cosine and sine for each wheel."""
 
@@ -66,8 +72,9 @@ def _waves(wheels: Wheels, heading: Array, angles: Array) -> Array:
     last = np.where(seen, known, -np.inf).max(axis=1, keepdims=True)
     early = known < last / 2.0
     lag = _lag(wheels, angles)
-    pairs = [_pairs(columns, np.where(seen, off, 0.0), seen & half, lag) for half in (~early, early)]
-    pair = np.where(early, *(np.moveaxis(one, 1, 0)[:, :, None] for one in pairs))  # (4, trials, steps)
+    phases = [_phases(columns, np.where(seen, off, 0.0), seen & half, lag) for half in (~early, early)]
+    kept = _kept(*phases)
+    pair = np.where(early, *(np.moveaxis(unit * np.repeat(sure * kept, 2, axis=1), 1, 0)[:, :, None] for unit, sure in phases))
     out: Array = pair[::2] * wave[0] + pair[1::2] * wave[1]
     return out
 
@@ -126,15 +133,29 @@ def _repeated(product: Array, pairs: Array, lag: int) -> float:
     return max(1.0 + 2.0 * float(covariance[1:] @ wave) / float(covariance[0]), _LEAST_REPEATED)
 
 
-def _pairs(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> Array:
-    """Cosine and sine of each wheel's wave, (trials, 4): least squares beside the other columns, then of length 1 or less."""
+def _phases(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> tuple[Array, Array]:
+    """Cosine and sine of each wheel's phase, (trials, 4), by least squares beside the other columns; and how sure, (trials, 2).
+
+    How sure: the expected cosine of the phase's error.
+    """
     fitted = _fitted(columns, off, used, lag)
     pair = fitted.values[:, :_WAVES]
-    length2, unsure = (
-        np.repeat(v[:, ::2] + v[:, 1::2], 2, axis=1) for v in (pair**2, fitted.variance[:, :_WAVES])
-    )
+    length2, unsure = (v[:, ::2] + v[:, 1::2] for v in (pair**2, fitted.variance[:, :_WAVES]))
     known = 2.0 * np.maximum(length2 - unsure, 0.0) / (unsure + 1e-30)  # concentration of the phase's distribution
-    out: Array = pair / np.sqrt(length2 + 1e-30) * (i1e(known) / i0e(known))  # the expected cosine of its error
+    return pair / np.repeat(np.sqrt(length2 + 1e-30), 2, axis=1), i1e(known) / i0e(known)
+
+
+def _kept(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+    """Expected cosine of what is added to each wheel's phase between the halves of a trial, (2,): wheels do not run as told.
+
+    A wheel that is off by some millimetres on the way has its wave shifted by as much. How well the phases of the two halves
+    agree, over all trials, says how far that is; ``one``, ``other`` as `_phases` gives them.
+    """
+    (a, sure_a), (b, sure_b) = one, other
+    product, sure = a * b, sure_a * sure_b
+    agreed = sure * (product[:, ::2] + product[:, 1::2])
+    cosine = (agreed.sum(axis=0) + _UNKNOWN) / ((sure**2).sum(axis=0) + _UNKNOWN)
+    out: Array = np.clip(cosine, _LEAST_KEPT, 1.0) ** _BEYOND
     return out
 
 

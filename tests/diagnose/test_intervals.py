@@ -1,0 +1,128 @@
+"""Intervals: the jackknife over trials, and numbers along which the loss has steps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bns.diagnose.data.checks import checked
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.fit import jackknife_covariance
+from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.jagged import _drawn, _middle_of_least, _searched, with_jagged
+from bns.diagnose.estimate.normal_equations import normal_equations
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.starts import listed
+from bns.diagnose.predict.wheels import WheelPredictor
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def predictor_of(model, **how):
+    return WheelPredictor(tracks_of(checked(measured(model, **how))[0]))
+
+
+def test_the_jackknife_is_that_of_fits_without_each_trial():
+    """Trials of unequal weight: a line through points, one far out, by NumPy's own least squares."""
+    rng = np.random.default_rng(0)
+    x, y = np.append(rng.uniform(0, 1, 11), 6.0), rng.normal(size=12)
+    columns = np.stack([np.ones(12), x], axis=1)
+    whole = np.linalg.lstsq(columns, y, rcond=None)[0]
+    without = [np.linalg.lstsq(np.delete(columns, i, 0), np.delete(y, i), rcond=None)[0] for i in range(12)]
+    steps = np.array(without) - whole
+    expected = 11 / 12 * sum(np.outer(s - steps.mean(axis=0), s - steps.mean(axis=0)) for s in steps)
+    np.testing.assert_allclose(jackknife_covariance(steps), expected)
+
+
+def test_a_fits_standard_error_is_the_jackknifes():
+    predictor = predictor_of(hidden(speed_gain={"gain": 0.95}), trials=12)
+    problem = problem_for(predictor, NOMINAL)
+    gain = listed(NOMINAL, None, predictor.tracks)["speed-gain"]
+    fit = problem.fit(NOMINAL.with_active(gain, (0.95,)))
+    moved = []
+    for i in range(12):
+        others = predictor.tracks.trial != i
+        curvature, gradient = normal_equations(fit.jacobian[others], fit.whitened[others])
+        moved.append(-gradient[0] / curvature[0, 0])
+    assert fit.se(0) == pytest.approx(np.std(moved) * np.sqrt(11), rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def dead_band():
+    """Threshold 0.04 m/s: the fit, the problem, and the commands next to it below and above."""
+    predictor = predictor_of(hidden(dead_band={"threshold_m_s": 0.04}), trials=30)
+    effect = listed(NOMINAL, None, predictor.tracks)["dead-band"]
+    model = NOMINAL.with_active(effect, (0.0412,))
+    problem = problem_for(predictor, model)
+    told = np.unique(np.abs(np.concatenate([predictor.tracks.left_m_s.ravel(), predictor.tracks.right_m_s.ravel()])))
+    return problem, problem.fit(model), told[told < 0.04].max(), told[told > 0.04].min()
+
+
+def test_a_threshold_lies_midway_between_the_commands_next_to_it(dead_band):
+    problem, fit, below, above = dead_band
+    found = with_jagged(problem, fit)
+    assert found.loss < fit.loss + 1e-9
+    assert found.values[0] == pytest.approx((below + above) / 2, abs=0.2 * (above - below))
+    low, high = found.interval(0)
+    assert low < below + 0.1 * (above - below)
+    assert high > above - 0.1 * (above - below)
+    assert high - low < 0.01, "and is known well all the same"
+    assert found.se(0) == pytest.approx((high - low) / 2 / 1.96, rel=1e-3)
+
+
+def test_fits_of_sets_of_effects_search_for_thresholds(dead_band):
+    """`diagnose` and `add` both end there."""
+    problem, fit, _, _ = dead_band
+    effect = fit.model.effects[0].effect
+    assert fit_set(problem.predictor, NOMINAL, [effect], known=fit.model)[1].spans
+
+
+@pytest.fixture(scope="module")
+def gain():
+    """A smooth number that says that it is jagged: problem and fit."""
+    predictor = predictor_of(hidden(speed_gain={"gain": 0.95}), trials=30)
+    effect = listed(NOMINAL, None, predictor.tracks)["speed-gain"]
+    jagged = replace(effect, parameters=(replace(effect.parameters[0], jagged=True),))
+    problem = problem_for(predictor, NOMINAL.with_active(effect, (0.95,)))
+    return problem, problem.fit(NOMINAL.with_active(jagged, (0.95,)))
+
+
+def test_of_a_smooth_number_the_search_says_what_the_slopes_say(gain):
+    problem, fit = gain
+    value, (low, high) = _searched(problem, fit, 0)
+    assert value == pytest.approx(fit.values[0], abs=0.3 * fit.se(0))
+    assert high - low == pytest.approx(4 * fit.se(0), rel=0.35)
+
+
+def test_an_interval_is_not_narrower_than_that_of_the_slopes(gain, monkeypatch):
+    problem, fit = gain
+    monkeypatch.setattr("bns.diagnose.estimate.jagged._searched", lambda *_: (0.95, (0.9499, 0.9501)))
+    found = with_jagged(problem, fit)
+    low, high = replace(found, spans={}).interval(0)
+    assert found.interval(0) == (min(low, 0.9499), max(high, 0.9501))
+    assert high - low > 2e-4
+
+
+def test_a_step_lies_between_the_values_that_are_good_and_the_next_ones():
+    losses = np.where(np.abs(np.arange(9.0) - 4.0) < 1.5, 0.0, 10.0)[:, None] * np.ones(5)
+    assert _drawn(np.arange(9.0), losses) == (2.0, 6.0)
+
+
+def test_smooth_numbers_are_left_as_they_are():
+    predictor = predictor_of(hidden(speed_gain={"gain": 0.95}), trials=12)
+    problem = problem_for(predictor, NOMINAL)
+    fit = problem.fit(NOMINAL.with_effect("speed-gain", gain=0.95))
+    assert with_jagged(problem, fit) is fit
+
+
+def test_the_bootstrap_of_a_parabola_is_the_jackknifes_interval():
+    rng = np.random.default_rng(1)
+    at, own = np.linspace(-1.5, 1.5, 121), rng.normal(size=60)
+    losses = (at[:, None] - own) ** 2 / 2
+    low, high = _drawn(at, losses)
+    half = 1.96 * own.std() / np.sqrt(60)
+    assert (low, high) == pytest.approx((own.mean() - half, own.mean() + half), abs=0.09)
+
+
+def test_of_equally_good_values_the_middle_is_taken():
+    losses = np.array([9.0, 2.0, 1.0, 1.0, 1.01, 1.0, 5.0, 1.0])
+    assert _middle_of_least(np.arange(8.0), losses) == 3.5
