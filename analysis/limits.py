@@ -23,7 +23,7 @@ from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, lettered, style
 
 PUBLISHED = Path(__file__).parents[1] / "results" / "published"
 SWEEP, BASE = "noise", "bns+margin=0.03"
-APPROACHES = ("bns", BASE, "bns+noise=8")
+APPROACHES = ("bns", BASE, "bns+noise=16")
 LAST, EARLY, LATEST = 5, 20, 5
 """Evaluations at the end and at the beginning that are averaged, and those that a point of a curve is the mean of."""
 _PLACES = {"simulated": "networks", "quiet": "world without noise", "noisy": "world"}

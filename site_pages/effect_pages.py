@@ -79,7 +79,7 @@ def joints() -> str:
 
 def _placed(text: str) -> str:
     """A sentence about "the joint", where it names one of many."""
-    words = {"the marker {site}": "a marker", "{joint}": "a joint", "{site}": "a marker", "|": "\\|"}
+    words = {"the marker {site}": "a marker", "{joint}": "a joint", "{link}": "a link", "{site}": "a marker", "|": "\\|"}
     for there, here in words.items():
         text = text.replace(there, here)
     return text

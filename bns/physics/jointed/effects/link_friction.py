@@ -23,7 +23,7 @@ EFFECT = PerLink(
         residuals="The robot turns about this link in cycles in which it presses on the floor; the others fit.",
         lookalikes=("weak-joint", "uneven-mass", "tether-drag", "floor-friction"),
         sentence="{link} slides on the floor less easily than the model says, or more easily",
-        measurement="switch the robot off and pull it sideways at {link}, then at the links beside it, with a spring balance",
+        measurement="switch the robot off and pull it sideways at {link}, then at its neighbours, with a spring balance",
         beside={
             "floor-friction": "The floor acts on all links alike: wipe the link's underside, and repeat some trials.",
         },
