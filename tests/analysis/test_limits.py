@@ -80,7 +80,7 @@ def test_the_table_compares_pairs_at_the_end_and_over_the_last_five():
     assert new.change_low <= new.change <= new.change_high
     assert table.loc[("circle", limits.BASE), "change"] == 0
     said = limits.in_words(table.reset_index())[2]
-    assert said.startswith("| circle | `bns+noise=8` | 100 % (61–100) | 80 % (")
+    assert said.startswith(f"| circle | `{limits.APPROACHES[2]}` | 100 % (61–100) | 80 % (")
     assert "| +13 (" in said
 
 
