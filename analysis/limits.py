@@ -98,6 +98,17 @@ def limits(drives: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def limits_in_words(found: pd.DataFrame) -> list[str]:
+    """The rows of `limits` as the page shows them."""
+    lines = []
+    for task in ceiling.TASKS:
+        for approach in APPROACHES:
+            row = found[(found.task == task) & (found.approach == approach)].iloc[0]
+            cells = (f"{row[place]:.0f} % ({row[f'{place}_low']:.0f}–{row[f'{place}_high']:.0f})" for place in _PLACES)
+            lines.append(f"| {task} | `{approach}` | {' | '.join(cells)} |")
+    return lines
+
+
 @style()
 def drawn(rows: pd.DataFrame, found: pd.DataFrame, possible: pd.DataFrame) -> Figure:
     """Success against evaluations above, what limits it below, a column a task."""
@@ -147,9 +158,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = parser.parse_args(arguments)
     rows = evaluations(Results(wanted.runs, archived=True))
     found, possible = limits(pd.read_csv(wanted.drives)), ceiling.summary(pd.read_csv(wanted.lists))
-    print(*in_words(compared(rows)), sep="\n")
-    for table in (found, possible):
-        print(table.round(1).to_string(index=False))
+    print(*in_words(compared(rows)), *limits_in_words(found), sep="\n")
+    print(possible.round(1).to_string(index=False))
     with style():
         drawn(rows, found, possible).savefig(wanted.out)
     return 0

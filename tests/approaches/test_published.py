@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
-from analysis import approach_pairs, approach_summary
+import pandas as pd
+import pytest
+
+from analysis import approach_pairs, approach_summary, ceiling, limits
 from analysis.results import Results
 
 ROOT = Path(__file__).parents[2]
@@ -43,3 +46,21 @@ def test_what_is_said_of_pairs_is_what_the_archive_gives():
     snake = drawn["snake-snake-substitute"]
     certain = snake[snake.late_p_holm < approach_pairs.LEVEL]
     assert certain[["one", "other"]].to_numpy().tolist() == [["bns+margin=0.03", "precomputed"]]
+
+
+def test_what_is_said_of_noise_is_what_its_archive_and_its_drives_give():
+    published = limits.PUBLISHED
+    rows = limits.evaluations(Results(published / "noise.parquet", archived=True))
+    assert "\n".join(limits.in_words(limits.compared(rows))) in TEXT
+    found = limits.limits(pd.read_csv(published / "noise-drives.csv"))
+    assert found.runs.unique().tolist() == [20]
+    assert "\n".join(limits.limits_in_words(found)) in TEXT
+
+
+@pytest.mark.slow
+def test_known_controllers_succeed_as_often_as_is_said():
+    possible = ceiling.summary(pd.read_csv(limits.PUBLISHED / "ceiling.csv"))
+    flat = " ".join(TEXT.split())
+    for row in possible.itertuples():
+        name = {"infinity": "infinity sign"}.get(row.task, row.task)
+        assert f"{row.success:.1f} % ({name}, {row.commands}" in flat
