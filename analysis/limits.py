@@ -22,7 +22,7 @@ from analysis.results import Results
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, lettered, style
 
 PUBLISHED = Path(__file__).parents[1] / "results" / "published"
-SWEEP, BASE = "noise", "bns+margin=0.03"
+SWEEP, PHYSICS, BASE = "noise", "noise-physics", "bns+margin=0.03"
 APPROACHES = ("bns", BASE, "bns+noise=16")
 LAST, EARLY, LATEST = 5, 20, 5
 """Evaluations at the end and at the beginning that are averaged, and those that a point of a curve is the mean of."""
@@ -45,7 +45,7 @@ def compared(rows: pd.DataFrame) -> pd.DataFrame:
     table = []
     for task in ceiling.TASKS:
         base = _of_seeds(rows[(rows.task == task) & (rows.approach == BASE)])
-        for approach in APPROACHES:
+        for approach in (name for name in APPROACHES if name in set(rows.approach)):
             own = rows[(rows.task == task) & (rows.approach == approach)]
             shares = _of_seeds(own)
             at_end = own[own.evaluation == own.evaluation.max()].success
@@ -158,7 +158,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = parser.parse_args(arguments)
     rows = evaluations(Results(wanted.runs, archived=True))
     found, possible = limits(pd.read_csv(wanted.drives)), ceiling.summary(pd.read_csv(wanted.lists))
-    print(*in_words(compared(rows)), *limits_in_words(found), sep="\n")
+    elsewhere = evaluations(Results(wanted.runs, archived=True), PHYSICS)
+    for lines in (in_words(compared(rows)), in_words(compared(elsewhere)), limits_in_words(found)):
+        print(*lines, sep="\n")
     print(possible.round(1).to_string(index=False))
     with style():
         drawn(rows, found, possible).savefig(wanted.out)

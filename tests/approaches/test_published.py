@@ -52,6 +52,8 @@ def test_what_is_said_of_noise_is_what_its_archive_and_its_drives_give():
     published = limits.PUBLISHED
     rows = limits.evaluations(Results(published / "noise.parquet", archived=True))
     assert "\n".join(limits.in_words(limits.compared(rows))) in TEXT
+    elsewhere = limits.evaluations(Results(published / "noise.parquet", archived=True), limits.PHYSICS)
+    assert "\n".join(limits.in_words(limits.compared(elsewhere))) in TEXT
     found = limits.limits(pd.read_csv(published / "noise-drives.csv"))
     assert found.runs.unique().tolist() == [20]
     assert "\n".join(limits.limits_in_words(found)) in TEXT
