@@ -176,8 +176,14 @@ def _relative(errors: PairedErrors) -> float:
 
 
 def _negligible(selection: SelectionResult) -> tuple[str, ...]:
-    """As `negligible`; not asked where trials have clocks of their own."""
-    return () if selection.fit.model.per_trial_effect is not None else negligible(selection)
+    """As `negligible`; not asked where trials have clocks of their own.
+
+    Of bodies whose cycles scatter each in its own way, an effect alone is judged, too: it can be certain by the cycles that
+    hardly scatter, while the error, which all make, does not fall.
+    """
+    if selection.fit.model.per_trial_effect is not None:
+        return ()
+    return negligible(selection, fewest=1 if selection.problem.predictor.luck is None else 0)
 
 
 def _established(
