@@ -58,7 +58,7 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
     """A stand-in for the judgement: the mismatch is worth naming, and is taken for negligible here."""
     asked = []
 
-    def judged(selection):
+    def judged(selection, fewest):
         asked.append(selection.accepted)
         return ("wheel-mismatch",)
 
