@@ -7,7 +7,7 @@ from analysis.figure_result import FigureResult
 from analysis.labels import SHORT
 from analysis.results import NoDataError, Results
 
-NAME = "success-so-far-by-parameter"
+NAME = "success-so-far-by"
 PAPER = "another reading of figures 4.7 to 4.10 and 5.22 to 5.25"
 
 
@@ -15,7 +15,7 @@ def draw(store: Results) -> list[FigureResult]:
     found, lacking = [], []
     for parameter, short in SHORT.items():
         try:
-            found += success_by(store, parameter, f"success-so-far-by-{short.replace(' ', '-')}", "ever_success")
+            found += success_by(store, parameter, f"{NAME}-{short.replace(' ', '-')}", "ever_success")
         except NoDataError as none:
             lacking.append(none)
     if not found:
