@@ -33,7 +33,7 @@ def with_jagged(problem: Problem, fit: Fit) -> Fit:
     if not jagged or problem.predictor.luck is not None:
         return fit
     spans: dict[int, tuple[float, float]] = {}
-    for number in jagged:  # each is best beside the best values of those before
+    for number in jagged:  # each at its best, given the best values of those before
         j = fit.free.index(number)
         if number.parameter.low < fit.values[j] < number.parameter.high:
             value, spans[j] = _searched(problem, fit, j)

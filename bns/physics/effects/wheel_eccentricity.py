@@ -134,7 +134,7 @@ def _repeated(product: Array, pairs: Array, lag: int) -> float:
 
 
 def _phases(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> tuple[Array, Array]:
-    """Cosine and sine of each wheel's phase, (trials, 4), by least squares beside the other columns; and how sure, (trials, 2).
+    """Cosine and sine of each wheel's phase, (trials, 4), by least squares with the other columns; and how sure, (trials, 2).
 
     How sure: the expected cosine of the phase's error.
     """
