@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from argparse import Namespace
@@ -67,6 +68,23 @@ def test_a_run_and_a_sweep_do_not_wait_for_pandas(tmp_path):
     loaded = set(done.stdout.split())
     assert "numba" in loaded
     assert not {"pandas", "matplotlib"} & loaded
+
+
+def test_a_new_sweep_starts_its_first_run_before_it_loads_pandas(tmp_path):
+    """A third of a second, which the first run would wait; it is loaded when the first result is stored."""
+    spec = tmp_path / "tiny.yaml"
+    spec.write_text(
+        "name: tiny\nrobot: khepera\nseeds: 1\ngrid: {task: [circle]}\n"
+        "fixed: {evaluations: 1, population_size: 4, generations_per_evaluation: 1}\n"
+    )
+    code = "import sys\nfrom bns.sweep.jobs.workers import LokyExecutor\nsubmit = LokyExecutor.submit\n"
+    code += "def said(self, spec):\n    print('pandas' in sys.modules, 'numba' in sys.modules)\n    submit(self, spec)\n"
+    code += "LokyExecutor.submit = said\nfrom bns.cli.main import main\n"
+    code += f"main(['sweep', {str(spec)!r}, '--results', {str(tmp_path / 'results')!r}, '--jobs', '2'])"
+    for _ in range(2):  # the second time kernels lie compiled on the disk
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
+        shutil.rmtree(tmp_path / "results")
+    assert done.stdout.split() == ["False", "True"]
 
 
 def test_a_diagnosis_loads_nothing_that_only_figures_and_formulas_need():

@@ -8,15 +8,17 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
 import yaml
 
 from bns.errors import StoreError, SweepWarning
 from bns.spec import FIELDS, RunSpec
 from bns.store.read.reader import finished, query
 from bns.sweep.expand.grid import Sweep, parse_sweep
+
+if TYPE_CHECKING:  # a third of a second to load, and a sweep needs no table
+    import pandas as pd
 
 RANKED_BY = ("success", "success_10cm", "success_14cm", "success_20cm", "fitness_world")
 """Means over the runs of a combination at their last evaluation, the first that differs decides (section 4.5). ``success`` is

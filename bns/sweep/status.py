@@ -6,13 +6,15 @@ import json
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from bns.errors import SpecError
 from bns.spec import RunSpec
 from bns.store.read.reader import finished, load
 from bns.sweep.expand.grid import Sweep, parse_sweep
+
+if TYPE_CHECKING:  # a third of a second to load, and a sweep needs no table
+    import pandas as pd
 
 _COLUMNS = ["sweep", "task", "status", "started_at", "wall_s", "spec"]
 
@@ -60,7 +62,7 @@ def _that_count(results: Path, runs: pd.DataFrame) -> pd.DataFrame:
 def _rows(name: str, runs: pd.DataFrame, files: dict[str, Sweep]) -> list[SweepRow]:
     """Of one sweep; ``runs``: those of its name."""
     file = files.get(name)
-    described = pd.Series(True, runs.index) if file is None else _described(file, runs["spec"])
+    described = runs["sweep"] == name if file is None else _described(file, runs["spec"])
     totals = {} if file is None else file.runs_by_task()
     return [
         _row(name, task, group, described[group.index], None if file is None else totals.get(task, 0))

@@ -84,8 +84,11 @@ def archived(results: Path | str, sweep: str) -> pd.DataFrame:
 
 def recorded(results: Path | str, sweep: str) -> dict[str, str]:
     """Status of every run of a sweep by run id: those in the results, as `finished` gives them, and those in their archives."""
+    done = finished(results, sweep)
+    if not stored_archives(results):
+        return done
     kept = archived(results, sweep)
-    return dict(zip(kept["run_id"], kept["status"], strict=True)) | finished(results, sweep)
+    return dict(zip(kept["run_id"], kept["status"], strict=True)) | done
 
 
 def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:

@@ -84,7 +84,7 @@ def finished(results: Path | str, sweep: str) -> dict[str, str]:
 
 
 def _finished(found: Snapshot) -> dict[str, str]:
-    if found.is_empty:
+    if not found.journals and not found.parts["runs"]:
         return {}
     with connect_views(found) as connection:
         rows = connection.execute("""

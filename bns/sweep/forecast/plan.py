@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from bns.spec import RunSpec
 from bns.store.archive.read import recorded
@@ -19,6 +18,9 @@ from bns.sweep.expand.shard import Shard
 from bns.sweep.forecast.pace import Pace
 from bns.sweep.jobs.executor import Job
 from bns.sweep.jobs.job import run_job
+
+if TYPE_CHECKING:  # a third of a second to load, and a sweep needs no table
+    import pandas as pd
 
 _TRIAL_EVALUATIONS = 20
 _BYTES_PER_EVALUATION = 100
