@@ -59,12 +59,12 @@ def checked(store: Results, chosen: Selection, *, early: bool = False) -> pd.Dat
                     result = _among_all(result, _ranked(store, chosen, numbers[number]))
                 title = f"{number}, {task_title(chosen.robot, numbers[number])}"
                 row = {"task": title, "the dissertation": result.claim, "these results": result.ours, "verdict": result.verdict}
-                made.append(row | {"where": finding["where"]})
+                made.append(row | {"where": finding["where"], "runs": float("nan") if result.runs is None else result.runs})
     for number, findings in waiting.items():
         title = f"{number}, {task_title(chosen.robot, numbers[number])}"
         few = f"no combination of parameters has {fewest(store, chosen)} finished runs yet"
         row = {"task": title, "the dissertation": f"all {findings} findings", "these results": few, "verdict": UNDECIDED}
-        made.append(row | {"where": _NOWHERE})
+        made.append(row | {"where": _NOWHERE, "runs": float("nan")})
     return pd.DataFrame(made)
 
 
@@ -130,5 +130,5 @@ def _drawn(store: Results, chosen: Selection, table: pd.DataFrame) -> FigureResu
     )
     return FigureResult(
         f"{NAME}-{chosen.robot}", "What the dissertation found, and these results", None, shows, chosen.n, chosen.sweeps,
-        (*said.missing, *chosen.left_out), see=f"{see}.", data=table, table=table,
+        (*said.missing, *chosen.left_out), see=f"{see}.", data=table, table=table.drop(columns="runs"),
     )  # fmt: skip

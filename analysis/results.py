@@ -15,8 +15,8 @@ from analysis.labels import CELL
 from bns import store as results_store
 from bns.errors import BnsError, SpecError, StoreError
 from bns.spec import FIELDS
-from bns.store.archive.kept import NEAR, rounded_evals
-from bns.store.archive.read import archives, connect_archives
+from bns.store.archive.kept import NEAR, RECORDED, rounded_evals, rounded_rows
+from bns.store.archive.read import archives, connect_archives, recorded_tables
 from bns.sweep.expand.grid import parse_sweep
 
 BEGIN = "bns sweep khepera-small --budget 10m"
@@ -53,7 +53,7 @@ class Plan:
 class Results:
     """The results in one folder as they are now: all figures of one call show the same runs; with ``run``, that run alone.
 
-    The same from an archive (`bns archive`), which has fewer tables and columns. Measures of ``evals`` are rounded to what an
+    The same from an archive (`bns archive`), which has fewer tables and columns. Measures are rounded to what an
     archive keeps, so both give the same numbers. With ``so_far`` each success is that of any fittest controller up to then:
     another reading of section 4.5's "a trial run which developed a controller".
 
@@ -100,8 +100,10 @@ class Results:
     def _connection(self) -> duckdb.DuckDBPyConnection:
         connection = connect_archives(archives(self.results)) if self.archived else results_store.connect(self.results)
         only = "true" if self.run is None else among("run_id", [self.run])
-        for table in OF_RUNS[:2] if self.archived else OF_RUNS:
+        for table in (*OF_RUNS[:2], *recorded_tables(connection)) if self.archived else OF_RUNS:
             rows = f"memory.main.{table}"
+            if not self.archived and table in RECORDED:
+                rows = f"({rounded_rows(rows, table)})"
             rows = f"({rounded_evals(rows)})" if table == "evals" and not self.archived else rows
             rows = f"(SELECT * REPLACE ({_EVER}) FROM {rows})" if table == "evals" and self.so_far else rows
             connection.execute(f"CREATE TEMP VIEW {table} AS SELECT * FROM {rows} WHERE {only}")

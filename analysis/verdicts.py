@@ -16,6 +16,8 @@ class Checked:
     claim: str
     ours: str
     verdict: str
+    runs: int | None = None
+    """How many runs it is drawn from, where these are not all runs of the task."""
 
 
 def within(low: float, high: float, lowest: float, highest: float) -> str:

@@ -8,10 +8,10 @@ import pandas as pd
 from analysis.checks.bootstrap import interval
 from analysis.intervals import wilson
 from analysis.results import NoDataError, Results, among
-from analysis.selection import Selection
+from analysis.selection import RUNS, Selection
 from analysis.verdicts import Checked, within
 
-NOT_RECORDED = "no stored run has generations and probes (an archive does not keep them); run bns sweep prototype"
+NOT_RECORDED = "no stored run of the study's settings has generations and probes; run bns sweep prototype"
 _FEWEST = 6
 """Evaluations that a run must have for thirds of it to be compared."""
 
@@ -35,7 +35,7 @@ def simulators_change_less(store: Results, chosen: Selection, task: str) -> Chec
 
 
 def _asked(store: Results, sql: str) -> pd.DataFrame:
-    """Rows of generations or probes; none from an archive, which keeps neither."""
+    """Rows of generations or probes; none from an archive of runs that recorded neither."""
     try:
         return store.query(sql)
     except NoDataError:
@@ -43,9 +43,9 @@ def _asked(store: Results, sql: str) -> pd.DataFrame:
 
 
 def _recorded(chosen: Selection, task: str) -> str:
-    """SELECT of finished runs of the robot and task, of any sweep that recorded them."""
+    """SELECT of finished runs of the task at the study's settings (its world, say), of any sweep that recorded them."""
     return (
-        f"SELECT run_id, min(sweep) AS sweep FROM runs WHERE status = 'ok' AND {among('robot', [chosen.robot])} "
+        f"SELECT run_id, min(sweep) AS sweep FROM {RUNS} WHERE status = 'ok' AND ({chosen.setting}) "
         f"AND {among('task', [task])} GROUP BY run_id"
     )
 
@@ -73,4 +73,4 @@ def _in_most_runs(claim: str, holds: np.ndarray) -> Checked:
         raise NoDataError(NOT_RECORDED)
     low, high = (float(end) for end in wilson(holds.sum(), len(holds)))
     ours = f"in {holds.sum()} of {len(holds)} runs{interval(100 * low, 100 * high, '.0f')}"
-    return Checked(claim, ours, within(low, high, 0.5, 1.0))
+    return Checked(claim, ours, within(low, high, 0.5, 1.0), len(holds))

@@ -49,13 +49,13 @@ def best_combination(store: Results, chosen: Selection, task: str, column: str, 
     again = confirmed(store, chosen, task)
     if len(again):
         successes, runs = again["confirm_successes" if column == "success" else f"confirm_{column}"], again.confirm_runs
-        how = f"runs on fresh seeds, the best of {len(again)} that were rerun"
+        how, drawn_from = f"runs on fresh seeds, the best of {len(again)} that were rerun", int(runs.sum())
     else:
-        successes, runs, how = rows[column], rows.runs, "runs, as swept"
+        successes, runs, how, drawn_from = rows[column], rows.runs, "runs, as swept", None
     best = (successes / runs).idxmax()
     low, high = (100 * float(end) for end in wilson(successes[best], runs[best]))
     ours = f"{100 * successes[best] / runs[best]:.0f}{interval(low, high, '.0f')} % of {runs[best]:.0f} {how}"
-    return Checked(f"best combination {percent:g} %{radius}", ours, near(low, high, percent))
+    return Checked(f"best combination {percent:g} %{radius}", ours, near(low, high, percent), drawn_from)
 
 
 def best_have_at_most(store: Results, chosen: Selection, task: str, parameter: str, value: float) -> Checked:

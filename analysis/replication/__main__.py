@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
-from analysis import advice, random_behaviour, worlds
+from analysis import advice, prototype_worlds, random_behaviour, worlds
 from analysis.__main__ import figures
 from analysis.intervals import FEWEST_SEEDS
 from analysis.readings import compared, in_words
@@ -38,10 +38,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         pictures = drawn(store, found, wanted.out.parent / "figures" / "replication", wanted.out.parent)
         paired = _readings(wanted.results if wanted.fresh else archive.with_name(READINGS), fresh=wanted.fresh)
         elsewhere = _worlds(wanted.results if wanted.fresh else archive.with_name(WORLDS), fresh=wanted.fresh)
-        costs = [one.table for one in _of_the_archive(advice, store) if one.table is not None]
+        costs, trials = (
+            [one.table for one in _of_the_archive(module, store) if one.table is not None]
+            for module in (advice, prototype_worlds)
+        )
         random = _random(wanted.results, fresh=wanted.fresh)
         origin = _origin(store, archive, fresh=wanted.fresh)
-        text = page(found, either, paired, elsewhere, costs, random, pictures, origin)
+        text = page(found, either, paired, elsewhere, costs, random, trials, pictures, origin)
         publish(text.encode(), wanted.out.with_name(f".{wanted.out.name}.part"), wanted.out)
     except BnsError as fault:
         print(f"error: {fault}", file=sys.stderr)

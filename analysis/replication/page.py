@@ -24,6 +24,7 @@ def page(
     worlds: Sequence[pd.DataFrame],
     advice: Sequence[pd.DataFrame],
     random: pd.DataFrame | None,
+    trials: Sequence[pd.DataFrame],
     pictures: Mapping[str, str],
     origin: Sequence[str],
 ) -> str:
@@ -36,6 +37,7 @@ def page(
         worlds: tables of the influence of parameters in two worlds, one a robot; empty if there are no runs.
         advice: tables of what the dissertation's advice costs, one a robot; empty if there are too few runs.
         random: table of simulators on random behaviour; None if there are no runs.
+        trials: tables of the prototype trials in two worlds, one a robot; empty if there are no runs.
         pictures: "figure 4.7" -> path of a picture, relative to the page.
         origin: lines that say where the numbers come from.
     """
@@ -47,6 +49,7 @@ def page(
         "WORLDS": "\n\n".join(map(table, worlds)) or "There are no runs of two worlds yet.",
         "ADVICE": "\n\n".join(map(table, advice)) or "There are too few runs yet.",
         "RANDOM": "There are no runs of this yet." if random is None else table(random),
+        "TRIALS": "\n\n".join(map(table, trials)) or "There are no runs of this yet.",
         "ORIGIN": "\n".join(f"- {line}" for line in origin),
     }
     text = TEMPLATE.read_text(encoding="utf-8")
@@ -101,7 +104,8 @@ def _findings(one: Study, pictures: Mapping[str, str]) -> str:
             continue
         rows = pd.DataFrame({
             "task": own.task, "the dissertation": own["the dissertation"], "here (95 % interval)": own["these results"],
-            "n": [f"{runs.get(task, 0):,}" for task in own.task], "verdict": [f"**{word}**" for word in own.verdict],
+            "n": [f"{count:,.0f}" for count in own.runs.fillna(own.task.map(runs))],
+            "verdict": [f"**{word}**" for word in own.verdict],
         })  # fmt: skip
         sections.append(f"#### {where[:1].upper()}{where[1:]}")
         sections += [table(rows)] if len(rows) else []

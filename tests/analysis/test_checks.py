@@ -180,10 +180,16 @@ def test_what_single_runs_show_over_time(tmp_path):
             made.tables["generations"] |= {"best_fitness": np.ones(many), "best_fitness_world": in_world}
             runs.append(made)
         written(tmp_path / name, "made", runs)
+        # Of another world than the study's: the other way round, and not counted.
+        elsewhere = record(RunSpec(world="physics", evaluations=EVALUATIONS, record="full"), ("evals", "generations"))
+        elsewhere.tables["generations"] |= {"best_fitness": in_world, "best_fitness_world": np.ones(many)}
+        written(tmp_path / name, "prototype-physics", [elsewhere])
     for check in ("world_is_mostly_below", "probes_settle", "simulators_change_less"):
-        assert [checked(tmp_path / name, check).verdict for name in ("holds", "fails")] == ["agrees", "differs"], check
+        found = [checked(tmp_path / name, check) for name in ("holds", "fails")]
+        assert [one.verdict for one in found] == ["agrees", "differs"], check
+        assert [one.ours.partition(" runs")[0] for one in found] == ["in 20 of 20", "in 0 of 20"]
     store_of(tmp_path / "plain", lambda *_: {})
-    with pytest.raises(NoDataError, match="no stored run has generations and probes"):
+    with pytest.raises(NoDataError, match="no stored run of the study's settings has generations and probes"):
         checked(tmp_path / "plain", "world_is_mostly_below")
 
 

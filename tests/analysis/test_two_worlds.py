@@ -116,7 +116,7 @@ def test_findings_that_depend_on_whose_success_is_meant_stand_side_by_side():
 
     rows = by_either_reading(study(["22", "4"], ["differs", "differs"]), study(["46", "4"], ["replicates", "differs"]))
     assert rows["the dissertation"].tolist() == ["gap"]
-    text = page([], rows, None, [], [], None, {}, [])
+    text = page([], rows, None, [], [], None, [], {}, [])
     assert "| 1, circle | figure 4.7 | gap | 22; **differs** | 46; **replicates** |" in text
     assert "| now | 0 | 1 | 0 |" in text
     assert "| so far | 1 | 0 | 0 |" in text

@@ -11,8 +11,19 @@ from bns.cli.main import main
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store import Writer, connect
-from bns.store.archive.kept import COMPARED, COMPARED_RUN, DECIMALS, EVAL_COLUMNS, RUN_COLUMNS, rounded_evals
-from bns.store.archive.read import archives, connect_archives, described
+from bns.store.archive.kept import (
+    COMPARED,
+    COMPARED_RUN,
+    DECIMALS,
+    EVAL_COLUMNS,
+    RECORDED,
+    RECORDED_ORDER,
+    RECORDED_ROWS,
+    RUN_COLUMNS,
+    rounded_evals,
+    rounded_rows,
+)
+from bns.store.archive.read import archives, connect_archives, described, recorded_tables
 from bns.store.archive.write import archive
 from bns.sweep.expand.grid import parse_sweep
 from bns.sweep.runner import run_sweep
@@ -155,6 +166,48 @@ def test_approaches_that_lie_in_an_archive_and_in_the_results_are_compared_toget
     with connect_archives([path]) as back:
         assert not of(back, "evals", ("robot_s", "approach"), "approach").isna().any(axis=None)
         assert back.sql("SELECT count(DISTINCT approach) FROM runs WHERE cpu_s = 1.25").fetchall() == [(3,)]
+
+
+def full(seed):
+    """A run that recorded generations and probes; what the first probes changed by is not known."""
+    made = record(RunSpec(seed=seed, evaluations=4, record="full"), ("evals", *RECORDED))
+    made.tables["probes"]["change_m"][: len(made.tables["probes"]["change_m"]) // 4] = np.nan
+    return made
+
+
+def test_generations_and_probes_come_back_in_their_order_and_rounded(tmp_path):
+    results = tmp_path / "results"
+    path = archive_of(results, "prototype", [full(0), *records(2, evaluations=3), full(1)], tmp_path)
+    with connect(results) as there, connect_archives([path]) as back:
+        for table, decimals in RECORDED.items():
+            columns = ("run_id", "sweep", *decimals)
+            order = f"run_id, {RECORDED_ORDER[table]}"
+            rows = f"{table} WHERE {RECORDED_ROWS[table]}"
+            kept, plain = of(back, table, columns, order), of(there, f"({rounded_rows(rows, table)})", columns, order)
+            pd.testing.assert_frame_equal(kept, plain, check_dtype=False, check_exact=True)
+            assert kept.run_id.nunique() == 2
+            for name, places in decimals.items():
+                exact = of(there, rows, columns, order)[name]
+                if name == "who":
+                    continue
+                assert np.nanmax(np.abs(kept[name] - exact)) <= 0.5 * 10**-places + 1e-12, name
+        driven = [of(one, "evals WHERE sweep = 'prototype'", ("driven_ms",), "run_id, evaluation") for one in (there, back)]
+        assert (driven[0].round() == driven[1]).all(axis=None)
+        assert len(of(back, "runs WHERE started_at IS NOT NULL", ("run_id",), "run_id")) == 4
+        assert back.sql("SELECT count(*) FILTER (change_m IS NULL) * 4 = count(*) FROM probes").fetchall() == [(True,)]
+
+
+def test_runs_of_an_older_archive_that_recorded_more_keep_it_beside_new_ones(tmp_path):
+    """And an archive of runs that recorded nothing more has no empty tables, as those of earlier versions."""
+    results, former = tmp_path / "results", archive_of(tmp_path / "there", "prototype", [full(0)], tmp_path)
+    (results / "archived").mkdir(parents=True)
+    former.rename(results / "archived" / "former.parquet")
+    path = archive_of(results, "grid", records(2, evaluations=3), tmp_path)
+    plain = archive(results, tmp_path / "plain.parquet", ["grid"]).path
+    with connect_archives([path]) as back, connect_archives([plain]) as none, connect_archives([path, plain]) as both:
+        assert back.sql("SELECT DISTINCT run_id FROM probes").fetchall() == [(full(0).spec.run_id,)]
+        assert (recorded_tables(back), recorded_tables(none)) == ([*RECORDED], [])
+        assert both.sql("SELECT count(*) FROM generations").fetchall() == back.sql("SELECT count(*) FROM generations").fetchall()
 
 
 def archive_of(results, sweep, runs, folder):

@@ -11,7 +11,19 @@ import duckdb
 import pyarrow.parquet as pq
 
 from bns.errors import StoreError
-from bns.store.archive.kept import COMPARED, COMPARED_RUN, DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE
+from bns.store.archive.kept import (
+    COMPARED,
+    COMPARED_RUN,
+    DECIMALS,
+    FORMAT,
+    NEAR,
+    RECORDED,
+    RECORDING,
+    RECORDING_RUN,
+    RUN_COLUMNS,
+    WHOSE,
+    recorded_column,
+)
 from bns.store.disk.digest import is_intact, is_sealed
 from bns.store.disk.parquet import READ_FAULTS
 from bns.store.read.reader import finished
@@ -94,6 +106,8 @@ def recorded(results: Path | str, sweep: str) -> dict[str, str]:
 def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:
     """A DuckDB connection with the views runs, evals and specs over archives. A run that several of them have counts once.
 
+    There are views generations, probes and paths as well if an archive has runs that recorded them.
+
     Raises:
         StoreError: a file is no archive, or not as it was written.
     """
@@ -104,15 +118,24 @@ def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:
     connection.execute(f"""CREATE TABLE archived AS SELECT * FROM read_parquet([{files}], union_by_name = true)
         QUALIFY row_number() OVER (PARTITION BY sweep, run_id ORDER BY status <> 'ok') = 1""")
     there = set(connection.table("archived").columns)
-    columns = (*RUN_COLUMNS, *(name for name in COMPARED_RUN if name in there))
+    columns = (*RUN_COLUMNS, *(name for name in (*COMPARED_RUN, *RECORDING_RUN) if name in there))
     connection.execute(f"CREATE VIEW runs AS SELECT {', '.join(columns)} FROM archived")
-    measures = DECIMALS | {name: decimals for name, decimals in COMPARED.items() if name in there}
+    measures = DECIMALS | {name: decimals for name, decimals in (COMPARED | RECORDING).items() if name in there}
     connection.execute(f"CREATE VIEW evals AS {_evals(measures)}")
+    for table, columns_of in RECORDED.items():
+        if recorded_column(table, next(iter(columns_of))) in there:
+            connection.execute(f"CREATE VIEW {table} AS {_recorded_rows(table)}")
     import pandas as pd  # noqa: PLC0415  # as above
 
     connection.register("plans", pd.DataFrame(plans, columns=list(_SPECS)).astype(dict.fromkeys(_SPECS[:4], str)))
     connection.execute("CREATE TABLE specs AS SELECT DISTINCT * REPLACE (written_at::TIMESTAMPTZ AS written_at) FROM plans")
     return connection
+
+
+def recorded_tables(connection: duckdb.DuckDBPyConnection) -> list[str]:
+    """Which of generations, probes and paths the archives of `connect_archives` hold."""
+    views = {name for (name,) in connection.execute("SELECT view_name FROM duckdb_views()").fetchall()}
+    return [table for table in RECORDED if table in views]
 
 
 def _evals(decimals: Mapping[str, int]) -> str:
@@ -129,6 +152,13 @@ def _evals(decimals: Mapping[str, int]) -> str:
         {", ".join((*successes, *measures))} FROM (
             SELECT run_id, sweep, robot, task, {parameters}, radii,
                    unnest(range(1, len(success_bits) + 1)) AS evaluation, {lists} FROM archived)"""
+
+
+def _recorded_rows(table: str) -> str:
+    """SELECT of the rows of a table that runs recorded."""
+    lists = ", ".join(f"unnest({recorded_column(table, name)}) AS {name}" for name in RECORDED[table])
+    values = ", ".join(f"{name} / {10**places}.0 AS {name}" if places else name for name, places in RECORDED[table].items())
+    return f"SELECT run_id, sweep, robot, task, {values} FROM (SELECT run_id, sweep, robot, task, {lists} FROM archived)"
 
 
 def _bit(column: str, place: int, name: str, *, known: bool) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,24 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from bns.errors import StoreError, unknown_name
-from bns.store.archive.kept import COMPARED, COMPARED_RUN, DECIMALS, FORMAT, NEAR, RUN_COLUMNS, WHOSE, bits, whole
-from bns.store.archive.read import connect_archives, stored_archives
+from bns.store.archive.kept import (
+    COMPARED,
+    COMPARED_RUN,
+    DECIMALS,
+    FORMAT,
+    NEAR,
+    RECORDED,
+    RECORDED_ORDER,
+    RECORDED_ROWS,
+    RECORDING,
+    RECORDING_RUN,
+    RUN_COLUMNS,
+    WHOSE,
+    bits,
+    recorded_column,
+    whole,
+)
+from bns.store.archive.read import connect_archives, recorded_tables, stored_archives
 from bns.store.disk.digest import BLANK, FIELD, sealed
 from bns.store.disk.files import publish
 from bns.store.read.reader import connect
@@ -56,7 +72,9 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
     Kept of every run: parameters, seed, spec, versions, commit and, for every evaluation, successes at all radii (of the
     fittest, the evaluated, and so far), diversity, fitness error and fitness in the world of the fittest (to 0.001 per
     metre) and the length of its list; of sweeps with several approaches also the robot's time (to 0.1 s), the error of the
-    evaluated's fitness and the CPU time of runs. Paths, probes, other times and everything else stay in the results.
+    evaluated's fitness and the CPU time of runs; of runs that recorded them (``record: full``) the fitness of every generation
+    (to 0.0001 per metre), the probes (to 0.01 mm), the poses of the fittest's paths (to 0.1 mm) and the time of driving.
+    Everything else stays in the results.
 
     Raises:
         StoreError: there are no results, no such sweep, or the file cannot be written.
@@ -73,7 +91,9 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
                 raise StoreError(unknown_name(f"sweep in {results}", name, there))
         chosen = sorted(set(sweeps or there))
         connection.execute("CREATE TEMP TABLE chosen AS SELECT unnest(?::VARCHAR[]) AS sweep", [chosen])
-        table = connection.sql(_select(_comparing(approaches, chosen))).to_arrow_table()
+        recorded = _recorded(connection, former, chosen)
+        select = _select(_comparing(approaches, chosen), recorded)
+        table = connection.sql(select).to_arrow_table()
         plans = connection.sql("SELECT * FROM specs SEMI JOIN chosen USING (sweep) ORDER BY ALL").to_arrow_table().to_pylist()
     if former:
         table, plans = _with_former(table, plans, former, chosen)
@@ -116,27 +136,65 @@ def _comparing(pairs: set[tuple[str, str]], chosen: Sequence[str]) -> list[str]:
     return sorted(sweep for sweep, count in Counter(sweep for sweep, _ in pairs).items() if count > 1 and sweep in chosen)
 
 
-def _select(comparing: Sequence[str]) -> str:
-    """SELECT of one row a run, with a list of each thing that is kept of its evaluations."""
+def _recorded(
+    connection: duckdb.DuckDBPyConnection, former: Sequence[Path], chosen: Sequence[str]
+) -> dict[str, list[str]]:
+    """Tables of `RECORDED` -> those sweeps that have rows in them, in the results or in their archives."""
+    sweeps = {table: _with_rows(connection, table) for table in RECORDED}
+    if former:
+        with connect_archives(former) as older:
+            sweeps |= {table: sweeps[table] | _with_rows(older, table) for table in recorded_tables(older)}
+    return {table: found for table in RECORDED if (found := sorted(sweeps[table] & {*chosen}))}
+
+
+def _with_rows(connection: duckdb.DuckDBPyConnection, table: str) -> set[str]:
+    return {sweep for (sweep,) in connection.execute(f"SELECT DISTINCT sweep FROM {table}").fetchall()}
+
+
+def _select(comparing: Sequence[str], recorded: Mapping[str, Sequence[str]]) -> str:
+    """SELECT of one row a run, with a list of each thing that is kept of its evaluations and of the tables ``recorded``."""
+    recording = sorted({sweep for sweeps in recorded.values() for sweep in sweeps})
+    only = [(COMPARED_RUN, COMPARED, comparing), (RECORDING_RUN, RECORDING, recording)]
     lists = {column: f"({bits(prefix)})::UTINYINT" for column, prefix in WHOSE.items()}
     lists |= {name: whole(name) for name in DECIMALS}
-    more = {name: whole(name) for name in COMPARED} if comparing else {}
+    more = {name: whole(name) for _, measures, sweeps in only if sweeps for name in measures}
     listed = ", ".join(f"list({value} ORDER BY evaluation) AS {name}" for name, value in (lists | more).items())
-    names = ", ".join("'" + name.replace("'", "''") + "'" for name in comparing)
-    added = [f"runs.{name}" for name in COMPARED_RUN if comparing] + [f"kept.{name}" for name in more]
-    of_these = (f", CASE WHEN sweep IN ({names}) THEN {name} END AS {name.partition('.')[2]}" for name in added)
+    of_these = (
+        f", CASE WHEN {_among(sweeps)} THEN {name} END AS {name.partition('.')[2]}"
+        for run_columns, measures, sweeps in only
+        if sweeps
+        for name in (*(f"runs.{column}" for column in run_columns), *(f"kept.{measure}" for measure in measures))
+    )
+    columns = {table: [recorded_column(table, name) for name in RECORDED[table]] for table in recorded}
+    details = (f", coalesce({table}_kept.{name}, []) AS {name}" for table, names in columns.items() for name in names)
+    joined = (f"LEFT JOIN ({_lists_of(table)}) AS {table}_kept USING (run_id, sweep)" for table in recorded)
     return f"""
         SELECT {", ".join(f"runs.{name}" for name in RUN_COLUMNS)}, coalesce(radii, false) AS radii,
                {", ".join(f"coalesce(kept.{name}, []) AS {name}" for name in lists)}
-               {"".join(of_these)}
+               {"".join(of_these)} {"".join(details)}
         FROM runs SEMI JOIN chosen USING (sweep)
         LEFT JOIN (SELECT run_id, sweep, count({NEAR[0]}) > 0 AS radii, {listed}
                    FROM evals SEMI JOIN chosen USING (sweep) GROUP BY run_id, sweep) AS kept USING (run_id, sweep)
+        {" ".join(joined)}
         ORDER BY {_ORDER}"""
 
 
+def _among(sweeps: Sequence[str]) -> str:
+    return "sweep IN (" + ", ".join("'" + name.replace("'", "''") + "'" for name in sweeps) + ")"
+
+
+def _lists_of(table: str) -> str:
+    """SELECT of one row a run, with a list of each column that is kept of ``table``."""
+    values = {name: whole(name) if decimals else name for name, decimals in RECORDED[table].items()}
+    order = RECORDED_ORDER[table]
+    lists = (f"list({value} ORDER BY {order}) AS {recorded_column(table, name)}" for name, value in values.items())
+    rows = f"{table} SEMI JOIN chosen USING (sweep) WHERE {RECORDED_ROWS[table]}"
+    return f"SELECT run_id, sweep, {', '.join(lists)} FROM {rows} GROUP BY run_id, sweep"
+
+
 def _file_bytes(table: pa.Table, plans: list[dict[str, Any]]) -> bytes:
-    measures = [name for name in (*DECIMALS, *COMPARED) if name in table.column_names]
+    recorded = [recorded_column(name, column) for name, of in RECORDED.items() for column, places in of.items() if places]
+    measures = [name for name in (*DECIMALS, *COMPARED, *RECORDING, *recorded) if name in table.column_names]
     sink = pa.BufferOutputStream()
     pq.write_table(
         table.replace_schema_metadata({METADATA_KEY: _metadata(table, plans)}),
