@@ -1,19 +1,21 @@
 """The Arduino bridge: frames as documented, the driver against an emulated bridge."""
 
 import itertools
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bns import hardware
 from bns.errors import HardwareError
 from bns.hardware.emulators.devices.bridge import BOOT_S, BridgeEmulator
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.link.hardware_log import HardwareLog
-from bns.hardware.servos.bridge import BridgeChain
-from bns.hardware.servos.bridge_frames import STARTED_S, WATCHDOG_S, Frame, crc16, decoded, encoded, searched
+from bns.hardware.servos.bridge import BAUD, BridgeChain
+from bns.hardware.servos.bridge_frames import SERVO, STARTED_S, WATCHDOG_S, Frame, crc16, decoded, encoded, searched
 from bns.hardware.servos.servo_chain import ServoError, ServoLimits
 
 
@@ -193,3 +195,17 @@ def test_nonsense_is_refused_by_the_bridge(bridge):
     driver, _ = bridge()
     with pytest.raises(ServoError, match="asked 6 times"):
         driver.move([0.0], [1.0])
+
+
+@pytest.mark.parametrize(("register", "share"), [(0, 0.0), (512, 512 / 1023), (1023, 1.0), (1024 + 512, -512 / 1023)])
+def test_a_load_is_a_share_of_the_largest_torque_with_its_sign(bridge, register, share):
+    """Present load of the AX-12's manual: ten bits, and bit 10 for clockwise."""
+    driver, _ = bridge()
+    state = SERVO.pack(512, register, 30, 120, 0) * 3
+    driver._state = lambda: state
+    assert [one.load for one in driver.health().values()] == pytest.approx([share] * 3)
+
+
+def test_driver_and_sketch_talk_at_the_same_speed():
+    sketch = (Path(hardware.__file__).parent / "bridge_sketch" / "bridge_sketch.ino").read_text()
+    assert f"Serial.begin({BAUD});" in sketch

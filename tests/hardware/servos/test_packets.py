@@ -176,9 +176,17 @@ def test_a_header_that_leads_nowhere_is_passed_over_wherever_it_ends():
 @pytest.mark.parametrize("protocol", [1, 2])
 def test_an_answer_is_whole_only_behind_its_header_and_with_all_of_its_bytes(protocol):
     wire = WIRES[protocol]
-    answer = wire.status(3, 0, b"\x20")
+    answer = wire.status(3, 0, bytes(range(8)))
     assert wire.seems_whole(answer)
-    for cut in range(6 * protocol, len(answer)):
+    for cut in range(6 if protocol == 1 else 11, len(answer)):
         assert not wire.seems_whole(answer[:cut]), cut
     for at in (0, 1):
         assert not wire.seems_whole(answer[:at] + b"\x00" + answer[at + 1 :])
+
+
+@pytest.mark.parametrize("off", [-1, 1])
+def test_a_checksum_that_is_lower_or_higher_is_noticed(off):
+    clean = WIRES[1].status(3, 0, b"\x05")
+    packet, left = WIRES[1].taken(clean[:-1] + bytes([clean[-1] + off]))
+    assert (packet.good, left) == (False, b"")
+    assert WIRES[1].taken(clean)[0].good
