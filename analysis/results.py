@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, wraps
@@ -82,7 +83,7 @@ class Results:
             except (duckdb.BinderException, duckdb.CatalogException) as lacking:
                 if not self.archived:
                     raise
-                what = _first_line(lacking)
+                what = _lacking(lacking)
                 raise NoDataError(f"an archive does not hold what this is drawn from ({what}); {FROM_RUNS}") from None
             except duckdb.IOException as error:  # a compaction has replaced files: the new ones hold the same rows
                 fault = error
@@ -121,8 +122,11 @@ class Results:
         return {row.sweep: _plan(row.text, row.runs) for row in newest.itertuples()}
 
 
-def _first_line(fault: Exception) -> str:
-    return str(fault).partition("\n")[0].partition(": ")[2]
+def _lacking(fault: Exception) -> str:
+    """The column or table that a database says it lacks, or what it says."""
+    first = str(fault).partition("\n")[0].partition(": ")[2]
+    found = re.search(r"(column|Table)[^\w]*(?:with name )?([\w.]+)", first)
+    return f"{found[1].lower()} {found[2]}" if found else first
 
 
 def _plan(text: str, runs: float) -> Plan:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 
 from bns.errors import DataError
 
@@ -32,6 +33,8 @@ def pose_of(text: str | None) -> tuple[float, float, float] | None:
             f"--start {text!r} is no pose; write X,Y,DEGREES (metres; 0 faces east, 90 north): --start 0,0,90"
         )
     x, y, degrees = numbers
+    if 0 < abs(degrees) < 2 * math.pi and not degrees.is_integer():
+        print(f"bns: --start: the heading is taken as {degrees:g} degrees, not radians", file=sys.stderr)
     return x, y, math.radians(degrees)
 
 

@@ -144,7 +144,7 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
 def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
     for p in rest.residual_dependence[:4]:
         yield (
-            f"Left unexplained: {p.channel} along {p.variable}, {p.share:.2%} of the loss on held-out trials "
+            f"Left unexplained by listed effects: {p.channel} along {p.variable}, {p.share:.2%} of the loss on held-out trials "
             f"(p {'<' if p.paired_comparison.p_value < 1e-4 else '='} {max(p.paired_comparison.p_value, 1e-4):.2g})."
         )
     if rest.autocorrelation is not None:

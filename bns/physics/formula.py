@@ -67,6 +67,8 @@ PAST: Mapping[str, str] = {
 WITH_PAST = (*WHICH_WHEELS, "v", "w")
 RECENT_S = 0.15
 NEVER_M = 1e3
+LARGEST = 1e9
+"""Of a number in a term. At 1 mm/s a speed that is halved by a term in v**3 has a number of 5e5, in v**4 of 5e8."""
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "abs": np.abs,
     "sign": np.sign,
@@ -114,7 +116,7 @@ def formula_effect(
         name=name,
         stage="body",
         parameters=tuple(
-            Parameter(p, "1", -1e3, 1e3, (-10.0, 10.0), 0.0 if linear or p == unknown[0] else 1.0, "of a formula")
+            Parameter(p, "1", -LARGEST, LARGEST, (-10.0, 10.0), 0.0 if linear or p == unknown[0] else 1.0, "of a formula")
             for p in unknown
         ),
         starts=((0.0,) * len(unknown),) if linear else (),

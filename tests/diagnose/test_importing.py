@@ -4,11 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bns.api.measurements import Measurements
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.import_log import refuse_to_overwrite
 from bns.diagnose.data.load import load_measured
 from bns.diagnose.data.mapping import load_mapping
 from bns.errors import DataError
+from bns.measurements import write_measurements
 from tests.diagnose.worlds import NOMINAL, measured
 
 MAPPING = """
@@ -85,3 +88,47 @@ def test_no_mapping_lists_the_columns(log, capsys):
     assert main(["import", str(folder / "log.csv"), "-o", str(folder / "m.csv")]) == 2
     assert "has the columns run, time, vl" in capsys.readouterr().err
     assert not (folder / "m.csv").exists()
+
+
+@pytest.mark.parametrize("output", ["log.csv", "sub/../log.csv", "link.csv"])
+def test_what_is_imported_is_not_overwritten(log, output, capsys):
+    folder, _ = log
+    (folder / "sub").mkdir()
+    (folder / "link.csv").symlink_to(folder / "log.csv")
+    before = {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    source, mapping = str(folder / "log.csv"), str(folder / "map.yaml")
+    assert main(["import", source, "--map", mapping, "-o", str(folder / output)]) == 2
+    assert "is what is imported" in capsys.readouterr().err
+    assert before == {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def test_neither_is_a_second_file_of_the_log(log):
+    folder, _ = log
+    mapping = {"also": [{"file": "other.csv", "columns": {}}]}
+    (folder / "other.csv").write_text("x")
+    with pytest.raises(DataError, match=r"other\.csv is what is imported"):
+        refuse_to_overwrite(folder / "other.csv", [folder / "log.csv"], None, mapping)
+    refuse_to_overwrite(folder / "new.csv", [folder / "log.csv"], folder / "map.yaml", mapping)
+
+
+def test_the_same_trial_in_two_files_is_refused(tmp_path):
+    """Counted twice, it would make every interval too narrow, and two times six trials enough for a verdict."""
+    table = measured(NOMINAL, trials=3)
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
+    write_measurements(table, first)
+    write_measurements(table[table.trial > 0].assign(trial=lambda t: t.trial + 5), second)
+    with pytest.raises(DataError, match=r"second\.csv: trial 6 is trial 1 of .*first\.csv, row for row"):
+        load_measured(first, more=[second])
+    with pytest.raises(DataError, match=r"trial 0 is trial 0 of .*first\.csv"):
+        Measurements([first, first])
+    write_measurements(measured(NOMINAL, trials=3, seed=5), second)
+    assert len(load_measured(first, more=[second]).tracks) == 6
+
+
+@pytest.mark.parametrize(
+    ("content", "message"), [(b"", r"log\.csv is empty"), ("trial,é\n".encode("utf-16"), "no text in UTF-8. Save it as UTF-8")]
+)
+def test_what_is_no_text_is_said_to_be_none(tmp_path, content, message):
+    (tmp_path / "log.csv").write_bytes(content)
+    with pytest.raises(DataError, match=message):
+        load_measured(tmp_path / "log.csv")

@@ -31,6 +31,7 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.proposal_text import proposal_text
 from bns.errors import DataError
 from bns.measurements import write_measurements
+from bns.physics.model import load_model
 from bns.physics.wheels.differential_drive import simulate
 from bns.robots import load_robot
 from bns.trial.experiment import read_commands
@@ -299,3 +300,22 @@ def test_measurements_of_two_files_are_taken_together(tmp_path):
 def test_sequences_of_different_lengths_are_joined():
     short, long = (Sequences(*(np.ones((1, n)) for _ in range(3))) for n in (1, 3))
     assert short.joined(long).lasting_s.tolist() == [1.0, 3.0]
+
+
+def test_a_robot_that_bns_cannot_drive_gets_no_command_for_it(narrow):
+    """The next command is one that works: bns trial drives its own robots, as fast as they go."""
+    d, predictor = narrow
+    own = bounds_of(predictor.tracks, load_model("khepera"))
+    assert own.robot == "khepera"
+    other = bounds_of(predictor.tracks, replace(load_model("khepera"), name="differential-drive"))
+    fast = bounds_of(predictor.tracks, load_model("khepera"), (-0.2, 0.9))
+    assert (other.robot, fast.robot) == ("", "")
+    for bounds, command in ((own, "drive it with: bns trial --robot khepera"), (other, "log them as before")):
+        text = proposal_text(propose(d, ARENA, replace(bounds, trial_s=6.0), 0.5), "next.csv")
+        assert command in text
+        assert ("bns trial" in text) == (bounds is own)
+
+
+def test_speeds_in_other_units_are_refused():
+    with pytest.raises(DataError, match="above 20 m/s look like mm/s"):
+        bounds_of(tracks_of(measured(NOMINAL, trials=2)), NOMINAL, (-300.0, 300.0))

@@ -149,14 +149,16 @@ def import_(options: argparse.Namespace) -> int:
     """A log as a table of measurements; the mapping is kept beside it."""
     import yaml
 
-    from bns.diagnose.data.import_log import import_log
-    from bns.diagnose.data.mapping import load_mapping
+    from bns.diagnose.data.import_log import import_log, refuse_to_overwrite
+    from bns.diagnose.data.mapping import load_mapping, mapping_beside
     from bns.diagnose.report.text import findings_text
     from bns.measurements import check_table_name, write_measurements
 
     check_table_name(options.output)
     first = options.data[0]
-    found = import_log(options.data, load_mapping(options.map) if options.map else None)
+    given = load_mapping(options.map) if options.map else None
+    refuse_to_overwrite(options.output, options.data, options.map, given or mapping_beside(first))
+    found = import_log(options.data, given)
     write_measurements(found.table, options.output)
     if options.map:
         beside = first.with_name(first.name + ".import.yaml")

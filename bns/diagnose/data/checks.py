@@ -27,6 +27,7 @@ _LONGEST_TRIAL_S = DEFAULTS.data.longest_trial_s
 _LARGEST = DEFAULTS.data.largest_number
 _FINER = DEFAULTS.data.finer_units
 _UNTOLD_RATIO = DEFAULTS.data.untold_ratio
+FASTEST_M_S = DEFAULTS.data.fastest_m_s
 _DEGREES_AT_LEAST = DEFAULTS.data.degrees_rad_m
 
 
@@ -118,7 +119,9 @@ def check_columns(table: pd.DataFrame, columns: Sequence[str]) -> None:
     if missing:
         raise DataError(
             f"The measurements lack {', '.join(missing)}; they have {', '.join(map(str, table.columns))}. "
-            "Name the columns with `bns import`, or write " + ", ".join(columns) + "."
+            "Name the columns with `bns import` (in Python: bns.Measurements(table, mapping=...)), or write "
+            + ", ".join(columns)
+            + "."
         )
     if table.empty:
         raise DataError("The measurements have no rows.")
@@ -311,7 +314,7 @@ def _units(table: pd.DataFrame) -> None:
         )
     if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
         raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
-    if speed > 20:
+    if speed > FASTEST_M_S:
         raise DataError(f"Commands of up to {speed:g} m/s: left_m_s and right_m_s look like mm/s or a device's units.")
     for factor, unit in ((100.0, "centimetres"), (1000.0, "millimetres")):
         if factor / 3 < ratio < factor * 3:

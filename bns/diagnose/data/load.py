@@ -124,11 +124,33 @@ def _joined(paths: Sequence[Path]) -> pd.DataFrame:
     tables = [_mapped(path) for path in paths]
     if len(tables) == 1:
         return tables[0]
+    _check_different(paths, tables)
     for number, (path, table) in enumerate(zip(paths, tables, strict=True)):
         if "trial" in table.columns:
             before = f"{number}-{path.stem}: " if number else ""
             table["trial"] = before + table["trial"].astype(str)
     return pd.concat(tables, ignore_index=True)
+
+
+def _check_different(paths: Sequence[Path], tables: Sequence[pd.DataFrame]) -> None:
+    """DataError if a trial of one file is one of another, row for row: counted twice it would make all intervals too narrow."""
+    shared = sorted(set.intersection(*(set(map(str, table.columns)) for table in tables)) - {"trial"})
+    known: dict[bytes, tuple[Path, str]] = {}
+    for path, table in zip(paths, tables, strict=True):
+        if "trial" not in table.columns or not shared:
+            continue
+        hashes = pd.util.hash_pandas_object(table[shared], index=False).to_numpy()
+        here = {}
+        for name, rows in table.groupby("trial", sort=False).indices.items():
+            key = hashlib.sha256(hashes[rows].tobytes()).digest()
+            if key in known and len(rows) > 1:
+                other, same = known[key]
+                raise DataError(
+                    f"{path}: trial {name} is trial {same} of {other}, row for row. The same drive must not count twice: "
+                    "leave the file or the trial out."
+                )
+            here[key] = (path, str(name))
+        known |= here
 
 
 def _mapped(path: Path) -> pd.DataFrame:

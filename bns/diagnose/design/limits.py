@@ -6,6 +6,7 @@ from typing import cast
 
 import numpy as np
 
+from bns.diagnose.data.checks import FASTEST_M_S
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.design.sequences import MARGIN_M, Arena, Bounds
 from bns.diagnose.settings import DEFAULTS
@@ -67,18 +68,21 @@ def bounds_of(tracks: Tracks, model: Model, speeds: tuple[float, float] | None =
     short, long = (float(v) for v in np.quantile(tracks.duration_s[lasting], [0.02, 0.98]))
     name = str(model.provenance.get("begun_from", model.name)).removesuffix("-world")
     robot = load_robot(name) if name in robot_names() else None
+    takes = (np.inf, -np.inf)
     if robot is not None and robot.two_wheeled:
         left, _, lasts = cast(TwoWheeled, robot).wheel_speeds_m_s(
             np.stack([robot.bounds.low, robot.bounds.high]).astype(float)
         )
-        low, high = min(low, float(left[0])), max(high, float(left[1]))
+        takes = float(left[0]), float(left[1])
+        low, high = min(low, takes[0]), max(high, takes[1])
         short, long = min(short, float(lasts[0])), max(long, float(lasts[1]))
     if speeds is not None:
         low, high = _checked_speeds(speeds)
     per_trial = float(np.median(tracks.duration_s.sum(axis=1)))
     grid_s = 0.04
     short = max(round(short / grid_s), 1) * grid_s
-    return Bounds(low, high, short, max(long, short), float(np.clip(per_trial, *_TRIAL_S)), grid_s)
+    drives = name if takes[0] <= low and high <= takes[1] else ""
+    return Bounds(low, high, short, max(long, short), float(np.clip(per_trial, *_TRIAL_S)), grid_s, drives)
 
 
 def _checked_size(size: tuple[float, ...]) -> Array:
@@ -118,6 +122,11 @@ def _checked_speeds(speeds: tuple[float, float]) -> tuple[float, float]:
         raise DataError(
             f"The wheels' speeds are {speeds!r}; they must be the lowest and the highest in m/s: --speeds=LOW,HIGH such as "
             "--speeds=-0.2,0.2; in Python speeds=(-0.2, 0.2)."
+        )
+    if np.abs(pair).max() > FASTEST_M_S:
+        raise DataError(
+            f"The wheels' speeds are {speeds!r}; speeds above {FASTEST_M_S:g} m/s look like mm/s or a device's units: "
+            "--speeds=LOW,HIGH in m/s."
         )
     return float(pair[0]), float(pair[1])
 

@@ -39,7 +39,7 @@ class Arena:
 @dataclass(frozen=True)
 class Bounds:
     """What may be commanded: wheel speeds (m/s), durations of a command (s), how long a trial lasts (s); times are multiples
-    of ``grid_s``."""
+    of ``grid_s``. ``robot``: that of this project which takes all of these, if any: `bns trial` can drive the experiment."""
 
     slowest_m_s: float
     fastest_m_s: float
@@ -47,6 +47,7 @@ class Bounds:
     longest_s: float
     trial_s: float
     grid_s: float = 0.04
+    robot: str = ""
 
 
 class Plan(Protocol):

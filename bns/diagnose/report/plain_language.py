@@ -104,11 +104,16 @@ def certainty(d: Diagnosis) -> str:
         )
     if d.verdict == "unlisted":
         left = next((n for n in d.notes if n.startswith(("Left unexplained", "The unexplained motion"))), "")
-        return f"Over {trials} trials, predictions are still wrong in a pattern that chance does not explain. {left}".strip()
-    chance = next(c.paired_comparison.p_value for s in found.steps for c in s.ranking if c.name in d.effects)
+        with_effects = "with all listed effects" if d.effects else "as given"
+        return (
+            f"Over {trials} trials, predictions of the model {with_effects} are wrong in a pattern that chance does not explain. "
+            f"{left}"
+        ).strip()
+    chance, tried = next(
+        (c.paired_comparison.p_value, len(s.ranking)) for s in found.steps for c in s.ranking if c.name in d.effects
+    )
     better = int((found.problem.fit(without_last(found)).held_out > found.fit.held_out).sum())
-    luck = "less than one in ten thousand" if chance < 1e-4 else f"about {chance:.1g}"
     return (
         f"With it, {better} of {trials} trials are predicted better, each by a fit to other trials. The probability that "
-        f"chance alone gives such a gain is {luck}."
+        f"chance alone gives such a gain to any of the {tried} effects tried is at most {min(1.0, tried * chance):.1g}."
     )

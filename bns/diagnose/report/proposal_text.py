@@ -52,12 +52,14 @@ def proposal_lines(p: Proposal) -> list[str]:
 
 
 def _next(p: Proposal, written: str) -> Iterator[str]:
-    if written and p.arena is None:
+    if written and (p.bounds is None or not p.bounds.robot or p.arena is None):
         yield f"written to {written}; drive its trials, log them as before, and then: bns diagnose DATA --more NEW.csv --model M"
-    elif written and p.arena is not None:
+    elif written:
+        assert p.bounds is not None
+        assert p.arena is not None
         if not np.allclose(p.arena.start, START, atol=0.02):
             yield "note: bns trial starts every trial at x = 0, y = 0, heading 90°; --start=0,0,90 plans for that."
-        yield f"written to {written}; drive it with: bns trial --robot khepera --rig RIG.yaml --commands {written}"
+        yield f"written to {written}; drive it with: bns trial --robot {p.bounds.robot} --rig RIG.yaml --commands {written}"
         yield "then: bns diagnose DATA --more NEW.csv --model M"
 
 

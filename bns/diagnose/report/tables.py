@@ -27,33 +27,25 @@ def ahead(horizon: str) -> str:
 
 def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
     """Error at every horizon, before and after, beside the noise of the tracking."""
-    errors = d.errors if d.errors is not None else c.judged if c is not None else None
+    errors = d.errors_with_terms or d.errors or (c.judged if c is not None else None)
     if errors is None:
         return None
     shown = [e for e in errors.horizons.values() if e.windows]
-    if d.effects:
-        rows = [
-            [
-                ahead(e.horizon),
-                _both(e.models[0]),
-                _both(e.models[-1]),
-                _interval(e),
-                _mm(e.noise_floor_m),
-                str(e.windows),
-            ]
-            for e in shown
+    models = ["as given (mm)"]
+    models += ["with the effects (mm)"] if d.effects else []
+    models += ["with what is left described, too (mm)"] if d.errors_with_terms is not None else []
+    changes = ["change, 95 % (mm)"] if len(models) > 1 else []
+    rows = [
+        [
+            ahead(e.horizon),
+            *(_both(e.models[0 if index == 0 else index - len(models)]) for index in range(len(models))),
+            *(_interval(e) for _ in changes),
+            _mm(e.noise_floor_m),
+            str(e.windows),
         ]
-        columns = [
-            "after",
-            "as given (mm)",
-            "with the effects (mm)",
-            "change, 95 % (mm)",
-            "tracking noise (mm)",
-            "windows",
-        ]
-        return _table(columns, rows)
-    rows = [[ahead(e.horizon), _both(e.models[0]), _mm(e.noise_floor_m), str(e.windows)] for e in shown]
-    return _table(["after", "as given (mm)", "tracking noise (mm)", "windows"], rows)
+        for e in shown
+    ]
+    return _table(["after", *models, *changes, "tracking noise (mm)", "windows"], rows)
 
 
 def _both(m: ModelError) -> str:
@@ -185,8 +177,8 @@ def next_commands(d: Diagnosis, p: Proposal | None, command: Mapping[str, str]) 
         out.append(f"bns add {data} {term.name} --term '{term.term}' --on {term.on} {base} -o extended.yaml")
     if p is not None and len(p.plan):
         out.append(f"bns propose {data} {model} -o next.csv")
-        if p.arena is not None:
-            out.append("bns trial --robot khepera --rig RIG.yaml --commands next.csv")
+        if p.bounds is not None and p.bounds.robot:
+            out.append(f"bns trial --robot {p.bounds.robot} --rig RIG.yaml --commands next.csv")
         out.append(f"bns diagnose {data} {model} --more NEW-MEASUREMENTS.csv")
     return out
 

@@ -32,7 +32,8 @@ def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
     lines = [f"  trial {f.trial}, row {f.row}: {f.text}" for f in findings[:most]]
     if len(findings) > most:
         lines.append(f"  … and {len(findings) - most} more (--findings lists all)")
-    return "\n".join([f"{len(findings)} irregularities in the data:", *lines]) if findings else "no irregularities in the data"
+    many = "1 irregularity" if len(findings) == 1 else f"{len(findings)} irregularities"
+    return "\n".join([f"{many} in the data:", *lines]) if findings else "no irregularities in the data"
 
 
 def diagnosis_text(d: Diagnosis) -> str:

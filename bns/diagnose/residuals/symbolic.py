@@ -134,7 +134,7 @@ def patch(problem: Problem, fit: Fit, on: str, name: str = NAME) -> Formula | No
     term = f"k * {carrier}{_disc('(x - a)', '(y - b)', 'c')}"
     effect = formula_effect(name, term, on)
     start = dict(zip("kabc", best[1:], strict=True))
-    model = fit.model.with_active(effect, tuple(start[p.name] for p in effect.parameters))
+    model = fit.model.with_active(effect, _within(effect, start))
     try:
         added = problem.fit(_written(model, term, on, name))
     except ModelError:
@@ -142,6 +142,11 @@ def patch(problem: Problem, fit: Fit, on: str, name: str = NAME) -> Formula | No
     formula = Formula(on, term, added, problem.paired_comparison(fit, added), name, "place")
     inside = x0 <= formula.values["a"] <= x1 and y0 <= formula.values["b"] <= y1
     return formula if inside else None
+
+
+def _within(effect: Effect, start: Mapping[str, float]) -> tuple[float, ...]:
+    """Start values that the parameters may have; 0 where none is given. A step of least squares can lead far beyond."""
+    return tuple(float(np.clip(start.get(p.name, 0.0), p.low, p.high)) for p in effect.parameters)
 
 
 def _disc(x: str, y: str, radius: str) -> str:
@@ -160,9 +165,7 @@ def fitted(
 ) -> Formula | None:
     """The model with a term whose numbers begin at ``start`` (0), all numbers fitted; None where it cannot be calculated."""
     effect, start = formula_effect(name, term, on), start or {}
-    model = _written(
-        fit.model.with_active(effect, tuple(start.get(p.name, 0.0) for p in effect.parameters)), term, on, name
-    )
+    model = _written(fit.model.with_active(effect, _within(effect, start)), term, on, name)
     try:
         added = problem.fit(model)
     except ModelError:

@@ -64,6 +64,11 @@ class Data:
         "A step between rows above each of these numbers of seconds means that times are in the unit next to it: "
         "rows are 0.01 to 1 s apart, and the units differ by factors of a thousand.",
     )
+    fastest_m_s: float = setting(
+        20.0,
+        "m/s",
+        f"Wheel speeds above it are a mistaken unit: mm/s, or a device's own; {BY_HAND}.",
+    )
     untold_ratio: float = setting(
         1.5,
         "1",

@@ -27,6 +27,8 @@ def read_table(path: Path) -> pd.DataFrame:
         raise DataError(f"{path} is a folder without metadata.yaml, .mcap or .db3. Give {KINDS}.")
     if is_bag(path):
         return read_bag(path)
+    if not path.stat().st_size:
+        raise DataError(f"{path} is empty.")
     try:
         if path.name.endswith(TEXTS):
             return read_text_table(path)
@@ -44,6 +46,12 @@ def read_table(path: Path) -> pd.DataFrame:
         ArrowException,
         yaml.YAMLError,
     ) as fault:
-        raise DataError(f"{path} does not read as {path.suffix[1:]}: {fault}.") from fault
+        raise DataError(f"{path} does not read as {path.suffix[1:]}: {_in_words(fault)}.") from fault
     known = ", ".join((*TEXTS, ".parquet", ".tuple", *BAGS))
     raise DataError(f"{path} is no file of measurements by its name; these are read: {known}.")
+
+
+def _in_words(fault: Exception) -> str:
+    if isinstance(fault, UnicodeDecodeError):
+        return "it is no text in UTF-8. Save it as UTF-8, or give it the ending of what it is (.parquet)"
+    return str(fault).rstrip(".")
