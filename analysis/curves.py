@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.coverage import coverage
 from analysis.figure_result import FigureResult
-from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
+from analysis.intervals import POOLED, pooled
 from analysis.labels import TITLES, counted, task_title, valued
 from analysis.outcomes import FEWEST, by_value, criterion
 from analysis.results import Results
@@ -31,8 +31,7 @@ def success_by(store: Results, parameter: str, name: str, success: str = "succes
 
 @style()
 def _draw(store: Results, chosen: Selection, parameter: str, name: str, success: str) -> FigureResult:
-    rows, thin, least = enough_runs(by_value(store, chosen, parameter, success))
-    rows = rows.assign(**dict(zip(("low", "high"), wilson(rows.successes, rows.runs), strict=True)))
+    rows, thin, least = enough_runs(pooled(by_value(store, chosen, parameter, success), ("task", "value")))
     tasks, n = [task for task in chosen.tasks if task in set(rows.task)], chosen.n - thin
     looks = dict(zip(sorted(rows.value.unique()), ordered_styles(rows.value.nunique()), strict=True))
     figure, axes = panels(len(tasks), 3.6, rows_each=2, ratios=(3, 1))
@@ -44,12 +43,11 @@ def _draw(store: Results, chosen: Selection, parameter: str, name: str, success:
     axes[0, 0].set_ylabel("successful runs (%)")
     said, what = coverage(store, chosen.sweeps, n), criterion(store, chosen)
     too_few = (f"{counted(thin, 'run')} in curves of fewer than {least} not drawn",) if thin else ()
-    note(figure, "; ".join((f"Success: {what}", *said.sentences, *too_few, f"bands: {INTERVALS}")) + ".")
+    note(figure, "; ".join((f"Success: {what}", *said.sentences, *too_few, POOLED)) + ".")
     title, whose = WHOSE[success]
     shows = (
         f"Fraction of runs {whose.format(what=what)}, by {TITLES[parameter]}; "
-        f"all other parameters pooled. n = {n:,} runs of {', '.join(chosen.sweeps)}; bands are 95 % Wilson intervals "
-        f"({INDEPENDENCE})."
+        f"all other parameters pooled. n = {n:,} runs of {', '.join(chosen.sweeps)}; {POOLED}."
     )
     return FigureResult(
         f"{name}-{chosen.robot}",

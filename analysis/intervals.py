@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 INTERVALS = "pointwise 95 % Wilson intervals"
 """For the note on a figure."""
 INDEPENDENCE = "pointwise; runs taken as independent, though combinations share their seeds"
 """For its caption: all combinations have the luck of a seed in common, which the intervals know nothing of."""
+POOLED = "bands: pointwise 95 %, the wider of Wilson's interval and a bootstrap over seeds"
+"""For curves that pool combinations: with a seed's luck in common, they scatter more than independent runs would."""
 BOOTSTRAP = "pointwise 95 % bootstrap intervals over seeds"
 DRAWS = 1000
 _Z = 1.959963984540054
@@ -57,6 +61,25 @@ def bootstrap(sums: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndar
         nothing = np.full(sums.shape[1:], np.nan)
         return nothing, nothing.copy()
     return band(ratios(resampled(len(sums)), sums, counts))
+
+
+def pooled(rows: pd.DataFrame, curve: Sequence[str]) -> pd.DataFrame:
+    """Of each curve and evaluation: runs, successes, and ``low`` and ``high`` as in `POOLED`.
+
+    rows: a row a curve, evaluation and seed, with root_seed, seed, runs and successes. ``curve``: the columns that name a curve.
+    From fewer than `FEWEST_SEEDS` seeds, or where all runs agree, Wilson's interval is the wider one.
+    """
+    keys = [*curve, "evaluation"]
+    totals = rows.groupby(keys, as_index=False)[["runs", "successes"]].sum()
+    low, high = wilson(totals.successes, totals.runs)
+    for _, own in totals.groupby(list(curve)):
+        at = own.index.to_numpy()
+        seeds = rows.merge(own[keys], on=keys).pivot_table(
+            index=["root_seed", "seed"], columns="evaluation", values=["runs", "successes"], aggfunc="sum", fill_value=0
+        )
+        ends = bootstrap(seeds["successes"].to_numpy(float), seeds["runs"].to_numpy(float))
+        low[at], high[at] = np.fmin(low[at], ends[0]), np.fmax(high[at], ends[1])
+    return totals.assign(low=low, high=high)
 
 
 def mean_interval(mean: Any, spread: Any, n: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -60,9 +60,10 @@ def criterion(store: Results, chosen: Selection) -> str:
 
 
 def by_value(store: Results, chosen: Selection, parameter: str, success: str = "success") -> pd.DataFrame:
-    """Runs and successes (`success` or `ever_success`) of each task, value of ``parameter`` and evaluation."""
+    """Runs and successes (`success` or `ever_success`) of each task, value of ``parameter``, evaluation and seed."""
     return store.query(f"""
-        SELECT task, {parameter} AS value, evaluation, count({success}) AS runs, count(*) FILTER ({success}) AS successes
+        SELECT task, {parameter} AS value, evaluation, root_seed, seed, count({success}) AS runs,
+               count(*) FILTER ({success}) AS successes
         FROM {outcomes(store, chosen)} WHERE {success} IS NOT NULL GROUP BY ALL ORDER BY ALL""")
 
 

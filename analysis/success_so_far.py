@@ -6,7 +6,7 @@ import pandas as pd
 
 from analysis.coverage import coverage
 from analysis.figure_result import FigureResult
-from analysis.intervals import INDEPENDENCE, INTERVALS, wilson
+from analysis.intervals import POOLED, pooled
 from analysis.labels import task_title
 from analysis.outcomes import criterion
 from analysis.results import Results
@@ -24,12 +24,12 @@ def draw(store: Results) -> list[FigureResult]:
 
 
 def counted(store: Results, chosen: Selection) -> pd.DataFrame:
-    """Runs and successes of each task, evaluation and reading, all combinations together, with Wilson intervals."""
+    """Runs and successes of each task, evaluation and reading, all combinations together, with the intervals of `POOLED`."""
     sums = ", ".join(f"count(*) FILTER ({name}) AS {name}" for name in READINGS)
-    rows = store.query(f"""SELECT task, evaluation, count(success) AS runs, {sums}
+    rows = store.query(f"""SELECT task, evaluation, root_seed, seed, count(success) AS runs, {sums}
         FROM evals JOIN ({chosen.sql}) AS chosen USING (run_id, sweep) WHERE success IS NOT NULL GROUP BY ALL ORDER BY ALL""")
-    long = rows.melt(["task", "evaluation", "runs"], list(READINGS), "reading", "successes")
-    return long.assign(**dict(zip(("low", "high"), wilson(long.successes, long.runs), strict=True)))
+    keys = ["task", "evaluation", "root_seed", "seed", "runs"]
+    return pooled(rows.melt(keys, list(READINGS), "reading", "successes"), ("task", "reading"))
 
 
 @style()
@@ -47,11 +47,11 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     axes[0, 0].set_ylabel("successful runs (%)")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     said, what = coverage(store, chosen.sweeps, chosen.n), criterion(store, chosen)
-    note(figure, "; ".join((f"Success: {what}", *said.sentences, f"bands: {INTERVALS}")) + ".")
+    note(figure, "; ".join((f"Success: {what}", *said.sentences, POOLED)) + ".")
     shows = (
         f"Fraction of runs in which the fittest controller, driven after this evaluation, {what}, and of those in which it has "
         f"done so after this or an earlier one; all combinations together, n = {chosen.n:,} runs of {', '.join(chosen.sweeps)}; "
-        f"bands are 95 % Wilson intervals ({INDEPENDENCE})."
+        f"{POOLED}."
     )
     return FigureResult(
         f"{NAME}-{chosen.robot}", "Success now and so far", figure, shows, chosen.n, chosen.sweeps,

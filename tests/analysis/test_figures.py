@@ -7,7 +7,7 @@ from store.synthetic import failed, make_store, record
 
 from analysis import budget, paths, scatter, success_by_diversity, success_by_mutation
 from analysis.__main__ import figures
-from analysis.intervals import wilson
+from analysis.intervals import POOLED, pooled, wilson
 from analysis.results import NoDataError, Results
 from bns.plotting.style import COLUMN_IN, PAGE_IN, TEXT_PT
 from bns.spec import RunSpec
@@ -297,7 +297,28 @@ def test_why_there_is_nothing_to_compare_is_said(tmp_path, module):
 
 def test_captions_say_what_the_intervals_take_for_granted(real_results, texts):
     store = Results(real_results)
-    for module in (success_by_mutation, success_by_diversity):
-        drawn = module.draw(store)[0]
-        assert "pointwise; runs taken as independent, though combinations share their seeds" in drawn.shows
-        assert any("pointwise 95 % Wilson intervals" in text.replace("\n", " ") for text, _ in texts(drawn.figure))
+    drawn = success_by_diversity.draw(store)[0]
+    assert "pointwise; runs taken as independent, though combinations share their seeds" in drawn.shows
+    assert any("pointwise 95 % Wilson intervals" in text.replace("\n", " ") for text, _ in texts(drawn.figure))
+    drawn = success_by_mutation.draw(store)[0]
+    assert POOLED in drawn.shows
+    assert any(POOLED in text.replace("\n", " ") for text, _ in texts(drawn.figure))
+
+
+def test_a_band_of_pooled_runs_knows_that_they_share_the_luck_of_their_seeds():
+    """Of ten seeds, five succeed in all twelve combinations, five in none: ten draws, and not a hundred and twenty."""
+    seeds = pd.DataFrame({"seed": np.arange(10), "root_seed": 0})
+    rows = pd.concat([seeds.assign(task="circle", evaluation=at, runs=12, successes=12 * (seeds.seed < many))
+                      for at, many in ((1, 5), (2, 10), (3, 0))])  # fmt: skip
+    found = pooled(rows, ("task",)).set_index("evaluation")
+    assert list(found.runs) == [120] * 3
+    luck = np.random.default_rng(5).binomial(10, 0.5, 100_000) / 10
+    assert (found.low[1], found.high[1]) == pytest.approx(tuple(np.quantile(luck, (0.025, 0.975))), abs=0.05)
+    for at, many in ((2, 120), (3, 0)):
+        assert (found.low[at], found.high[at]) == pytest.approx(wilson(many, 120))
+    few = pooled(rows[rows.seed < 4], ("task",)).set_index("evaluation")
+    assert (few.low[1], few.high[1]) == pytest.approx(wilson(48, 48))
+    one_more = rows[(rows.seed < 6) & (rows.evaluation == 1)]
+    halves = pooled(pd.concat([one_more.assign(task="infinity"), rows]), ("task",))
+    assert len(halves) == 4
+    assert halves[halves.task == "circle"].low.to_numpy() == pytest.approx(found.low.to_numpy())
