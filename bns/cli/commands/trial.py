@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bns.api.trial import driven, trial_setup, trial_spec
+from bns.errors import TrialPausedError
 from bns.trial.again.replay import replayed
 from bns.trial.experiment import drive_commands
 from bns.trial.session import TrialSetup
@@ -17,9 +18,14 @@ def carried_out(options: argparse.Namespace, parameters: Mapping[str, Any]) -> s
     if options.replay is not None:
         return replayed(options.replay, options.results).text
     spec, setup = trial_spec(**parameters), setup_of(options)
-    if options.commands is not None:
-        return drive_commands(options.commands, setup, options.results, spec.seed).text
-    return driven(spec, setup, options.results).summary()
+    try:
+        if options.commands is not None:
+            return drive_commands(options.commands, setup, options.results, spec.seed).text
+        return driven(spec, setup, options.results).summary()
+    except TrialPausedError as why:
+        if "--resume" in str(why):
+            raise
+        raise TrialPausedError(f"{why} (paused, the robot stands: the same command with --resume goes on)") from why
 
 
 def setup_of(options: argparse.Namespace) -> TrialSetup:

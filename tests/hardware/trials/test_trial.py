@@ -145,6 +145,7 @@ def test_signals_stop_the_robot_first(tmp_path, number, word):
     _, said = process.communicate(timeout=60)
     assert process.returncode == 3, said
     assert word in said
+    assert "the same command with --resume goes on" in said
     assert "Traceback" not in said
     *_, last = events(journal_of(tmp_path), "stop")
     assert last["confirmed"]
