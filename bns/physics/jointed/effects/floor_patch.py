@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
@@ -18,8 +19,8 @@ _SAMPLES = 9
 """The share of a tent that a disc covers is taken over so many points a side."""
 _RISE = 1.1
 """Tents are simulated at three times the friction: exp(1.1)."""
-_STRAIGHT_M = 3.0
-"""The rim of a larger disc is a straight line, as far as a robot can tell."""
+_STRAIGHT_M = 2.0
+"""The rim of a larger disc is a straight line, as far as a robot can tell: it bends by 6 cm over a metre."""
 
 
 def apply(plant: Plant, x_m: float, y_m: float, radius_m: float, factor: float) -> Plant:
@@ -72,12 +73,21 @@ def _weights() -> np.ndarray:
     return weight / weight.sum()
 
 
+def _starts() -> Iterator[tuple[float, float, float, float]]:
+    """Small and larger discs all over the floor, and straight edges in eight directions."""
+    side = np.arange(-1.2, 1.21, 0.4).round(2).tolist()
+    discs = [(x, y, radius) for x, y in product(side, repeat=2) for radius in (0.35, 0.9)]
+    edges = product(np.arange(8) * np.pi / 4, np.arange(-0.6, 0.61, 0.3) + _STRAIGHT_M)
+    discs += [(float(away * np.cos(to)), float(away * np.sin(to)), 0.95 * _STRAIGHT_M) for to, away in edges]
+    yield from ((*disc, factor) for disc in discs for factor in (0.5, 2.0))
+
+
 EFFECT = PiecedEffect(
     name="floor-patch",
     stage="mechanics",
     parameters=(
-        Parameter("x_m", "m", -5.0, 5.0, (-2.0, 2.0), 0.0, "centre of the patch, east"),
-        Parameter("y_m", "m", -5.0, 5.0, (-2.0, 2.0), 0.0, "centre of the patch, north"),
+        Parameter("x_m", "m", -5.0, 5.0, (-3.0, 3.0), 0.0, "centre of the patch, east"),
+        Parameter("y_m", "m", -5.0, 5.0, (-3.0, 3.0), 0.0, "centre of the patch, north"),
         Parameter(
             "radius_m", "m", 0.1, _STRAIGHT_M, (0.1, _STRAIGHT_M), 0.5, "radius of the patch", reached=(_STRAIGHT_M,)
         ),
@@ -89,11 +99,7 @@ EFFECT = PiecedEffect(
     sentence="the friction of the floor is different on one patch of it",
     measurement="drag the robot over the floor with a spring balance, on the patch and beside it",
     beside={"link-friction": "A link takes its friction along, a floor does not: turn the robot round and repeat some trials."},
-    starts=tuple(
-        (x, y, radius, factor)
-        for x, y in product(np.arange(-1.2, 1.21, 0.4).round(2).tolist(), repeat=2)
-        for radius, factor in product((0.35, 0.9), (0.5, 2.0))
-    ),
+    starts=tuple(_starts()),
     apply=apply,
     pieces=pieces,
 )
