@@ -30,7 +30,8 @@ def imitating_floor(problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tu
     Each is judged beside those that are kept. The field must be certain where the effect is not in the model. A patch of floor
     is no imitation of one, nor is an effect of the camera.
     """
-    pieces, lost = _tents(problem), ()
+    pieces = _tents(problem)
+    lost: tuple[str, ...] = ()
     left = [a.effect.name for a in fit.model.effects if a.effect.stage == "mechanics" and a.effect.name in accepted]
     while pieces and (names := [name for name in left if name != PATCH and name not in lost]):
         shares = {name: _kept(problem, fit, name, pieces) for name in names}
