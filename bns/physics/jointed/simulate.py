@@ -176,7 +176,7 @@ class Simulator:
                     initial_warmstart=warm[:n],
                     state=stepped[:n],
                     sensordata=felt[:n],
-                    skip_checks=True,  # they cost ten times as much as a step where every row has a model of its own
+                    skip_checks=True,  # where every row has a model of its own they cost seven times as much as the steps
                 )
                 warm[:n] = (after[:, 0, speeds] - state[:n, speeds]) / self._dt_s
                 state[:n], sensed[:n] = after[:, 0], now[:, 0]
