@@ -210,7 +210,7 @@ def _beside_the_floor(
 def _explained(selection: SelectionResult, names: tuple[str, ...]) -> SelectionResult:
     """The result with other effects, each with numbers near those that the search found for it."""
     known, problem, fit = known_effects(selection), selection.problem, selection.fit
-    tried = {c.name: c.fit.model for step in selection.steps for c in step.ranking}
+    tried = {c.name: c.fit.model for step in reversed(selection.steps) for c in step.ranking}
     for name in names:
         if name not in selection.accepted:
             fit = fit_with(problem, fit, known[name], tried.get(name))
