@@ -16,6 +16,7 @@ from bns.diagnose.residuals.worst_trials import WithoutWorst
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.jointed.model import JointedModel
 
 MOST_EFFECTS = DEFAULTS.select.most_effects
 LEAST_FALL = DEFAULTS.select.least_fall
@@ -45,9 +46,11 @@ def notes_on(
     if len(selection.accepted) >= MOST_EFFECTS:
         yield f"The search ends at {MOST_EFFECTS} effects; more may be missing."
     if found.imitating:
+        on_floor = isinstance(selection.fit.model, JointedModel)
+        what = "a floor that is not alike everywhere" if on_floor else "something that no listed effect explains"
         yield (
-            f"{' and '.join(found.imitating)} would lower the error, but only by imitating something that no listed effect "
-            "explains: with a flexible term for that in the model, too little gain is left."
+            f"{' and '.join(found.imitating)} would lower the error, but only by imitating {what}: with a flexible term for that "
+            "in the model, too little gain is left."
         )
     if found.withdrawn:
         yield (

@@ -9,11 +9,13 @@ from typing import Any
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.diagnose.residuals.established import Established, established, left_over
+from bns.diagnose.residuals.floor_field import imitating_floor
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained
 from bns.diagnose.select.known_effects import known_effects
@@ -88,7 +90,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
     matters.
     """
     stands = _standing(searched, predictor, given, tick)
-    imitating: tuple[str, ...] = ()
+    stands, imitating = _beside_the_floor(stands, predictor, given, tick)
     terms: tuple[Formula, ...] = ()
     slight: tuple[Formula, ...] = ()
     with_terms: PairedErrors | None = None
@@ -184,6 +186,35 @@ def _negligible(selection: SelectionResult) -> tuple[str, ...]:
     if selection.fit.model.per_trial_effect is not None:
         return ()
     return negligible(selection, fewest=1 if selection.problem.predictor.luck is None else 0)
+
+
+def _beside_the_floor(
+    stands: Standing, predictor: Predictor, given: Model, tick: Callable[[str], None]
+) -> tuple[Standing, tuple[str, ...]]:
+    """Where a body leaves something: without effects that only imitate a floor that is not alike everywhere, and their names.
+
+    An explanation of the same quality that has none of them takes the place of the accepted one.
+    """
+    selection = stands.selection
+    if not stands.rest.any or isinstance(predictor, WheelPredictor):
+        return stands, ()
+    lost = imitating_floor(selection.problem, selection.fit, selection.accepted)
+    if not lost:
+        return stands, ()
+    others = [names for names in selection.competing_models if not set(names) & set(lost)]
+    kept = tuple(name for name in selection.accepted if name not in lost)
+    other = _explained(selection.only(kept), others[0]) if others else selection.only(kept)
+    return _standing(other, predictor, given, tick), lost
+
+
+def _explained(selection: SelectionResult, names: tuple[str, ...]) -> SelectionResult:
+    """The result with other effects, each with numbers near those that the search found for it."""
+    known, problem, fit = known_effects(selection), selection.problem, selection.fit
+    tried = {c.name: c.fit.model for step in reversed(selection.steps) for c in step.ranking}
+    for name in names:
+        if name not in selection.accepted:
+            fit = fit_with(problem, fit, known[name], tried.get(name))
+    return replace(selection, fit=fit, accepted=names, competing_models=())
 
 
 def _established(

@@ -173,32 +173,43 @@ class Snake:
         if h.patch is not None:
             east = d.xpos[1:][:, 0] > h.patch[0]
             self.model.geom_friction[self._balls, 0] = (self._mu * np.where(east, h.patch[1], 1.0))[self._link]
-        d.xfrc_applied[2:] = 0
+        d.xfrc_applied[1, 2:], d.xfrc_applied[2:] = 0, 0
         if h.across != 1:
             self._scales()
         mujoco.mj_step(self.model, d)
 
     def _tether(self) -> None:
+        """Tied to the board, which is in the middle of the first link: the drag resists the motion of the point where it acts.
+
+        The source has both at one end of the robot (section 5.5.3) and does not say where on that link.
+        """
         h, d = self.hidden, self.data
-        v = d.qvel[:2]
+        speed = np.zeros(6)
+        mujoco.mj_objectVelocity(self.model, d, mujoco.mjtObj.mjOBJ_BODY, 1, speed, 0)
+        v = speed[3:5]
         pull = -(DRAG_N + h.drag_n) * v / max(float(np.hypot(*v)), 0.02)
-        pull = pull + np.array(h.pull_n) - h.pull_n_m * d.qpos[:2]
+        pull = pull + np.array(h.pull_n) - h.pull_n_m * d.xipos[1, :2]
         d.xfrc_applied[1, :2] = pull
 
     def _scales(self) -> None:
-        """What is harder across a link than along it: a drag of its own against sliding sideways; at a creep in proportion."""
-        d = self.data
-        extra = (self.hidden.across - 1) * self._mu * self.model.body_mass[1:] * 9.81
-        for n in range(LINKS):
-            axis = d.xmat[n + 1].reshape(3, 3)[:2, 0]
+        """Friction across a link that it does not have along it, at every contact with the floor; at a creep in proportion.
+
+        Each contact has its own load and its own sliding speed: a lifted link drags nothing, one that rolls does not slide.
+        """
+        d, force, speed = self.data, np.zeros(6), np.zeros(6)
+        for i in np.flatnonzero((d.contact.geom == 0).any(axis=1)):
+            link = int(self.model.geom_bodyid[d.contact.geom[i].max()])
+            axis = d.xmat[link].reshape(3, 3)[:2, 0]
             long = np.hypot(*axis)
             if long < 0.5:
                 continue
-            side = np.array([-axis[1], axis[0]]) / long
-            speed = np.zeros(6)
-            mujoco.mj_objectVelocity(self.model, d, mujoco.mjtObj.mjOBJ_BODY, n + 1, speed, 0)
-            slides = float(side @ speed[3:5])
-            d.xfrc_applied[n + 1, :2] += -extra[n] * slides / max(abs(slides), 0.02) * side
+            side = np.array([-axis[1], axis[0], 0.0]) / long
+            mujoco.mj_contactForce(self.model, d, int(i), force)
+            mujoco.mj_objectVelocity(self.model, d, mujoco.mjtObj.mjOBJ_BODY, link, speed, 0)
+            arm = d.contact.pos[i] - d.xipos[link]
+            slides = float(side @ (speed[3:] + np.cross(speed[:3], arm)))
+            pull = -(self.hidden.across - 1) * self._mu[link - 1] * force[0] * slides / max(abs(slides), 0.02) * side
+            d.xfrc_applied[link] += np.concatenate([pull, np.cross(arm, pull)])
 
     def _hits_itself(self) -> bool:
         """Links press against each other."""

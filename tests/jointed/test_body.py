@@ -8,9 +8,11 @@ import pytest
 import bns
 from bns.errors import DataError, ModelError
 from bns.physics.jointed.drives import at_times, through_postures, told_speed_rad_s
+from bns.physics.jointed.effects.floor_patch import tent
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model_files import load_body
-from bns.physics.jointed.plant import Plant, Sighting
+from bns.physics.jointed.pieced import PiecedEffect
+from bns.physics.jointed.plant import Plant, Rough, Sighting
 from bns.physics.jointed.simulate import Simulator
 from bns.physics.model import load_model
 from bns.physics.snake.body import Body
@@ -105,7 +107,9 @@ def test_an_effect_does_nothing_at_neutral_and_something_elsewhere(name):
     given = machine(SNAKE.mechanism).plant if effect.stage == "mechanics" else Sighting(points, points / 9, points / 7)
     for p in effect.parameters:
         far = max(p.plausible, key=lambda end, p=p: abs(end - p.neutral))
-        changed = effect.apply(given, **{**effect.neutral, p.name: far})
+        # where a patch is matters only if its friction is another one
+        others = {**effect.neutral, "factor": 2.0} if isinstance(effect, PiecedEffect) else effect.neutral
+        changed = effect.apply(given, **{**others, p.name: far})
         assert not same(changed, given), p.name
     assert same(effect.apply(given, **effect.neutral), given)
     assert effect.sentence
@@ -215,3 +219,33 @@ def test_a_joint_without_torque_is_not_put_where_its_servo_was_told_to_bring_it(
     assert half[0, at] == pytest.approx(told, abs=0.03)  # a weak one has brought it there all the same
     assert simulator.settled(body.plant)[0, at] == pytest.approx(told, abs=0.05)
     assert abs(simulator.settled(silent)[0, at]) < 0.1
+
+
+def test_a_patch_of_floor_acts_in_the_world_on_the_links_that_are_on_it(sound):
+    plant = machine(SNAKE.mechanism).plant
+
+    def with_rough(*places):
+        return moved(simulated(dataclasses.replace(plant, rough=places)))
+
+    rise = float(np.log(2.0))
+    everywhere = with_rough(Rough(0.3, 0.1, 50.0, rise))
+    doubled = moved(simulated(dataclasses.replace(plant, friction_along=2.0, friction_across=2.0)))
+    assert everywhere == pytest.approx(doubled, abs=1e-3)
+    assert with_rough(Rough(5.0, 0.1, 1.0, rise)) == pytest.approx(moved(sound), abs=1e-9)
+    # bodies lie along 0.5 rad, so the yellow end is to the south-west of (0.3, 0.1) and the green end to the north-east
+    ends = [with_rough(Rough(0.3 + s * 0.5, 0.1 + s * 0.27, 0.25, rise)) - moved(sound) for s in (-1, 1)]
+    assert all(np.abs(end).max() > 5e-3 for end in ends)
+    assert np.abs(ends[0] - ends[1]).max() > 5e-3
+
+
+def test_tents_add_up_to_a_level_floor_and_a_patch_to_its_shares_of_them():
+    tents = [tent(i, j) for i in range(-2, 3) for j in range(-2, 3)]
+    places = np.array([[0.0, 0.0], [0.13, -0.21], [0.5, 0.31]])
+    rough = [piece.apply(machine(SNAKE.mechanism).plant, rise=0.7).rough[0] for piece in tents]
+    assert sum(one.at(places) for one in rough) == pytest.approx(0.7)
+    patch = SNAKE.effect_named("floor-patch")
+    wide = {piece.name: amount for piece, amount in patch.pieces(0.0, 0.0, 3.0, 2.0)}
+    assert wide["floor-tent-0-0"] == pytest.approx(np.log(2.0), rel=1e-3)
+    small = {piece.name: amount for piece, amount in patch.pieces(0.4, 0.0, 0.35, 2.0)}
+    assert max(small, key=lambda name: small[name]) == "floor-tent-1-0"
+    assert "floor-tent--3-0" not in small

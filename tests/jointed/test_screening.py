@@ -54,6 +54,39 @@ def test_the_nodes_of_a_limit_lie_where_it_begins_to_bind():
     assert nodes == pytest.approx([0.631, 0.251, 0.063], abs=1e-3)
 
 
+PATCH = SNAKE.effect_named("floor-patch")
+
+
+def test_a_patch_is_screened_where_it_may_lie_and_not_number_by_number():
+    problem, base, _ = one_sided((0.3, 4.0))
+    here = (0.4, 0.0, 0.35, 2.0)
+    lost = base.whitened
+    problem.whitened = lambda model: lost * (0.5 if model.effects[-1].values == here else 1.0)
+    found = screening._scored(problem, base, PATCH, tuple(screening._ways(PATCH)))
+    assert found.values == here
+    assert found.gain > 0
+
+
+def test_a_patch_is_read_as_the_sum_of_its_pieces_and_each_is_simulated_once():
+    asked = []
+
+    def simulate(model):
+        asked.append(model)
+        rough = model.plant.rough
+        return np.array([sum(one.rise * (one.x_m + 1.0) for one in rough), 0.0]) / 1000
+
+    responses = Responses(simulate, SNAKE, None, (0.2, 0.6, 1.2))
+    model = SNAKE.with_active(PATCH, (0.4, 0.0, 0.35, 2.0))
+    pieces = PATCH.pieces(**model.effects[0].by_name)
+    expected = sum(amount * (int(piece.name.split("-")[2]) * 0.4 + 1.0) for piece, amount in pieces if amount)
+    assert responses.seen(model)[0] == pytest.approx(expected / 1000)
+    assert len(asked) == 1 + len(pieces)
+    responses.seen(SNAKE.with_active(PATCH, (0.4, 0.0, 0.35, 0.6)))
+    assert len(asked) == 1 + len(pieces)
+    assert responses.anchor(model)  # the patch itself
+    assert responses.seen(model)[0] == pytest.approx(np.log(2.0) * 1.4 / 1000)
+
+
 def one_sided(which):
     """A problem whose residuals are what a multiple below 1 does; above 1 it does something else."""
     rng = np.random.default_rng(1)

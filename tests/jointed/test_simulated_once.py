@@ -11,6 +11,7 @@ from bns.diagnose.predict import jointed
 from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.predict.stretches import Simulations, _Level
 from bns.physics.jointed.model_files import load_body
+from bns.physics.jointed.plant import Rough
 from tests.hidden_snake.body import Hidden
 from tests.hidden_snake.worlds import World, driven
 
@@ -58,6 +59,9 @@ def test_plants_that_differ_in_anything_are_told_apart():
         replace(plant, sag=0.1),
         replace(plant, slope=(0.0, 0.01)),
         replace(plant, slope=(0.01, 0.0)),
+        replace(plant, rough=(Rough(0.0, 0.0, 0.5, 0.7),)),
+        replace(plant, rough=(Rough(0.0, 0.0, 0.5, 0.7, disc=False),)),
+        replace(plant, rough=(Rough(0.0, 0.0, 0.5, 0.7), Rough(0.0, 0.0, 0.5, 0.7))),
         plant.with_link("grip", 3, 2.0),
         plant.with_link("mass", 3, 2.0),
         *(plant.with_joint(values, "joint4", 0.5) for values in ("stiffness", "torque", "zero_rad", "damping")),
@@ -87,3 +91,24 @@ def test_a_model_is_worked_out_finely_where_numbers_are_settled(tracks, asked):
     asked.clear()
     assert predictor.screening is None or predictor.screening.anchor(model)
     assert all(dt > fine for dt, _ in asked)
+
+
+def test_only_stretches_that_come_to_a_place_of_the_floor_are_simulated_on_it(tracks, monkeypatch):
+    simulations, simulated = Simulations.of(tracks, SNAKE.mechanism), []
+    usual = _Level._all_simulated
+
+    def counted(self, plant, stretches):
+        simulated.append(stretches.tolist())
+        return usual(self, plant, stretches)
+
+    level = simulations.seen_of(simulations.plant)
+    monkeypatch.setattr(_Level, "_all_simulated", counted)
+    edge_m = float(np.median(tracks.pose[tracks.begins, 0])) + 0.45
+    patch = replace(simulations.plant, rough=(Rough(edge_m + 3.0, 0.0, 3.0, 0.7),))
+    on_it = simulations.seen_of(patch)
+    assert 0 < len(simulated[-1]) < len(simulations)
+    np.testing.assert_array_equal(simulations.seen_of(replace(patch, rough=(Rough(50.0, 0.0, 1.0, 0.7),))), level)
+    assert len(simulated) == 1
+    every = _Level._all_simulated(simulations._body.coarse, patch, np.arange(len(simulations)))
+    np.testing.assert_allclose(on_it, every, atol=1e-9)
+    assert np.abs(on_it - level).max() > 5e-3

@@ -170,6 +170,10 @@ class JointedPredictor:
         rows, steps = self.tracks.trial[frames], np.minimum(self._at[frames], last)
         return {name: values[rows, steps] for name, values in self.variables().items()}
 
+    def listed(self, name: str) -> Effect | None:
+        """The effect of that name of the body's catalogue; None if it has none."""
+        return self._bare.catalogue().get(name)
+
     def scores(self) -> Mapping[str, Mapping[str, float]]:
         """A body has but a path."""
         return {}

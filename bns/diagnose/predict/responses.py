@@ -10,7 +10,7 @@ each other, is then made good.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from threading import RLock
 
@@ -19,6 +19,7 @@ import numpy as np
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
+from bns.physics.jointed.pieced import Piece, PiecedEffect
 from bns.physics.model import ActiveEffect, Model
 
 Number = tuple[str, str]
@@ -102,6 +103,8 @@ class Responses:
     def _refined(self, number: Number, value: float) -> bool:
         """Simulate a curve close to a value, on either side, where it is not known there; not closer: such slopes are chance."""
         effect, p = self._known[number]
+        if isinstance(effect, Piece):
+            return False
         known = self._curves.setdefault(number, {})
         found = False
         for side in (1.0, -1.0):
@@ -116,12 +119,13 @@ class Responses:
 
     def _values(self, model: Model) -> dict[Number, float]:
         """The numbers that are not neutral."""
-        out = {}
+        out: dict[Number, float] = {}
         for active in model.at("mechanics"):
-            for p, value in zip(active.effect.parameters, active.values, strict=True):
-                self._known.setdefault((active.effect.name, p.name), (active.effect, p))
-                if value != p.neutral:
-                    out[active.effect.name, p.name] = value
+            for effect, values in _simulated_as(active):
+                for p, value in zip(effect.parameters, values, strict=True):
+                    self._known.setdefault((effect.name, p.name), (effect, p))
+                    if value != p.neutral:
+                        out[effect.name, p.name] = out.get((effect.name, p.name), p.neutral) + value - p.neutral
         return out
 
     def _distance(self, one: Mapping[Number, float], other: Mapping[Number, float]) -> float:
@@ -134,6 +138,9 @@ class Responses:
     def _curve(self, number: Number, value: float) -> Array:
         """What this number alone changes: straight between the nodes on either side, and on beyond the last."""
         effect, p = self._known[number]
+        if isinstance(effect, Piece):
+            self._curves.setdefault(number, {})
+            return self._node(number, effect, p, p.plausible[1]) * (value / p.plausible[1])
         side = 1.0 if value > p.neutral else -1.0
         known = self._curves.setdefault(number, {})
         nodes = sorted({*self._planned(p, side), *known}, key=lambda at: side * (at - p.neutral))
@@ -163,3 +170,11 @@ class Responses:
             model = replace(self._bare, effects=(ActiveEffect(effect, values),))
             known[value] = np.clip(self._simulate(model) - self._sound, -_CLIPPED_M, _CLIPPED_M)
         return known[value]
+
+
+def _simulated_as(active: ActiveEffect) -> Iterator[tuple[Effect, tuple[float, ...]]]:
+    """The effect itself, or the pieces of one whose numbers act on each other."""
+    if isinstance(active.effect, PiecedEffect):
+        yield from ((piece, (value,)) for piece, value in active.effect.pieces(**active.by_name))
+    else:
+        yield active.effect, active.values

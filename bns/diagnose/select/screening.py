@@ -17,6 +17,7 @@ from bns.diagnose.estimate.fit import Fit, Problem, chance
 from bns.diagnose.estimate.problem import problem_with_noise
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
+from bns.physics.jointed.pieced import PiecedEffect
 
 MOST = DEFAULTS.select.screen_most
 CHANCE = DEFAULTS.select.screen_chance
@@ -88,6 +89,9 @@ def _ways(effect: Effect) -> Iterator[tuple[float, ...]]:
     Of a multiple to both sides: a servo of half the stiffness does not do the opposite of what one of twice the stiffness does.
     And where robots reach a bound, there: a joint without torque moves in another way than a weak one.
     """
+    if isinstance(effect, PiecedEffect):  # none of its numbers does anything alone
+        yield from effect.starts
+        return
     numbers = effect.parameters
     both = any(p.is_multiple and p.plausible[0] < 1 < p.plausible[1] for p in numbers)
     if both:
@@ -101,7 +105,10 @@ def _ways(effect: Effect) -> Iterator[tuple[float, ...]]:
 
 
 def _scored_at(few: Problem, base: Fit, effect: Effect, values: tuple[float, ...]) -> Screened:
-    columns = np.stack([_column(few, base, effect, index, value) for index, value in enumerate(values)], axis=2)
+    if isinstance(effect, PiecedEffect):
+        columns = (few.whitened(base.model.with_active(effect, values)) - base.whitened)[..., None]
+    else:
+        columns = np.stack([_column(few, base, effect, index, value) for index, value in enumerate(values)], axis=2)
     columns = columns[..., np.abs(columns).max(axis=(0, 1)) > 0]
     if not columns.shape[2]:
         return Screened(effect, 0.0, 1.0, values)

@@ -23,7 +23,7 @@ def catalogue(joints: tuple[str, ...], sites: tuple[str, ...], links: Links, fre
     return {e.name: e for e in (*listed, *clocks) if free or e.name not in OF_THE_FLOOR}
 
 
-OF_THE_FLOOR = ("floor-friction", "friction-anisotropy", "floor-slope", "tether-pull", "tether-drag")
+OF_THE_FLOOR = ("floor-friction", "friction-anisotropy", "floor-slope", "floor-patch", "tether-pull", "tether-drag")
 """Effects that a body fixed to the world cannot have, beside those of its links."""
 
 

@@ -67,11 +67,11 @@ class Machine:
     @property
     def on_the_floor(self) -> tuple[tuple[str, int], ...]:
         """Links that may touch it: name, and number among the links."""
-        links = sorted({int(link) - 1 for link in self._pair_links})
+        links = sorted({int(link) - 1 for link in self.pair_links})
         return tuple((self.model.body(link + 1).name or f"link-{link}", link) for link in links)
 
     @property
-    def _pair_links(self) -> NDArray[np.int64]:
+    def pair_links(self) -> NDArray[np.int64]:
         """The moving body of every contact pair, (pairs,)."""
         bodies = self.model.geom_bodyid
         return np.maximum(bodies[self.model.pair_geom1], bodies[self.model.pair_geom2]).astype(np.int64)
@@ -90,7 +90,7 @@ class Machine:
         model.actuator_biasprm[:, 2] *= plant.damping
         model.body_mass[1:] *= plant.mass
         model.body_inertia[1:] *= plant.mass[:, None]
-        grip = np.concatenate([[1.0], plant.grip])[self._pair_links]
+        grip = np.concatenate([[1.0], plant.grip])[self.pair_links]
         model.pair_friction[:, 0] *= plant.friction_along * grip
         model.pair_friction[:, 1] *= plant.friction_across * grip
         mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -143,7 +143,7 @@ def _name(spec: Any) -> None:
 
 
 def _track(spec: Any, mechanism: Mechanism) -> None:
-    """Sensors of every tracked site (where it is, its link's first two axes), then of the tether's end."""
+    """Sensors of every tracked site (where it is, its link's first two axes), of the tether's end, and of where every link is."""
     names = [site.name for site in spec.sites]
     for name in mechanism.sites:
         if name not in names:
@@ -156,6 +156,8 @@ def _track(spec: Any, mechanism: Mechanism) -> None:
             spec.add_sensor(type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name)
     for kind in (mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtSensor.mjSENS_FRAMELINVEL):
         spec.add_sensor(type=kind, objtype=mujoco.mjtObj.mjOBJ_BODY, objname=_tether(spec, mechanism))
+    for body in spec.bodies[1:]:  # the first is the world
+        spec.add_sensor(type=mujoco.mjtSensor.mjSENS_FRAMEPOS, objtype=mujoco.mjtObj.mjOBJ_BODY, objname=body.name)
 
 
 def _tether(spec: Any, mechanism: Mechanism) -> str:

@@ -6,12 +6,41 @@ points really are. Between them the body is simulated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rough:
+    """A place of the floor, round (x_m, y_m), where the friction is exp(``rise``) times what it is elsewhere.
+
+    ``disc``: within ``reach_m`` of the middle, with a soft rim; else a tent, the product of two hats that fall to 0 ``reach_m``
+    from the middle in x and in y. Tents that stand ``reach_m`` apart add up to a level floor.
+    """
+
+    x_m: float
+    y_m: float
+    reach_m: float
+    rise: float
+    disc: bool = True
+
+    def at(self, place_m: Array) -> Array:
+        """The logarithm of the factor at places (..., 2)."""
+        off = place_m - np.array([self.x_m, self.y_m])
+        if self.disc:
+            beyond = np.clip((np.hypot(off[..., 0], off[..., 1]) - self.reach_m) / RIM_M, -50, 50)
+            share = 1 / (1 + np.exp(beyond))
+        else:
+            share = np.maximum(1 - np.abs(off) / self.reach_m, 0.0).prod(axis=-1)
+        return np.asarray(self.rise * share)
+
+
+RIM_M = 0.02
+"""A link's contacts with the floor are a few centimetres apart: it does not cross the rim of a place at once."""
 
 
 @dataclass(frozen=True)
@@ -23,9 +52,9 @@ class Plant:
     fastest that it is told to move; from 1 on none). Of each link, (links,): ``mass`` and ``grip`` (on the floor, all ways) as
     factors. ``friction_along``, ``friction_across``: of links on the floor, factors along and across their own axes.
     ``dead_band_rad`` and ``delay_s`` come on top of the model's own. ``sag``: share of stiffness and torque limit that is lost
-    when all servos pull with all they have. ``slope``: fall of the floor towards east and north, rad. ``pull_n``: force of the
-    tether east and north; ``return_n_m``: the same a metre of way from the origin, back to it; ``drag_n``: of the tether against
-    its motion, beyond the model's own.
+    when all servos pull with all they have. ``rough``: places of the floor with another friction. ``slope``: fall of the floor
+    towards east and north, rad. ``pull_n``: force of the tether east and north; ``return_n_m``: the same a metre of way from the
+    origin, back to it; ``drag_n``: of the tether against its motion, beyond the model's own.
     """
 
     joints: tuple[str, ...]
@@ -41,6 +70,7 @@ class Plant:
     dead_band_rad: float = 0.0
     delay_s: float = 0.0
     sag: float = 0.0
+    rough: tuple[Rough, ...] = ()
     slope: tuple[float, float] = (0.0, 0.0)
     pull_n: tuple[float, float] = (0.0, 0.0)
     return_n_m: float = 0.0
@@ -49,8 +79,9 @@ class Plant:
     @property
     def key(self) -> bytes:
         """The same for two plants alone of which nothing differs."""
-        numbers = (np.atleast_1d(np.asarray(getattr(self, f.name), dtype=np.float64)) for f in fields(self) if f.name != "joints")
-        return np.concatenate(list(numbers)).tobytes()
+        of = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "joints"}
+        of["rough"] = [astuple(place) for place in self.rough]
+        return np.concatenate([np.asarray(values, dtype=np.float64).ravel() for values in of.values()]).tobytes()
 
     def with_joint(self, values: str, joint: str, value: float) -> Plant:
         """One joint's entry of an array of joints multiplied by a factor; of ``zero_rad`` something added."""

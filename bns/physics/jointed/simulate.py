@@ -26,6 +26,8 @@ _CLEAR_M = 5e-4
 """How far above the floor it is put down."""
 _CREEP_M_S = 0.02
 """Below it the tether's drag fades."""
+_BOX_STEPS = 5
+"""How often it is noted where links are: in so many steps they move by less than a link's radius."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,8 @@ class Simulator:
         self.counts = np.array([len(d.frames) for d in drives])
         self.simulated = 0
         """Rows simulated so far."""
+        self.box_m = np.tile([np.inf, np.inf, -np.inf, -np.inf], (len(self.drives), 1))
+        """Where the links of each drive have been on a level floor, (drives, 4): least x and y, largest x and y."""
 
     def only(self, chosen: NDArray[np.int64]) -> Simulator:
         """Some of the drives, by servos as fast as those of all."""
@@ -147,29 +151,39 @@ class Simulator:
         spec = mujoco.mjtState.mjSTATE_CTRL.value | mujoco.mjtState.mjSTATE_XFRC_APPLIED.value
         control = np.zeros((len(order), 1, mujoco.mj_stateSize(model, spec)))
         warm, sensed = np.zeros((len(order), model.nv)), np.zeros((len(order), model.nsensordata))
+        stepped, felt = np.zeros((len(order), 1, state.shape[1])), np.zeros((len(order), 1, model.nsensordata))
         seen = [np.empty((0, model.nsensordata))] * len(order)
         wanted_frames = [{int(f) for f in self.drives[i].frames} for i in order]
         speeds = slice(1 + model.nq, 1 + model.nq + model.nv)
         kept: list[list[Array]] = [[] for _ in order]
         datas = [mujoco.MjData(model) for _ in range(self._threads)]
+        floors = _Floors(machine, plant, model, floor)
+        box_m = self.box_m[order]
         with rollout.Rollout(nthread=self._threads) as threads:
             for step in range(int(lasts[0]) + 1):
                 n = int(np.searchsorted(-lasts, -step, side="right"))  # rows that last so many steps or longer
                 q = state[:n, 1 + machine.joint_at]
                 control[:n, 0, : model.nu] = servos.control(step, q)
                 floor.push(control[:n, 0, model.nu :], sensed[:n])
+                models = [model] * n if not plant.rough else floors.under(sensed[:n])
                 after, now = threads.rollout(
-                    model,
+                    models,
                     datas,
                     state[:n],
                     control[:n],
                     control_spec=spec,
                     nstep=1,
                     initial_warmstart=warm[:n],
-                    skip_checks=False,
+                    state=stepped[:n],
+                    sensordata=felt[:n],
+                    skip_checks=True,  # where every row has a model of its own they cost seven times as much as the steps
                 )
                 warm[:n] = (after[:, 0, speeds] - state[:n, speeds]) / self._dt_s
                 state[:n], sensed[:n] = after[:, 0], now[:, 0]
+                if step % _BOX_STEPS == 0 and not plant.rough:
+                    links = floors.links_m(sensed[:n])
+                    box_m[:n, :2] = np.minimum(box_m[:n, :2], links.min(axis=1))
+                    box_m[:n, 2:] = np.maximum(box_m[:n, 2:], links.max(axis=1))
                 for row in range(n):
                     if step in wanted_frames[row]:  # what is sensed is where the step began
                         repeats = int((self.drives[order[row]].frames == step).sum())
@@ -177,6 +191,7 @@ class Simulator:
         for row, frames in enumerate(kept):
             seen[row] = np.array(frames)
         back = np.argsort(order)
+        self.box_m = box_m[back]
         return np.concatenate([seen[i] for i in back]), state[back]
 
 
@@ -238,6 +253,7 @@ class _Outside:
 
     def __init__(self, machine: Machine, plant: Plant, rest: Rest) -> None:
         self._machine, self._plant, self._rest = machine, plant, rest
+        self.rows = len(rest.turn_rad)
         self._cos, self._sin = np.cos(rest.turn_rad), np.sin(rest.turn_rad)
         weights = machine.model.body_mass[1:] * plant.mass * -machine.model.opt.gravity[2]
         east, north = self._into(np.tile(plant.slope, (len(rest.turn_rad), 1)))
@@ -253,7 +269,7 @@ class _Outside:
         speed = np.maximum(np.hypot(*velocity.T), _CREEP_M_S)[:, None]
         pull = -(p.drag_n + self._machine.mechanism.tether_drag_n) * velocity / speed
         if p.return_n_m or any(p.pull_n):
-            pull = pull + np.stack(self._into(np.array(p.pull_n) - p.return_n_m * self._world(place, n), n), axis=1)
+            pull = pull + np.stack(self._into(np.array(p.pull_n) - p.return_n_m * self.world(place), n), axis=1)
         applied[:, tether, :2] += pull
         forces[:] = applied.reshape(n, -1)
 
@@ -262,12 +278,41 @@ class _Outside:
         cos, sin = self._cos[:n], self._sin[:n]
         return cos * vectors[:, 0] + sin * vectors[:, 1], cos * vectors[:, 1] - sin * vectors[:, 0]
 
-    def _world(self, place: Array, n: int) -> Array:
-        off = place - self._rest.origin_m[:n]
-        cos, sin = self._cos[:n], self._sin[:n]
-        turned = np.stack([cos * off[:, 0] - sin * off[:, 1], sin * off[:, 0] + cos * off[:, 1]], axis=1)
-        out: Array = turned + self._rest.begin_m[:n]
+    def world(self, place: Array) -> Array:
+        """Where places (rows, ..., 2) of the simulations are in the world."""
+        n, shape = len(place), (-1, *[1] * (place.ndim - 2), 2)
+        off = place - self._rest.origin_m[:n].reshape(shape)
+        cos, sin = (v[:n].reshape(shape[:-1]) for v in (self._cos, self._sin))
+        turned = np.stack([cos * off[..., 0] - sin * off[..., 1], sin * off[..., 0] + cos * off[..., 1]], axis=-1)
+        out: Array = turned + self._rest.begin_m[:n].reshape(shape)
         return out
+
+
+class _Floors:
+    """A floor that is rougher in one place than in another: the friction of every link goes by where it is.
+
+    MuJoCo knows one friction for each pair of geoms, so every row has a model of its own, whose pairs are set in each step.
+    """
+
+    def __init__(self, machine: Machine, plant: Plant, model: Any, outside: _Outside) -> None:
+        self._models = [model.__copy__() for _ in range(outside.rows if plant.rough else 0)]
+        self._pairs = [m.pair_friction for m in self._models]
+        self._usual, self._links = model.pair_friction.copy(), machine.pair_links
+        self._rough, self._outside = plant.rough, outside
+        self._from = 9 * len(machine.mechanism.sites) + 6
+
+    def under(self, sensed: Array) -> list[Any]:
+        """The models of these rows, from what was sensed after the last step."""
+        n, there = len(sensed), self.links_m(sensed)
+        factor = np.exp(sum(place.at(there) for place in self._rough))
+        sliding = self._usual[:, :2] * factor[:, self._links - 1, None]
+        for pairs, now in zip(self._pairs[:n], sliding, strict=True):
+            pairs[:, :2] = now
+        return self._models[:n]
+
+    def links_m(self, sensed: Array) -> Array:
+        """Where every link is in the world, (rows, links, 2)."""
+        return self._outside.world(sensed[:, self._from :].reshape(len(sensed), -1, 3)[:, :, :2])
 
 
 def _poses(points: Array) -> tuple[Array, Array]:
