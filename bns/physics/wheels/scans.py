@@ -264,3 +264,79 @@ def carried_on(rate: Array, step_s: Array, session_s: Array | None, fade_s: floa
     first, alone = np.zeros(1), np.zeros(1, dtype=np.int64)
     trials = [accumulated(rate[i : i + 1], step_s[i : i + 1], first, alone, fade_s) for i in range(len(rate))]
     return np.concatenate(trials) if trials else rate
+
+
+@exact
+def limited_together(left: Array, right: Array, step_s: Array, straight: float, turning: float) -> tuple[Array, Array]:
+    """Mean over each step of the speeds of two wheels of one body, each of which follows its target as fast as its force allows.
+
+    From 0; exact. Both wheels in one direction change by ``straight`` (m/s^2), against each other by ``turning``. A wheel that keeps
+    its speed holds against the other, which then changes by the harmonic mean of the two.
+    """
+    mean_left, mean_right = np.zeros_like(left), np.zeros_like(right)
+    alone = 2.0 * straight * turning / (straight + turning)
+    for row in range(left.shape[0]):
+        w, v = 0.0, 0.0
+        for k in range(left.shape[1]):
+            h = step_s[row, k]
+            if h == 0.0:
+                continue
+            rest_s, way_w, way_v = h, 0.0, 0.0
+            for _ in range(3):  # until one wheel is there, until both are, and from then on
+                gap_w, gap_v = left[row, k] - w, right[row, k] - v
+                limit = alone if gap_w == 0.0 or gap_v == 0.0 else straight if gap_w * gap_v > 0.0 else turning
+                t_w, t_v = abs(gap_w) / limit, abs(gap_v) / limit
+                t = rest_s
+                if gap_w != 0.0:
+                    t = min(t, t_w)
+                if gap_v != 0.0:
+                    t = min(t, t_v)
+                way_w += w * t + np.sign(gap_w) * limit * t * t / 2.0
+                way_v += v * t + np.sign(gap_v) * limit * t * t / 2.0
+                w = left[row, k] if t == t_w or gap_w == 0.0 else w + np.sign(gap_w) * limit * t
+                v = right[row, k] if t == t_v or gap_v == 0.0 else v + np.sign(gap_v) * limit * t
+                rest_s -= t
+                if rest_s <= 0.0:
+                    break
+            mean_left[row, k], mean_right[row, k] = way_w / h, way_v / h
+    return mean_left, mean_right
+
+
+@exact
+def turned_under_load(
+    speed: Array, step_s: Array, cos: Array, sin: Array, starts: Array, droop: Array, per_m: float, light: float
+) -> tuple[Array, Array, Array]:
+    """Wheels at the angles phi, dphi/dt = (speed + droop·sin(phi))·``per_m``: cos(phi) and sin(phi) in the middle of each step, and
+    where speed·cos(phi) + ``light``·sin(phi) has led to by then, m; each (wheels, n, batch, steps).
+
+    ``speed`` (wheels, batch, steps); ``cos``, ``sin`` the same, of the angle without droop; ``starts`` (wheels, n, batch) the angles
+    at the start; ``droop`` (wheels,) m/s. Midpoint rule for what the droop adds to the angle, which is small in a step: its cosine
+    and sine are taken to the third power.
+    """
+    wheels, batch, steps = speed.shape
+    n = starts.shape[1]
+    out_cos, out_sin = np.empty((wheels, n, batch, steps)), np.empty((wheels, n, batch, steps))
+    led = np.empty((wheels, n, batch, steps))
+    for wheel in range(wheels):
+        per_s = droop[wheel] * per_m
+        for row in range(batch):
+            for i in range(n):
+                re, im = np.cos(starts[wheel, i, row]), np.sin(starts[wheel, i, row])
+                way = 0.0
+                for k in range(steps):
+                    h = step_s[row, k]
+                    c, s = cos[wheel, row, k], sin[wheel, row, k]
+                    turn = per_s * h / 2.0 * (s * re + c * im)
+                    middle_re = re * (1.0 - turn * turn / 2.0) - im * (turn - turn * turn * turn / 6.0)
+                    middle_im = im * (1.0 - turn * turn / 2.0) + re * (turn - turn * turn * turn / 6.0)
+                    at_cos, at_sin = c * middle_re - s * middle_im, s * middle_re + c * middle_im
+                    out_cos[wheel, i, row, k], out_sin[wheel, i, row, k] = at_cos, at_sin
+                    half = (speed[wheel, row, k] * at_cos + light * at_sin) * h / 2.0
+                    led[wheel, i, row, k] = way + half
+                    way += 2.0 * half
+                    turn = per_s * h * at_sin
+                    new_re = re * (1.0 - turn * turn / 2.0) - im * (turn - turn * turn * turn / 6.0)
+                    new_im = im * (1.0 - turn * turn / 2.0) + re * (turn - turn * turn * turn / 6.0)
+                    size = np.sqrt(new_re * new_re + new_im * new_im)
+                    re, im = new_re / size, new_im / size
+    return out_cos, out_sin, led
