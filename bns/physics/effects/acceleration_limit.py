@@ -47,7 +47,7 @@ EFFECT = Effect(
     "speed become ramps. Where the motors' force is the limit, turns lose less than straight lines.",
     lookalikes=("motor-lag", "command-delay"),
     sentence="the acceleration of the wheels is limited",
-    measurement="log the wheels' own speeds (encoders) at a high rate while a command changes, on a straight line and on the spot",
+    measurement="log the wheels' own speeds (encoders) at a high rate while a command changes, ahead and on the spot",
     apply=apply,
     revision=2,
     needs="track",

@@ -1,9 +1,9 @@
 """A caster's hinge resists while the caster swings, and its wheel presses sideways against the robot.
 
-The caster's wheel rolls where it points; that turns it. The hinge's torque is carried by a force across the wheel, a trail behind
-the hinge: it slows or pushes the robot and turns it, until the caster trails again. A motor that gives way loses speed in proportion
-to that force. The direction of the caster at the start of a trial is not logged: the force is the mean over all directions, which
-differ less and less while the robot drives.
+The caster's wheel rolls where it points; that turns it. The hinge's torque is carried by a force across the wheel, a trail
+behind the hinge: it slows or pushes the robot and turns it, until the caster trails again. A motor that gives way loses speed
+in proportion to that force. The direction of the caster at the start of a trial is not logged: the force is the mean over all
+directions, which differ less and less while the robot drives.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ half of a trial give the angle for the other half, so that no pose explains itse
 distance per revolution remain to be fitted. In a simulation the wheels begin at their fastest angle.
 
 Such a wheel also lifts its load once per revolution. A speed controller without an integral term then gives way: uphill the
-wheel loses the speed ``droop_m_s`` times the slope of its axle's path, downhill it gains as much. This wave does not grow with the
-speed, so slow commands show more of it. The wheel loses more time uphill than it gains downhill, and stands where the loss exceeds
-the command: the angle follows the equation of Adler, Proceedings of the IRE 34(6), 1946, "A study of locking phenomena in
-oscillators".
+wheel loses the speed ``droop_m_s`` times the slope of its axle's path, downhill it gains as much. This wave does not grow with
+the speed, so slow commands show more of it. The wheel loses more time uphill than it gains downhill, and stands where the loss
+exceeds the command: its angle follows the equation of Adler, Proceedings of the IRE 34(6), 1946, "A study of locking phenomena
+in oscillators".
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def apply(wheels: Wheels, left_share: float, right_share: float, turn_m: float, 
 
 
 class _Turning:
-    """The left and the right wheel in the middle of each step, (2, trials, steps) each: ``told`` speeds, cosine and sine of the angle.
+    """The left and the right wheel in the middle of each step, (2, trials, steps) each: ``told`` speeds, cosine, sine of angles.
 
     The angles are 0 at the start, and no load slows the wheels.
     """
@@ -82,7 +82,7 @@ class _Turning:
         self.cos, self.sin = np.cos(self.angles), np.sin(self.angles)
 
     def wave(self, droop_m_s: float) -> Array:
-        """What a share of 1 adds to the speed of each wheel, at its angle and a quarter of a turn before: (2, 2, trials, steps)."""
+        """What a share of 1 adds to each wheel's speed, at its angle and a quarter of a turn before: (2, 2, trials, steps)."""
         return np.stack(
             [self.told * self.cos + droop_m_s * self.sin, self.told * self.sin - droop_m_s * self.cos], axis=1
         )

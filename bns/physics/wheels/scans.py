@@ -270,7 +270,7 @@ def carried_on(rate: Array, step_s: Array, session_s: Array | None, fade_s: floa
 
 @exact
 def limited_together(left: Array, right: Array, step_s: Array, straight: float, turning: float) -> tuple[Array, Array]:
-    """Mean over each step of the speeds of two wheels of one body, each of which follows its target as fast as its force allows.
+    """Mean over each step of the speeds of two wheels of one body; each follows its target as fast as its force allows.
 
     From 0; exact. Both wheels in one direction change by ``straight`` (m/s^2), against each other by ``turning``. A wheel that keeps
     its speed holds against the other, which then changes by the harmonic mean of the two.
@@ -308,12 +308,12 @@ def limited_together(left: Array, right: Array, step_s: Array, straight: float, 
 def turned_under_load(
     speed: Array, step_s: Array, cos: Array, sin: Array, starts: Array, droop: Array, per_m: float, light: float
 ) -> tuple[Array, Array, Array]:
-    """Wheels at the angles phi, dphi/dt = (speed + droop·sin(phi))·``per_m``: cos(phi) and sin(phi) in the middle of each step, and
-    where speed·cos(phi) + ``light``·sin(phi) has led to by then, m; each (wheels, n, batch, steps).
+    """Wheels at the angles phi, dphi/dt = (speed + droop·sin(phi))·``per_m``: cos(phi) and sin(phi) in the middle of each step,
+    and where speed·cos(phi) + ``light``·sin(phi) has led to by then, m; each (wheels, n, batch, steps).
 
-    ``speed`` (wheels, batch, steps); ``cos``, ``sin`` the same, of the angle without droop; ``starts`` (wheels, n, batch) the angles
-    at the start; ``droop`` (wheels,) m/s. Midpoint rule for what the droop adds to the angle, which is small in a step: its cosine
-    and sine are taken to the third power.
+    ``speed`` (wheels, batch, steps); ``cos``, ``sin`` the same, of the angle without droop; ``starts`` (wheels, n, batch) the
+    angles at the start; ``droop`` (wheels,) m/s. Midpoint rule for what the droop adds to the angle, which is small in a step:
+    its cosine and sine are taken to the third power.
     """
     wheels, batch, steps = speed.shape
     n = starts.shape[1]
