@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from bns.errors import ModelError
 from bns.physics.effects import effect_named
 from bns.physics.effects.wheel_eccentricity import starts_from
+from bns.physics.model import Model
 from bns.physics.signals import Body, Conditions, Wheels
 from bns.physics.wheels.scans import limited_together, rate_limited, swivelled, turned_under_load
 
@@ -128,3 +130,15 @@ def test_a_caster_drags_only_until_it_trails_behind_its_hinge():
     assert changed[:, 50:60].max() < 2e-4  # 15 cm on, it trails whatever its direction was
     assert changed[:, 61:80].max() > 1e-3  # it swings round
     assert changed[:, 115:].max() < 2e-4
+
+
+def test_a_model_that_gives_no_turn_ratio_has_the_limit_of_each_wheel_by_itself():
+    limit = effect_named("acceleration-limit")
+    assert limit.checked({"max_m_s2": 0.3}) == (0.3, 1.0)
+    assert limit.checked({"max_m_s2": 0.3, "turn_ratio": 4.0}) == (0.3, 4.0)
+    assert effect_named("wheel-eccentricity").checked({"left_share": 0.1, "right_share": 0.0, "turn_m": 0.1})[3] == 0.0
+    with pytest.raises(ModelError, match="lacks max_m_s2"):
+        limit.checked({"turn_ratio": 4.0})
+    model = Model(B).with_effect("acceleration-limit", max_m_s2=0.3)
+    assert "turn_ratio" not in model.canonical_json()
+    assert model.digest != Model(B).with_effect("acceleration-limit", max_m_s2=0.3, turn_ratio=4.0).digest

@@ -38,7 +38,14 @@ EFFECT = Effect(
     parameters=(
         Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest acceleration of a wheel"),
         Parameter(
-            "turn_ratio", "1", 0.05, 50.0, (0.2, 8.0), 1.0, "highest acceleration of a wheel in turns, divided by that on lines"
+            "turn_ratio",
+            "1",
+            0.05,
+            50.0,
+            (0.2, 8.0),
+            1.0,
+            "highest acceleration of a wheel in turns, divided by that on lines",
+            optional=True,
         ),
     ),
     equation="|dw/dt| <= a for each wheel; for wheels that change against each other r·a, beside one that keeps its speed "
@@ -49,6 +56,5 @@ EFFECT = Effect(
     sentence="the acceleration of the wheels is limited",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes, ahead and on the spot",
     apply=apply,
-    revision=2,
     needs="track",
 )

@@ -345,6 +345,7 @@ EFFECT = Effect(
             0.0,
             "speed that a wheel loses per unit of slope while it lifts its load",
             reached=(0.0,),
+            optional=True,
         ),
     ),
     equation="w' = w·(1 + a·cos(phi)) + a·L·sin(phi) for each wheel, d(phi)/dt = 2·pi·(w + a·L·sin(phi))/U",

@@ -272,8 +272,8 @@ def carried_on(rate: Array, step_s: Array, session_s: Array | None, fade_s: floa
 def limited_together(left: Array, right: Array, step_s: Array, straight: float, turning: float) -> tuple[Array, Array]:
     """Mean over each step of the speeds of two wheels of one body; each follows its target as fast as its force allows.
 
-    From 0; exact. Both wheels in one direction change by ``straight`` (m/s^2), against each other by ``turning``. A wheel that keeps
-    its speed holds against the other, which then changes by the harmonic mean of the two.
+    From 0; exact. Both wheels in one direction change by ``straight`` (m/s^2), against each other by ``turning``. A wheel that
+    keeps its speed holds against the other, which then changes by the harmonic mean of the two.
     """
     mean_left, mean_right = np.zeros_like(left), np.zeros_like(right)
     alone = 2.0 * straight * turning / (straight + turning)
