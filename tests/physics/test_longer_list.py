@@ -156,7 +156,7 @@ def test_where_a_wheel_stood_is_read_from_the_other_half_of_the_trial():
     wheels = Wheels(step, left, right, B, Conditions(seen=seen))
     turned = effect_named("wheel-eccentricity").apply(wheels, left_share=0.2, right_share=0.0, turn_m=0.13)
     assert np.std(turned.left_m_s - really) < 0.2 * np.std(left - really)
-    assert any(share > 0 and abs(turn - 0.13) < 0.004 for share, _, turn in starts_from(wheels))
+    assert any(share > 0 and abs(turn - 0.13) < 0.004 for share, _, turn, _ in starts_from(wheels))
     early = np.arange(200) < 100
     other = heading + rng.normal(0, 0.5, heading.shape) * early  # what the early half shows must not matter to itself
     noisy = Wheels(step, left, right, B, Conditions(seen=np.stack([0 * other, 0 * other, other], axis=2)))
@@ -192,7 +192,7 @@ def test_a_wheels_turn_is_found_though_the_wheelbase_and_a_wheels_size_are_wrong
     rate = (really - left) / (0.9 * B) * step
     heading = np.cumsum(rate, axis=1) - rate / 2 + rng.normal(0, 0.004, rate.shape)
     seen = np.stack([np.zeros_like(heading), np.zeros_like(heading), heading], axis=2)
-    best = starts_from(Wheels(step, left, right, B, Conditions(seen=seen)))[0]
+    best = starts_from(Wheels(step, left, right, B, Conditions(seen=seen)))[0][:3]
     assert best == pytest.approx((0.03, 0.1 * 1.05 / 0.9, 0.13), rel=0.15)
 
 

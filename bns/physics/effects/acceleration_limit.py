@@ -48,8 +48,8 @@ EFFECT = Effect(
             optional=True,
         ),
     ),
-    equation="|dw/dt| <= a for each wheel; for wheels that change against each other r·a, beside one that keeps its speed "
-    "2·a·r/(1 + r)",
+    equation="|dw/dt| <= a where both wheels change in one direction, r·a in opposite ones, 2·a·r/(1 + r) if the other wheel "
+    "keeps its speed",
     residuals="A start from rest falls short by u^2/(2·a): fast commands lose more than in proportion. Steps of "
     "speed become ramps. Where the motors' force is the limit, turns lose less than straight lines.",
     lookalikes=("motor-lag", "command-delay"),
