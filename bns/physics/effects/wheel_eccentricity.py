@@ -276,7 +276,7 @@ def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     """The ways of a turn that explain most of the heading, of `_TURNS` between a third and five times the wheelbase.
 
     ``wheels`` turn as the model without this effect has them. The shares are those of the waves fitted to each trial; without a
-    droop, and with the one of `_DROOPS` that explains most.
+    droop, and for the best way also with the one of `_DROOPS` that explains most.
     """
     if wheels.conditions.seen is None:
         return ()
@@ -289,9 +289,11 @@ def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     peaks = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] >= score[2:]))
     starts = []
     for peak in peaks[np.argsort(-score[1 + peaks])][:_PEAKS]:
-        drooping = [(*_explained(some, heading, turns[peak], droop), droop) for droop in _DROOPS]
-        for _, shares, droop in ((*found[peak], 0.0), max(drooping, key=lambda one: one[0])):
-            starts.append((*np.clip(shares, *_SHARES).tolist(), float(turns[peak]), droop))
+        ways = [(*found[peak], 0.0)]
+        if not starts:  # a droop takes long to work out
+            drooping = [(*_explained(some, heading, turns[peak], droop), droop) for droop in _DROOPS]
+            ways.append(max(drooping, key=lambda one: one[0]))
+        starts += [(*np.clip(shares, *_SHARES).tolist(), float(turns[peak]), droop) for _, shares, droop in ways]
     return tuple(starts)
 
 
