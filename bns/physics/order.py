@@ -29,6 +29,7 @@ ORDER = (
     "understeer",
     "side-slip",
     "caster-swing",
+    "caster-drag",
     "floor-patch",
     DECOYS,
     FORMULAS,
