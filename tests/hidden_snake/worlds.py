@@ -57,7 +57,7 @@ def worlds() -> list[World]:
         single("camera", Hidden(tilt_1_m=(0.03, 0.02)), "tilted-camera"),
         World("friction-and-zero", "two", Hidden(friction=1.6, zero_rad={4: 0.1}), ("floor-friction", "joint-zero-joint4")),
         World("long-links", "unlisted", Hidden(pitch=1.06), ()),
-        World("patch", "unlisted", Hidden(patch=(0.3, 3.0)), ()),
+        single("patch", Hidden(patch=(0.3, 3.0)), "floor-patch", "link-friction-link12"),
         World("tired", "unlisted", Hidden(tired_per_cycle=0.1), ()),
         single("smooth", Hidden(friction=0.5), "floor-friction"),
         single("weak-joint-2", Hidden(strength={2: 0.3}), "weak-joint-joint2"),
