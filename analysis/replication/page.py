@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 
 import pandas as pd
 
@@ -50,7 +51,7 @@ def page(
         "ADVICE": "\n\n".join(map(table, advice)) or "There are too few runs yet.",
         "RANDOM": "There are no runs of this yet." if random is None else table(random),
         "TRIALS": "\n\n".join(map(table, trials)) or "There are no runs of this yet.",
-        "ORIGIN": "\n".join(f"- {line}" for line in origin),
+        "ORIGIN": "\n".join(fill(f"- {line}", 120, subsequent_indent="  ", break_on_hyphens=False) for line in origin),
     }
     text = TEMPLATE.read_text(encoding="utf-8")
     for name, part in parts.items():
