@@ -115,10 +115,10 @@ def test_one_run_shows_its_own_generations_and_probes(real_results):
     assert lines["in the world"] == pytest.approx(rows.best_fitness_world.round(4).to_numpy())
     probes = load(real_results, "probes", where={"run_id": run.run_id[0]})
     assert drawn.figure.axes[1].get_lines()[-1].get_ydata() == pytest.approx(
-        100 * probes.groupby("evaluation").distance_m.median().to_numpy()
-    )
+        100 * probes.groupby("evaluation").distance_m.median().to_numpy(), abs=6e-4
+    )  # of 0.01 mm
     totals = 100 * probes.query("evaluation > 1").groupby("evaluation").change_m.sum()
-    assert drawn.figure.axes[2].get_lines()[0].get_ydata() == pytest.approx(totals.to_numpy())
+    assert drawn.figure.axes[2].get_lines()[0].get_ydata() == pytest.approx(totals.to_numpy(), abs=6e-3)
 
 
 def test_a_trial_says_when_it_succeeded_and_what_the_robot_would_have_cost(tmp_path):

@@ -207,7 +207,11 @@ def test_measurements_are_the_same_from_a_file_a_table_and_a_mapping(log, table,
     assert from_file.sha256 == from_table.sha256 == bns.Measurements(tmp_path / "log.parquet").sha256
     assert bns.Measurements(table.assign(x_m=table["x_m"] + 1e-9)).sha256 != from_table.sha256
     assert from_file.trials["commands"].tolist() == [5] * 12
-    assert len(bns.Measurements(log, tmp_path / "log.parquet")) == len(bns.Measurements([log, log])) == 24
+    other = tmp_path / "other.parquet"
+    write_measurements(table.assign(x_m=table["x_m"] + 0.5), other)
+    assert len(bns.Measurements(log, other)) == len(bns.Measurements([log, other])) == 24
+    with pytest.raises(bns.DataError, match="row for row"):
+        bns.Measurements([log, tmp_path / "log.parquet"])
     names = {name: {"from": name} for name in ("trial", "t_s", "left_m_s", "right_m_s", "x_m", "y_m")}
     turned = table.assign(yaw=np.degrees(table["heading_rad"])).drop(columns="heading_rad")
     mapped = bns.Measurements(turned, mapping={"columns": {**names, "heading_rad": {"from": "yaw", "unit": "deg"}}})
