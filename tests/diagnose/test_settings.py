@@ -26,7 +26,7 @@ NO_SETTINGS = {
     ("report/page.py", "_PIXELS_IN_POINT"): "layout",
     ("report/plain_language.py", "_UNITS"): "factors between units, by definition",
     ("residuals/floor_field.py", "_WIDE_M"): "wider than the floor that tents cover, so that all of them are meant",
-    ("predict/stretches.py", "_RIMS"): "where a rim has the friction of the floor within 1 %: what is simulated again, no decision",
+    ("predict/stretches.py", "_RIMS"): "where a rim has the friction of the floor within 1 %: saves simulations alone",
     ("residuals/words.py", "_WAYS"): "a metre, driven lately and before: where a curve is put in words",
     ("residuals/words.py", "_POINTS"): "points at which a curve is evaluated to be put in words",
 }
