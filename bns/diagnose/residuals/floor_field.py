@@ -43,7 +43,7 @@ def imitating_floor(problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tu
 
 
 def _kept(problem: Problem, fit: Fit, name: str, pieces: list[Piece]) -> float:
-    """The share of an effect's gain on held-out trials that is left when the field is fitted, too; 1 where the field is not certain."""
+    """The share of an effect's gain on held-out trials that is left next to the field; 1 where the field is not certain."""
     lacking = problem.fit(fit.model.without(name), nearby=fit.jacobian_by_parameter)
     alone = paired_elpd_diff(lacking.held_out, fit.held_out)[0]
     comparison, without = with_columns(problem, lacking, _field(problem, lacking, pieces))
