@@ -50,8 +50,6 @@ class Parameter:
     """Bounds at which a fit may end, because real robots reach them: the strength of a servo without torque."""
     resolution: float = 0.0
     """A small change that is still visible in data; 0: a thousandth of the plausible range."""
-    optional: bool = False
-    """Whether it is neutral in models that do not give it: it was added when there were models with the effect already."""
     jagged: bool = False
     """Whether the likelihood has steps or kinks along it, at commands, ticks or poses: its interval needs a search."""
 
@@ -191,15 +189,11 @@ class Effect:
         return {p.name: p.neutral for p in self.parameters}
 
     def checked(self, values: Mapping[str, object]) -> tuple[float, ...]:
-        """All values in the order of `parameters`; ModelError if one is missing, unknown or out of bounds.
-
-        Optional ones that are missing are neutral.
-        """
+        """All values in the order of `parameters`; ModelError if one is missing, unknown or out of bounds."""
         names = [p.name for p in self.parameters]
         for name in values:
             if name not in names:
                 raise ModelError(unknown_name(f"parameter of {self.name}", name, names))
-        values = {p.name: p.neutral for p in self.parameters if p.optional} | dict(values)
         missing = [name for name in names if name not in values]
         if missing:
             raise ModelError(

@@ -66,12 +66,6 @@ class ActiveEffect:
         """Parameter name -> value."""
         return {p.name: v for p, v in zip(self.effect.parameters, self.values, strict=True)}
 
-    @property
-    def told(self) -> dict[str, float]:
-        """`by_name` without optional parameters at their neutral value."""
-        optional = {p.name for p in self.effect.parameters if p.optional}
-        return {name: v for name, v in self.by_name.items() if not (name in optional and v == self.effect.neutral[name])}
-
 
 @dataclass(frozen=True)
 class Model:
@@ -185,12 +179,9 @@ class Model:
         return replace(self, effects=tuple(a for a in self.effects if a.effect.name != name))
 
     def canonical_json(self) -> str:
-        """All that changes numbers, as JSON with sorted keys; neither the model's name nor the reasons.
-
-        Without optional parameters that change nothing: so models from before there were these keep their digest.
-        """
+        """All that changes numbers, as JSON with sorted keys; neither the model's name nor the reasons."""
         numbers: dict[str, Any] = {field: getattr(self, field) for field in LIMITS}
-        listed = [[a.effect.name, a.told, *([dict(a.written)] if a.written else [])] for a in self.effects]
+        listed = [[a.effect.name, a.by_name, *([dict(a.written)] if a.written else [])] for a in self.effects]
         numbers |= {"base": self.base, "effects": listed}
         if revised := {a.effect.name: a.effect.revision for a in self.effects if a.effect.revision > 1}:
             numbers |= {"revisions": revised}

@@ -29,7 +29,6 @@ ORDER = (
     "understeer",
     "side-slip",
     "caster-swing",
-    "caster-drag",
     "floor-patch",
     DECOYS,
     FORMULAS,

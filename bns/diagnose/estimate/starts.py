@@ -87,8 +87,7 @@ def _starts(effect: Effect, predictor: Predictor, model: Model) -> Iterator[tupl
     grids = [list(_grid(p)) for p in effect.parameters]
     if len(grids) == 2 or prod(map(len, grids)) > _MOST:  # along each axis: the effect of all is nearly the sum of each
         neutral = tuple(effect.neutral.values())
-        limits = [axis for axis, value in enumerate(neutral) if np.isinf(value)]
-        for axis in limits or range(len(grids)):  # beside a limit that is infinite no other number does anything
+        for axis in range(len(grids)):
             for value in grids[axis]:
                 yield tuple(value if i == axis else n for i, n in enumerate(neutral))
     else:

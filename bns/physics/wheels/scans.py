@@ -10,8 +10,6 @@ from bns.physics.signals import Array
 
 _CIN_TERMS = 13
 """The next term at pi is below 1e-16."""
-SLOW_RAD_S = 0.1
-"""A hinge that turns more slowly counts as partly at rest: a jump of its friction would be hard to fit."""
 _NO_WAY = 1e-6
 """Ways below this share of the trail: the difference of two integrals would be rounding errors."""
 
@@ -266,92 +264,3 @@ def carried_on(rate: Array, step_s: Array, session_s: Array | None, fade_s: floa
     first, alone = np.zeros(1), np.zeros(1, dtype=np.int64)
     trials = [accumulated(rate[i : i + 1], step_s[i : i + 1], first, alone, fade_s) for i in range(len(rate))]
     return np.concatenate(trials) if trials else rate
-
-
-@exact
-def limited_together(left: Array, right: Array, step_s: Array, straight: float, turning: float) -> tuple[Array, Array]:
-    """Mean over each step of the speeds of two wheels of one body; each follows its target as fast as its force allows.
-
-    From 0; exact. Both wheels in one direction change by ``straight`` (m/s^2), against each other by ``turning``. A wheel that
-    keeps its speed holds against the other, which then changes by the harmonic mean of the two.
-    """
-    mean_left, mean_right = np.zeros_like(left), np.zeros_like(right)
-    alone = 2.0 * straight * turning / (straight + turning)
-    for row in range(left.shape[0]):
-        w, v = 0.0, 0.0
-        for k in range(left.shape[1]):
-            h = step_s[row, k]
-            if h == 0.0:
-                continue
-            rest_s, way_w, way_v = h, 0.0, 0.0
-            for _ in range(3):  # until one wheel is there, until both are, and from then on
-                gap_w, gap_v = left[row, k] - w, right[row, k] - v
-                limit = alone if gap_w == 0.0 or gap_v == 0.0 else straight if gap_w * gap_v > 0.0 else turning
-                t_w, t_v = abs(gap_w) / limit, abs(gap_v) / limit
-                t = rest_s
-                if gap_w != 0.0:
-                    t = min(t, t_w)
-                if gap_v != 0.0:
-                    t = min(t, t_v)
-                way_w += w * t + np.sign(gap_w) * limit * t * t / 2.0
-                way_v += v * t + np.sign(gap_v) * limit * t * t / 2.0
-                w = left[row, k] if t == t_w or gap_w == 0.0 else w + np.sign(gap_w) * limit * t
-                v = right[row, k] if t == t_v or gap_v == 0.0 else v + np.sign(gap_v) * limit * t
-                rest_s -= t
-                if rest_s <= 0.0:
-                    break
-            mean_left[row, k], mean_right[row, k] = way_w / h, way_v / h
-    return mean_left, mean_right
-
-
-
-@exact
-def swivelled(
-    forward: Array,
-    yaw: Array,
-    step_s: Array,
-    starts: Array,
-    friction: float,
-    damping: float,
-    trail: float,
-    pivot: float,
-) -> tuple[Array, Array]:
-    """Mean over each step of q·sin(psi) and q·(trail - pivot·cos(psi)) of a caster at psi from straight behind its hinge.
-
-    It rolls where it points, from each of the angles ``starts``, of which the mean is returned; q = ``friction``·sign(s) +
-    ``damping``·s, s = dpsi/dt relative to the robot. The way round is exact for constant velocities but for the robot's own turn,
-    half of which is taken before and half after it.
-    """
-    pushed, turned = np.zeros_like(forward), np.zeros_like(forward)
-    share = 1.0 / len(starts)
-    re, im = np.empty(len(starts)), np.empty(len(starts))
-    for row in range(forward.shape[0]):
-        re[:], im[:] = np.cos(starts), np.sin(starts)
-        for k in range(forward.shape[1]):
-            h = step_s[row, k]
-            if h == 0.0:
-                continue
-            v, u = forward[row, k], yaw[row, k] * pivot
-            fast = np.sqrt(v * v + u * u)
-            turn = yaw[row, k] * h
-            cos, sin = np.cos(turn / 2.0), np.sin(turn / 2.0)
-            left = np.exp(-fast * h / trail)  # of the tangent of half the angle to the way of the hinge
-            for i in range(len(starts)):
-                c, s = re[i] * cos + im[i] * sin, im[i] * cos - re[i] * sin
-                gone = 0.0
-                if fast > 0.0:
-                    off_c, off_s = (v * c + u * s) / fast, (u * c - v * s) / fast
-                    tangent = off_s / (1.0 + off_c + 1e-12)
-                    then = tangent * left
-                    gone = 2.0 * np.arctan((tangent - then) / (1.0 + tangent * then))
-                    off_c, off_s = (1.0 - then * then) / (1.0 + then * then), 2.0 * then / (1.0 + then * then)
-                    c, s = (v * off_c + u * off_s) / fast, (u * off_c - v * off_s) / fast
-                c, s = c * cos + s * sin, s * cos - c * sin
-                rate = (gone - turn) / h
-                middle_c, middle_s = re[i] + c, im[i] + s
-                size = np.sqrt(middle_c * middle_c + middle_s * middle_s) + 1e-12
-                q = (friction * rate / (abs(rate) + SLOW_RAD_S) + damping * rate) * share
-                pushed[row, k] += q * middle_s / size
-                turned[row, k] += q * (trail - pivot * middle_c / size)
-                re[i], im[i] = c, s
-    return pushed, turned
