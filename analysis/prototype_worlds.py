@@ -9,7 +9,7 @@ from analysis.figure_result import FigureResult
 from analysis.labels import counted, task_number, task_order, task_title
 from analysis.results import NoDataError, Results
 from analysis.source import trials_of
-from analysis.trials import IN_A_ROW, MARKS, first_in_a_row
+from analysis.trials import IN_A_ROW, MARKS, marks_of
 
 NAME = "prototype-worlds"
 PAPER = "table 4.2"
@@ -44,11 +44,10 @@ def of_each_run(store: Results) -> pd.DataFrame:
 
 
 def _run(rows: pd.DataFrame) -> dict[str, object]:
-    marks = {name: first_in_a_row(rows[column].fillna(False).to_numpy(bool), many) for name, (_, column, many) in MARKS.items()}
     return {
         **{name: rows[name].iloc[0] for name in ("robot", "task", "world", "root_seed", "seed", "run_id")},
         "evaluations": len(rows),
-        **{name: np.inf if mark is None else float(mark) for name, mark in marks.items()},
+        **{name: np.inf if mark is None else float(mark) for name, mark in marks_of(rows).items()},
     }
 
 

@@ -53,7 +53,7 @@ def trials(store: Results) -> pd.DataFrame:
 
 def _trial(rows: pd.DataFrame) -> dict[str, object]:
     head, driven = rows.iloc[0], np.cumsum(rows.driven_ms.to_numpy()) / 60_000
-    marks = {name: first_in_a_row(rows[column].fillna(False).to_numpy(bool), many) for name, (_, column, many) in MARKS.items()}
+    marks = marks_of(rows)
     first = marks["first_success"]
     return {
         **{name: head[name] for name in ("robot", "task", "sweep", "seed", "run_id")},
@@ -61,6 +61,11 @@ def _trial(rows: pd.DataFrame) -> dict[str, object]:
         **{name: math.nan if mark is None else mark for name, mark in marks.items()},
         "driving_min": math.nan if first is None else float(driven[first - 1]),
     }
+
+
+def marks_of(rows: pd.DataFrame) -> dict[str, int | None]:
+    """The evaluation of each of `MARKS` in one run's evals, in order; None where it never came."""
+    return {name: first_in_a_row(rows[column].fillna(False).to_numpy(bool), many) for name, (_, column, many) in MARKS.items()}
 
 
 def first_in_a_row(success: np.ndarray, many: int) -> int | None:

@@ -9,6 +9,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import _starts, fit_with
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.symbolic import _within
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
 from bns.physics.formula import formula_effect
@@ -69,3 +70,12 @@ def test_many_numbers_of_another_kind_start_one_at_a_time():
     predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=2)))
     starts = list(_starts(formula_effect("mine", "k * v * exp(-a * x - b * y - c * x * y - e * x**2)", "v"), predictor, NOMINAL))
     assert len(starts) == 30
+
+
+def test_a_number_of_a_slow_robot_may_be_large_and_a_start_beyond_all_bounds_is_drawn_in():
+    """A term in v**3 of a robot of 0.01 m/s has a number near -2000; a step of least squares may lead anywhere."""
+    effect = formula_effect("cubic", "k * v**3", "v")
+    assert effect.checked({"k": -1800.0}) == (-1800.0,)
+    low, high = effect.parameters[0].low, effect.parameters[0].high
+    assert [_within(effect, {"k": k}) for k in (-1e12, 3.5, 1e12)] == [(low,), (3.5,), (high,)]
+    assert _within(effect, {}) == (0.0,)

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from bns.cli.main import main
+from bns.cli.values import pose_of
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.design.competing_models import competing_models_of, model_pairs_of
 from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, discriminations
@@ -319,3 +320,9 @@ def test_a_robot_that_bns_cannot_drive_gets_no_command_for_it(narrow):
 def test_speeds_in_other_units_are_refused():
     with pytest.raises(DataError, match="above 20 m/s look like mm/s"):
         bounds_of(tracks_of(measured(NOMINAL, trials=2)), NOMINAL, (-300.0, 300.0))
+
+
+@pytest.mark.parametrize(("text", "said"), [("0,0,1.57", True), ("0,0,90", False), ("0,0,0", False), ("0,0,3", False)])
+def test_a_heading_that_looks_like_radians_is_said_to_be_degrees(text, said, capsys):
+    assert pose_of(text)[2] == pytest.approx(np.radians(float(text.rpartition(",")[2])))
+    assert ("degrees, not radians" in capsys.readouterr().err) == said

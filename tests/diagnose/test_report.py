@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from functools import cache
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,6 +16,7 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.report.shown_paths import shown_paths
+from bns.diagnose.report.tables import error_table
 from bns.measurements import write_measurements
 from bns.physics.effects import effect_named
 from bns.physics.formula import formula_effect
@@ -189,3 +191,32 @@ def test_every_listed_effect_is_described_in_everyday_words():
     words = {name: effect_named(name).in_words for name in EFFECTS.own}
     assert all("effect “" not in text for name, text in words.items() if name in ORDER)
     assert all(word not in text for text in words.values() for word in ("omega", "residual", "parameter"))
+
+
+def test_a_gain_by_chance_is_that_of_the_best_of_all_effects_that_were_tried(page_of):
+    """One in twenty thousand for one effect is not that for the best of thirty."""
+    said = re.search(r"to any of the (\d+) effects tried is at most ([0-9.e-]+)\.", page_of("effects").read_text())
+    tried, chance = int(said[1]), float(said[2])
+    assert tried > 20
+    assert chance >= 0.9 * tried * 5e-5
+
+
+@pytest.mark.parametrize(
+    ("effects", "terms", "columns"),
+    [
+        ((), False, ["as given (mm)"]),
+        (("one",), False, ["as given (mm)", "with the effects (mm)"]),
+        ((), True, ["as given (mm)", "with what is left described, too (mm)"]),
+        (("one",), True, ["as given (mm)", "with the effects (mm)", "with what is left described, too (mm)"]),
+    ],
+)
+def test_the_table_of_errors_has_every_model_of_the_answer(effects, terms, columns):
+    models = [SimpleNamespace(rms_m=n / 1000, median_m=n / 2000) for n in range(30, 30 - 10 * len(columns), -10)]
+    at = SimpleNamespace(horizon="1s", windows=7, models=models, total=None, noise_floor_m=0.002)
+    errors = SimpleNamespace(horizons={"1s": at})
+    d = SimpleNamespace(effects=effects, errors=None if terms else errors, errors_with_terms=errors if terms else None)
+    table = error_table(d, None)
+    assert table["columns"][1 : 1 + len(columns)] == columns
+    said = [cell.partition(" ")[0] for cell in table["rows"][0][1 : 1 + len(columns)]]
+    assert said == [f"{1e3 * m.rms_m:.1f}" for m in models]
+    assert ("change, 95 % (mm)" in table["columns"]) == (len(columns) > 1)
