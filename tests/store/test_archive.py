@@ -194,6 +194,7 @@ def test_generations_and_probes_come_back_in_their_order_and_rounded(tmp_path):
         driven = [of(one, "evals WHERE sweep = 'prototype'", ("driven_ms",), "run_id, evaluation") for one in (there, back)]
         assert (driven[0].round() == driven[1]).all(axis=None)
         assert len(of(back, "runs WHERE started_at IS NOT NULL", ("run_id",), "run_id")) == 4
+        assert back.sql("SELECT DISTINCT who FROM paths").fetchall() == [("fittest",)]
         assert back.sql("SELECT count(*) FILTER (change_m IS NULL) * 4 = count(*) FROM probes").fetchall() == [(True,)]
 
 
