@@ -19,7 +19,7 @@ from bns.diagnose.residuals.floor_field import imitating_floor
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.negligible import LEAST_FALL, negligible
+from bns.diagnose.select.negligible import fall_matters, negligible
 from bns.diagnose.select.result import SelectionResult, certainly_lower
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of
@@ -258,12 +258,8 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
 
 def _matters(errors: PairedErrors) -> bool:
     """Do the terms certainly lower the error at one horizon, by as much as is asked of an effect (`least_fall`)?"""
-    for at in errors.horizons.values():
-        before = at.models[-2]
-        change = at.change_between(before.name, WITH_TERMS)
-        if change.fell and -change.change_m >= LEAST_FALL * before.rms_m:
-            return True
-    return False
+    before = next((at.models[-2].name for at in errors.horizons.values()), "")
+    return fall_matters(errors, before, WITH_TERMS)
 
 
 def _within_noise(errors: PairedErrors) -> bool:

@@ -140,6 +140,11 @@ class Effect:
     """Raised whenever the same values would give other numbers; part of the digest of models that have the effect."""
     per_trial_allowed: bool = False
     """Whether its one parameter may have another value in each trial. Only effects of the stage ``clock`` may."""
+    extends: str = ""
+    """Name of a simpler effect that this one equals at neutral values of the parameters that only this one has.
+
+    A search tries it in the place of that effect, once that one is accepted.
+    """
 
     def __post_init__(self) -> None:
         for kind, given, valid in (

@@ -18,8 +18,10 @@ ORDER = (
     "speed-limit",
     OTHERS,
     "acceleration-limit",  # exact for commands, which are constant in a step: so before delay and lag
+    "force-limit",
     "command-delay",
     "motor-lag",
+    "inertia-lag",
     "heating",  # by the work that the wheels really do
     "wheel-eccentricity",
     "backlash",
@@ -30,6 +32,8 @@ ORDER = (
     "side-slip",
     "caster-swing",
     "floor-patch",
+    "slope-load",
+    "tether-load",
     DECOYS,
     FORMULAS,
     "yaw-bias",

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 from tests.hidden_effects.cause import Body, Cause, Moment
 from tests.hidden_effects.listed_floor import CasterSwing, FloorPatch, LensDistortion, QuadraticTurnSlip, TiltedCamera
+from tests.hidden_effects.listed_loads import ForceLimit, InertiaLag, SlopeLoad, TetherLoad
 from tests.hidden_effects.listed_motors import (
     Backlash,
     CommandQuantisation,
@@ -266,6 +267,8 @@ LISTED: dict[str, type[Cause]] = {
     "battery-sag": BatterySag,
     "motor-lag": MotorLag,
     "acceleration-limit": AccelerationLimit,
+    "force-limit": ForceLimit,
+    "inertia-lag": InertiaLag,
     "heating": Heating,
     "wheel-eccentricity": WheelEccentricity,
     "backlash": Backlash,
@@ -276,6 +279,8 @@ LISTED: dict[str, type[Cause]] = {
     "turn-slip-quadratic": QuadraticTurnSlip,
     "side-slip": SideSlip,
     "floor-patch": FloorPatch,
+    "slope-load": SlopeLoad,
+    "tether-load": TetherLoad,
     "floor-slope": FloorSlope,
     "tether-pull": TetherPull,
     "marker-offset": MarkerOffset,

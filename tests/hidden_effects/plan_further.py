@@ -8,6 +8,11 @@ from dataclasses import replace
 from tests.hidden_effects.camera import Camera, Layout
 from tests.hidden_effects.world import Parameters, World
 
+
+def _tether(pull_per_s: float, anchor_m: tuple[float, float], **others: float) -> Parameters:
+    return {"pull_per_s": pull_per_s, "anchor_x_m": anchor_m[0], "anchor_y_m": anchor_m[1]} | others
+
+
 LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "wheel-eccentricity": (
         {"left_share": 0.12, "right_share": 0.0, "turn_m": 0.1288},
@@ -30,6 +35,16 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "lens-distortion": (
         {"per_m2": -0.04, "x_m": 0.8, "y_m": 0.5},
         {"per_m2": 0.08, "x_m": 0.7, "y_m": 0.4},
+    ),
+    "force-limit": ({"max_m_s2": 0.4, "turn_ratio": 2.5}, {"max_m_s2": 0.2, "turn_ratio": 4.0}),
+    "inertia-lag": ({"tau_s": 0.12, "turn_ratio": 0.5}, {"tau_s": 0.25, "turn_ratio": 0.3}),
+    "slope-load": (
+        {"x_m_s": 0.003, "y_m_s": -0.002, "turn_per_m": 2.0, "at_rest": 0.0},
+        {"x_m_s": -0.008, "y_m_s": 0.006, "turn_per_m": 5.0, "at_rest": 1.0},
+    ),
+    "tether-load": (
+        _tether(0.01, (1.2, 0.3), free_m=0.2, ahead_m=-0.04, turn_per_m=-5.0, at_rest=0.0),
+        _tether(0.03, (0.6, 0.6), free_m=0.1, ahead_m=-0.05, turn_per_m=-8.0, at_rest=1.0),
     ),
 }
 """Medium and strong, of the Khepera."""

@@ -64,6 +64,18 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
     return problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter)
 
 
+def fit_extended(problem: Problem, base: Fit, effect: Effect) -> Fit:
+    """The fit with an effect in the place of the one of ``base`` that it ``extends``, from that one's numbers."""
+    given = base.model.values_of(effect.extends)
+    alike = tuple(given.get(p.name, p.neutral) for p in effect.parameters)
+    starts = [alike]
+    for i, p in enumerate(effect.parameters):
+        if p.name not in given:
+            starts += [(*alike[:i], value, *alike[i + 1 :]) for value in _grid(p)]
+    models = [base.model.without(effect.extends).with_active(effect, values) for values in starts]
+    return problem.fit(min(models, key=problem.loss))
+
+
 def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None = None) -> StartingPoint:
     """The fitted model with the effect at the most promising of its starts, one step of least squares taken."""
     lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
@@ -87,7 +99,8 @@ def _starts(effect: Effect, predictor: Predictor, model: Model) -> Iterator[tupl
     grids = [list(_grid(p)) for p in effect.parameters]
     if len(grids) == 2 or prod(map(len, grids)) > _MOST:  # along each axis: the effect of all is nearly the sum of each
         neutral = tuple(effect.neutral.values())
-        for axis in range(len(grids)):
+        limits = [axis for axis, value in enumerate(neutral) if np.isinf(value)]
+        for axis in limits or range(len(grids)):  # beside a limit that is infinite no other number does anything
             for value in grids[axis]:
                 yield tuple(value if i == axis else n for i, n in enumerate(neutral))
     else:

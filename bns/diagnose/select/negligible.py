@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.diagnose.estimate.cross_validation import held_out_steps
+from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
@@ -36,6 +37,26 @@ def negligible(selection: SelectionResult, fewest: int = 1) -> tuple[str, ...]:
             break
         dropped = (*dropped, least)
     return dropped
+
+
+def fall_matters(errors: PairedErrors, before: str, after: str) -> bool:
+    """Is the error of one model certainly lower than that of another at one horizon, by `least_fall`?"""
+    for at in errors.horizons.values():
+        rms_m = next(one.rms_m for one in at.models if one.name == before)
+        change = at.change_between(before, after)
+        if change.fell and -change.change_m >= LEAST_FALL * rms_m:
+            return True
+    return False
+
+
+def certainly_better(lacking: tuple[Problem, Fit], having: tuple[Problem, Fit]) -> bool:
+    """As `fall_matters`, on held-out trials from one fit to another."""
+    predictor = having[0].predictor
+    steps = [
+        (name, held_out_steps(predictor, problem.pose_filter, fit.model))
+        for name, (problem, fit) in (("lacking", lacking), (_ALL, having))
+    ]
+    return fall_matters(paired_errors(predictor, steps), "lacking", _ALL)
 
 
 def _without_each(selection: SelectionResult, dropped: Sequence[str], kept: Sequence[str]) -> PairedErrors:

@@ -33,6 +33,8 @@ class SelectionStep:
     """An implausible candidate that did clearly better than what was taken; "" if there was none."""
     of: int = 0
     """Among how many effects these were chosen, where only promising ones were fitted; 0: all are in the ranking."""
+    instead_of: str = ""
+    """The accepted effect whose place the selected one took, if that extends another."""
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,11 @@ from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.plausibility import at_bound, implausible
 from bns.diagnose.estimate.problem import problem_for, settled_problem
 from bns.diagnose.estimate.significance import MIN_Z
-from bns.diagnose.estimate.starts import best_start, fit_with, listed
+from bns.diagnose.estimate.starts import best_start, fit_extended, fit_with, listed
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.indistinguishable import indistinguishable
+from bns.diagnose.select.negligible import certainly_better
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
 from bns.diagnose.select.screening import screened, worth_a_fit
 from bns.diagnose.settings import DEFAULTS
@@ -162,13 +163,49 @@ class StepwiseSelection:
             if not step.selected:
                 break
             self._entry = _Entry(*before, accepted, step)
-            accepted = (*accepted, step.selected)
+            accepted = (*(a for a in accepted if a != step.instead_of), step.selected)
             problem, fit, accepted = self._exchange_step(problem, fit, accepted)
             problem, fit, accepted = self._backward_step(problem, fit, accepted)
             if frozenset(accepted) in tried:
                 break
             tried.add(frozenset(accepted))
         return self._ended(problem, fit, accepted, steps)
+
+    def _extended(self, name: str) -> tuple[str, ...]:
+        """The name of the effect that this one extends, if it does."""
+        extends = self.catalogue[name].extends if name in self.catalogue else ""
+        return (extends,) if extends else ()
+
+    def _simple(self, accepted: Collection[str]) -> list[Effect]:
+        """The effects worth a fit that extend no other and are neither accepted nor a part of what is."""
+        there = {*accepted, *(part for name in accepted for part in self._extended(name))}
+        return [e for e in self._worth.values() if not e.extends and e.name not in there]
+
+    def _to_extend(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> dict[str, tuple[str, Fit]]:
+        """Name of an effect that extends another -> which accepted effect it would replace, and the fit that it begins from.
+
+        It extends an accepted effect, or one that could stand for an accepted effect nearly as well.
+        """
+        found: dict[str, tuple[str, Fit]] = {}
+        longer = [e for e in self._worth.values() if e.extends and e.name not in accepted]
+        others = self._exchanges(problem, fit, accepted) if any(e.extends not in accepted for e in longer) else []
+        for effect in longer:
+            if effect.extends in accepted:
+                found[effect.name] = effect.extends, fit
+                continue
+            near = [(tried.loss, name, tried) for name, other, tried in others if other == effect.extends]
+            if near:
+                _, name, tried = min(near, key=lambda n: n[0])
+                found[effect.name] = name, tried
+        return found
+
+    def _lacking(self, problem: Problem, fit: Fit, name: str) -> Fit:
+        """The fit that lacks an effect; of one that extends another, with that other in its place."""
+        if not self._extended(name):
+            return without(problem, fit, name)
+        simple, values = self.catalogue[self.catalogue[name].extends], fit.model.values_of(name)
+        model = fit.model.without(name).with_active(simple, tuple(values[p.name] for p in simple.parameters))
+        return problem.fit(model, nearby=fit.jacobian_by_parameter)
 
     def stands(self, before: SelectionResult) -> SelectionResult | None:
         """The end of another search as the end of this one, if it is one here as well; else None.
@@ -181,7 +218,7 @@ class StepwiseSelection:
         problem, fit = self._refit_with_noise(model, before.problem.pose_filter.noise)
         if any(self._rejected(fit, name, bounds=False) for name in accepted):
             return None
-        if not all(self._earned_over(problem, without(problem, fit, name), fit, name) for name in accepted):
+        if not all(self._earned_over(problem, self._lacking(problem, fit, name), fit, name) for name in accepted):
             return None
         if self._exchange_step(problem, fit, accepted)[2] != accepted:
             return None
@@ -209,8 +246,10 @@ class StepwiseSelection:
     ) -> tuple[SelectionStep, Problem, Fit]:
         """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in."""
         left = self._worth_a_fit(problem, fit, accepted)
+        to_extend = self._to_extend(problem, fit, accepted)
         of = len(self.catalogue) - len(accepted) if self.predictor.screening is not None else 0
-        tried = each(partial(self._tried, problem, fit), [*DECOYS, *left])
+        longer = [self._worth[name] for name in to_extend]
+        tried = each(partial(self._tried, problem, fit, to_extend), [*DECOYS, *left, *longer])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
         if self.predictor.screening is not None:
             tried[len(DECOYS) :] = self._worked_out(problem, fit, tried[len(DECOYS) :])
@@ -223,10 +262,13 @@ class StepwiseSelection:
                 passed_over += [candidate] if implausible(candidate.fit, candidate.name, bounds=False) else []
                 continue
             settled = self._refit_with_noise(candidate.fit.model, problem.pose_filter.noise)
+            if candidate.name in to_extend and not certainly_better((problem, fit), settled):
+                continue
             rejected_because = self._rejected(settled[1], candidate.name, bounds=False)
             if not rejected_because:
                 better = next((p.name for p in passed_over if not indistinguishable(candidate.fit, p.fit, fit)), "")
-                return SelectionStep(tuple(ranking), decoy_threshold, candidate.name, better, of), *settled
+                gone = to_extend.get(candidate.name, ("",))[0]
+                return SelectionStep(tuple(ranking), decoy_threshold, candidate.name, better, of, gone), *settled
             ranking[index] = replace(candidate, rejected_because=rejected_because)
             passed_over.append(ranking[index])
         best = passed_over[0].name if passed_over else ""
@@ -238,7 +280,7 @@ class StepwiseSelection:
             self.tick("screening")
             left = [effect for name, effect in self.catalogue.items() if name not in accepted]
             self._worth |= {effect.name: effect for effect in worth_a_fit(screened(problem, fit, left))}
-        return [effect for name, effect in self._worth.items() if name not in accepted]
+        return self._simple(accepted)
 
     def _worked_out(self, problem: Problem, fit: Fit, tried: Sequence[Candidate]) -> list[Candidate]:
         """Where models are worked out roughly: those that come near the best one worked out well, each at its own numbers.
@@ -263,9 +305,12 @@ class StepwiseSelection:
         why = implausible(fit, name, bounds)
         return "" if self._all_believed and not at_bound(fit, name) else why
 
-    def _tried(self, problem: Problem, fit: Fit, effect: Effect) -> Candidate:
+    def _tried(self, problem: Problem, fit: Fit, to_extend: Mapping[str, tuple[str, Fit]], effect: Effect) -> Candidate:
         self.tick(effect.name)
-        added = fit_with(problem, fit, effect)
+        if effect.name in to_extend:
+            added = fit_extended(problem, to_extend[effect.name][1], effect)
+        else:
+            added = fit_with(problem, fit, effect)
         found = self._candidate(problem, fit, added, effect.name)
         if len(added.model.effects) == len(self.model.effects) + 1 and effect.name in self.catalogue:
             self.alone(found)
@@ -307,15 +352,16 @@ class StepwiseSelection:
             )  # at a bound it may be: there it does, and earns, nothing
             if believed and name == newest and not at_bound(fit, name):  # an exchange since may have left it nothing to do
                 continue
-            lacking = without(problem, fit, name)
-            if not believed or not self._earned_over(problem, lacking, fit, name):
-                accepted = tuple(a for a in accepted if a != name)
+            lacking = self._lacking(problem, fit, name)
+            needless = bool(self._extended(name)) and not certainly_better((problem, lacking), (problem, fit))
+            if not believed or needless or not self._earned_over(problem, lacking, fit, name):
+                accepted = tuple(a for a in accepted if a != name) + self._extended(name)
                 problem, fit = self._refit_with_noise(lacking.model, problem.pose_filter.noise)
         return problem, fit, accepted
 
     def _may_stay(self, problem: Problem, fit: Fit, name: str) -> bool:
         """Whether that effect of a fit would be taken as a newcomer: few trials that gain much do not bring one in."""
-        return not self._rejected(fit, name) and self._earned_over(problem, without(problem, fit, name), fit, name)
+        return not self._rejected(fit, name) and self._earned_over(problem, self._lacking(problem, fit, name), fit, name)
 
     def _earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:
         return self._earned(Candidate(name, fit, problem.paired_comparison(lacking, fit)), lacking, 0.0)
@@ -326,7 +372,7 @@ class StepwiseSelection:
             return self._exchanged[2]
         result = []
         for name in accepted:
-            others = [effect for other, effect in self._worth.items() if other not in accepted]
+            others = self._simple(accepted)
             entry = self._entry if self._entry and self._entry.of(name, accepted) else None
             if entry and self.predictor.screening is None:  # tried already, when it was chosen among them
                 loose, lacking, known = entry.problem, entry.base, entry.fits

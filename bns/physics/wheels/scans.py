@@ -264,3 +264,39 @@ def carried_on(rate: Array, step_s: Array, session_s: Array | None, fade_s: floa
     first, alone = np.zeros(1), np.zeros(1, dtype=np.int64)
     trials = [accumulated(rate[i : i + 1], step_s[i : i + 1], first, alone, fade_s) for i in range(len(rate))]
     return np.concatenate(trials) if trials else rate
+
+
+@exact
+def limited_together(left: Array, right: Array, step_s: Array, straight: float, turning: float) -> tuple[Array, Array]:
+    """Mean over each step of the speeds of two wheels of one body; each follows its target as fast as its force allows.
+
+    From 0; exact. Both wheels in one direction change by ``straight`` (m/s^2), against each other by ``turning``. A wheel that
+    keeps its speed holds against the other, which then changes by the harmonic mean of the two.
+    """
+    mean_left, mean_right = np.zeros_like(left), np.zeros_like(right)
+    alone = 2.0 * straight * turning / (straight + turning)
+    for row in range(left.shape[0]):
+        w, v = 0.0, 0.0
+        for k in range(left.shape[1]):
+            h = step_s[row, k]
+            if h == 0.0:
+                continue
+            rest_s, way_w, way_v = h, 0.0, 0.0
+            for _ in range(3):  # until one wheel is there, until both are, and from then on
+                gap_w, gap_v = left[row, k] - w, right[row, k] - v
+                limit = alone if gap_w == 0.0 or gap_v == 0.0 else straight if gap_w * gap_v > 0.0 else turning
+                t_w, t_v = abs(gap_w) / limit, abs(gap_v) / limit
+                t = rest_s
+                if gap_w != 0.0:
+                    t = min(t, t_w)
+                if gap_v != 0.0:
+                    t = min(t, t_v)
+                way_w += w * t + np.sign(gap_w) * limit * t * t / 2.0
+                way_v += v * t + np.sign(gap_v) * limit * t * t / 2.0
+                w = left[row, k] if t == t_w or gap_w == 0.0 else w + np.sign(gap_w) * limit * t
+                v = right[row, k] if t == t_v or gap_v == 0.0 else v + np.sign(gap_v) * limit * t
+                rest_s -= t
+                if rest_s <= 0.0:
+                    break
+            mean_left[row, k], mean_right[row, k] = way_w / h, way_v / h
+    return mean_left, mean_right

@@ -1,0 +1,88 @@
+"""A cable or a spring pulls on the robot's wheels: they grip, so that only the pull along the heading moves it.
+
+The pull grows with the distance from the anchor. It acts at a point c ahead of the axle: what the wheels' grip takes up
+across the heading turns the robot there. At rest a motor without friction yields as well; one with a gear that locks does
+not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Body, Wheels
+from bns.physics.wheels.loads import guessed, pulled
+
+
+def apply(
+    body: Body,
+    pull_per_s: float,
+    anchor_x_m: float,
+    anchor_y_m: float,
+    free_m: float,
+    ahead_m: float,
+    turn_per_m: float,
+    at_rest: float,
+) -> Body:
+    """The part along the heading of a velocity towards the anchor, and a turn in proportion to the part across it."""
+    if body.place is None:
+        return body  # first round of a simulation: nobody knows yet where the robot goes
+    x, y, heading = (body.place[..., i] for i in range(3))
+    east, north = anchor_x_m - x - ahead_m * np.cos(heading), anchor_y_m - y - ahead_m * np.sin(heading)
+    length = np.maximum(np.hypot(east, north), 1e-9)
+    pull = pull_per_s * np.maximum(length - free_m, 0.0) / length
+    return pulled(body, body.place, pull * east, pull * north, turn_per_m, at_rest)
+
+
+def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
+    """A pull fitted to pieces of the tracked trials, with motors that yield at rest and with such that do not."""
+    found = guessed(wheels, anchored=True)
+    if not found or found[2] <= 0.0:
+        return ()
+    east, north, fall, turn_per_m = found
+    return tuple((fall, east / fall, north / fall, 0.0, 0.0, turn_per_m, rest) for rest in (0.0, 1.0))
+
+
+EFFECT = Effect(
+    name="tether-load",
+    stage="body",
+    parameters=(
+        Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.5), 0.0, "speed per metre of distance from the anchor"),
+        Parameter("anchor_x_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, east"),
+        Parameter("anchor_y_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, north"),
+        Parameter("free_m", "m", 0.0, 100.0, (0.0, 10.0), 0.0, "length below which the cable is slack", reached=(0.0,)),
+        Parameter(
+            "ahead_m", "m", -10.0, 10.0, (-0.5, 0.5), 0.0, "how far ahead of the axle it is fixed to the robot", size_power=1.0
+        ),
+        Parameter(
+            "turn_per_m",
+            "rad/m",
+            -100.0,
+            100.0,
+            (-20.0, 20.0),
+            0.0,
+            "turn rate per speed across the heading (positive: pulled ahead of the axle)",
+            size_power=-1.0,
+        ),
+        Parameter(
+            "at_rest",
+            "1",
+            0.0,
+            1.0,
+            (0.0, 1.0),
+            0.0,
+            "share that acts while the wheels are commanded to stand",
+            reached=(0.0, 1.0),
+        ),
+    ),
+    equation="v += e·cos(theta) + n·sin(theta), omega += c·(n·cos(theta) - e·sin(theta)) with e = k·(ax - x), n = k·(ay - y)",
+    residuals="The robot is faster towards one point of the floor and slower away from it; it is not carried sideways.",
+    lookalikes=("tether-pull", "slope-load"),
+    sentence="something pulls on the robot's wheels towards one point, as a cable or a spring does",
+    measurement="repeat some trials with the cable unplugged or held up",
+    beside={"slope-load": "A slope is a cable from far away: to tell them apart, drive on both sides of the assumed anchor."},
+    apply=apply,
+    needs="track",
+    needs_place=True,
+    starts_from=starts_from,
+)

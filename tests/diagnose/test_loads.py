@@ -1,0 +1,67 @@
+"""Effects of loads: an effect that extends another takes its place only where that lowers the error; pulls on gripping wheels."""
+
+import numpy as np
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.stepwise import StepwiseSelection
+from bns.physics.effects import all_effects, effect_named
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def selected(model, **how):
+    predictor = WheelPredictor(tracks_of(measured(model, **{"trials": 20, "seed": 11, "speeds": (-0.2, 0.2)} | how)))
+    return StepwiseSelection(predictor, NOMINAL).run()
+
+
+def test_turns_that_lag_less_than_straight_lines_take_the_lags_place():
+    found = selected(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}))
+    assert found.accepted == ("inertia-lag",)
+    replaced = {step.instead_of for step in found.steps if step.selected == "inertia-lag"}
+    assert replaced and replaced <= {"motor-lag", "clock-offset", "command-delay"}
+    assert found.fit.model.values_of("inertia-lag") == pytest.approx({"tau_s": 0.25, "turn_ratio": 0.3}, rel=0.1)
+    assert all("motor-lag" not in names for names in found.competing_models)
+
+
+def test_wheels_that_lag_alike_keep_the_simple_lag():
+    found = selected(hidden(motor_lag={"tau_s": 0.2}))
+    assert found.accepted == ("motor-lag",)
+    extended = [c for step in found.steps for c in step.ranking if c.name == "inertia-lag"]
+    assert extended, "the longer effect was never tried"
+
+
+def test_an_extension_equals_what_it_extends_where_its_own_numbers_are_neutral():
+    for effect in all_effects().values():
+        if effect.extends:
+            simple = effect_named(effect.extends)
+            own = [p for p in effect.parameters if p.name not in simple.neutral]
+            assert {p.name for p in simple.parameters} < {p.name for p in effect.parameters}
+            assert own
+            table = {p.name: 0.3 for p in simple.parameters}
+            model = NOMINAL.with_effect(simple.name, **table)
+            longer = NOMINAL.with_effect(effect.name, **table | {p.name: p.neutral for p in own})
+            one, other = (measured(m, trials=2, seed=3, noise=(0, 0), speeds=(-0.2, 0.2)) for m in (model, longer))
+            np.testing.assert_allclose(one, other, atol=1e-9)
+
+
+def test_a_slope_on_wheels_that_grip_is_no_drift():
+    slope = {"x_m_s": 0.012, "y_m_s": -0.007, "turn_per_m": 3.0, "at_rest": 0.0}
+    answer = diagnose(
+        WheelPredictor(tracks_of(measured(hidden(slope_load=slope), trials=20, seed=11, speeds=(-0.2, 0.2)))), NOMINAL
+    ).as_json()
+    assert (answer["verdict"], answer["effects"]) == ("effects", ["slope-load"])
+    numbers = answer["parameters"]["slope-load"]
+    assert all(numbers[name]["low"] < slope[name] < numbers[name]["high"] for name in ("x_m_s", "y_m_s", "turn_per_m"))
+
+
+def test_a_spring_is_found_from_what_was_tracked():
+    spring = {"anchor_x_m": 0.3, "anchor_y_m": -0.2, "pull_per_s": 0.06, "free_m": 0.15, "ahead_m": -0.05, "turn_per_m": -6.0}
+    predictor = WheelPredictor(
+        tracks_of(measured(hidden(tether_load=spring | {"at_rest": 1.0}), trials=30, seed=5, speeds=(-0.2, 0.2)))
+    )
+    _, fit, _ = fit_set(predictor, NOMINAL, [effect_named("tether-load")])
+    values = fit.model.values_of("tether-load")
+    assert {name: values[name] for name in spring} == pytest.approx(spring, rel=0.15, abs=0.02)

@@ -1,0 +1,105 @@
+"""Listed effects of loads on gripping wheels, written a second time: from forces in small steps, not from closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.hidden_effects.cause import Body, Cause, Moment
+
+FINE = 40
+"""Parts of a step in which forces are integrated."""
+
+
+def _in_small_steps(wheels: np.ndarray, moment: Moment, push, limits) -> np.ndarray:
+    """Mean speeds of two wheels of one body that forces change: ``push(gap)`` (n, 2), ``limits`` of mean and half difference."""
+    out, now = np.empty_like(wheels), np.zeros_like(wheels[:, 0])
+    small_s = moment.step_s / FINE
+    for i in range(wheels.shape[1]):
+        way = np.zeros_like(now)
+        for _ in range(FINE):
+            force = push(wheels[:, i] - now)
+            straight, spin = force.mean(axis=1) * limits[0], (force[:, 1] - force[:, 0]) / 2 * limits[1]
+            after = now + np.stack([straight - spin, straight + spin], axis=1) * small_s
+            way += (now + after) / 2 * small_s
+            now = after
+        out[:, i] = way / moment.step_s
+    return out
+
+
+@dataclass
+class ForceLimit(Cause):
+    """Stiff controllers of motors with limited force, on one body with mass and inertia."""
+
+    max_m_s2: float
+    turn_ratio: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        near = self.max_m_s2 * moment.step_s / FINE
+        limits = self.max_m_s2, self.max_m_s2 * self.turn_ratio
+        return _in_small_steps(wheels, moment, lambda gap: np.clip(gap / near, -1.0, 1.0), limits)
+
+
+@dataclass
+class InertiaLag(Cause):
+    """Forces in proportion to what each wheel lacks, on one body with mass and inertia."""
+
+    tau_s: float
+    turn_ratio: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        return _in_small_steps(wheels, moment, lambda gap: gap, (1 / self.tau_s, 1 / self.tau_s / self.turn_ratio))
+
+
+class Pulled(Cause):
+    """A force in the plane, of which the wheels let through what points along them; the rest has a lever and turns the robot."""
+
+    depends_on_pose = True
+    lever_per_m = 0.0
+    at_rest = 0.0
+
+    def force(self, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> np.ndarray:
+        """As the velocity to which it drives free wheels: a complex number, east and north."""
+        raise NotImplementedError
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        along = self.force(x, y, heading) * np.exp(-1j * heading)
+        along = np.where(body.moving > 0, along, self.at_rest * along)
+        return body._replace(forward=body.forward + along.real, turn=body.turn + self.lever_per_m * along.imag)
+
+
+@dataclass
+class SlopeLoad(Pulled):
+    """Gravity down a slope."""
+
+    x_m_s: float
+    y_m_s: float
+    turn_per_m: float
+    at_rest: float
+
+    def __post_init__(self) -> None:
+        self.lever_per_m = -self.turn_per_m
+
+    def force(self, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> np.ndarray:
+        return np.full(np.shape(x), self.x_m_s + 1j * self.y_m_s)
+
+
+@dataclass
+class TetherLoad(Pulled):
+    """A spring from an anchor to a point of the robot."""
+
+    pull_per_s: float
+    anchor_x_m: float
+    anchor_y_m: float
+    free_m: float
+    ahead_m: float
+    turn_per_m: float
+    at_rest: float
+
+    def __post_init__(self) -> None:
+        self.lever_per_m = self.turn_per_m
+
+    def force(self, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> np.ndarray:
+        gap = self.anchor_x_m + 1j * self.anchor_y_m - (x + 1j * y + self.ahead_m * np.exp(1j * heading))
+        return self.pull_per_s * gap * np.maximum(1 - self.free_m / np.abs(gap), 0.0)
