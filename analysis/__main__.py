@@ -44,14 +44,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         modules = figures(broken) if wanted.only is None else {wanted.only: FIGURES.load(wanted.only)}
         out = wanted.out or wanted.results / "figures"
         for fault in broken:
-            print(f"error: {fault}", file=sys.stderr)
+            print(f"bns: {fault}", file=sys.stderr)
         if wanted.run is not None:
             modules = {name: module for name, module in modules.items() if getattr(module, "OF_A_RUN", False)}
         if not wanted.page:
             failed = not _draw_all(modules, _source(wanted), out, everything=wanted.only is None)
         print(f"page: {write_page(out, wanted.refresh)}")
     except BnsError as fault:
-        print(f"error: {fault}", file=sys.stderr)
+        print(f"bns: {fault}", file=sys.stderr)
         return fault.exit_code
     except KeyboardInterrupt:
         print("interrupted; what is drawn stays. Repeat the command for the rest.", file=sys.stderr)
@@ -101,7 +101,7 @@ def _draw_all(modules: dict[str, Any], store: Results, out: Path, *, everything:
         except Exception as fault:
             failed = True
             traceback.print_exc()
-            print(f"error: {name} ({module.PAPER}) could not be drawn; the others are", file=sys.stderr)
+            print(f"bns: {name} ({module.PAPER}) could not be drawn; the others are", file=sys.stderr)
             publish_skipped(name, module.PAPER, f"its script failed: {type(fault).__name__}: {fault}", out)
             made.add(name)
     if everything:

@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         text = page(found, either, paired, elsewhere, costs, random, trials, pictures, origin)
         publish(text.encode(), wanted.out.with_name(f".{wanted.out.name}.part"), wanted.out)
     except BnsError as fault:
-        print(f"error: {fault}", file=sys.stderr)
+        print(f"bns: {fault}", file=sys.stderr)
         return fault.exit_code
     print(f"{wanted.out}: {sum(len(one.findings) for one in found)} findings, {len(pictures)} pictures")
     return 0

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from bns.api.common.parameters import parameter_table
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Progress, silent
 from bns.api.common.provenance import provenance
@@ -41,6 +42,11 @@ class AddResult(Shown):
     def model(self) -> Model:
         """The new model, with 95 % intervals and where its numbers come from; `bns.Model.save` writes it."""
         return Model(self.extended.model)
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """Parameters of all effects of the model: effect, parameter, value, se, low, high (95 % interval), unit, at_bound."""
+        return parameter_table(numbers_of(self.extended.fit))
 
     @property
     def errors(self) -> pd.DataFrame:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from bns.api.common.cache import remembered
+from bns.api.common.parameters import parameter_table
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
@@ -106,11 +107,7 @@ class DiagnoseResult(Shown):
     @property
     def parameters(self) -> pd.DataFrame:
         """Parameters of the accepted effects: effect, parameter, value, se, low, high (95 % interval), unit, at_bound."""
-        listed = self.diagnosis.as_json()["parameters"]
-        rows = [
-            {"effect": e, "parameter": p, **number} for e, numbers in listed.items() for p, number in numbers.items()
-        ]
-        return pd.DataFrame(rows, columns=["effect", "parameter", "value", "se", "low", "high", "unit", "at_bound"])
+        return parameter_table(self.diagnosis.as_json()["parameters"])
 
     @property
     def errors(self) -> pd.DataFrame:

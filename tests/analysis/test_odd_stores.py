@@ -63,7 +63,7 @@ def test_a_script_that_fails_is_told_and_costs_no_other_figure(tmp_path, monkeyp
     assert "skipped" not in shown["success-by-mutation-khepera"]
     told = capsys.readouterr().err
     assert "ZeroDivisionError" in told
-    assert "error: findings (sections 4.6 and 5.9) could not be drawn; the others are" in told
+    assert "bns: findings (sections 4.6 and 5.9) could not be drawn; the others are" in told
     monkeypatch.undo()
     assert main(["--results", str(tmp_path / "results"), "--out", str(tmp_path / "out"), "--only", "findings"]) == 0
     assert [caption["name"] for caption in captions(tmp_path / "out") if "findings" in caption["name"]] == ["findings-khepera"]

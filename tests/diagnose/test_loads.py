@@ -7,6 +7,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select import stepwise
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.effects import all_effects, effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -21,9 +22,17 @@ def test_turns_that_lag_less_than_straight_lines_take_the_lags_place():
     found = selected(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}))
     assert found.accepted == ("inertia-lag",)
     replaced = {step.instead_of for step in found.steps if step.selected == "inertia-lag"}
-    assert replaced and replaced <= {"motor-lag", "clock-offset", "command-delay"}
+    assert replaced
+    assert replaced <= {"motor-lag", "clock-offset", "command-delay"}
     assert found.fit.model.values_of("inertia-lag") == pytest.approx({"tau_s": 0.25, "turn_ratio": 0.3}, rel=0.1)
     assert all("motor-lag" not in names for names in found.competing_models)
+
+
+def test_an_extension_that_lowers_no_error_is_not_taken(monkeypatch):
+    monkeypatch.setattr(stepwise, "certainly_better", lambda *_: False)
+    found = selected(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=12)
+    assert "inertia-lag" not in found.accepted
+    assert "motor-lag" in found.accepted
 
 
 def test_wheels_that_lag_alike_keep_the_simple_lag():

@@ -17,7 +17,7 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.established import Established
 from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import NOTHING
-from bns.diagnose.select.negligible import LUCK, MEDIAN_OF, _largest_fall, negligible
+from bns.diagnose.select.negligible import LUCK, MEDIAN_OF, _largest_fall, fall_matters, negligible
 from bns.diagnose.select.result import SelectionResult
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
@@ -176,3 +176,17 @@ def test_an_error_falls_by_the_share_beyond_luck_of_the_measure_that_falls_most(
     assert _largest_fall(errors(many, **models), "before", "after") == pytest.approx(0.75 - LUCK / many**0.5)
     nothing = {"before": (0.0, 0.0, 0.0), "after": (1.0, 1.0, 1.0)}
     assert _largest_fall(errors(many, **nothing), "before", "after") == 0.0
+
+
+@pytest.mark.parametrize(
+    ("change_m", "fell", "matters"),
+    [(-0.003, True, True), (-0.002, True, True), (-0.0019, True, False), (-0.003, False, False), (0.003, True, False)],
+)
+def test_a_fall_matters_where_it_is_certain_and_two_percent(change_m, fell, matters):
+    models = (SimpleNamespace(name="a", rms_m=0.1), SimpleNamespace(name="b", rms_m=0.1 + change_m))
+    nothing = SimpleNamespace(change_m=0.0, fell=False)
+    change = SimpleNamespace(change_m=change_m, fell=fell)
+    far = SimpleNamespace(models=models, change_between=lambda *names: {("a", "b"): change}[names])
+    near = SimpleNamespace(models=models, change_between=lambda *_: nothing)
+    assert fall_matters(SimpleNamespace(horizons={"1s": near, "trial": far}), "a", "b") is matters
+    assert not fall_matters(SimpleNamespace(horizons={"1s": near}), "a", "b")

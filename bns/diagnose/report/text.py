@@ -79,9 +79,13 @@ def _intervals(
     for effect, numbers in values.items():
         for name, n in numbers.items():
             if n["low"] is not None and n["high"] is not None:
-                yield f"  {effect}: {name} = {n['value']:.5g}{_unit(n)} (95 %: {n['low']:.5g} to {n['high']:.5g})"
+                yield _with_interval(effect, name, n)
         if catalogue and effect in catalogue:
             yield f"    {catalogue[effect].equation}"
+
+
+def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
+    return f"  {effect}: {name} = {n['value']:.5g}{_unit(n)} (95 %: {n['low']:.5g} to {n['high']:.5g})"
 
 
 def _unit(number: Mapping[str, Any]) -> str:
@@ -198,6 +202,11 @@ def extension_text(m: ExtendedModel) -> str:
     lines = ["position error on held-out trials, mm: root mean square (median), all on the same windows:"]
     lines += error_lines(m.errors, "+ ")
     for effect, numbers in numbers_of(m.fit).items():
-        lines += [f"  {effect}: {name} = {n['value']:.5g} ± {n['se']:.2g}{_unit(n)}" for name, n in numbers.items()]
+        lines += [
+            _with_interval(effect, name, n)
+            if n["low"] is not None and n["high"] is not None
+            else f"  {effect}: {name} = {n['value']:.5g} ± {n['se']:.2g}{_unit(n)} (standard error)"
+            for name, n in numbers.items()
+        ]
     lines += [f"  warning: {text}" for text in m.warnings]
     return "\n".join(lines)
