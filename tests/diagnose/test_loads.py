@@ -9,6 +9,7 @@ from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select import stepwise
 from bns.diagnose.select.stepwise import StepwiseSelection
+from bns.diagnose.values import numbers_of
 from bns.physics.effects import all_effects, effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
@@ -74,3 +75,13 @@ def test_a_spring_is_found_from_what_was_tracked():
     _, fit, _ = fit_set(predictor, NOMINAL, [effect_named("tether-load")])
     values = fit.model.values_of("tether-load")
     assert {name: values[name] for name in spring} == pytest.approx(spring, rel=0.15, abs=0.02)
+
+
+def test_what_no_pose_depends_on_may_be_anything_that_is_allowed():
+    """Whether a slope moves a standing robot, where it never stands."""
+    slope = {"x_m_s": 0.012, "y_m_s": -0.007, "turn_per_m": 3.0, "at_rest": 0.0}
+    predictor = WheelPredictor(tracks_of(measured(hidden(slope_load=slope), trials=12, seed=11, speeds=(0.02, 0.2))))
+    _, fit, _ = fit_set(predictor, NOMINAL, [effect_named("slope-load")])
+    numbers = numbers_of(fit)["slope-load"]
+    assert (numbers["at_rest"]["low"], numbers["at_rest"]["high"]) == (0.0, 1.0)
+    assert numbers["x_m_s"]["high"] - numbers["x_m_s"]["low"] < 1e-3

@@ -76,9 +76,14 @@ class Fit:
         return float(np.sqrt(max(self.covariance[index, index], 0.0)))
 
     def interval(self, index: int, share: float = 0.95) -> tuple[float, float]:
-        """Student's interval with as many degrees of freedom as there are trials to spare, within the number's bounds."""
+        """Student's interval with as many degrees of freedom as there are trials to spare, within the number's bounds.
+
+        All that is allowed where no pose depends on the number.
+        """
         if index in self.spans:
             return self.spans[index]
+        if len(self.jacobian) and not self.jacobian[..., index].any():
+            return self.free[index].parameter.low, self.free[index].parameter.high
         freedom = max(len(self.losses) - len(self.free), 1)
         half = float(stdtrit(freedom, (1 + share) / 2)) * self.se(index)
         value, p = float(self.values[index]), self.free[index].parameter
