@@ -41,7 +41,8 @@ class Lean(Bootstrap):
 
 
 _PAGE = """{% extends "bootstrap/bootstrap.html" %}
-{% block postamble %}{{ super() }}<script>SCRIPT</script>{% endblock %}"""
+{% block postamble %}{{ super() }}<meta name="viewport" content="width=device-width, initial-scale=1">
+<script>SCRIPT</script>{% endblock %}"""
 
 
 def template(title: str) -> Any:

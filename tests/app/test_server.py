@@ -38,6 +38,12 @@ def test_the_page_is_served_on_loopback_under_a_token(page):
     assert answer(page.address) == 200
 
 
+def test_a_phone_is_told_to_use_its_own_width(page):
+    with urllib.request.urlopen(page.address, timeout=30) as got:
+        head = got.read().decode().partition("<body")[0]
+    assert '<meta name="viewport" content="width=device-width' in head
+
+
 def run_as_notebook(cell):
     """What `cell` returns where a loop runs; in a thread of its own, for a browser of other tests leaves its loop in this one."""
     with ThreadPoolExecutor(1) as thread:
