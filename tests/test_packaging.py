@@ -128,4 +128,4 @@ def test_figures_are_drawn_from_what_is_installed(installed, tmp_path):
         command, cwd=tmp_path, env=without_us(installed), capture_output=True, text=True, timeout=100, check=False
     )
     assert done.returncode == 2, done.stderr
-    assert "error: there are no runs in" in done.stderr
+    assert "bns: there are no runs in" in done.stderr

@@ -58,17 +58,17 @@ def test_an_extension_equals_what_it_extends_where_its_own_numbers_are_neutral()
 
 
 def test_a_slope_on_wheels_that_grip_is_no_drift():
-    slope = {"x_m_s": 0.012, "y_m_s": -0.007, "turn_per_m": 3.0, "at_rest": 0.0}
+    slope = {"x_m_s": 0.012, "y_m_s": -0.007, "behind_share": 0.1, "at_rest": 0.0}
     answer = diagnose(
         WheelPredictor(tracks_of(measured(hidden(slope_load=slope), trials=20, seed=11, speeds=(-0.2, 0.2)))), NOMINAL
     ).as_json()
     assert (answer["verdict"], answer["effects"]) == ("effects", ["slope-load"])
     numbers = answer["parameters"]["slope-load"]
-    assert all(numbers[name]["low"] < slope[name] < numbers[name]["high"] for name in ("x_m_s", "y_m_s", "turn_per_m"))
+    assert all(numbers[name]["low"] < slope[name] < numbers[name]["high"] for name in ("x_m_s", "y_m_s", "behind_share"))
 
 
 def test_a_spring_is_found_from_what_was_tracked():
-    spring = {"anchor_x_m": 0.3, "anchor_y_m": -0.2, "pull_per_s": 0.06, "free_m": 0.15, "ahead_m": -0.05, "turn_per_m": -6.0}
+    spring = {"anchor_x_m": 0.3, "anchor_y_m": -0.2, "pull_per_s": 0.06, "free_m": 0.15, "ahead_share": -0.5}
     predictor = WheelPredictor(
         tracks_of(measured(hidden(tether_load=spring | {"at_rest": 1.0}), trials=30, seed=5, speeds=(-0.2, 0.2)))
     )
@@ -79,7 +79,7 @@ def test_a_spring_is_found_from_what_was_tracked():
 
 def test_what_no_pose_depends_on_may_be_anything_that_is_allowed():
     """Whether a slope moves a standing robot, where it never stands."""
-    slope = {"x_m_s": 0.012, "y_m_s": -0.007, "turn_per_m": 3.0, "at_rest": 0.0}
+    slope = {"x_m_s": 0.012, "y_m_s": -0.007, "behind_share": 0.1, "at_rest": 0.0}
     predictor = WheelPredictor(tracks_of(measured(hidden(slope_load=slope), trials=12, seed=11, speeds=(0.02, 0.2))))
     _, fit, _ = fit_set(predictor, NOMINAL, [effect_named("slope-load")])
     numbers = numbers_of(fit)["slope-load"]

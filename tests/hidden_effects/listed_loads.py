@@ -8,8 +8,9 @@ import numpy as np
 
 from tests.hidden_effects.cause import Body, Cause, Moment
 
+BASE_M = 0.0884
 FINE = 40
-"""Parts of a step in which forces are integrated."""
+"""Of the robot (Khepera III), and parts of a step in which forces are integrated."""
 
 
 def _in_small_steps(wheels: np.ndarray, moment: Moment, push, limits) -> np.ndarray:
@@ -53,10 +54,10 @@ class InertiaLag(Cause):
 
 
 class Pulled(Cause):
-    """A force in the plane, of which the wheels let through what points along them; the rest has a lever and turns the robot."""
+    """A force in the plane on the robot of these worlds: each wheel slips backwards by its own load; none slips sideways."""
 
     depends_on_pose = True
-    lever_per_m = 0.0
+    ahead_m = 0.0
     at_rest = 0.0
 
     def force(self, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> np.ndarray:
@@ -66,7 +67,9 @@ class Pulled(Cause):
     def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
         along = self.force(x, y, heading) * np.exp(-1j * heading)
         along = np.where(body.moving > 0, along, self.at_rest * along)
-        return body._replace(forward=body.forward + along.real, turn=body.turn + self.lever_per_m * along.imag)
+        torque = 2 * along.imag * self.ahead_m  # the force on both wheels is twice that on one
+        left, right = along.real - torque / BASE_M, along.real + torque / BASE_M
+        return body._replace(forward=body.forward + (left + right) / 2, turn=body.turn + (right - left) / BASE_M)
 
 
 @dataclass
@@ -75,11 +78,11 @@ class SlopeLoad(Pulled):
 
     x_m_s: float
     y_m_s: float
-    turn_per_m: float
+    behind_share: float
     at_rest: float
 
     def __post_init__(self) -> None:
-        self.lever_per_m = -self.turn_per_m
+        self.ahead_m = -self.behind_share * BASE_M
 
     def force(self, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> np.ndarray:
         return np.full(np.shape(x), self.x_m_s + 1j * self.y_m_s)
@@ -93,12 +96,11 @@ class TetherLoad(Pulled):
     anchor_x_m: float
     anchor_y_m: float
     free_m: float
-    ahead_m: float
-    turn_per_m: float
+    ahead_share: float
     at_rest: float
 
     def __post_init__(self) -> None:
-        self.lever_per_m = self.turn_per_m
+        self.ahead_m = self.ahead_share * BASE_M
 
     def force(self, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> np.ndarray:
         gap = self.anchor_x_m + 1j * self.anchor_y_m - (x + 1j * y + self.ahead_m * np.exp(1j * heading))

@@ -39,15 +39,17 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "force-limit": ({"max_m_s2": 0.4, "turn_ratio": 2.5}, {"max_m_s2": 0.2, "turn_ratio": 4.0}),
     "inertia-lag": ({"tau_s": 0.12, "turn_ratio": 0.5}, {"tau_s": 0.25, "turn_ratio": 0.3}),
     "slope-load": (
-        {"x_m_s": 0.003, "y_m_s": -0.002, "turn_per_m": 2.0, "at_rest": 0.0},
-        {"x_m_s": -0.008, "y_m_s": 0.006, "turn_per_m": 5.0, "at_rest": 1.0},
+        {"x_m_s": 0.003, "y_m_s": -0.002, "behind_share": 0.05, "at_rest": 0.0},
+        {"x_m_s": -0.008, "y_m_s": 0.006, "behind_share": 0.15, "at_rest": 1.0},
     ),
     "tether-load": (
-        _tether(0.01, (1.2, 0.3), free_m=0.2, ahead_m=-0.04, turn_per_m=-5.0, at_rest=0.0),
-        _tether(0.03, (0.6, 0.6), free_m=0.1, ahead_m=-0.05, turn_per_m=-8.0, at_rest=1.0),
+        _tether(0.01, (1.2, 0.3), free_m=0.2, ahead_share=-0.3, at_rest=0.0),
+        _tether(0.03, (0.6, 0.6), free_m=0.1, ahead_share=-0.6, at_rest=1.0),
     ),
 }
 """Medium and strong, of the Khepera."""
+ALIKE = {"slope-load": ("tether-load",)}
+"""What would stand in for an effect that is taken out: a slope is a cable from far away."""
 TURNING = {"backlash", "caster-swing", "dead-band", "stribeck"}
 """Effects that show only where wheels reverse or turn slowly."""
 
@@ -122,7 +124,7 @@ def _longer() -> Iterator[World]:
             plan = "mixed" if name in TURNING or (number + (level == "strong")) % 2 else "forward"
             yield World(f"new-{name}-{level}", "new", {name: parameters}, plan=plan)
             out = World(f"removed-{name}-{level}", "removed", unlisted={name: parameters}, plan=plan)
-            yield replace(out, barred=(name,))
+            yield replace(out, barred=(name, *ALIKE.get(name, ())))
 
 
 def _sized(parameters: Parameters, robot: str) -> Parameters:

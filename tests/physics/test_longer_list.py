@@ -218,7 +218,7 @@ def test_a_patch_covers_no_whole_floor():
 @pytest.mark.parametrize(("at_rest", "share"), [(0.0, 0.0), (0.25, 0.25), (1.0, 1.0)])
 def test_a_standing_robot_yields_to_a_slope_by_the_share_at_rest(at_rest, share):
     """It rolls downhill along its heading and turns its rear, where the mass is, downhill."""
-    slope = {"x_m_s": 0.01, "y_m_s": 0.0, "turn_per_m": 2.0, "at_rest": at_rest}
+    slope = {"x_m_s": 0.01, "y_m_s": 0.0, "behind_share": 2.0 * B / 4, "at_rest": at_rest}
     model = IDEAL.with_effect("slope-load", **slope)
     end = simulate(model, [[0.0]], [[0.0]], [[0.1]], start=np.array([[0.0, 0.0, np.pi / 3]]))[0, -1]
     way = share * 0.1 * 0.01
@@ -227,7 +227,7 @@ def test_a_standing_robot_yields_to_a_slope_by_the_share_at_rest(at_rest, share)
 
 
 def test_a_cable_is_slack_within_its_free_length():
-    spring = {"pull_per_s": 0.5, "anchor_x_m": 0.2, "anchor_y_m": 0.0, "free_m": 0.15, "ahead_m": 0.05, "turn_per_m": 0.0}
+    spring = {"pull_per_s": 0.5, "anchor_x_m": 0.2, "anchor_y_m": 0.0, "free_m": 0.15, "ahead_share": 0.05 / B}
     model = IDEAL.with_effect("tether-load", **spring, at_rest=1.0)
     start = np.array([[0.0, 0.0, 0.0]])
     assert simulate(model, [[0.0]], [[0.0]], [[0.1]], start=start)[0, -1] == pytest.approx([0.0, 0.0, 0.0])

@@ -13,11 +13,11 @@ from bns.physics.signals import Body, Wheels
 from bns.physics.wheels.loads import guessed, pulled
 
 
-def apply(body: Body, x_m_s: float, y_m_s: float, turn_per_m: float, at_rest: float) -> Body:
+def apply(body: Body, x_m_s: float, y_m_s: float, behind_share: float, at_rest: float) -> Body:
     """The part of the downhill velocity along the heading, and a turn in proportion to the part across it."""
     if body.place is None:
         return body  # first round of a simulation: nobody knows yet where the robot heads
-    return pulled(body, body.place, x_m_s, y_m_s, -turn_per_m, at_rest)
+    return pulled(body, body.place, x_m_s, y_m_s, -behind_share, at_rest)
 
 
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
@@ -33,14 +33,13 @@ EFFECT = Effect(
         Parameter("x_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "downhill speed, part to the east", size_power=1.0),
         Parameter("y_m_s", "m/s", -1.0, 1.0, (-0.1, 0.1), 0.0, "downhill speed, part to the north", size_power=1.0),
         Parameter(
-            "turn_per_m",
-            "rad/m",
-            -100.0,
-            100.0,
-            (-20.0, 20.0),
+            "behind_share",
+            "1",
+            -1.5,
+            1.5,
+            (-1.0, 1.0),
             0.0,
-            "turn rate away from downhill, per downhill speed across the heading (positive: centre of mass behind the axle)",
-            size_power=-1.0,
+            "centre of mass behind the axle (negative: ahead of it), in wheelbases",
         ),
         Parameter(
             "at_rest",
@@ -53,7 +52,7 @@ EFFECT = Effect(
             reached=(0.0, 1.0),
         ),
     ),
-    equation="v += sx·cos(theta) + sy·sin(theta), omega -= c·(sy·cos(theta) - sx·sin(theta))",
+    equation="v += sx·cos(theta) + sy·sin(theta), omega -= 4·(c/b)/b·(sy·cos(theta) - sx·sin(theta))",
     residuals="The robot is faster in one direction of the floor and slower in the opposite one; it is not carried sideways.",
     lookalikes=("floor-slope", "tether-load"),
     sentence="the robot is faster downhill and slower uphill, on wheels that do not slip sideways",

@@ -20,18 +20,18 @@ def apply(
     anchor_x_m: float,
     anchor_y_m: float,
     free_m: float,
-    ahead_m: float,
-    turn_per_m: float,
+    ahead_share: float,
     at_rest: float,
 ) -> Body:
     """The part along the heading of a velocity towards the anchor, and a turn in proportion to the part across it."""
     if body.place is None:
         return body  # first round of a simulation: nobody knows yet where the robot goes
     x, y, heading = (body.place[..., i] for i in range(3))
+    ahead_m = ahead_share * body.wheelbase_m
     east, north = anchor_x_m - x - ahead_m * np.cos(heading), anchor_y_m - y - ahead_m * np.sin(heading)
     length = np.maximum(np.hypot(east, north), 1e-9)
     pull = pull_per_s * np.maximum(length - free_m, 0.0) / length
-    return pulled(body, body.place, pull * east, pull * north, turn_per_m, at_rest)
+    return pulled(body, body.place, pull * east, pull * north, ahead_share, at_rest)
 
 
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
@@ -39,8 +39,8 @@ def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     found = guessed(wheels, anchored=True)
     if not found or found[2] <= 0.0:
         return ()
-    east, north, fall, turn_per_m = found
-    return tuple((fall, east / fall, north / fall, 0.0, 0.0, turn_per_m, rest) for rest in (0.0, 1.0))
+    east, north, fall, ahead_share = found
+    return tuple((fall, east / fall, north / fall, 0.0, ahead_share, rest) for rest in (0.0, 1.0))
 
 
 EFFECT = Effect(
@@ -52,17 +52,13 @@ EFFECT = Effect(
         Parameter("anchor_y_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, north"),
         Parameter("free_m", "m", 0.0, 100.0, (0.0, 10.0), 0.0, "length below which the cable is slack", reached=(0.0,)),
         Parameter(
-            "ahead_m", "m", -10.0, 10.0, (-0.5, 0.5), 0.0, "how far ahead of the axle it is fixed to the robot", size_power=1.0
-        ),
-        Parameter(
-            "turn_per_m",
-            "rad/m",
-            -100.0,
-            100.0,
-            (-20.0, 20.0),
+            "ahead_share",
+            "1",
+            -3.0,
+            3.0,
+            (-1.5, 1.5),
             0.0,
-            "turn rate per speed across the heading (positive: pulled ahead of the axle)",
-            size_power=-1.0,
+            "how far ahead of the axle it is fixed (negative: behind), in wheelbases",
         ),
         Parameter(
             "at_rest",
@@ -75,7 +71,8 @@ EFFECT = Effect(
             reached=(0.0, 1.0),
         ),
     ),
-    equation="v += e·cos(theta) + n·sin(theta), omega += c·(n·cos(theta) - e·sin(theta)) with e = k·(ax - x), n = k·(ay - y)",
+    equation="v += e·cos(theta) + n·sin(theta), omega += 4·(c/b)/b·(n·cos(theta) - e·sin(theta)), "
+    "(e, n) = k·(1 - free/length)·(anchor - point c ahead of the axle)",
     residuals="The robot is faster towards one point of the floor and slower away from it; it is not carried sideways.",
     lookalikes=("tether-pull", "slope-load"),
     sentence="something pulls on the robot's wheels towards one point, as a cable or a spring does",

@@ -11,20 +11,23 @@ _PIECE_S, _FEWEST = 0.4, 50
 
 
 def pulled(
-    body: Body, place: Array, east_m_s: Array | float, north_m_s: Array | float, turn_per_m: float, at_rest: float
+    body: Body, place: Array, east_m_s: Array | float, north_m_s: Array | float, ahead_share: float, at_rest: float
 ) -> Body:
-    """The part of a velocity along the heading added to the forward one; the part to the left, times ``turn_per_m``, to the turn.
+    """What a force makes of a robot whose wheels give way in proportion to their load and do not slip; it drives free wheels so.
 
+    The force acts a distance c, ``ahead_share`` wheelbases b, ahead of the axle. Along the heading both wheels share it. Across
+    it, its torque F·c loads them with F·c/b each, in opposite directions: a turn rate of 4·c/b^2 times what F makes ahead.
     Where the wheels stand, the share ``at_rest`` of both.
     """
     cos, sin = np.cos(place[..., 2]), np.sin(place[..., 2])
     share = at_rest + (1.0 - at_rest) * body.moving
     moved = body.with_added("forward_m_s", share * (east_m_s * cos + north_m_s * sin))
+    turn_per_m = 4.0 * ahead_share / body.wheelbase_m
     return moved.with_added("yaw_rad_s", turn_per_m * share * (north_m_s * cos - east_m_s * sin))
 
 
 def guessed(wheels: Wheels, anchored: bool) -> tuple[float, ...]:
-    """East and north velocity at the origin, decrease of both with the distance (1/s, 0 unless ``anchored``), and turn_per_m.
+    """East and north velocity at the origin, their decrease with the distance (1/s, 0 unless ``anchored``), wheelbases ahead.
 
     By least squares on pieces of the trials, beside a gain of each of the two velocities; empty where too little was tracked.
     """
@@ -50,7 +53,7 @@ def guessed(wheels: Wheels, anchored: bool) -> tuple[float, ...]:
     fall = less[0] if less else 0.0
     across = (north - fall * y) * cos - (east - fall * x) * sin
     _, turn_per_m = _solved([told_turn[good], (lasted * across)[good]], (moved[..., 2] - told_turn)[good])
-    return east, north, fall, turn_per_m
+    return east, north, fall, float(np.clip(turn_per_m * wheels.wheelbase_m / 4.0, -1.0, 1.0))
 
 
 def _solved(columns: list[Array], target: Array) -> list[float]:
