@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Body, Wheels
-from bns.physics.wheels.loads import guessed, pulled
+from bns.physics.wheels.loads import AT_REST, guessed, pulled
 
 
 def apply(body: Body, x_m_s: float, y_m_s: float, behind_share: float, at_rest: float) -> Body:
@@ -41,16 +41,7 @@ EFFECT = Effect(
             0.0,
             "centre of mass behind the axle (negative: ahead of it), in wheelbases",
         ),
-        Parameter(
-            "at_rest",
-            "1",
-            0.0,
-            1.0,
-            (0.0, 1.0),
-            0.0,
-            "share that acts while the wheels are commanded to stand",
-            reached=(0.0, 1.0),
-        ),
+        AT_REST,
     ),
     equation="v += sx·cos(theta) + sy·sin(theta), omega -= 4·(c/b)/b·(sy·cos(theta) - sx·sin(theta))",
     residuals="The robot is faster in one direction of the floor and slower in the opposite one; it is not carried sideways.",

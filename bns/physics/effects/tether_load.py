@@ -11,7 +11,7 @@ import numpy as np
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Body, Wheels
-from bns.physics.wheels.loads import guessed, pulled
+from bns.physics.wheels.loads import AT_REST, guessed, pulled
 
 
 def apply(
@@ -60,16 +60,7 @@ EFFECT = Effect(
             0.0,
             "how far ahead of the axle it is fixed (negative: behind), in wheelbases",
         ),
-        Parameter(
-            "at_rest",
-            "1",
-            0.0,
-            1.0,
-            (0.0, 1.0),
-            0.0,
-            "share that acts while the wheels are commanded to stand",
-            reached=(0.0, 1.0),
-        ),
+        AT_REST,
     ),
     equation="v += e·cos(theta) + n·sin(theta), omega += 4·(c/b)/b·(n·cos(theta) - e·sin(theta)), "
     "(e, n) = k·(1 - free/length)·(anchor - point c ahead of the axle)",

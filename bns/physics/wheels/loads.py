@@ -4,10 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from bns.physics.effect import Parameter
 from bns.physics.signals import Array, Body, Wheels
 
 _PIECE_S, _FEWEST = 0.4, 50
 """Long enough that a pose's noise is small against the way, short enough to lie at one place."""
+
+AT_REST = Parameter(
+    "at_rest",
+    "1",
+    0.0,
+    1.0,
+    (0.0, 1.0),
+    0.0,
+    "share that acts while the wheels are commanded to stand",
+    reached=(0.0, 1.0),
+)
 
 
 def pulled(
