@@ -36,6 +36,17 @@ def test_an_extension_that_lowers_no_error_is_not_taken(monkeypatch):
     assert "motor-lag" in found.accepted
 
 
+def test_an_extension_that_is_needed_no_longer_goes_back_to_the_simple_effect():
+    table = measured(hidden(motor_lag={"tau_s": 0.2}, wheelbase={"factor": 1.08}), trials=12, seed=3, speeds=(-0.2, 0.2))
+    predictor = WheelPredictor(tracks_of(table))
+    problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named("inertia-lag"), effect_named("wheelbase")])
+    search = stepwise.StepwiseSelection(predictor, NOMINAL)
+    _, fit, accepted = search._backward_step(problem, fit, ("inertia-lag", "wheelbase"))
+    assert accepted == ("wheelbase", "motor-lag")
+    assert fit.model.values_of("motor-lag")["tau_s"] == pytest.approx(0.2, rel=0.05)
+    assert {a.effect.name for a in fit.model.effects} == set(accepted)
+
+
 def test_wheels_that_lag_alike_keep_the_simple_lag():
     found = selected(hidden(motor_lag={"tau_s": 0.2}))
     assert found.accepted == ("motor-lag",)

@@ -24,6 +24,7 @@ from bns.diagnose.estimate.significance import MIN_Z
 from bns.diagnose.estimate.starts import best_start, fit_extended, fit_with, listed
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.select.extending import extended, reduced, simple, to_extend
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.negligible import certainly_better
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
@@ -171,42 +172,6 @@ class StepwiseSelection:
             tried.add(frozenset(accepted))
         return self._ended(problem, fit, accepted, steps)
 
-    def _extended(self, name: str) -> tuple[str, ...]:
-        """The name of the effect that this one extends, if it does."""
-        extends = self.catalogue[name].extends if name in self.catalogue else ""
-        return (extends,) if extends else ()
-
-    def _simple(self, accepted: Collection[str]) -> list[Effect]:
-        """The effects worth a fit that extend no other and are neither accepted nor a part of what is."""
-        there = {*accepted, *(part for name in accepted for part in self._extended(name))}
-        return [e for e in self._worth.values() if not e.extends and e.name not in there]
-
-    def _to_extend(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> dict[str, tuple[str, Fit]]:
-        """Name of an effect that extends another -> which accepted effect it would replace, and the fit that it begins from.
-
-        It extends an accepted effect, or one that could stand for an accepted effect nearly as well.
-        """
-        found: dict[str, tuple[str, Fit]] = {}
-        longer = [e for e in self._worth.values() if e.extends and e.name not in accepted]
-        others = self._exchanges(problem, fit, accepted) if any(e.extends not in accepted for e in longer) else []
-        for effect in longer:
-            if effect.extends in accepted:
-                found[effect.name] = effect.extends, fit
-                continue
-            near = [(tried.loss, name, tried) for name, other, tried in others if other == effect.extends]
-            if near:
-                _, name, tried = min(near, key=lambda n: n[0])
-                found[effect.name] = name, tried
-        return found
-
-    def _lacking(self, problem: Problem, fit: Fit, name: str) -> Fit:
-        """The fit that lacks an effect; of one that extends another, with that other in its place."""
-        if not self._extended(name):
-            return without(problem, fit, name)
-        simple, values = self.catalogue[self.catalogue[name].extends], fit.model.values_of(name)
-        model = fit.model.without(name).with_active(simple, tuple(values[p.name] for p in simple.parameters))
-        return problem.fit(model, nearby=fit.jacobian_by_parameter)
-
     def stands(self, before: SelectionResult) -> SelectionResult | None:
         """The end of another search as the end of this one, if it is one here as well; else None.
 
@@ -218,7 +183,8 @@ class StepwiseSelection:
         problem, fit = self._refit_with_noise(model, before.problem.pose_filter.noise)
         if any(self._rejected(fit, name, bounds=False) for name in accepted):
             return None
-        if not all(self._earned_over(problem, self._lacking(problem, fit, name), fit, name) for name in accepted):
+        simpler = {name: reduced(self.catalogue, problem, fit, name) for name in accepted}
+        if not all(self._earned_over(problem, one, fit, name) for name, one in simpler.items()):
             return None
         if self._exchange_step(problem, fit, accepted)[2] != accepted:
             return None
@@ -246,10 +212,10 @@ class StepwiseSelection:
     ) -> tuple[SelectionStep, Problem, Fit]:
         """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in."""
         left = self._worth_a_fit(problem, fit, accepted)
-        to_extend = self._to_extend(problem, fit, accepted)
+        place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges(problem, fit, accepted))
         of = len(self.catalogue) - len(accepted) if self.predictor.screening is not None else 0
-        longer = [self._worth[name] for name in to_extend]
-        tried = each(partial(self._tried, problem, fit, to_extend), [*DECOYS, *left, *longer])
+        longer = [self._worth[name] for name in place]
+        tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *left, *longer])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
         if self.predictor.screening is not None:
             tried[len(DECOYS) :] = self._worked_out(problem, fit, tried[len(DECOYS) :])
@@ -262,12 +228,12 @@ class StepwiseSelection:
                 passed_over += [candidate] if implausible(candidate.fit, candidate.name, bounds=False) else []
                 continue
             settled = self._refit_with_noise(candidate.fit.model, problem.pose_filter.noise)
-            if candidate.name in to_extend and not certainly_better((problem, fit), settled):
+            if candidate.name in place and not certainly_better((problem, fit), settled):
                 continue
             rejected_because = self._rejected(settled[1], candidate.name, bounds=False)
             if not rejected_because:
                 better = next((p.name for p in passed_over if not indistinguishable(candidate.fit, p.fit, fit)), "")
-                gone = to_extend.get(candidate.name, ("",))[0]
+                gone = place.get(candidate.name, ("",))[0]
                 return SelectionStep(tuple(ranking), decoy_threshold, candidate.name, better, of, gone), *settled
             ranking[index] = replace(candidate, rejected_because=rejected_because)
             passed_over.append(ranking[index])
@@ -280,7 +246,7 @@ class StepwiseSelection:
             self.tick("screening")
             left = [effect for name, effect in self.catalogue.items() if name not in accepted]
             self._worth |= {effect.name: effect for effect in worth_a_fit(screened(problem, fit, left))}
-        return self._simple(accepted)
+        return simple(self.catalogue, self._worth.values(), accepted)
 
     def _worked_out(self, problem: Problem, fit: Fit, tried: Sequence[Candidate]) -> list[Candidate]:
         """Where models are worked out roughly: those that come near the best one worked out well, each at its own numbers.
@@ -305,12 +271,10 @@ class StepwiseSelection:
         why = implausible(fit, name, bounds)
         return "" if self._all_believed and not at_bound(fit, name) else why
 
-    def _tried(self, problem: Problem, fit: Fit, to_extend: Mapping[str, tuple[str, Fit]], effect: Effect) -> Candidate:
+    def _tried(self, problem: Problem, fit: Fit, place: Mapping[str, tuple[str, Fit]], effect: Effect) -> Candidate:
         self.tick(effect.name)
-        if effect.name in to_extend:
-            added = fit_extended(problem, to_extend[effect.name][1], effect)
-        else:
-            added = fit_with(problem, fit, effect)
+        extends = place.get(effect.name)
+        added = fit_extended(problem, extends[1], effect) if extends else fit_with(problem, fit, effect)
         found = self._candidate(problem, fit, added, effect.name)
         if len(added.model.effects) == len(self.model.effects) + 1 and effect.name in self.catalogue:
             self.alone(found)
@@ -352,16 +316,17 @@ class StepwiseSelection:
             )  # at a bound it may be: there it does, and earns, nothing
             if believed and name == newest and not at_bound(fit, name):  # an exchange since may have left it nothing to do
                 continue
-            lacking = self._lacking(problem, fit, name)
-            needless = bool(self._extended(name)) and not certainly_better((problem, lacking), (problem, fit))
-            if not believed or needless or not self._earned_over(problem, lacking, fit, name):
-                accepted = tuple(a for a in accepted if a != name) + self._extended(name)
-                problem, fit = self._refit_with_noise(lacking.model, problem.pose_filter.noise)
+            simpler, parts = reduced(self.catalogue, problem, fit, name), extended(self.catalogue, name)
+            needless = bool(parts) and not certainly_better((problem, simpler), (problem, fit))
+            if not believed or needless or not self._earned_over(problem, simpler, fit, name):
+                accepted = tuple(a for a in accepted if a != name) + parts
+                problem, fit = self._refit_with_noise(simpler.model, problem.pose_filter.noise)
         return problem, fit, accepted
 
     def _may_stay(self, problem: Problem, fit: Fit, name: str) -> bool:
         """Whether that effect of a fit would be taken as a newcomer: few trials that gain much do not bring one in."""
-        return not self._rejected(fit, name) and self._earned_over(problem, self._lacking(problem, fit, name), fit, name)
+        simpler = reduced(self.catalogue, problem, fit, name)
+        return not self._rejected(fit, name) and self._earned_over(problem, simpler, fit, name)
 
     def _earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:
         return self._earned(Candidate(name, fit, problem.paired_comparison(lacking, fit)), lacking, 0.0)
@@ -372,7 +337,7 @@ class StepwiseSelection:
             return self._exchanged[2]
         result = []
         for name in accepted:
-            others = self._simple(accepted)
+            others = simple(self.catalogue, self._worth.values(), accepted)
             entry = self._entry if self._entry and self._entry.of(name, accepted) else None
             if entry and self.predictor.screening is None:  # tried already, when it was chosen among them
                 loose, lacking, known = entry.problem, entry.base, entry.fits

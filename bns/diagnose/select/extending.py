@@ -1,0 +1,52 @@
+"""Effects that contain a simpler one (`Effect.extends`): each comes in the place of that one, and goes back to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+
+from bns.diagnose.estimate.fit import Fit, Problem
+from bns.physics.effect import Effect
+
+Exchange = tuple[str, str, Fit]
+"""An accepted name, the name of what takes its place, and the fit."""
+
+
+def extended(catalogue: Mapping[str, Effect], name: str) -> tuple[str, ...]:
+    """The name of the effect that this one extends, if it does."""
+    extends = catalogue[name].extends if name in catalogue else ""
+    return (extends,) if extends else ()
+
+
+def simple(catalogue: Mapping[str, Effect], effects: Iterable[Effect], accepted: Collection[str]) -> list[Effect]:
+    """The effects that extend no other and are neither accepted nor a part of what is."""
+    there = {*accepted, *(part for name in accepted for part in extended(catalogue, name))}
+    return [effect for effect in effects if not effect.extends and effect.name not in there]
+
+
+def to_extend(
+    effects: Iterable[Effect], fit: Fit, accepted: Collection[str], exchanges: Callable[[], Iterable[Exchange]]
+) -> dict[str, tuple[str, Fit]]:
+    """Name of an effect that extends another -> which accepted effect it would replace, and the fit that it begins from.
+
+    It extends an accepted effect, or one that could stand for an accepted effect nearly as well, among ``exchanges``.
+    """
+    found: dict[str, tuple[str, Fit]] = {}
+    longer = [effect for effect in effects if effect.extends and effect.name not in accepted]
+    others = list(exchanges()) if any(effect.extends not in accepted for effect in longer) else []
+    for effect in longer:
+        if effect.extends in accepted:
+            found[effect.name] = effect.extends, fit
+            continue
+        near = [(tried.loss, name, tried) for name, other, tried in others if other == effect.extends]
+        if near:
+            _, name, tried = min(near, key=lambda n: n[0])
+            found[effect.name] = name, tried
+    return found
+
+
+def reduced(catalogue: Mapping[str, Effect], problem: Problem, fit: Fit, name: str) -> Fit:
+    """The fit that lacks an effect; of one that extends another, with that other in its place."""
+    model, values = fit.model.without(name), fit.model.values_of(name)
+    for part in extended(catalogue, name):
+        model = model.with_active(catalogue[part], tuple(values[p.name] for p in catalogue[part].parameters))
+    return problem.fit(model, nearby=fit.jacobian_by_parameter)
