@@ -145,13 +145,14 @@ def test_what_comes_near_the_best_is_worked_out_before_it_is_compared(monkeypatc
 def test_a_step_of_the_search_compares_what_was_worked_out(monkeypatch):
     search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
     search.predictor, search.catalogue = SimpleNamespace(screening=64), dict.fromkeys("abcde")
+    search._worth = {}
     gain = {"a": 100.0, "b": 90.0}
 
     def candidate(name, elpd):
         return Candidate(name, None, SimpleNamespace(elpd_diff=elpd))
 
     monkeypatch.setattr(search, "_worth_a_fit", lambda *_: list(gain), raising=False)
-    monkeypatch.setattr(search, "_tried", lambda _problem, _fit, name: candidate(name, gain.get(name, 0.0)), raising=False)
+    monkeypatch.setattr(search, "_tried", lambda *given: candidate(given[-1], gain.get(given[-1], 0.0)), raising=False)
     monkeypatch.setattr(search, "_earned", lambda *_: False, raising=False)
     well = {"a": 50.0, "b": 95.0}
     monkeypatch.setattr(search, "_worked_out", lambda _problem, _fit, tried: [candidate(c.name, well[c.name]) for c in tried])

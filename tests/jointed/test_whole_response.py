@@ -66,6 +66,7 @@ def test_an_interval_ends_at_the_bounds_of_its_number():
         losses=np.zeros(20),
         se=lambda _: 0.1,
         spans={},
+        jacobian=np.ones((20, 3, 1)),
     )
     low, high = Fit.interval(fit, 0)
     assert low == 0.0

@@ -78,15 +78,15 @@ class Fit:
     def interval(self, index: int, share: float = 0.95) -> tuple[float, float]:
         """Student's interval with as many degrees of freedom as there are trials to spare, within the number's bounds.
 
-        All that is allowed where no pose depends on the number.
+        All that is allowed where no pose depends on the number; one that is jagged may do nothing only nearby.
         """
         if index in self.spans:
             return self.spans[index]
-        if len(self.jacobian) and not self.jacobian[..., index].any():
-            return self.free[index].parameter.low, self.free[index].parameter.high
+        value, p = float(self.values[index]), self.free[index].parameter
+        if len(self.jacobian) and not p.jagged and not self.jacobian[..., index].any():
+            return p.low, p.high
         freedom = max(len(self.losses) - len(self.free), 1)
         half = float(stdtrit(freedom, (1 + share) / 2)) * self.se(index)
-        value, p = float(self.values[index]), self.free[index].parameter
         return max(value - half, min(p.low, value)), min(value + half, max(p.high, value))
 
 
