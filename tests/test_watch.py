@@ -50,7 +50,7 @@ def test_the_page_follows_the_runs_and_is_at_rest_in_the_end(tmp_path):
         watch(tmp_path, 0.01, said.append, rounds)
     assert seen == [("2", True), ("4", True)]
     assert "http-equiv" not in page.read_text()
-    assert said[0].startswith(f"error: there are no runs in {tmp_path}")
+    assert said[0].startswith(f"bns: there are no runs in {tmp_path}")
     assert said[1:] == [f"{page.as_uri()} is up to date"]
 
 
