@@ -1,5 +1,7 @@
 """Effects of loads: an effect that extends another takes its place only where that lowers the error; pulls on gripping wheels."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select import stepwise
+from bns.diagnose.select import extending, stepwise
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.diagnose.values import numbers_of
 from bns.physics.effects import all_effects, effect_named
@@ -45,6 +47,16 @@ def test_an_extension_that_is_needed_no_longer_goes_back_to_the_simple_effect():
     assert accepted == ("wheelbase", "motor-lag")
     assert fit.model.values_of("motor-lag")["tau_s"] == pytest.approx(0.2, rel=0.05)
     assert {a.effect.name for a in fit.model.effects} == set(accepted)
+
+
+def test_an_extension_that_lowers_no_error_certainly_goes_back_as_well(monkeypatch):
+    hiding = hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}, wheelbase={"factor": 1.08})
+    predictor = WheelPredictor(tracks_of(measured(hiding, trials=12, seed=3, speeds=(-0.2, 0.2))))
+    problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named("inertia-lag"), effect_named("wheelbase")])
+    search, both = stepwise.StepwiseSelection(predictor, NOMINAL), ("inertia-lag", "wheelbase")
+    assert search._backward_step(problem, fit, both)[2] == both
+    monkeypatch.setattr(stepwise, "certainly_better", lambda *_: False)
+    assert search._backward_step(problem, fit, both)[2] == ("wheelbase", "motor-lag")
 
 
 def test_wheels_that_lag_alike_keep_the_simple_lag():
@@ -96,3 +108,23 @@ def test_what_no_pose_depends_on_may_be_anything_that_is_allowed():
     numbers = numbers_of(fit)["slope-load"]
     assert (numbers["at_rest"]["low"], numbers["at_rest"]["high"]) == (0.0, 1.0)
     assert numbers["x_m_s"]["high"] - numbers["x_m_s"]["low"] < 1e-3
+
+
+EFFECTS = {name: effect_named(name) for name in ("motor-lag", "inertia-lag", "clock-offset", "force-limit")}
+
+
+@pytest.mark.parametrize(
+    ("accepted", "left"),
+    [((), ["motor-lag", "clock-offset"]), (("motor-lag",), ["clock-offset"]), (("inertia-lag",), ["clock-offset"])],
+)
+def test_what_extends_another_is_no_candidate_of_its_own_and_its_part_none_beside_it(accepted, left):
+    assert [e.name for e in extending.simple(EFFECTS, EFFECTS.values(), accepted)] == left
+
+
+def test_an_effect_extends_what_is_accepted_or_what_could_stand_for_it():
+    fit, far, near = object(), SimpleNamespace(loss=3.0), SimpleNamespace(loss=2.0)
+    exchanges = [("wheelbase", "motor-lag", far), ("clock-offset", "motor-lag", near), ("clock-offset", "side-slip", near)]
+    accepted = ("wheelbase", "clock-offset")
+    assert extending.to_extend(EFFECTS.values(), fit, accepted, lambda: exchanges) == {"inertia-lag": ("clock-offset", near)}
+    assert extending.to_extend(EFFECTS.values(), fit, ("motor-lag",), list) == {"inertia-lag": ("motor-lag", fit)}
+    assert extending.to_extend(EFFECTS.values(), fit, ("inertia-lag",), list) == {}

@@ -230,6 +230,7 @@ def test_a_cable_is_slack_within_its_free_length():
     spring = {"pull_per_s": 0.5, "anchor_x_m": 0.2, "anchor_y_m": 0.0, "free_m": 0.15, "ahead_share": 0.05 / B}
     model = IDEAL.with_effect("tether-load", **spring, at_rest=1.0)
     start = np.array([[0.0, 0.0, 0.0]])
-    assert simulate(model, [[0.0]], [[0.0]], [[0.1]], start=start)[0, -1] == pytest.approx([0.0, 0.0, 0.0])
+    near = np.array([[0.05, 0.0, 0.0]])
+    assert simulate(model, [[0.0]], [[0.0]], [[0.1]], start=near)[0, -1] == pytest.approx(near[0])
     far = simulate(model, [[0.0]], [[0.0]], [[0.02]], start=start - [[0.1, 0.0, 0.0]])[0, -1]
     assert far[0] + 0.1 == pytest.approx(0.5 * 0.1 * 0.02, rel=0.02)
