@@ -18,6 +18,7 @@ from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
+from bns.diagnose.adding import documented
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.diagnosis import diagnose as find
 from bns.diagnose.report.text import diagnosis_text
@@ -64,18 +65,28 @@ class DiagnoseResult(Shown):
 
     @property
     def model(self) -> Model:
-        """The model refitted with these effects; the unchanged model if there were too few data to fit.
+        """The model refitted with these effects; the unchanged model if no effect was found.
 
-        If terms describe the remaining structure, `parameters` are fitted together with them; see `model_with_terms`.
+        With 95 % intervals and where its numbers come from, as that of `bns.add`; `bns.Model.save` writes it. If terms describe
+        the remaining structure, `parameters` are fitted together with them; see `model_with_terms`.
         """
-        fitted = self.diagnosis.model
-        return self.ready.model if fitted is None else Model(fitted)
+        selection = self.diagnosis.selection
+        if selection is None or not selection.accepted:
+            return self.ready.model
+        return Model(documented(selection.fit, self.ready.model, self.ready.measured, self.diagnosis.errors))
 
     @property
     def model_with_terms(self) -> Model | None:
         """The model with the effects and the terms that describe what no effect explains; None if there are none."""
-        fitted = self.diagnosis.model_with_terms
-        return None if fitted is None else Model(fitted)
+        terms = self.diagnosis.terms
+        if not terms:
+            return None
+        return Model(documented(terms[0].fit, self.ready.model, self.ready.measured, self.diagnosis.errors_with_terms))
+
+    @property
+    def extended(self) -> Model | None:
+        """The model with all that was found, effects and terms, as `bns diagnose -o` writes it; None if nothing was found."""
+        return self.model_with_terms or (self.model if self.effects else None)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -68,6 +68,13 @@ class Model(physics.Model):
         """Of the canonical JSON: all that changes numbers, neither name nor reasons; 64 digits."""
         return hashlib.sha256(self.canonical_json().encode()).hexdigest()
 
+    def __eq__(self, other: object) -> bool:
+        """Whether both simulate alike: names, reasons and provenance do not count."""
+        return self.canonical_json() == other.canonical_json() if isinstance(other, physics.Model) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self.canonical_json())
+
     def summary(self) -> str:
         """The numbers, one effect per line."""
         lines = [f"model {self.name}: {self.base}, wheelbase {self.wheelbase_m:g} m"]

@@ -7,9 +7,10 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 SHELLS = ("bash", "zsh", "tcsh")
+_MISSING = "the following arguments are required:"
 
 
 class Parser(argparse.ArgumentParser):
@@ -25,7 +26,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]  # only as it is called here
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """As its parent's, but nothing stays unknown: a command's own usage is shown, not that of ``bns``."""
+        """As its parent's, but nothing stays unknown, and help is a command's own, not that of ``bns``."""
         words = self.rewrite(list(sys.argv[1:] if args is None else args))
         for word in self._own(words):
             if word.startswith("--") and len(word) > 2 and " " not in word:
@@ -51,16 +52,28 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
             near = get_close_matches(str(value), action.choices, n=1, cutoff=0.5)
-            usage: argparse.ArgumentParser = action.choices[near[0]] if near else self
-            usage.print_usage(sys.stderr)
-            self.exit(2, f"bns: there is no command {value}.{_meant(value, action.choices)} All of them: bns --help\n")
+            below = f"; its options: bns {near[0]} --help" if near else ""
+            self.exit(2, f"bns: there is no command {value}.{_meant(value, action.choices)} All of them: bns --help{below}\n")
         super()._check_value(action, value)
+
+    def error(self, message: str) -> NoReturn:
+        """One line that says what is wrong and where help is; where something is missing, also what is always needed."""
+        needed = [_written(action) for action in self._actions if action.required]
+        short = f" Needed: {self.prog} {' '.join(needed)}." if needed and message.startswith(_MISSING) else ""
+        said = message.replace(_MISSING, "missing:")
+        self.exit(2, f"bns: {said}{'' if said.endswith(('.', '?')) else '.'}{short} All options: {self.prog} --help\n")
 
     def _commands(self) -> dict[str, argparse.ArgumentParser]:
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction):
                 return dict(action.choices)
         return {}
+
+
+def _written(action: argparse.Action) -> str:
+    """An argument as it is written on the command line."""
+    value = str(action.metavar or action.dest.upper())
+    return f"{action.option_strings[-1]} {value}" if action.option_strings else value
 
 
 def _meant(given: str, valid: Iterable[str]) -> str:

@@ -112,7 +112,7 @@ def add_effects(
     windows, fit = memory.windows or PairedWindows(predictor), judged[-1][1]
     errors = windows.errors(list(zip(names, steps, strict=True)))
     warnings = tuple(warnings_on(fit, effects, errors))
-    return ExtendedModel(fit, _documented(fit, model, measured, errors), errors, warnings, steps)
+    return ExtendedModel(fit, documented(fit, model, measured, errors), errors, warnings, steps)
 
 
 def _judged(
@@ -187,8 +187,8 @@ def _written(model: Model, name: str, written: Mapping[str, str]) -> Model:
     )
 
 
-def _documented(fit: Fit, before: Model, measured: Measured, errors: PairedErrors) -> Model:
-    """The fitted model with intervals, reasons and provenance."""
+def documented(fit: Fit, before: Model, measured: Measured, errors: PairedErrors | None) -> Model:
+    """The fitted model with intervals, reasons and provenance; errors of None: none are known."""
     reason = f"fitted to {len(measured.tracks)} trials of {measured.path.name} ({measured.digest})"
     effects = tuple(_with_interval(fit, active, reason) for active in fit.model.effects)
     provenance = {
@@ -200,7 +200,9 @@ def _documented(fit: Fit, before: Model, measured: Measured, errors: PairedError
         "held_out_position_error_m": {
             name: {h: round(e.rms_m, 6) for h, e in errors.of(name).items() if np.isfinite(e.rms_m)}
             for name in (m.name for m in next(iter(errors.horizons.values())).models)
-        },
+        }
+        if errors
+        else {},
     }
     return replace(fit.model, effects=effects, provenance=provenance)
 

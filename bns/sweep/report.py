@@ -52,7 +52,8 @@ def summed_up(summary: Summary, results: Path) -> str:
 def status_table(rows: Sequence[SweepRow]) -> str:
     """One line a sweep and task."""
     head = ("sweep", "task", "done", "of", "failed", "quarantined", "other", "mean s per run", "last run began (UTC)")
-    lines = [head] + [
+    archives = any(row.archived for row in rows)  # a column that most stores do not need
+    lines = [(*head, "archived") if archives else head] + [
         (
             row.sweep,
             row.task,
@@ -63,10 +64,11 @@ def status_table(rows: Sequence[SweepRow]) -> str:
             str(row.other),
             "-" if math.isnan(row.mean_wall_s) else f"{row.mean_wall_s:.2f}",
             "-" if row.last is None else row.last.strftime("%Y-%m-%d %H:%M:%S"),
+            *([str(row.archived)] if archives else []),
         )
         for row in rows
     ]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines
     )

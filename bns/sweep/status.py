@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from bns.errors import SpecError
 from bns.spec import RunSpec
+from bns.store.archive.read import connect_archives, stored_archives
 from bns.store.read.reader import finished, load
 from bns.sweep.expand.grid import Sweep, parse_sweep
 
@@ -24,7 +25,8 @@ class SweepRow:
     """One sweep and task. ``total`` is None without a known sweep file; ``last``: when the last run began, None before any.
 
     Only runs that the newest sweep file of that name describes are done, failed or quarantined; ``other`` are
-    all the rest, those of an earlier file or an earlier engine. Without a known file there are none.
+    all the rest, those of an earlier file or an earlier engine. Without a known file there are none. ``archived``: how many of
+    the runs lie in archives in the folder ``archived`` of the results; a sweep does not repeat them, so they count as the others.
     """
 
     sweep: str
@@ -36,6 +38,7 @@ class SweepRow:
     last: datetime | None
     mean_wall_s: float
     other: int = 0
+    archived: int = 0
 
     @property
     def remaining(self) -> int | None:
@@ -48,7 +51,7 @@ def sweep_status(results: Path) -> list[SweepRow]:
 
     ``mean_wall_s`` is the mean of the runs that are done, NaN without any.
     """
-    runs = _that_count(results, load(results, "runs", columns=["run_id", *_COLUMNS]))
+    runs = _with_archived(results, _that_count(results, load(results, "runs", columns=["run_id", *_COLUMNS])))
     files = _newest_files(load(results, "specs", columns=["sweep", "written_at", "text"]))
     return [row for name in sorted({*runs["sweep"], *files}) for row in _rows(name, runs[runs["sweep"] == name], files)]
 
@@ -57,6 +60,19 @@ def _that_count(results: Path, runs: pd.DataFrame) -> pd.DataFrame:
     """``runs`` without those that are ok and have lost rows: the sweep does them again."""
     known = {name: finished(results, str(name)) for name in runs["sweep"].unique()}
     return runs[[run in known[sweep] for run, sweep in zip(runs["run_id"], runs["sweep"], strict=True)]]
+
+
+def _with_archived(results: Path, runs: pd.DataFrame) -> pd.DataFrame:
+    """``runs`` and those that only archives have; with a column ``archived``."""
+    import pandas as pd  # noqa: PLC0415  # as above
+
+    runs, files = runs.assign(archived=False), stored_archives(results)
+    if not files:
+        return runs
+    with connect_archives(files) as connection:
+        kept = connection.execute("SELECT run_id, sweep, task, status, spec FROM runs").df().assign(archived=True)
+    both = pd.concat([runs, kept], ignore_index=True)  # those of the store come first
+    return both.drop_duplicates(["sweep", "run_id"]).reset_index(drop=True)
 
 
 def _rows(name: str, runs: pd.DataFrame, files: dict[str, Sweep]) -> list[SweepRow]:
@@ -72,8 +88,11 @@ def _rows(name: str, runs: pd.DataFrame, files: dict[str, Sweep]) -> list[SweepR
 
 
 def _row(sweep: str, task: str, runs: pd.DataFrame, described: pd.Series[bool], total: int | None) -> SweepRow:
+    import pandas as pd  # noqa: PLC0415  # as above
+
     own = runs[described]
     counts = own["status"].value_counts()
+    last = runs["started_at"].max()
     done, failed, quarantined = (int(counts.get(status, 0)) for status in ("ok", "failed", "quarantined"))
     return SweepRow(
         sweep,
@@ -82,9 +101,10 @@ def _row(sweep: str, task: str, runs: pd.DataFrame, described: pd.Series[bool], 
         failed,
         quarantined,
         total,
-        None if runs.empty else runs["started_at"].max().to_pydatetime(),
+        None if pd.isna(last) else last.to_pydatetime(),
         float(own.loc[own["status"] == "ok", "wall_s"].mean()),
         len(runs) - len(own),
+        int(runs["archived"].sum()),
     )
 
 

@@ -8,8 +8,11 @@ import pytest
 import bns
 from bns.cli.main import main
 from bns.measurements import write_measurements
+from bns.physics.formula import formula_effect
 from bns.physics.model import load_model
 from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+WARMING = NOMINAL.with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (-0.15,))
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +54,49 @@ def test_added_effects_lower_the_error_and_the_model_comes_back(data, tmp_path, 
     assert model.effects[0].basis == "fitted"
     assert main(["add", "turn-slip", "--model", str(new), "--data", str(data), "-o", str(tmp_path / "x.yaml")]) == 2
     assert "already has turn-slip" in capsys.readouterr().err
+
+
+def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path, capsys, monkeypatch):
+    new, added = tmp_path / "found.yaml", tmp_path / "added.yaml"
+    words = ["diagnose", str(data), "--model", "khepera"]
+    monkeypatch.setattr("sys.argv", ["bns", *words])
+    assert main(words) == 0
+    assert capsys.readouterr().out.endswith(f"bns diagnose {data} --model khepera -o extended.yaml\n")
+    assert main([*words, "-o", str(new)]) == 0
+    assert f"written to {new}" in capsys.readouterr().out
+    assert main(["add", str(data), "turn-slip", "--model", "khepera", "-o", str(added)]) == 0
+    assert bns.Model(new) == bns.Model(added) != bns.Model("khepera")
+    assert hash(bns.Model(new)) == hash(bns.Model(added))
+    model = load_model(new)
+    assert model.effects[0].intervals["slip_s"][0] < 0.12 < model.effects[0].intervals["slip_s"][1]
+    errors = model.provenance["held_out_position_error_m"]
+    assert errors["with the effects"]["command"] < errors["as given"]["command"]
+    capsys.readouterr()
+    assert main(["diagnose", str(data), "--model", str(new), "-o", str(tmp_path / "more.yaml")]) == 0
+    assert "Nothing was found to add, so" in capsys.readouterr().out
+    assert not (tmp_path / "more.yaml").exists()
+    assert main([*words, "-o", str(tmp_path / "model.txt")]) == 2
+    assert "must end in .yaml" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_diagnosis_writes_terms_that_lower_the_error_where_no_effect_is_listed(tmp_path, capsys):
+    log, new = tmp_path / "warming.parquet", tmp_path / "found.yaml"
+    write_measurements(measured(WARMING, trials=24, seed=3), log)
+    words = ["diagnose", str(log), "--model", "khepera", "--without-effect", "warm-up", "-o", str(new)]
+    assert main(words) == 0
+    assert "added to share: " in capsys.readouterr().out
+    before, after = (bns.compare(log, model).errors.position_m["trial"] for model in ("khepera", new))
+    assert after < 0.6 * before
+
+
+def test_commands_that_are_all_zero_are_said_to_be(data, tmp_path, capsys):
+    table = pd.read_parquet(data).assign(left_m_s=0.0, right_m_s=0.0)
+    write_measurements(table, tmp_path / "zero.parquet")
+    assert main(["compare", str(tmp_path / "zero.parquet"), "--model", "khepera"]) == 0
+    assert "the robot was never told to move" in capsys.readouterr().err
+    assert main(["compare", str(data), "--model", "khepera"]) == 0
+    assert "never told to move" not in capsys.readouterr().err
 
 
 def test_a_formula_is_added_and_comes_back(data, tmp_path):

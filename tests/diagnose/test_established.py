@@ -94,6 +94,14 @@ def test_a_diagnosis_lists_what_imitates_apart_and_offers_the_term_with_its_erro
     assert error["after"] < 0.6 * error["before"]
 
 
+def test_no_knot_in_time_lies_behind_the_last_pose():
+    predictor = predictor_of(NOMINAL, trials=6)
+    functions = next(f for f in families(predictor, NOMINAL.wheelbase_m) if f.signal == "time in the trial").functions
+    knots = {float(number) for text in functions for number in re.findall(r"\d+\.\d+", text)}
+    assert max(knots) <= float(predictor.tracks.own_s.max()) + 1e-9
+    assert max(knots) > 0.5 * float(predictor.tracks.own_s.max())
+
+
 def test_steps_of_speed_are_found():
     predictor = predictor_of(hidden(command_quantisation={"step_m_s": 0.015, "share": 1.0}), trials=20)
     problem = problem_for(predictor, NOMINAL)

@@ -182,6 +182,11 @@ def test_after_a_clear_verdict_only_the_accepted_one_is_contested():
     competing_models = competing_models_of(d)
     assert competing_models[0].names == ("turn-slip",)
     assert len(competing_models) > 1
+    proposal = propose(d, ARENA, BOUNDS, 2.0)
+    assert all(pair.already_decided for pair in proposal.model_pairs)
+    assert "No experiment is needed: these measurements tell" in proposal_text(proposal)
+    undecided = replace(proposal, model_pairs=(replace(proposal.model_pairs[0], already_decided=False),))
+    assert "No experiment is needed" not in proposal_text(undecided)
     assert model_pairs_of(d, competing_models) == tuple((0, i) for i in range(1, len(competing_models)))
 
 

@@ -12,6 +12,7 @@ from sweep_jobs import make_sweep
 
 from bns.errors import StoreError, SweepWarning
 from bns.spec import RunSpec
+from bns.store.archive.write import archive
 from bns.store.read.reader import load
 from bns.store.record import RunRecord
 from bns.sweep.expand.grid import parse_sweep
@@ -74,6 +75,21 @@ def test_status_counts_by_sweep_and_task_against_the_sweep_file(tmp_path):
     ]
     assert rows[0].mean_wall_s == pytest.approx(1.05)
     assert rows[0].last.tzinfo is not None
+
+
+def test_runs_that_only_an_archive_has_count_as_the_sweep_counts_them(tmp_path):
+    serial(sweep_of(tmp_path), tmp_path / "there", limit=5)
+    archive(tmp_path / "there", tmp_path / "part.parquet")
+    serial(sweep_of(tmp_path), tmp_path / "here", limit=2)
+    before = sum(row.done + row.failed for row in sweep_status(tmp_path / "here"))
+    (tmp_path / "here" / "archived").mkdir()
+    (tmp_path / "part.parquet").rename(tmp_path / "here" / "archived" / "part.parquet")
+    rows = sweep_status(tmp_path / "here")
+    assert (before, sum(row.done + row.failed for row in rows)) == (2, 5)
+    assert (sum(row.archived for row in rows), sum(row.remaining for row in rows)) == (3, 7)
+    assert status_table(rows).splitlines()[0].endswith("archived")
+    again = serial(sweep_of(tmp_path), tmp_path / "here")
+    assert again.new == 7
 
 
 def test_status_of_a_sweep_half_done(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from bns.api.common.progress import Progress
     from bns.api.diagnose import DiagnoseResult
     from bns.api.measurements import Measurements
-    from bns.api.model import Given
+    from bns.api.model import Given, Model
 
 SAYS_LITTLE = 0.03
 """A share so small says nothing yet of how long the whole takes."""
@@ -81,6 +82,9 @@ def add_commands(command: Adder) -> None:
         one.add_argument("--figures", type=Path, metavar="DIR", help="also write figures into this folder")
     add_effect_options(found)
     add_fresh(held)
+    found.add_argument(
+        "-o", "--output", type=Path, metavar="NEW.yaml", help="also write the model with all effects and terms that were found"
+    )
     for one in (held, more):
         add_trust(one, also=True)
 
@@ -95,7 +99,10 @@ def add_model_options(parser: argparse.ArgumentParser) -> None:
         "snake-networks, snake+changes)",
     )
     parser.add_argument(
-        "--wheelbase", type=float, metavar="METRES", help="distance between the wheels, for differential-drive"
+        "--wheelbase",
+        type=float,
+        metavar="METRES",
+        help="distance between the wheels: needed for differential-drive, in place of its own for any other drive",
     )
     parser.add_argument("--robot", metavar="NAME", help="robot to use, if the column 'robot' of the data names several")
     parser.add_argument(
@@ -198,8 +205,17 @@ def compare(options: argparse.Namespace) -> int:
 
 def diagnose(options: argparse.Namespace) -> int:
     """The verdict on what a model lacks."""
+    from bns.api.model import checked_target
+
+    if options.output is not None:
+        checked_target(options.output)
     found = diagnosed(options)
+    extended = found.extended
+    if options.output is not None and extended is not None:
+        extended.save(options.output)
     print(json.dumps(found.to_json()) if options.json else found.summary())
+    if not options.json:
+        print(_where_written(options, extended), end="")
 
     def draw(folder: Path) -> Iterator[Path]:
         from bns.diagnose.report.figures import diagnosis_figure
@@ -209,6 +225,17 @@ def diagnose(options: argparse.Namespace) -> int:
 
     _drawn(options, draw)
     return 0
+
+
+def _where_written(options: argparse.Namespace, extended: Model | None) -> str:
+    """Where the model with all that was found is, or how to have it written; "" if nothing was found and nothing asked for."""
+    if options.output is not None:
+        if extended is None:
+            return f"\nNothing was found to add, so {options.output} was not written.\n"
+        return f"\nwritten to {options.output}; the old model is unchanged ({options.model})\n"
+    if extended is None:
+        return ""
+    return f"\nTo write the model with all this: {shlex.join(['bns', *sys.argv[1:], '-o', 'extended.yaml'])}\n"
 
 
 def diagnosed(options: argparse.Namespace) -> DiagnoseResult:

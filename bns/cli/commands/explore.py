@@ -28,7 +28,10 @@ def add_commands(command: Adder) -> None:
         help="khepera (default), differential-drive, snake, a YAML file, snake-networks, or the networks of a run",
     )
     page.add_argument(
-        "--wheelbase", type=float, metavar="METRES", help="distance between the wheels, for differential-drive"
+        "--wheelbase",
+        type=float,
+        metavar="METRES",
+        help="distance between the wheels: needed for differential-drive, in place of its own for any other drive",
     )
     page.add_argument("--port", type=_port, default=0, metavar="N", help="port on 127.0.0.1 (default: a free one)")
     page.add_argument("--no-browser", action="store_true", help="print the address without opening a browser")
@@ -43,6 +46,8 @@ def explore(options: argparse.Namespace) -> int:
 
     require("app", "panel", "bokeh")
     logging.getLogger("tornado.access").setLevel(logging.ERROR)  # no line for every file that the browser fetches
+    for name in ("tornado.application", "tornado.general", "bokeh", "asyncio"):
+        logging.getLogger(name).addFilter(_still_open)
     given = {} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}
     words = (options.model, *(["--wheelbase", f"{options.wheelbase:g}"] if given else []))
     files = [str(file) for file in options.data]
@@ -53,6 +58,13 @@ def explore(options: argparse.Namespace) -> int:
     print("open this address in a browser on this machine; Ctrl-C ends the page", flush=True)
     explorer.serve(browser=not options.no_browser)
     return 0
+
+
+def _still_open(record: logging.LogRecord) -> bool:
+    """Whether a message is about anything but a page that was closed while something was on its way to it."""
+    error = record.exc_info[1] if record.exc_info else None
+    closed = ("WebSocketClosedError", "StreamClosedError")
+    return type(error).__name__ not in closed and not any(name in record.getMessage() for name in closed)
 
 
 def _port(text: str) -> int:

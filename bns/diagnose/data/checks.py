@@ -64,6 +64,9 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     if not _tracked(usable).any():
         raise DataError("There is no tracked pose in these measurements: every x_m, y_m or heading_rad is empty.")
     _units(usable)
+    if not (usable[list(COMMANDS)].abs() > 0).any(axis=None):
+        text = "all commands are 0 in all trials: the robot was never told to move. Are these the columns of the commands?"
+        findings.insert(0, Finding(str(usable["trial"].iloc[0]), int(usable.index[0]), text))
     return usable, findings
 
 

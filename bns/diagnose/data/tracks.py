@@ -64,6 +64,11 @@ class Tracks:
         return self.t_s if self.lead_s is None else self.t_s - self.lead_s[self.trial]
 
     @cached_property
+    def session_s(self) -> Array:
+        """Time of every frame since the session began, (frames,)."""
+        return self.start_s[self.trial] + self.t_s
+
+    @cached_property
     def trial(self) -> NDArray[np.int64]:
         """The trial of every frame, (frames,)."""
         return np.repeat(np.arange(len(self)), np.diff(self.first))

@@ -9,6 +9,10 @@ import numpy as np
 from bns.diagnose.design.proposal import ModelPair, Proposal
 from bns.robots.khepera import START
 
+_NEEDLESS = (
+    "No experiment is needed: these measurements tell all these explanations apart. What follows confirms that on new data."
+)
+
 
 def proposal_text(p: Proposal, written: str = "") -> str:
     """Who stands against whom, what the experiment would decide, and what to type next."""
@@ -31,8 +35,9 @@ def model_pair_text(c: ModelPair) -> str:
 
 
 def proposal_lines(p: Proposal) -> list[str]:
-    """A sentence a pair, then what the trials are."""
-    lines = [model_pair_text(c) for c in p.model_pairs]
+    """Whether an experiment is needed at all, a sentence a pair, then what the trials are."""
+    needless = bool(p.model_pairs) and all(c.already_decided for c in p.model_pairs)
+    lines = [_NEEDLESS] * needless + [model_pair_text(c) for c in p.model_pairs]
     if not len(p.plan):
         return [*lines, "No trial is proposed: no commands would decide."]
     a = p.arena

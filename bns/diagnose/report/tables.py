@@ -170,11 +170,13 @@ def next_commands(d: Diagnosis, p: Proposal | None, command: Mapping[str, str]) 
     """What to type next."""
     data, model = command["data"], command["model"]
     out = []
-    if d.effects:
+    if d.terms:  # fitted together with the effects: one after the other they would be others
+        out.append(f"bns diagnose {data} {model} -o extended.yaml")
+    elif d.effects:
         out.append(f"bns add {data} {' '.join(d.effects)} {model} -o extended.yaml")
-    for term in d.terms or ((d.formula,) if d.formula else ()):
+    if d.formula and not d.terms:
         base = "--model extended.yaml" if out else model
-        out.append(f"bns add {data} {term.name} --term '{term.term}' --on {term.on} {base} -o extended.yaml")
+        out.append(f"bns add {data} {d.formula.name} --term '{d.formula.term}' --on {d.formula.on} {base} -o extended.yaml")
     if p is not None and len(p.plan):
         out.append(f"bns propose {data} {model} -o next.csv")
         if p.bounds is not None and p.bounds.robot:

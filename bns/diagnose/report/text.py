@@ -33,7 +33,9 @@ def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
     if len(findings) > most:
         lines.append(f"  … and {len(findings) - most} more (--findings lists all)")
     many = "1 irregularity" if len(findings) == 1 else f"{len(findings)} irregularities"
-    return "\n".join([f"{many} in the data:", *lines]) if findings else "no irregularities in the data"
+    if not findings:
+        return "no irregularities in the data"
+    return "\n".join([f"{many} in the data (rows of the table are counted from 0):", *lines])
 
 
 def diagnosis_text(d: Diagnosis) -> str:
@@ -60,9 +62,8 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
         for side, (value, low, high) in wheel_sizes(d.calibration).items():
             yield f"  {side} wheel: {value:.5g} of the drawing's size (95 %: {low:.5g} to {high:.5g})"
     for term in d.terms or ((d.formula,) if d.formula else ()):
-        values = ", ".join(f"{name} = {value:.4g}" for name, value in term.values.items())
-        yield f"\ncandidate term: {term.term}   added to {term.on}; {values}"
-        yield f"  bns add DATA {term.name} --term '{term.term}' --on {term.on} … adds it"
+        yield f"\ncandidate term {term.name}, added to {term.on}: {term.term}"
+        yield from _intervals({term.name: numbers_of(term.fit)[term.name]})
     if d.notes:
         yield "\nnotes:"
         yield from (f"  - {note}" for note in d.notes)

@@ -122,12 +122,12 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
         yield Family("distance since each wheel reversed", WHEELS, tuple(f"u * {h}" for h in _hats("since", ways)[:-1]))
     yield Family("recent work of each wheel", WHEELS, ("u * lately10", "u * lately100"))
     yield Family("direction of motion", SHARE, tuple(_hats("swing", SWING_KNOTS)[1:]))
-    longest = float(seen["time_in_trial_s"].max())
+    longest = float(predictor.tracks.own_s.max())
     times = [share * longest for share in TIME_KNOTS]
     yield Family("time in the trial", SHARE, tuple(_hats("tau", times)[:-1]))
-    began = seen["session_s"]
     if predictor.tracks.start_known:
-        first, last = float(began.min()), float(began.max())
+        session = predictor.tracks.session_s
+        first, last = float(session.min()), float(session.max())
         times = [first + share * (last - first) for share in SESSION_KNOTS]
         yield Family("time of the session", SHARE, tuple(_hats("t", times)))
     turns = ("cos(heading)", "sin(heading)", "cos(2*heading)", "sin(2*heading)")

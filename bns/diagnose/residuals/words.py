@@ -61,12 +61,12 @@ def _along(term: Formula, name: str, grid: Array, what: str) -> str:
 
 
 def _time_in_trial(term: Formula, predictor: Predictor) -> str:
-    longest = float(predictor.variables()["time_in_trial_s"].max())
+    longest = float(predictor.tracks.own_s.max())
     return _along(term, "tau", np.linspace(0, longest, _POINTS), "of a trial")
 
 
 def _session(term: Formula, predictor: Predictor) -> str:
-    t_s = predictor.variables()["session_s"]
+    t_s = predictor.tracks.session_s
     return _along(term, "t", np.linspace(float(t_s.min()), float(t_s.max()), _POINTS), "of the session")
 
 
