@@ -82,8 +82,11 @@ def test_a_new_sweep_starts_its_first_run_before_it_loads_pandas(tmp_path):
     code += "LokyExecutor.submit = said\nfrom bns.cli.main import main\n"
     code += f"main(['sweep', {str(spec)!r}, '--results', {str(tmp_path / 'results')!r}, '--jobs', '2'])"
     for _ in range(2):  # the second time kernels lie compiled on the disk
+        shutil.rmtree(tmp_path / "results", ignore_errors=True)
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
-        shutil.rmtree(tmp_path / "results")
+    assert done.stdout.split() == ["False", "True"]
+    spec.write_text(spec.read_text().replace("seeds: 1", "seeds: 2"))  # one run is there, and one is left
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
     assert done.stdout.split() == ["False", "True"]
 
 

@@ -134,7 +134,7 @@ def empty(table: str) -> pa.Table:
     """``table`` without rows, with the folder columns."""
     schema = SCHEMAS[table]
     folders = [pa.field(name, pa.string()) for name in read_columns(table) if name in FOLDER_COLUMNS]
-    return pa.schema([*schema, *folders]).empty_table()
+    return pa.Table.from_batches([], pa.schema([*schema, *folders]))  # Schema.empty_table would load pandas
 
 
 def file_metadata(

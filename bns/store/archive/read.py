@@ -76,7 +76,7 @@ def stored_archives(results: Path | str) -> list[Path]:
     return sorted((Path(results) / ARCHIVED).glob("*.parquet"))
 
 
-def archived(results: Path | str, sweep: str) -> pd.DataFrame:
+def archived(results: Path | str, sweep: str) -> list[tuple[str, str, str, str, str]]:
     """The runs of a sweep that lie in archives in the folder ``results``/archived: run_id, status, task, world, world_digest.
 
     They count as done, and `archive` writes them together with the new ones: so a study continues on another machine.
@@ -84,14 +84,12 @@ def archived(results: Path | str, sweep: str) -> pd.DataFrame:
     Raises:
         StoreError: a file there is no archive, or not as it was written.
     """
-    columns = "run_id, status, task, world, world_digest"
     files = stored_archives(results)
     if not files:
-        import pandas as pd  # noqa: PLC0415  # as above
-
-        return pd.DataFrame(columns=columns.split(", "), dtype=str)
+        return []
     with connect_archives(files) as connection:
-        return connection.execute(f"SELECT {columns} FROM runs WHERE sweep = ? ORDER BY run_id", [sweep]).df()
+        columns = "run_id, status, task, world, world_digest"
+        return connection.execute(f"SELECT {columns} FROM runs WHERE sweep = ? ORDER BY run_id", [sweep]).fetchall()
 
 
 def recorded(results: Path | str, sweep: str) -> dict[str, str]:
@@ -99,8 +97,7 @@ def recorded(results: Path | str, sweep: str) -> dict[str, str]:
     done = finished(results, sweep)
     if not stored_archives(results):
         return done
-    kept = archived(results, sweep)
-    return dict(zip(kept["run_id"], kept["status"], strict=True)) | done
+    return {run: status for run, status, *_ in archived(results, sweep)} | done
 
 
 def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:

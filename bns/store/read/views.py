@@ -32,7 +32,7 @@ def connect_views(found: Snapshot) -> duckdb.DuckDBPyConnection:
 
 
 def _journal_rows(table: str, found: Snapshot) -> pa.Table:
-    nothing = empty(table).append_column("place", pa.array([], pa.string()))
+    nothing = empty(table).append_column("place", pa.nulls(0, pa.string()))
     rows = [
         _with_place(frame, table, file) for file, frames in found.journals for frame in frames if table in frame.tables
     ]

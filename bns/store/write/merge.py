@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from bns.store.disk.files import publish, remove, set_aside
 from bns.store.disk.journal import journals
@@ -184,6 +183,8 @@ def _gathered(table: str, group: list[_Fold]) -> pa.Table:
     for fold in group:
         if table in fold.parts:
             rows = _rows(fold.parts[table])
+            import pyarrow.compute as pc  # noqa: PLC0415  # slow to load, and a sweep without a compaction does without it
+
             pieces.append(rows.filter(pc.is_in(rows["run_id"], pa.array(sorted(fold.kept), pa.string()))))
     return pa.concat_tables(piece.replace_schema_metadata(None) for piece in pieces)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store.archive.read import archived
-from bns.store.read.reader import load
+from bns.store.read.reader import load_rows
 from bns.store.record import RunRecord
 
 
@@ -20,12 +20,11 @@ class WorldDigests:
 
     def read(self) -> None:
         """Take note of the runs in the store, which must exist, and in its archives."""
+        kept = [made_in for _, status, *made_in in archived(self._results, self._sweep) if status == "ok"]
         columns = ["task", "world", "world_digest"]
-        kept = archived(self._results, self._sweep)
-        stored = load(self._results, "runs", columns=columns, where={"sweep": self._sweep, "status": "ok"})
-        for runs in (kept.loc[kept["status"] == "ok", columns], stored):
-            for task, world, digest in runs.drop_duplicates().itertuples(index=False):
-                self.compare(task, world, digest)
+        stored = load_rows(self._results, "runs", columns, {"sweep": self._sweep, "status": "ok"})
+        for task, world, digest in dict.fromkeys([*map(tuple, kept), *stored]):
+            self.compare(task, world, digest)
 
     def check(self, record: RunRecord) -> None:
         """StoreError if there are runs of this sweep, task and world with another digest."""
