@@ -31,7 +31,7 @@ from bns.store.read.views import pattern
 from bns.store.schema import METADATA_KEY, PARAMETERS
 
 if TYPE_CHECKING:  # half a second to load, and a run needs no table
-    import pandas as pd
+    pass
 
 ARCHIVED = "archived"
 """Folder in the results: archives whose runs count as done."""
