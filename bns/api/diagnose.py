@@ -125,9 +125,15 @@ class DiagnoseResult(Shown):
         """Position error (m) on held-out trials, before and after on the same windows: one row per horizon.
 
         Columns before, after (root mean square), median_before, median_after, change, change_low, change_high (95 %, paired
-        by trial), noise_floor (of the tracking), windows, windows_left_out.
+        by trial), noise_floor (of the tracking), windows, windows_left_out. Of `model`; if there are terms, see
+        `errors_with_terms`.
         """
         return pd.DataFrame(self.diagnosis.as_json()["error"]).T.rename_axis("horizon")
+
+    @property
+    def errors_with_terms(self) -> pd.DataFrame:
+        """As `errors`, before and after adding all effects and terms (`model_with_terms`); empty if there are no terms."""
+        return pd.DataFrame(self.diagnosis.as_json()["error_with_terms"]).T.rename_axis("horizon")
 
     def summary(self) -> str:
         """Verdict first; then numbers, errors, ranking, notes."""

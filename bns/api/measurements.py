@@ -256,6 +256,12 @@ def _read(log: Log, more: tuple[str | PathLike[str], ...], robot: str | None, ma
                 "A table and files cannot be taken together; join them with pandas.concat, or give files only."
             )
         return measured_table(_mapped(log, mapping, Path()), _TABLE, robot=robot)
+    many = isinstance(log, list | tuple) and all(isinstance(each, str | PathLike) for each in log)
+    if not (many or isinstance(log, str | PathLike)):
+        raise DataError(
+            f"Measurements cannot be read from {type(log).__name__}; give the path of a file, several paths, a pandas.DataFrame, "
+            "or bns.Measurements."
+        )
     files = [Path(each) for each in ([log] if isinstance(log, str | PathLike) else log)] + [Path(each) for each in more]
     if not files:
         raise DataError("No file is given; give at least one .csv or .parquet file of measurements.")

@@ -224,6 +224,8 @@ def parse_model(text: str, name: str, folder: Path | None = None) -> Model:
     No Python file is run but those that are trusted (`bns.physics.trust`).
     """
     tree, lines = read_yaml(text, f"model {name}", ModelError)
+    if tree is None:
+        raise ModelError(f"The file of model {name} is empty; it needs at least base and wheelbase_m (docs/missing-effect.md).")
     if isinstance(tree, dict) and tree.get("base") == "mujoco":
         from bns.physics.jointed.model_files import parse_body  # noqa: PLC0415  # it needs MuJoCo, and knows this module
 

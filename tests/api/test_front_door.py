@@ -222,6 +222,18 @@ def test_measurements_are_the_same_from_a_file_a_table_and_a_mapping(log, table,
         bns.compare("gone.csv", "khepera")
 
 
+@pytest.mark.parametrize("log", [np.zeros((3, 3)), 3, [np.zeros(3)]])
+def test_what_is_no_log_is_refused_in_words(log):
+    with pytest.raises(bns.errors.DataError, match=r"cannot be read from .*; give the path of a file"):
+        bns.compare(log, "khepera")
+
+
+def test_a_model_file_without_content_is_said_to_be_empty(tmp_path):
+    (tmp_path / "empty.yaml").write_text("")
+    with pytest.raises(bns.errors.ModelError, match="The file of model empty is empty"):
+        bns.Model(tmp_path / "empty.yaml")
+
+
 def test_a_table_and_its_file_have_one_diagnosis(found, log):
     from_table = bns.diagnose(pd.read_csv(log), "khepera")
     assert from_table.to_json() == found.to_json()

@@ -42,6 +42,14 @@ def test_misleading_data_are_refused(table, change, message):
         checked(table.assign(**change(table)))
 
 
+@pytest.mark.parametrize(("column", "told"), [("left_m_s", 1), ("right_m_s", 1)])
+def test_a_command_for_one_wheel_only_is_listed(table, column, told):
+    half = table.assign(**{column: table[column].where(table.index % 3 != told)})
+    assert any("a command for one wheel only" in f.text and f"({column} is empty)" in f.text for f in checked(half)[1])
+    both = table.assign(left_m_s=half[column], right_m_s=half[column])
+    assert not any("one wheel only" in f.text for f in checked(both)[1])
+
+
 def test_missing_columns_are_named(table):
     with pytest.raises(DataError, match=r"lack heading_rad; they have trial, t_s.*bns import"):
         checked(table.drop(columns="heading_rad"))

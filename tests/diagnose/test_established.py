@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from bns.api.diagnose import DiagnoseResult
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
@@ -90,6 +91,9 @@ def test_a_diagnosis_lists_what_imitates_apart_and_offers_the_term_with_its_erro
     term = answer["terms"][0]
     assert found.model_with_terms.values_of(term["name"]) == term["values"]
     error = answer["error_with_terms"]["trial"]
+    result = DiagnoseResult(None, found)
+    assert result.errors_with_terms.loc["trial", "after"] == error["after"]
+    assert result.errors.loc["trial", "after"] == answer["error"]["trial"]["after"] > error["after"]
     assert error["change_high"] < 0
     assert error["after"] < 0.6 * error["before"]
 

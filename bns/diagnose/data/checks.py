@@ -47,6 +47,7 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     to_numbers(table, COLUMNS[1:])
     table.loc[left_out_rows(table), list(POSE)] = np.nan
     findings: list[Finding] = []
+    _half_told(table, findings)
     _held(table, findings)
     spare = _merge_rows_of_one_time(table)
     t, pose, own = table["t_s"].to_numpy(), table[list(POSE)].to_numpy(), own_rows(table)
@@ -149,6 +150,19 @@ def to_numbers(table: pd.DataFrame, columns: Sequence[str]) -> None:
     if table["t_s"].isna().any():
         row = int(np.flatnonzero(table["t_s"].isna())[0])
         raise DataError(f"Row {row}: t_s is empty; every row needs its time.")
+
+
+def _half_told(table: pd.DataFrame, findings: list[Finding]) -> None:
+    """Says so where one wheel has a command and the other has none: an empty cell means that no command is in force."""
+    empty = table[list(COMMANDS)].isna().to_numpy()
+    rows = np.flatnonzero(empty[:, 0] != empty[:, 1])
+    if len(rows):
+        lacks = COMMANDS[int(empty[rows[0], 1])]
+        text = (
+            f"{len(rows)} rows have a command for one wheel only, the first here ({lacks} is empty); an empty cell means that no "
+            "command is in force. Fill both cells, or leave both empty"
+        )
+        findings.append(Finding(str(table["trial"].iloc[rows[0]]), int(rows[0]), text))
 
 
 def _held(table: pd.DataFrame, findings: list[Finding]) -> None:
