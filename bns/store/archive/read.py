@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import duckdb
 import pyarrow.parquet as pq
@@ -29,9 +29,6 @@ from bns.store.disk.parquet import READ_FAULTS
 from bns.store.read.reader import finished
 from bns.store.read.views import pattern
 from bns.store.schema import METADATA_KEY, PARAMETERS
-
-if TYPE_CHECKING:  # half a second to load, and a run needs no table
-    pass
 
 ARCHIVED = "archived"
 """Folder in the results: archives whose runs count as done."""
