@@ -160,7 +160,7 @@ def test_formulas_that_fail_with_their_numbers_say_so(term):
         (f"{HEAD}effects: {'[' * 30}{']' * 30}\n", None, "nested too deeply: 3. levels"),
         (f"{HEAD}effects: &a [*a]\n", 3, "an alias contains itself"),
         ("3", None, "must be a mapping"),
-        ("", None, "must be a mapping"),
+        ("", None, "is empty; it needs at least base"),
         ("\x00", None, "special characters are not allowed"),
         ("a: " + "x" * 200_000, None, "200003 characters; 131072 are allowed"),
     ],
