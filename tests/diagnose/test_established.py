@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from bns.api.diagnose import DiagnoseResult
@@ -178,6 +179,19 @@ def test_a_slope_on_which_wheels_do_not_slip_sideways_is_described():
     predictor = predictor_of(NOMINAL.with_active(slope, (-0.02,)))
     found = stands(predictor)
     assert [(term.signal, term.on) for term in found.terms] == [("heading", "v")]
+    assert not left_over(found.problem, found.fit)
+
+
+def test_a_floor_that_slows_turns_as_well_in_one_direction_is_described():
+    """A carpet's nap: forward motion alone does not describe it."""
+    nap = formula_effect("nap", "k * cos(heading - 0.6)", "share")
+    predictor = predictor_of(NOMINAL.with_active(nap, (-0.12,)))
+    found = stands(predictor)
+    assert [(term.signal, term.on) for term in found.terms] == [("heading", "share")]
+    said = in_words(found.terms[0], predictor)
+    slower, at = map(float, re.match(r"slower by ([\d.]+)% at a heading of (-?\d+)°, faster by ", said).groups())
+    assert slower == pytest.approx(12.0, abs=1.0)
+    assert at == pytest.approx(np.degrees(0.6), abs=8)
     assert not left_over(found.problem, found.fit)
 
 

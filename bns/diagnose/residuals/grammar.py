@@ -134,6 +134,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     uphill = ("moving * cos(heading)", "moving * sin(heading)")  # a slope on which wheels do not slip sideways
     yield Family("heading", "v", (*(f"v * {t}" for t in turns), *uphill))
     yield Family("heading", "w", tuple(f"moving * {t}" for t in turns))
+    yield Family("heading", SHARE, turns)  # both wheels alike: a carpet's nap
     (x0, x1), (y0, y1) = (np.quantile(predictor.tracks.pose[:, i], [0.02, 0.98]) for i in (0, 1))
     bumps = tuple(_bumps(x0, x1, y0, y1))
     yield Family(PLACE, SHARE, bumps)

@@ -70,6 +70,14 @@ def _session(term: Formula, predictor: Predictor) -> str:
     return _along(term, "t", np.linspace(float(t_s.min()), float(t_s.max()), _POINTS), "of the session")
 
 
+def _heading(term: Formula, _: Predictor) -> str:
+    grid = np.linspace(-np.pi, np.pi, _POINTS)
+    share = _curve(term, "heading", grid)
+    low, high = (int(i) for i in (share.argmin(), share.argmax()))
+    at = [f"{_slower(-share[i])} at a heading of {np.degrees(grid[i]):.0f}°" for i in (low, high)]
+    return ", ".join(at)
+
+
 def _reversal(term: Formula, _: Predictor) -> str:
     way = np.linspace(0.0, 1.0, 10 * _POINTS)
     lost = -float(np.trapezoid(_curve(term, "since", way, u=1.0), way))
@@ -168,6 +176,7 @@ def _largest(term: Formula, predictor: Predictor) -> str:
 _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("time in the trial", "share"): _time_in_trial,
     ("time of the session", "share"): _session,
+    ("heading", "share"): _heading,
     ("distance since each wheel reversed", "wheels"): _reversal,
     ("direction of motion", "share"): _swing,
     ("speed of each wheel", "wheels"): _speed,
