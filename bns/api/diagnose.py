@@ -65,13 +65,13 @@ class DiagnoseResult(Shown):
 
     @property
     def model(self) -> Model:
-        """The model refitted with these effects; the unchanged model if no effect was found.
+        """The model refitted with these effects; the unchanged model if there were too few data to fit.
 
         With 95 % intervals and where its numbers come from, as that of `bns.add`; `bns.Model.save` writes it. If terms describe
         the remaining structure, `parameters` are fitted together with them; see `model_with_terms`.
         """
         selection = self.diagnosis.selection
-        if selection is None or not selection.accepted:
+        if selection is None:
             return self.ready.model
         return Model(documented(selection.fit, self.ready.model, self.ready.measured, self.diagnosis.errors))
 

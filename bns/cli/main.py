@@ -38,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     usable_streams()
     warnings.showwarning = _show_warning
     options = _parser().parse_args(arguments)
+    options.command_line = list(sys.argv[1:] if arguments is None else arguments)
     try:
         take_trust(options)
         return _flushed(int(options.command(options)))

@@ -149,6 +149,7 @@ class Diagnosis:
                 "signal": term.signal,
                 "in_words": words,
                 "values": {k: plain(v) for k, v in term.values.items()},
+                "parameters": numbers_of(term.fit)[term.name],
                 "elpd_diff": plain(term.paired_comparison.elpd_diff),
             }
             for term, words in zip(self.terms, self.terms_in_words, strict=True)

@@ -56,14 +56,13 @@ def test_added_effects_lower_the_error_and_the_model_comes_back(data, tmp_path, 
     assert "already has turn-slip" in capsys.readouterr().err
 
 
-def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path, capsys, monkeypatch):
+def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path, capsys):
     new, added = tmp_path / "found.yaml", tmp_path / "added.yaml"
     words = ["diagnose", str(data), "--model", "khepera"]
-    monkeypatch.setattr("sys.argv", ["bns", *words])
     assert main(words) == 0
     assert capsys.readouterr().out.endswith(f"bns diagnose {data} --model khepera -o extended.yaml\n")
     assert main([*words, "-o", str(new)]) == 0
-    assert f"written to {new}" in capsys.readouterr().out
+    assert f"written to {new}; the old model is unchanged (khepera)" in capsys.readouterr().out
     assert main(["add", str(data), "turn-slip", "--model", "khepera", "-o", str(added)]) == 0
     assert bns.Model(new) == bns.Model(added) != bns.Model("khepera")
     assert hash(bns.Model(new)) == hash(bns.Model(added))
@@ -75,6 +74,12 @@ def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path,
     assert main(["diagnose", str(data), "--model", str(new), "-o", str(tmp_path / "more.yaml")]) == 0
     assert "Nothing was found to add, so" in capsys.readouterr().out
     assert not (tmp_path / "more.yaml").exists()
+    refitted = bns.diagnose(data, new)
+    assert refitted.model.values_of("turn-slip")["slip_s"] == refitted.parameters.set_index("parameter").value["slip_s"]
+    own = tmp_path / "own.yaml"
+    bns.Model("khepera").save(own)
+    assert main(["diagnose", str(data), "--model", str(own), "-o", str(own)]) == 0
+    assert f"written to {own}; in the place of the model as given" in capsys.readouterr().out
     assert main([*words, "-o", str(tmp_path / "model.txt")]) == 2
     assert "must end in .yaml" in capsys.readouterr().err
 

@@ -12,6 +12,7 @@ from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.residuals.established import (
     _restored,
     _State,
@@ -91,6 +92,9 @@ def test_a_diagnosis_lists_what_imitates_apart_and_offers_the_term_with_its_erro
     assert answer["formula"]["term"] == answer["terms"][0]["term"]
     term = answer["terms"][0]
     assert found.model_with_terms.values_of(term["name"]) == term["values"]
+    assert {name: number["value"] for name, number in term["parameters"].items()} == term["values"]
+    k0 = term["parameters"]["k0"]
+    assert f"k0 = {k0['value']:.5g} (95 %: {k0['low']:.5g} to {k0['high']:.5g})" in diagnosis_text(found)
     error = answer["error_with_terms"]["trial"]
     result = DiagnoseResult(None, found)
     assert result.errors_with_terms.loc["trial", "after"] == error["after"]

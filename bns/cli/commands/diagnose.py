@@ -232,10 +232,18 @@ def _where_written(options: argparse.Namespace, extended: Model | None) -> str:
     if options.output is not None:
         if extended is None:
             return f"\nNothing was found to add, so {options.output} was not written.\n"
-        return f"\nwritten to {options.output}; the old model is unchanged ({options.model})\n"
+        return f"\n{_written(options)}\n"
     if extended is None:
         return ""
-    return f"\nTo write the model with all this: {shlex.join(['bns', *sys.argv[1:], '-o', 'extended.yaml'])}\n"
+    return f"\nTo write the model with all this: {shlex.join(['bns', *options.command_line, '-o', 'extended.yaml'])}\n"
+
+
+def _written(options: argparse.Namespace) -> str:
+    """Where the new model is, and what became of the old one."""
+    given = Path(options.model)
+    replaced = given.exists() and given.resolve() == options.output.resolve()
+    old = "in the place of the model as given" if replaced else f"the old model is unchanged ({options.model})"
+    return f"written to {options.output}; {old}"
 
 
 def diagnosed(options: argparse.Namespace) -> DiagnoseResult:
@@ -278,7 +286,7 @@ def add(options: argparse.Namespace) -> int:
     result.model.save(options.output)
     print(json.dumps(result.to_json()) if options.json else result.summary())
     if not options.json:
-        print(f"written to {options.output}; the old model is unchanged ({options.model})")
+        print(_written(options))
 
     def draw(folder: Path) -> Iterator[Path]:
         from bns.diagnose.report.figures import error_by_step_figure

@@ -13,6 +13,7 @@ import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
 from bns.diagnose.data.merge_topics import without_commands
+from bns.diagnose.data.odd_commands import half_told, never_told
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import COLUMNS, COMMANDS, LEFT_OUT, POSE, RUN_UP
@@ -47,7 +48,7 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     to_numbers(table, COLUMNS[1:])
     table.loc[left_out_rows(table), list(POSE)] = np.nan
     findings: list[Finding] = []
-    _half_told(table, findings)
+    odd = half_told(table)
     _held(table, findings)
     spare = _merge_rows_of_one_time(table)
     t, pose, own = table["t_s"].to_numpy(), table[list(POSE)].to_numpy(), own_rows(table)
@@ -65,10 +66,8 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     if not _tracked(usable).any():
         raise DataError("There is no tracked pose in these measurements: every x_m, y_m or heading_rad is empty.")
     _units(usable)
-    if not (usable[list(COMMANDS)].abs() > 0).any(axis=None):
-        text = "all commands are 0 in all trials: the robot was never told to move. Are these the columns of the commands?"
-        findings.insert(0, Finding(str(usable["trial"].iloc[0]), int(usable.index[0]), text))
-    return usable, findings
+    told = [Finding(str(table["trial"].iloc[row]), row, text) for row, text in filter(None, (odd, never_told(usable)))]
+    return usable, told + findings
 
 
 def rows_by_trial(table: pd.DataFrame) -> list[tuple[str, np.ndarray]]:
@@ -150,19 +149,6 @@ def to_numbers(table: pd.DataFrame, columns: Sequence[str]) -> None:
     if table["t_s"].isna().any():
         row = int(np.flatnonzero(table["t_s"].isna())[0])
         raise DataError(f"Row {row}: t_s is empty; every row needs its time.")
-
-
-def _half_told(table: pd.DataFrame, findings: list[Finding]) -> None:
-    """Says so where one wheel has a command and the other has none: an empty cell means that no command is in force."""
-    empty = table[list(COMMANDS)].isna().to_numpy()
-    rows = np.flatnonzero(empty[:, 0] != empty[:, 1])
-    if len(rows):
-        lacks = COMMANDS[int(empty[rows[0], 1])]
-        text = (
-            f"{len(rows)} rows have a command for one wheel only, the first here ({lacks} is empty); an empty cell means that no "
-            "command is in force. Fill both cells, or leave both empty"
-        )
-        findings.append(Finding(str(table["trial"].iloc[rows[0]]), int(rows[0]), text))
 
 
 def _held(table: pd.DataFrame, findings: list[Finding]) -> None:

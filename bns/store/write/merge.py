@@ -179,12 +179,12 @@ def _name(group: list[_Fold]) -> str:
 
 
 def _gathered(table: str, group: list[_Fold]) -> pa.Table:
+    import pyarrow.compute as pc  # noqa: PLC0415  # slow to load, and a sweep without a compaction does without it
+
     pieces = [SCHEMAS[table].empty_table()]
     for fold in group:
         if table in fold.parts:
             rows = _rows(fold.parts[table])
-            import pyarrow.compute as pc  # noqa: PLC0415  # slow to load, and a sweep without a compaction does without it
-
             pieces.append(rows.filter(pc.is_in(rows["run_id"], pa.array(sorted(fold.kept), pa.string()))))
     return pa.concat_tables(piece.replace_schema_metadata(None) for piece in pieces)
 

@@ -20,10 +20,10 @@ class WorldDigests:
 
     def read(self) -> None:
         """Take note of the runs in the store, which must exist, and in its archives."""
-        kept = [made_in for _, status, *made_in in archived(self._results, self._sweep) if status == "ok"]
+        kept = [row[2:] for row in archived(self._results, self._sweep) if row[1] == "ok"]
         columns = ["task", "world", "world_digest"]
         stored = load_rows(self._results, "runs", columns, {"sweep": self._sweep, "status": "ok"})
-        for task, world, digest in dict.fromkeys([*map(tuple, kept), *stored]):
+        for task, world, digest in dict.fromkeys([*kept, *stored]):
             self.compare(task, world, digest)
 
     def check(self, record: RunRecord) -> None:
