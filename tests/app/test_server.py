@@ -1,7 +1,6 @@
 """Who gets in: nobody but a browser on this machine that was given the address."""
 
 import asyncio
-import logging
 import subprocess
 import sys
 import urllib.error
@@ -12,19 +11,8 @@ import pytest
 
 pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
 
-from tornado.websocket import WebSocketClosedError
-
 from bns.app.explore import Explorer, explore, tabs_of
-from bns.cli.commands.explore import _still_open
 from bns.errors import BnsError
-
-
-def test_a_page_that_was_closed_is_no_traceback():
-    def about(error):
-        return logging.LogRecord("tornado.application", logging.ERROR, "", 0, "in callback", (), (type(error), error, None))
-
-    assert not _still_open(about(WebSocketClosedError()))
-    assert _still_open(about(ValueError("another")))
 
 
 @pytest.fixture(scope="module")

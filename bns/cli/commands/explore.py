@@ -46,8 +46,6 @@ def explore(options: argparse.Namespace) -> int:
 
     require("app", "panel", "bokeh")
     logging.getLogger("tornado.access").setLevel(logging.ERROR)  # no line for every file that the browser fetches
-    for name in ("tornado.application", "tornado.general", "bokeh", "asyncio"):
-        logging.getLogger(name).addFilter(_still_open)
     given = {} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}
     words = (options.model, *(["--wheelbase", f"{options.wheelbase:g}"] if given else []))
     files = [str(file) for file in options.data]
@@ -58,13 +56,6 @@ def explore(options: argparse.Namespace) -> int:
     print("open this address in a browser on this machine; Ctrl-C ends the page", flush=True)
     explorer.serve(browser=not options.no_browser)
     return 0
-
-
-def _still_open(record: logging.LogRecord) -> bool:
-    """Whether a message is about anything but a page that was closed while something was on its way to it."""
-    error = record.exc_info[1] if record.exc_info else None
-    closed = ("WebSocketClosedError", "StreamClosedError")
-    return type(error).__name__ not in closed and not any(name in record.getMessage() for name in closed)
 
 
 def _port(text: str) -> int:
