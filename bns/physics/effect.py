@@ -89,7 +89,8 @@ class Parameter:
         if not self.floor_share:
             return self
         high = max(self.floor_share * diagonal_m, 4.0 * self.low)
-        return replace(self, high=high, plausible=(min(self.plausible[0], high / 2.0), high))
+        neutral = min(self.neutral, high) if np.isfinite(self.neutral) else self.neutral
+        return replace(self, high=high, plausible=(min(self.plausible[0], high / 2.0), high), neutral=neutral)
 
     def scaled(self, ratio: float) -> Parameter:
         """The parameter for a robot whose wheelbase is ``ratio`` times that of the reference; its bounds stay."""

@@ -22,6 +22,7 @@ ORDER = (
     "command-delay",
     "motor-lag",
     "inertia-lag",
+    "controller-overshoot",
     "heating",  # by the work that the wheels really do
     "wheel-eccentricity",
     "backlash",

@@ -76,6 +76,18 @@ def _drive() -> list[World]:
             "each wheel's set speed changes by 0.3 m/s2 at most",
             "acceleration-limit",
         ),
+        _single(
+            "overshoot",
+            Setup(weak(MEDIUM, 0.06), Drive(integral_per_s=8.0)),
+            "speed controllers with an integral part, 8 /s times the proportional one (straight time constant 0.06 s)",
+            "controller-overshoot",
+        ),
+        _single(
+            "overshoot-hard",
+            Setup(weak(MEDIUM, 0.1), Drive(integral_per_s=25.0)),
+            "the same with 25 /s and 0.1 s: wheels that swing for a second",
+            "controller-overshoot",
+        ),
         _single("latency", Setup(LARGE, Drive(latency_s=0.12)), "commands act 0.12 s late", "latency", "clock-offset"),
         _single(
             "both-slow",

@@ -31,6 +31,8 @@ class Drive:
     dead_zone_ms: float = 0.0
     # The controllers give no torque while the wheel is this close to its set speed.
     dead_band_ms: float = 0.0
+    # An integral part of the controllers: what is asked of the proportional part grows by this share of the error a second.
+    integral_per_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -203,6 +205,7 @@ class Stage:
         shape = Shaper(drive, np.repeat(rows, TICKS_PER_ROW, axis=0))
         self.place(trial, rng)
         states = np.empty((len(rows) * TICKS_PER_ROW, self.model.nq))
+        summed = np.zeros(2)
         for tick in range(len(states)):
             states[tick] = self.data.qpos
             speeds = shape(tick) / radius
@@ -210,6 +213,9 @@ class Stage:
                 turning = self.data.qvel[self.rate]
                 error = speeds - turning
                 speeds = turning + np.sign(error) * np.maximum(np.abs(error) - drive.dead_band_ms / radius, 0)
+            if drive.integral_per_s:
+                summed += (speeds - self.data.qvel[self.rate]) * TICK_S
+                speeds = speeds + drive.integral_per_s * summed
             if changing:
                 self.surroundings()
             self.data.ctrl[:] = speeds

@@ -110,6 +110,28 @@ def test_what_no_pose_depends_on_may_be_anything_that_is_allowed():
     assert numbers["x_m_s"]["high"] - numbers["x_m_s"]["low"] < 1e-3
 
 
+OVERSHOOT = {"tau_s": 0.06, "lead_s": 0.1, "swing_s": 0.12, "turn_ratio": 0.5}
+
+
+def test_controllers_that_overshoot_are_found_and_told_from_a_late_clock():
+    found = selected(hidden(controller_overshoot=OVERSHOOT))
+    assert found.accepted == ("controller-overshoot",)
+    assert found.fit.model.values_of("controller-overshoot") == pytest.approx(OVERSHOOT, rel=0.1)
+    assert not found.competing_models
+
+
+def test_an_effect_that_extends_another_comes_in_by_itself_where_no_simpler_one_does_anything():
+    """Controllers without any lag: the wheels swing, and in the end all poses are as commanded."""
+    swinging = hidden(controller_overshoot=OVERSHOOT | {"tau_s": 0.0, "lead_s": 0.04, "swing_s": 0.06, "turn_ratio": 1.0})
+    predictor = WheelPredictor(tracks_of(measured(swinging, trials=20, seed=11, speeds=(-0.2, 0.2))))
+    barred = ("motor-lag", "clock-offset", "command-delay", "acceleration-limit", "clock-drift")
+    found = StepwiseSelection(predictor, NOMINAL, barred=barred).run()
+    assert found.accepted == ("controller-overshoot",)
+    assert ("controller-overshoot", "") in {(step.selected, step.instead_of) for step in found.steps}
+    step = next(step for step in found.steps if step.selected == "controller-overshoot")
+    assert {c.name for c in step.ranking} >= {"wheelbase", "inertia-lag", "controller-overshoot"}
+
+
 EFFECTS = {name: effect_named(name) for name in ("motor-lag", "inertia-lag", "clock-offset", "force-limit")}
 
 
@@ -128,3 +150,5 @@ def test_an_effect_extends_what_is_accepted_or_what_could_stand_for_it():
     assert extending.to_extend(EFFECTS.values(), fit, accepted, lambda: exchanges) == {"inertia-lag": ("clock-offset", near)}
     assert extending.to_extend(EFFECTS.values(), fit, ("motor-lag",), list) == {"inertia-lag": ("motor-lag", fit)}
     assert extending.to_extend(EFFECTS.values(), fit, ("inertia-lag",), list) == {}
+    both = [*EFFECTS.values(), effect_named("controller-overshoot")]
+    assert extending.to_extend(both, fit, ("inertia-lag",), list) == {"controller-overshoot": ("inertia-lag", fit)}

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from tests.hidden_effects.cause import Body, Cause, Moment
 from tests.hidden_effects.listed_floor import CasterSwing, FloorPatch, LensDistortion, QuadraticTurnSlip, TiltedCamera
-from tests.hidden_effects.listed_loads import ForceLimit, InertiaLag, SlopeLoad, TetherLoad
+from tests.hidden_effects.listed_loads import ControllerOvershoot, ForceLimit, InertiaLag, SlopeLoad, TetherLoad
 from tests.hidden_effects.listed_motors import (
     Backlash,
     CommandQuantisation,
@@ -269,6 +269,7 @@ LISTED: dict[str, type[Cause]] = {
     "acceleration-limit": AccelerationLimit,
     "force-limit": ForceLimit,
     "inertia-lag": InertiaLag,
+    "controller-overshoot": ControllerOvershoot,
     "heating": Heating,
     "wheel-eccentricity": WheelEccentricity,
     "backlash": Backlash,

@@ -53,6 +53,32 @@ class InertiaLag(Cause):
         return _in_small_steps(wheels, moment, lambda gap: gap, (1 / self.tau_s, 1 / self.tau_s / self.turn_ratio))
 
 
+@dataclass
+class ControllerOvershoot(Cause):
+    """A controller with a proportional and an integral part on each wheel of one body, whose motors also brake by themselves."""
+
+    tau_s: float
+    lead_s: float
+    swing_s: float
+    turn_ratio: float = 1.0
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        proportional, integral, slow_s = self.lead_s / self.tau_s, 1 / self.tau_s, self.swing_s**2 / self.tau_s
+        out, small_s = np.empty_like(wheels), moment.step_s / FINE
+        now, summed = np.zeros_like(wheels[:, 0]), np.zeros_like(wheels[:, 0])
+        for i in range(wheels.shape[1]):
+            way = np.zeros_like(now)
+            for _ in range(FINE):
+                force = (proportional * (wheels[:, i] - now) + integral * summed - now) / slow_s
+                straight, spin = force.mean(axis=1), (force[:, 1] - force[:, 0]) / 2 / self.turn_ratio
+                after = now + np.stack([straight - spin, straight + spin], axis=1) * small_s
+                summed = summed + (wheels[:, i] - (now + after) / 2) * small_s
+                way += (now + after) / 2 * small_s
+                now = after
+            out[:, i] = way / moment.step_s
+        return out
+
+
 class Pulled(Cause):
     """A force in the plane on the robot of these worlds: each wheel slips backwards by its own load; none slips sideways."""
 

@@ -46,6 +46,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         _tether(0.01, (1.2, 0.3), free_m=0.2, ahead_share=-0.3, at_rest=0.0),
         _tether(0.03, (0.6, 0.6), free_m=0.1, ahead_share=-0.6, at_rest=1.0),
     ),
+    "controller-overshoot": (
+        {"tau_s": 0.064, "lead_s": 0.0, "swing_s": 0.053, "turn_ratio": 1.0},
+        {"tau_s": 0.04, "lead_s": 0.1, "swing_s": 0.12, "turn_ratio": 0.5},
+    ),
 }
 """Medium and strong, of the Khepera."""
 ALIKE = {"slope-load": ("tether-load",)}

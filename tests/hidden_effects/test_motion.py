@@ -24,11 +24,12 @@ from tests.hidden_effects.listed import (
     YawBias,
 )  # fmt: skip
 from tests.hidden_effects.listed_floor import FloorPatch
+from tests.hidden_effects.listed_loads import ControllerOvershoot
 from tests.hidden_effects.listed_motors import Backlash
 from tests.hidden_effects.luck import luck
 from tests.hidden_effects.motion import mean_commands, move
 from tests.hidden_effects.unlisted import Kicks, Swing
-from tests.hidden_effects.unlisted_motors import LateStart, LooseWheel, Overshoot, SpeedLag, Stalls, WeakSupply
+from tests.hidden_effects.unlisted_motors import LateStart, LeftOvershoot, LooseWheel, SpeedLag, Stalls, WeakSupply
 
 BASE_M = 0.1
 
@@ -171,16 +172,45 @@ def test_a_wheel_that_starts_late_loses_that_time_after_each_halt():
     assert y == pytest.approx(0.1 * 0.85 + 0.05 + 0.1 * 0.85, abs=3e-4)
 
 
-def test_overshoot_is_the_step_response_of_the_textbook():
-    frequency_hz, damping = 2.0, 0.4
+def textbook_overshoot(t, frequency_hz, damping):
+    """Way after a step to 1 m/s: the integral of 1 - exp(-damping wn t) (cos wd t + damping wn / wd sin wd t)."""
     wn = 2 * np.pi * frequency_hz
     wd = wn * np.sqrt(1 - damping**2)
-    t = np.linspace(0.1, 1.5, 8)
     decay = np.exp(-damping * wn * t)
-    # the integral of 1 - exp(-damping wn t) (cos wd t + damping wn / wd sin wd t)
-    lost = 2 * damping / wn - decay * (2 * damping / wn * np.cos(wd * t) + (2 * damping**2 - 1) / wd * np.sin(wd * t))
-    way = [pose_after([Overshoot(frequency_hz, damping)], (0.1, 0.1, 2.0), at=one)[1] for one in t]
-    np.testing.assert_allclose(way, 0.1 * (t - lost), atol=1.5e-4)
+    return t - 2 * damping / wn + decay * (2 * damping / wn * np.cos(wd * t) + (2 * damping**2 - 1) / wd * np.sin(wd * t))
+
+
+@pytest.mark.parametrize(("told", "ratio"), [((0.1, 0.1), 3.0), ((-0.1, 0.1), 1.0)])
+def test_overshoot_is_the_step_response_of_the_textbook(told, ratio):
+    frequency_hz, damping, t = 2.0, 0.4, np.linspace(0.1, 1.5, 8)
+    wn = 2 * np.pi * frequency_hz
+    cause = ControllerOvershoot(2 * damping / wn, 0.0, 1 / wn, ratio)
+    seen = np.array([pose_after([cause], (*told, 2.0), at=one) for one in t])
+    way = seen[:, 1] if told[0] > 0 else (seen[:, 2] - np.pi / 2) * BASE_M / 2
+    np.testing.assert_allclose(way, 0.1 * textbook_overshoot(t, frequency_hz, damping), atol=1.5e-4)
+
+
+def test_in_turns_a_wheel_swings_with_the_inertia_that_it_moves_then():
+    wn, t = 2 * np.pi * 2.0, np.linspace(0.1, 1.5, 8)
+    cause = ControllerOvershoot(0.8 / wn, 0.0, 1 / wn, 4.0)  # half the frequency, half the damping ratio
+    turned = np.array([pose_after([cause], (-0.1, 0.1, 2.0), at=one)[2] for one in t]) - np.pi / 2
+    np.testing.assert_allclose(turned * BASE_M / 2, 0.1 * textbook_overshoot(t, 1.0, 0.2), atol=1.5e-4)
+
+
+def test_the_proportional_part_makes_a_start_lose_less_until_the_way_is_late_by_tau():
+    late = {
+        (lead, at): at - pose_after([ControllerOvershoot(0.1, lead, 0.1)], (0.1, 0.1, 3.0), at=at)[1] / 0.1
+        for lead in (0.0, 0.3)
+        for at in (0.1, 3.0)
+    }
+    assert late[0.3, 0.1] < 0.8 * late[0.0, 0.1]
+    assert [late[lead, 3.0] for lead in (0.0, 0.3)] == pytest.approx([0.1, 0.1], abs=1e-3)
+
+
+def test_a_left_wheel_overshoots_alone():
+    wn, t = 2 * np.pi * 2.0, np.linspace(0.1, 1.5, 8)
+    seen = np.array([pose_after([LeftOvershoot(2.0, 0.4)], (0.1, 0.1, 2.0), at=one)[2] for one in t]) - np.pi / 2
+    np.testing.assert_allclose(seen * BASE_M, 0.1 * (t - textbook_overshoot(t, wn / 2 / np.pi, 0.4)), atol=3e-4)
 
 
 def test_lag_grows_with_speed():

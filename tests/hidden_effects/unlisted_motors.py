@@ -25,8 +25,8 @@ class LateStart(Cause):
 
 
 @dataclass
-class Overshoot(Cause):
-    """A wheel's speed swings about a new command before it settles."""
+class LeftOvershoot(Cause):
+    """The left wheel's speed swings about a new command before it settles; the right one follows at once."""
 
     frequency_hz: float
     damping: float
@@ -38,8 +38,8 @@ class Overshoot(Cause):
         residue = root * np.conj(root) / (root * (root - np.conj(root))) * (pole - 1)
         first = 2 * residue.real
         second = -2 * (residue * np.conj(pole)).real
-        swung: np.ndarray = lfilter([0, first, second], [1, -2 * pole.real, abs(pole) ** 2], wheels, axis=1)
-        return swung
+        swung = lfilter([0, first, second], [1, -2 * pole.real, abs(pole) ** 2], wheels[..., 0], axis=1)
+        return np.stack([swung, wheels[..., 1]], axis=-1)
 
 
 @dataclass
@@ -97,7 +97,7 @@ class WeakSupply(Cause):
 
 MOTORS: dict[str, type[Cause]] = {
     "late-start": LateStart,
-    "overshoot": Overshoot,
+    "left-overshoot": LeftOvershoot,
     "speed-lag": SpeedLag,
     "stalls": Stalls,
     "loose-wheel": LooseWheel,

@@ -76,6 +76,13 @@ def test_an_effect_of_a_user_has_a_place_and_words_without_saying_so():
 
 
 @every_effect
+@pytest.mark.parametrize("diagonal_m", [0.03, 0.3, 30.0])
+def test_on_a_floor_of_any_size_the_neutral_values_are_allowed(effect, diagonal_m):
+    fitting = effect.within(diagonal_m)
+    assert fitting.checked(fitting.neutral)
+
+
+@every_effect
 def test_declared_completely(effect):
     assert effect.stage in STAGES
     assert effect.parameters

@@ -65,14 +65,19 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
 
 
 def fit_extended(problem: Problem, base: Fit, effect: Effect) -> Fit:
-    """The fit with an effect in the place of the one of ``base`` that it ``extends``, from that one's numbers."""
-    given = base.model.values_of(effect.extends)
-    alike = tuple(given.get(p.name, p.neutral) for p in effect.parameters)
-    starts = [alike]
-    for i, p in enumerate(effect.parameters):
-        if p.name not in given:
-            starts += [(*alike[:i], value, *alike[i + 1 :]) for value in _grid(p)]
-    models = [base.model.without(effect.extends).with_active(effect, values) for values in starts]
+    """The fit with an effect in the place of the one of ``base`` that it ``extends``, from that one's numbers.
+
+    Or in the place of one that extends the same effect in another way.
+    """
+    alike = {effect.extends, *(a.effect.name for a in base.model.effects if a.effect.extends == effect.extends)}
+    gone = next(a.effect.name for a in base.model.effects if a.effect.name in alike)
+    names = {p.name for p in effect.parameters}
+    given = {name: value for name, value in base.model.values_of(gone).items() if name in names}
+    own = [p for p in effect.parameters if p.name not in given]
+    varied = {p.name for p in own if not p.is_multiple} or {p.name for p in own}  # a multiple of nothing does nothing
+    neutral = {name: [value] for name, value in {**effect.neutral, **given}.items()}
+    starts = product(*(neutral[p.name] + (list(_grid(p)) if p.name in varied else []) for p in effect.parameters))
+    models = [base.model.without(gone).with_active(effect, values) for values in starts]
     return problem.fit(min(models, key=problem.loss))
 
 

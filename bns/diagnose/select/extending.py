@@ -12,9 +12,9 @@ Exchange = tuple[str, str, Fit]
 
 
 def extended(catalogue: Mapping[str, Effect], name: str) -> tuple[str, ...]:
-    """The name of the effect that this one extends, if it does."""
+    """The name of the effect that this one extends, if it does and that one may be missing (it is in the catalogue)."""
     extends = catalogue[name].extends if name in catalogue else ""
-    return (extends,) if extends else ()
+    return (extends,) if extends in catalogue else ()
 
 
 def simple(catalogue: Mapping[str, Effect], effects: Iterable[Effect], accepted: Collection[str]) -> list[Effect]:
@@ -28,14 +28,19 @@ def to_extend(
 ) -> dict[str, tuple[str, Fit]]:
     """Name of an effect that extends another -> which accepted effect it would replace, and the fit that it begins from.
 
-    It extends an accepted effect, or one that could stand for an accepted effect nearly as well, among ``exchanges``.
+    It extends an accepted effect, or one that could stand for an accepted effect nearly as well, among ``exchanges``; or an
+    accepted effect extends the same one in another way.
     """
     found: dict[str, tuple[str, Fit]] = {}
     longer = [effect for effect in effects if effect.extends and effect.name not in accepted]
-    others = list(exchanges()) if any(effect.extends not in accepted for effect in longer) else []
+    extending = {effect.extends: effect.name for effect in effects if effect.extends and effect.name in accepted}
+    others = list(exchanges()) if any(effect.extends not in {*accepted, *extending} for effect in longer) else []
     for effect in longer:
         if effect.extends in accepted:
             found[effect.name] = effect.extends, fit
+            continue
+        if effect.extends in extending:
+            found[effect.name] = extending[effect.extends], fit
             continue
         near = [(tried.loss, name, tried) for name, other, tried in others if other == effect.extends]
         if near:

@@ -210,16 +210,38 @@ class StepwiseSelection:
     def _forward_step(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
     ) -> tuple[SelectionStep, Problem, Fit]:
-        """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in."""
+        """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in.
+
+        Where there is none, the best of those that extend an effect which does nothing by itself here.
+        """
         left = self._worth_a_fit(problem, fit, accepted)
         place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges(problem, fit, accepted))
-        of = len(self.catalogue) - len(accepted) if self.predictor.screening is not None else 0
-        longer = [self._worth[name] for name in place]
-        tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *left, *longer])
+        tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *left, *(self._worth[name] for name in place)])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
+        chosen = self._chosen(problem, fit, tried[len(DECOYS) :], decoy_threshold, place)
+        lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in (*accepted, *place)]
+        if chosen[0].selected or not lone:
+            return chosen
+        first, tried = chosen[0], each(partial(self._tried, problem, fit, {}), lone)
+        step, problem, fit = self._chosen(problem, fit, tried, decoy_threshold, {})
+        ranking = sorted((*first.ranking, *step.ranking), key=lambda c: -c.paired_comparison.elpd_diff)
+        passed_over = step.passed_over or first.passed_over
+        return replace(step, ranking=tuple(ranking), passed_over=passed_over, of=first.of), problem, fit
+
+    def _chosen(
+        self,
+        problem: Problem,
+        fit: Fit,
+        tried: Sequence[Candidate],
+        decoy_threshold: float,
+        place: Mapping[str, tuple[str, Fit]],
+    ) -> tuple[SelectionStep, Problem, Fit]:
+        """The best candidate that earns its place; one that takes another's (``place``) must lower the error, too."""
+        added = len(fit.model.effects) - len(self.model.effects)
+        of = len(self.catalogue) - added if self.predictor.screening is not None else 0
         if self.predictor.screening is not None:
-            tried[len(DECOYS) :] = self._worked_out(problem, fit, tried[len(DECOYS) :])
-        ranking = sorted(tried[len(DECOYS) :], key=lambda c: -c.paired_comparison.elpd_diff)
+            tried = self._worked_out(problem, fit, tried)
+        ranking = sorted(tried, key=lambda c: -c.paired_comparison.elpd_diff)
         passed_over: list[Candidate] = []
         for index, candidate in enumerate(ranking):
             if not self._earned(candidate, fit, decoy_threshold):
@@ -228,12 +250,12 @@ class StepwiseSelection:
                 passed_over += [candidate] if implausible(candidate.fit, candidate.name, bounds=False) else []
                 continue
             settled = self._refit_with_noise(candidate.fit.model, problem.pose_filter.noise)
-            if candidate.name in place and not certainly_better((problem, fit), settled):
+            gone = place.get(candidate.name, ("",))[0]
+            if gone and not certainly_better((problem, fit), settled):
                 continue
             rejected_because = self._rejected(settled[1], candidate.name, bounds=False)
             if not rejected_because:
                 better = next((p.name for p in passed_over if not indistinguishable(candidate.fit, p.fit, fit)), "")
-                gone = place.get(candidate.name, ("",))[0]
                 return SelectionStep(tuple(ranking), decoy_threshold, candidate.name, better, of, gone), *settled
             ranking[index] = replace(candidate, rejected_because=rejected_because)
             passed_over.append(ranking[index])

@@ -13,6 +13,11 @@ _CIN_TERMS = 13
 _NO_WAY = 1e-6
 """Ways below this share of the trail: the difference of two integrals would be rounding errors."""
 
+_NO_SWING = 1e-10
+"""Shares of the square of the lag below which a swing is none: its rate of decay would be lost in rounding."""
+_NEARLY_EQUAL = 1e-4
+"""Roots so near each other (times the step) are one: the series' next term is below 1e-16."""
+
 
 @exact
 def first_order(target: Array, step_s: Array, tau_s: float) -> Array:
@@ -28,6 +33,54 @@ def first_order(target: Array, step_s: Array, tau_s: float) -> Array:
             mean[row, k] = target[row, k] + (w - target[row, k]) * settled * tau_s / h
             w += (target[row, k] - w) * settled
     return mean
+
+
+@exact
+def second_order(target: Array, step_s: Array, tau_s: float, lead_s: float, swing_s: float) -> Array:
+    """Mean over each step of w = y + lead·y', where swing²·y'' + (tau + lead)·y' + y = target and y = y' = 0 at the start; exact.
+
+    By the equation's two roots; y and y' do not jump with the target, and the equation itself gives the integral of y.
+    """
+    mean = np.zeros_like(target)
+    total_s, square = tau_s + lead_s, swing_s * swing_s
+    if square <= _NO_SWING * total_s * total_s:
+        square = 0.0
+    fall = total_s / (2.0 * square) if square > 0.0 else 0.0
+    apart = fall * fall - 1.0 / square if square > 0.0 else 0.0
+    for row in range(target.shape[0]):
+        y = rise = 0.0
+        for k in range(target.shape[1]):
+            h = step_s[row, k]
+            if h == 0.0:
+                continue
+            off = y - target[row, k]
+            if square == 0.0:
+                after = off * np.exp(-h / total_s) if total_s > 0.0 else 0.0
+                rise_after = 0.0
+            else:
+                even, odd = _decays(fall, apart, square, h)
+                after = off * even + (rise + fall * off) * odd
+                rise_after = rise * even - (fall * rise + off / square) * odd
+            moved = after - off
+            mean[row, k] = target[row, k] + (lead_s * moved - total_s * moved - square * (rise_after - rise)) / h
+            y, rise = target[row, k] + after, rise_after
+    return mean
+
+
+@exact
+def _decays(fall: float, apart: float, square: float, h: float) -> tuple[float, float]:
+    """exp(-fall·h) times cosh(b·h) and sinh(b·h)/b with b² = ``apart``, which may be negative (cos and sin) or near 0."""
+    if apart > 0.0:
+        b = np.sqrt(apart)
+        if b * h > _NEARLY_EQUAL:
+            slow, fast = np.exp(-h / (square * (fall + b))), np.exp(-(fall + b) * h)
+            return (slow + fast) / 2.0, (slow - fast) / (2.0 * b)
+    elif apart < 0.0:
+        b = np.sqrt(-apart)
+        if b * h > _NEARLY_EQUAL:
+            return np.exp(-fall * h) * np.cos(b * h), np.exp(-fall * h) * np.sin(b * h) / b
+    x = apart * h * h  # both roots are nearly one: the series of cosh and sinh
+    return np.exp(-fall * h) * (1.0 + x / 2.0), np.exp(-fall * h) * h * (1.0 + x / 6.0)
 
 
 @exact

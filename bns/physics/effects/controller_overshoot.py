@@ -1,0 +1,55 @@
+"""The wheels' speed controllers overshoot: a speed swings about a new command before it settles.
+
+A controller with a proportional and an integral part (gains P and I), on a motor with the gain K and the time constant T, obeys
+swing²·w'' + (tau + lead)·w' + w = u + lead·u' with lead = P/I, tau = 1/(K·I) and swing² = T/(K·I). The undamped swing has the
+frequency 1/(2·pi·swing), its damping ratio is (tau + lead)/(2·swing); without a lead it is any drive of the second order.
+T, and so swing², grows with the mass that the wheels move. That is the robot's mass on a straight line and a part of its moment
+of inertia in a turn on the spot (as in `inertia-lag`): the mean of the wheels and their difference swing by themselves.
+Without a swing and a lead it is `motor-lag`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from bns.physics.effect import Effect, Parameter
+from bns.physics.signals import Wheels
+from bns.physics.wheels.scans import second_order
+
+
+def apply(wheels: Wheels, tau_s: float, lead_s: float, swing_s: float, turn_ratio: float) -> Wheels:
+    """The answer of the second order of the wheels' mean and of half their difference, from rest."""
+    mean = (wheels.left_m_s + wheels.right_m_s) / 2
+    half = (wheels.right_m_s - wheels.left_m_s) / 2
+    mean = second_order(mean, wheels.step_s, tau_s, lead_s, swing_s)
+    half = second_order(half, wheels.step_s, tau_s, lead_s, swing_s * math.sqrt(turn_ratio))
+    return wheels.turning(mean - half, mean + half)
+
+
+EFFECT = Effect(
+    name="controller-overshoot",
+    stage="wheel",
+    parameters=(
+        Parameter(
+            "tau_s", "s", 0.0, 5.0, (0.0, 1.0), 0.0, "how late the way is at a steady command, in the end", reached=(0.0,)
+        ),
+        Parameter(
+            "lead_s", "s", 0.0, 5.0, (0.0, 1.0), 0.0, "proportional gain, divided by the integral gain", reached=(0.0,)
+        ),
+        Parameter("swing_s", "s", 0.0, 5.0, (0.0, 0.5), 0.0, "period of the undamped swing on lines, divided by 2·pi"),
+        Parameter(
+            "turn_ratio", "1", 0.02, 20.0, (0.1, 5.0), 1.0, "inertia that the wheels move in turns, divided by that on lines"
+        ),
+    ),
+    equation="swing²·m'' + (tau + lead)·m' + m = M + lead·M' for the mean m of the wheels (M: of their commands), and with "
+    "r·swing² for their difference",
+    residuals="After a change of the command the speed goes beyond the new one and comes back; what was lost at first is partly "
+    "made up for.",
+    lookalikes=("motor-lag", "clock-offset", "command-delay"),
+    sentence="the wheels' speed controllers overshoot",
+    measurement="log the wheels' own speeds (encoders) at a high rate while a command changes, ahead and on the spot",
+    apply=apply,
+    starts=tuple((0.0, lead, swing, 1.0) for swing in (0.04, 0.1, 0.25) for lead in (swing, 2.0 * swing)),
+    needs="track",
+    extends="motor-lag",
+)
