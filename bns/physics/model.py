@@ -199,6 +199,11 @@ def model_names() -> list[str]:
     return sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".yaml"))
 
 
+def _names() -> list[str]:
+    """All names that a command takes for a model: those of the package, the plain drive, and the snake."""
+    return [*model_names(), *BASES, "snake"]
+
+
 def load_model(name_or_path: str | Path) -> Model:
     """A model of the package by its name, or any YAML file by its path (with .yaml or .yml at the end).
 
@@ -207,13 +212,18 @@ def load_model(name_or_path: str | Path) -> Model:
     path = Path(name_or_path)
     if path.suffix in {".yaml", ".yml"}:
         if not path.is_file():
-            raise ModelError(
-                f"There is no model file {path}. Give the path of a YAML file or one of: {', '.join(model_names())}."
-            )
+            raise ModelError(f"There is no model file {path}. Give the path of a YAML file or one of: {', '.join(_names())}.")
         return parse_model(text_of(path, "the model", ModelError), path.stem, path.parent)
     if str(name_or_path) not in model_names():
-        known = unknown_name("robot model", str(name_or_path), model_names())
-        raise ModelError(f"{known} Or give the path of a YAML file, with .yaml at its end.")
+        if path.is_file():
+            raise ModelError(
+                f"{path} is no model: a model is the path of a YAML file (.yaml) or one of {', '.join(_names())}. If it is a log, give "
+                "it first and the model after it: bns diagnose LOG --model MODEL."
+            )
+        known = unknown_name("robot model", str(name_or_path), _names())
+        raise ModelError(
+            f"{known} Or give the path of a YAML file, with .yaml at its end. {BASES[0]} also needs --wheelbase METRES."
+        )
     text = (resources.files("bns.physics") / f"{name_or_path}.yaml").read_text(encoding="utf-8")
     return parse_model(text, str(name_or_path))
 
@@ -255,7 +265,10 @@ def effects_and_provenance(
     """What model files of all bases share; ``named`` finds a listed effect."""
     listed = top.get("effects") or []
     if not isinstance(listed, list):
-        raise ModelError(f"model {name}: effects is {shown(listed)}; it must be a list of {join(_EFFECT_KEYS)}.")
+        raise ModelError(
+            f"model {name}: effects is {shown(listed)}; it must be a list with an entry for each effect: "
+            "- {name: motor-lag, values: {tau_s: 0.1}, basis: guess, reason: why it is what it is}."
+        )
     provenance = top.get("provenance") or {}
     if not isinstance(provenance, dict):
         raise ModelError(f"provenance of model {name} is {shown(provenance)}; it must be a mapping (lines of key: value).")
@@ -268,6 +281,8 @@ def effects_and_provenance(
 
 def _effect(model: str, entry: Any, folder: Path, named: Callable[[str], Effect]) -> ActiveEffect:
     where = f"an effect of model {model}"
+    if isinstance(entry, dict) and "name" in entry and not {"term", "on", "file"} & entry.keys():
+        named(str(entry["name"]))  # a name that does not exist is said before keys that are not there
     given = keys(where, entry, (*_EFFECT_KEYS, *_EFFECT_MAY), required=_EFFECT_KEYS)
     written: dict[str, str] = {str(key): str(given[key]) for key in ("term", "on", "file") if key in given}
     numbers = given["values"] if isinstance(given["values"], dict) else {}

@@ -29,6 +29,9 @@ def test_good_data_pass_as_they_are(table):
         (lambda t: {"heading_rad": np.degrees(t.heading_rad)}, "looks like degrees"),
         (lambda t: {"t_s": t.t_s * 1000}, "t_s looks like milliseconds"),
         (lambda t: {"heading_rad": -t.heading_rad}, "counter-clockwise"),
+        (lambda t: {"x_m": t.x_m / 0.0254, "y_m": t.y_m / 0.0254}, "look like inches"),
+        (lambda t: {"left_m_s": t.left_m_s * 100, "right_m_s": t.right_m_s * 100}, r"look like cm/s; .* unit: cm/s"),
+        (lambda t: {"left_m_s": t.left_m_s / 0.0205, "right_m_s": t.right_m_s / 0.0205}, "rad/s of wheels with a radius of 2[01] mm"),
         (lambda t: {"left_m_s": t.left_m_s * 1000, "right_m_s": t.right_m_s * 1000}, "look like mm/s"),
         (lambda t: {"x_m": np.nan}, "no tracked pose"),
         (lambda t: {"y_m": "here"}, r"Row 0: y_m is 'here'; it must be a number"),
@@ -40,6 +43,12 @@ def test_good_data_pass_as_they_are(table):
 def test_misleading_data_are_refused(table, change, message):
     with pytest.raises(DataError, match=message):
         checked(table.assign(**change(table)))
+
+
+def test_a_robot_that_is_stuck_has_no_commands_in_another_unit(table):
+    rng = np.random.default_rng(4)
+    stuck = table.assign(x_m=0.1 + 0.002 * rng.normal(size=len(table)), y_m=0.002 * rng.normal(size=len(table)))
+    assert len(checked(stuck)[0]) == len(table)
 
 
 @pytest.mark.parametrize(("column", "told"), [("left_m_s", 1), ("right_m_s", 1)])

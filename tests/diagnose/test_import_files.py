@@ -217,3 +217,26 @@ def test_a_log_without_poses_and_commands_says_both():
         pytest.skip(f"no {path}")
     with pytest.raises(DataError, match=r"(?s)holds the commands. Suitable are.*No column holds x_m, y_m, heading_rad"):
         import_log([path])
+
+
+@pytest.mark.parametrize(
+    ("names", "factor", "entry", "remark"),
+    [
+        (("cmd_left", "cmd_right"), 1000, {"unit": "mm/s"}, "in mm/s is guessed"),
+        (("left_cmd_mmps", "right_cmd_mmps"), 1000, {"unit": "mm/s"}, None),
+        (("cmd_L", "cmd_R"), 100, {"unit": "cm/s"}, "in cm/s is guessed"),
+        (("vL_cmd", "vR_cmd"), 1, {}, None),
+        (("wheel_l", "wheel_r"), 1 / 0.0205, {"scale": "SCALE_M_S"}, "about 0.02 m per"),
+        (("u_l", "u_r"), 1275, {"scale": "SCALE_M_S"}, "about 0.00076 m per"),
+        (("left", "right"), 0, {}, None),
+    ],
+)
+def test_commands_without_a_unit_in_their_names_are_read_from_how_far_the_robot_went(table, names, factor, entry, remark):
+    left, right = names
+    drives = {left: table.left_m_s * factor, right: table.right_m_s * factor}
+    foreign = pd.DataFrame({"run": table.trial, "time": table.t_s, **drives, "x": table.x_m, "y": table.y_m, "yaw": table.heading_rad})
+    guess = guessed(foreign)
+    assert guess.mapping["columns"]["left_m_s"] == {"from": left, **entry}
+    assert guess.mapping["columns"]["right_m_s"] == {"from": right, **entry}
+    assert len(guess.remarks) == (remark is not None)
+    assert remark is None or remark in guess.remarks[0]

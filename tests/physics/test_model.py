@@ -85,6 +85,22 @@ def test_no_such_model(tmp_path):
         load_model("kepera")
     with pytest.raises(ModelError, match=r"no model file .*gone\.yaml.*khepera"):
         load_model(tmp_path / "gone.yaml")
+    with pytest.raises(ModelError, match=r"'snak'\. Did you mean 'snake'\?.*differential-drive.*--wheelbase METRES"):
+        load_model("snak")
+
+
+def test_a_log_in_the_place_of_a_model_is_called_one(tmp_path):
+    (tmp_path / "log.csv").write_text("trial,t_s\n")
+    with pytest.raises(ModelError, match=r"log\.csv is no model: .*bns diagnose LOG --model MODEL"):
+        load_model(tmp_path / "log.csv")
+
+
+def test_a_name_that_does_not_exist_is_said_before_the_keys_that_are_missing(tmp_path):
+    entry = "effects:\n  - {name: motor-lagg, values: {tau_s: 0.1}}\n"
+    with pytest.raises(ModelError, match=r"'motor-lagg'\. Did you mean 'motor-lag'"):
+        loaded(tmp_path, "base: differential-drive\nwheelbase_m: 0.1\n" + entry)
+    with pytest.raises(ModelError, match="lacks basis, reason"):
+        loaded(tmp_path, "base: differential-drive\nwheelbase_m: 0.1\n" + entry.replace("lagg", "lag"))
 
 
 def test_effects_switch_on_and_off_in_place():

@@ -28,6 +28,9 @@ _LONGEST_TRIAL_S = DEFAULTS.data.longest_trial_s
 _LARGEST = DEFAULTS.data.largest_number
 _FINER = DEFAULTS.data.finer_units
 _UNTOLD_RATIO = DEFAULTS.data.untold_ratio
+_LENGTHS = ((39.37, "inches"), (100.0, "centimetres"), (1000.0, "millimetres"))
+_SLOWEST = DEFAULTS.data.slowest_ratio
+_ALIKE = DEFAULTS.data.in_proportion
 FASTEST_M_S = DEFAULTS.data.fastest_m_s
 _DEGREES_AT_LEAST = DEFAULTS.data.degrees_rad_m
 
@@ -319,11 +322,18 @@ def _units(table: pd.DataFrame) -> None:
         raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
     if speed > FASTEST_M_S:
         raise DataError(f"Commands of up to {speed:g} m/s: left_m_s and right_m_s look like mm/s or a device's units.")
-    for factor, unit in ((100.0, "centimetres"), (1000.0, "millimetres")):
-        if factor / 3 < ratio < factor * 3:
-            raise DataError(
-                f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {unit}; they must be metres."
-            )
+    if _LENGTHS[0][0] / 1.25 < ratio < _LENGTHS[-1][0] * 3:
+        unit = min(_LENGTHS, key=lambda one: abs(np.log(one[0] / ratio)))[1]
+        raise DataError(
+            f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {unit}; they must be metres."
+        )
+    if 0 < ratio < _SLOWEST and np.corrcoef(ways[:, 0], ways[:, 1])[0, 1] > _ALIKE:
+        hundredths = 0.7 < 100 * ratio < 1.4
+        looks = "cm/s" if hundredths else f"rad/s of wheels with a radius of {1e3 * ratio:.0f} mm, or a device's units"
+        raise DataError(
+            f"The robot went {ratio:.2g} times as far as commanded, in proportion: left_m_s and right_m_s look like {looks}; they "
+            f"must be metres per second. In a mapping of `bns import`, give {'unit: cm/s' if hundredths else 'scale: METRES (a radius)'}."
+        )
     if _turns_as_degrees(table):
         raise DataError("Headings change far more than the wheels can turn the robot: heading_rad looks like degrees.")
     if len(ways) and np.abs(ways[:, 2]).sum() > 0.3:

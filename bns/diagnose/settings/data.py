@@ -75,6 +75,19 @@ class Data:
         "If a robot goes more than this many times as far as commanded, its commands are probably in separate rows; "
         f"{BY_HAND}.",
     )
+    slowest_ratio: float = setting(
+        0.2,
+        "1",
+        "A robot that goes less than this many times as far as commanded, in proportion to its commands, has commands in "
+        "another unit: cm/s, or rad/s of wheels with a radius below 0.2 m. No robot that works loses so much; one that is "
+        "stuck does not move in proportion.",
+    )
+    in_proportion: float = setting(
+        0.8,
+        "correlation",
+        "Correlation of commanded and tracked distances per second above which they are in proportion; the noise of a "
+        f"robot that is stuck does not correlate; {BY_HAND}.",
+    )
     degrees_rad_m: float = setting(
         150.0,
         "rad/m",
@@ -85,6 +98,19 @@ class Data:
         "number, unit",
         "A typical time step in a file above each of these numbers means that times are in the unit next to it: rows "
         "are 0.01 to 1 s apart, and the units differ by factors of a thousand.",
+    )
+    guess_speed_within: tuple[float, float] = setting(
+        (2.0, 1.2),
+        "factor",
+        "Commands whose names have no unit are in m/s, if the robot went as far within the first factor (robots that slip "
+        "or lag lose less than half), and are proposed in cm/s or mm/s within the second one: a device's own units are of any "
+        f"size; {BY_HAND}.",
+    )
+    guess_largest_m: float = setting(
+        100.0,
+        "m",
+        "Positions that spread further are not taken for metres, and no unit of speeds is proposed from them; "
+        f"{BY_HAND}.",
     )
     guess_degrees: float = setting(
         90.0,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from bns.diagnose.data.guess.numbers import unit_of_speeds
 from bns.diagnose.data.guess.words import QUATERNIONS, WORDS, rank, source, unit_of, words_of
 from bns.diagnose.data.mapping import DURATION, FORWARD, TURN, UNITS
 from bns.diagnose.settings import DEFAULTS
@@ -38,7 +39,9 @@ def of_columns(table: pd.DataFrame) -> dict[str, Any]:
             entries[column] = {"from": quaternion, "unit": "quaternion"}
         elif found is not None and not (column in {FORWARD, TURN} and "left_m_s" in entries):
             entries[column] = {"from": found, **unit_of_column(column, found, table[found])}
-    return _whole(entries)
+    entries = _whole(entries)
+    by_numbers = unit_of_speeds(table, entries)
+    return {name: {**entry, **(by_numbers if name in COMMANDS else {})} for name, entry in entries.items()}
 
 
 def motions_of(table: pd.DataFrame) -> dict[str, Any] | None:

@@ -11,8 +11,9 @@ import pandas as pd
 import yaml
 
 from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, motions_of, of_columns
+from bns.diagnose.data.guess.numbers import SCALE, metres_a_unit
 from bns.diagnose.data.guess.topics import of_topic_columns
-from bns.diagnose.data.guess.words import rank, words_of
+from bns.diagnose.data.guess.words import rank, unit_of, words_of
 from bns.diagnose.data.mapping import FORWARD, TURN
 from bns.diagnose.data.merge_topics import of_topics
 from bns.measurements import COMMANDS, POSE
@@ -118,6 +119,15 @@ def _apart(table: pd.DataFrame, entries: Entries) -> bool:
 def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
     yield from _lacks(entries)
     yield from _placeholders(entries)
+    left = entries.get(COMMANDS[0], {})
+    if "unit" in left and unit_of(words_of(str(left["from"]))) is None:
+        yield f"That the commands are in {left['unit']} is guessed from how far the robot went: check it."
+    if SCALE in {entry.get("scale") for entry in entries.values()}:
+        ratio = next(filter(None, (metres_a_unit(table, entries) for table in tables.values() if _has_all(table, entries))), 0.0)
+        yield (
+            f"Fill in {SCALE}, the speed in m/s that one unit of the commands stands for: the robot went about {ratio:.2g} m per "
+            "unit and second (of rad/s it is the radius of the wheels in metres, of rpm 0.105 times the radius)."
+        )
     if {FORWARD, TURN} <= set(entries):
         yield "Fill in METRES, the wheelbase that the robot's own controller assumes."
     told = " ".join(words_of(str(entries[n]["from"])) for n in (*COMMANDS, FORWARD, TURN) if n in entries)
@@ -128,6 +138,10 @@ def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[s
         yield "These poses are the robot's own odometry: they agree with its wheels whatever it does. Use poses of a tracker."
     if any(str(c).startswith("column_") for table in tables.values() for c in table.columns):
         yield "Columns without a heading are called column_1, column_2, ...; assign each."
+
+
+def _has_all(table: pd.DataFrame, entries: Entries) -> bool:
+    return all(entry["from"] in table for entry in entries.values() if isinstance(entry["from"], str))
 
 
 def _lacks(entries: Mapping[str, Any]) -> Iterator[str]:

@@ -10,8 +10,8 @@ from bns.diagnose.data.mapping import FORWARD, TURN, UNITS
 WORDS: dict[str, tuple[str, ...]] = {
     "trial": ("trial", "run", "episode", "experiment"),
     "t_s": ("t", "t s", "time", "stamp", "timestamp"),
-    "left_m_s": ("left", "vl", "wl", "phi l"),
-    "right_m_s": ("right", "vr", "wr", "phi r"),
+    "left_m_s": ("left", "vleft", "vl", "wl", "phi l", "l"),
+    "right_m_s": ("right", "vright", "vr", "wr", "phi r", "r"),
     FORWARD: ("v", "linear x", "twist x", "vx", "forward velocity", "linear velocity", "forward", "speed", "velocity"),
     TURN: ("omega", "angular z", "w", "wz", "yaw rate", "yawrate", "angular velocity", "turn rate"),
     "x_m": ("position x", "pos x", "px", "tx", "x"),
@@ -28,10 +28,17 @@ _TOLD = ("cmd", "command", "commanded", "cmd vel", "setpoint", "target", "desire
 _MEASURED = ("odom", "odometry", "encoder", "joint states", "measured", "wheel odom")
 
 
+_SHORT = {"mps": "m s", "mmps": "mm s", "cmps": "cm s", "mms": "mm s", "cms": "cm s", "kmh": "km h", "radps": "rad s"}
+_SHORT |= {"degps": "deg s", "dps": "deg s"}
+"""Units of speeds written as one word."""
+
+
 def words_of(name: str) -> str:
-    """A column's name in small words: `pose.position.x`, `cmdVel_left (mm/s)` -> `pose position x`, `cmd vel left mm s`."""
+    """A column's name in small words: `pose.position.x`, `cmdVel_left (mm/s)`, `vLeft_mmps` -> `pose position x`, `cmd vel left mm s`,
+    `v left mm s`.
+    """
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    return " ".join(re.findall(r"[a-z0-9]+", spaced.lower()))
+    return " ".join(_SHORT.get(word, word) for word in re.findall(r"[a-z0-9]+", spaced.lower()))
 
 
 def rank(said: str, truth: bool) -> int:

@@ -1,0 +1,60 @@
+"""What the sizes of numbers tell where names do not: the unit of the wheels' speeds, from how far the robot went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bns.diagnose.data.mapping import UNITS
+from bns.diagnose.settings import DEFAULTS
+from bns.measurements import COMMANDS
+
+SCALE = "SCALE_M_S"
+"""Stands where the speed is that one unit of a device stands for."""
+_SPEEDS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}
+_WITHIN = DEFAULTS.data.guess_speed_within
+_LARGEST_M = DEFAULTS.data.guess_largest_m
+_WINDOW_S = 1.0
+
+
+def unit_of_speeds(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, Any]:
+    """What an entry for a wheel's speed lacks: a unit, a scale to be filled in, or nothing (metres per second, or not known)."""
+    if any({"unit", "scale"} & set(entries[name]) for name in COMMANDS if name in entries):
+        return {}
+    ratio = metres_a_unit(table, entries)
+    if ratio is None:
+        return {}
+    unit = min(_SPEEDS, key=lambda name: abs(np.log(ratio / _SPEEDS[name])))
+    within = _WITHIN[0 if unit == "m/s" else 1]
+    if not 1 / within < ratio / _SPEEDS[unit] < within:
+        return {"scale": SCALE}
+    return {} if unit == "m/s" else {"unit": unit}
+
+
+def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any]) -> float | None:
+    """How far the robot went, over what the two columns of commands add up to; None where that cannot be said."""
+    needed = ("t_s", "x_m", "y_m", *COMMANDS)
+    if not set(needed) <= set(entries) or any(not isinstance(entries[name]["from"], str) for name in needed):
+        return None
+    t, x, y, left, right = (_in_si(table, entries[name], name not in COMMANDS) for name in needed)
+    good = np.isfinite(t) & np.isfinite(x) & np.isfinite(y)
+    if good.sum() < 3 or np.ptp(x[good]) > _LARGEST_M or np.ptp(y[good]) > _LARGEST_M:
+        return None
+    step = np.append(np.diff(t), 0.0)
+    usual = 3.0 * np.nanmedian(step[step > 0]) if (step > 0).any() else 0.0
+    lasts = np.where((step > 0) & (step <= usual), step, 0.0)  # not from trial to trial
+    way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(np.abs(left + right) / 2) * lasts)[:-1]])
+    every = max(round(_WINDOW_S / np.median(lasts[lasts > 0])), 1) if (lasts > 0).any() else 1
+    at = np.flatnonzero(good)[::every]
+    a, b = at[:-1], at[1:]
+    near = (t[b] > t[a]) & (t[b] - t[a] < 3.0 * _WINDOW_S)
+    went, told = np.hypot(x[b] - x[a], y[b] - y[a])[near].sum(), (way[b] - way[a])[near].sum()
+    return float(went / told) if went > 0 and told > 0 else None
+
+
+def _in_si(table: pd.DataFrame, entry: Mapping[str, Any], with_unit: bool) -> np.ndarray:
+    numbers = pd.to_numeric(table[entry["from"]], errors="coerce").to_numpy(float)
+    return numbers * (UNITS[entry["unit"]][1] if with_unit and "unit" in entry else 1.0)
