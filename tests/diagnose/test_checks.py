@@ -31,7 +31,7 @@ def test_good_data_pass_as_they_are(table):
         (lambda t: {"heading_rad": -t.heading_rad}, "counter-clockwise"),
         (lambda t: {"x_m": t.x_m / 0.0254, "y_m": t.y_m / 0.0254}, "look like inches"),
         (lambda t: {"left_m_s": t.left_m_s * 100, "right_m_s": t.right_m_s * 100}, r"look like cm/s; .* unit: cm/s"),
-        (lambda t: {"left_m_s": t.left_m_s / 0.0205, "right_m_s": t.right_m_s / 0.0205}, "rad/s of wheels with a radius of 2[01] mm"),
+        (lambda t: {"left_m_s": t.left_m_s * 50, "right_m_s": t.right_m_s * 50}, "rad/s of wheels with a radius of 20 mm"),
         (lambda t: {"left_m_s": t.left_m_s * 1000, "right_m_s": t.right_m_s * 1000}, "look like mm/s"),
         (lambda t: {"x_m": np.nan}, "no tracked pose"),
         (lambda t: {"y_m": "here"}, r"Row 0: y_m is 'here'; it must be a number"),

@@ -234,7 +234,8 @@ def test_a_log_without_poses_and_commands_says_both():
 def test_commands_without_a_unit_in_their_names_are_read_from_how_far_the_robot_went(table, names, factor, entry, remark):
     left, right = names
     drives = {left: table.left_m_s * factor, right: table.right_m_s * factor}
-    foreign = pd.DataFrame({"run": table.trial, "time": table.t_s, **drives, "x": table.x_m, "y": table.y_m, "yaw": table.heading_rad})
+    poses = {"x": table.x_m, "y": table.y_m, "yaw": table.heading_rad}
+    foreign = pd.DataFrame({"run": table.trial, "time": table.t_s, **drives, **poses})
     guess = guessed(foreign)
     assert guess.mapping["columns"]["left_m_s"] == {"from": left, **entry}
     assert guess.mapping["columns"]["right_m_s"] == {"from": right, **entry}

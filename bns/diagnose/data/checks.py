@@ -331,8 +331,9 @@ def _units(table: pd.DataFrame) -> None:
         hundredths = 0.7 < 100 * ratio < 1.4
         looks = "cm/s" if hundredths else f"rad/s of wheels with a radius of {1e3 * ratio:.0f} mm, or a device's units"
         raise DataError(
-            f"The robot went {ratio:.2g} times as far as commanded, in proportion: left_m_s and right_m_s look like {looks}; they "
-            f"must be metres per second. In a mapping of `bns import`, give {'unit: cm/s' if hundredths else 'scale: METRES (a radius)'}."
+            f"The robot went {ratio:.2g} times as far as commanded, in proportion: left_m_s and right_m_s look like {looks}; "
+            "they must be metres per second. In a mapping of `bns import`, give "
+            f"{'unit: cm/s' if hundredths else 'scale: METRES (a radius)'}."
         )
     if _turns_as_degrees(table):
         raise DataError("Headings change far more than the wheels can turn the robot: heading_rad looks like degrees.")

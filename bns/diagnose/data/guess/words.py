@@ -28,15 +28,13 @@ _TOLD = ("cmd", "command", "commanded", "cmd vel", "setpoint", "target", "desire
 _MEASURED = ("odom", "odometry", "encoder", "joint states", "measured", "wheel odom")
 
 
-_SHORT = {"mps": "m s", "mmps": "mm s", "cmps": "cm s", "mms": "mm s", "cms": "cm s", "kmh": "km h", "radps": "rad s"}
-_SHORT |= {"degps": "deg s", "dps": "deg s"}
+_SHORT = {"mps": "m s", "mmps": "mm s", "cmps": "cm s", "mms": "mm s", "cms": "cm s", "kmh": "km h"}
+_SHORT |= {"radps": "rad s", "degps": "deg s", "dps": "deg s"}
 """Units of speeds written as one word."""
 
 
 def words_of(name: str) -> str:
-    """A column's name in small words: `pose.position.x`, `cmdVel_left (mm/s)`, `vLeft_mmps` -> `pose position x`, `cmd vel left mm s`,
-    `v left mm s`.
-    """
+    """A column's name in small words: `cmdVel_left (mm/s)` -> `cmd vel left mm s`, `vLeft_mmps` -> `v left mm s`."""
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     return " ".join(_SHORT.get(word, word) for word in re.findall(r"[a-z0-9]+", spaced.lower()))
 
