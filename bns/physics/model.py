@@ -217,8 +217,8 @@ def load_model(name_or_path: str | Path) -> Model:
     if str(name_or_path) not in model_names():
         if path.is_file():
             raise ModelError(
-                f"{path} is no model: a model is the path of a YAML file (.yaml) or one of {', '.join(_names())}. If it is a log, "
-                "give it first and the model after it: bns diagnose LOG --model MODEL."
+                f"{path} is no model: a model is the path of a YAML file (.yaml) or one of {', '.join(_names())}. If it is a "
+                "log, give it first and the model after it: bns diagnose LOG --model MODEL."
             )
         known = unknown_name("robot model", str(name_or_path), _names())
         raise ModelError(
