@@ -10,6 +10,7 @@ from scipy.special import stdtrit
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.predict.paired_errors import PairedErrors, plain
 from bns.diagnose.residuals.along_variables import ResidualDependence
+from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.physics.model import ActiveEffect
 
@@ -51,6 +52,11 @@ def numbers_of(fit: Fit) -> dict[str, dict[str, dict[str, Any]]]:
             "at_bound": bool(fit.values[index] in {p.low, p.high}),
         }
     return out
+
+
+def numbers_of_term(term: Formula) -> dict[str, dict[str, Any]]:
+    """As `numbers_of`, of a term; k2 before k10."""
+    return dict(sorted(numbers_of(term.fit)[term.name].items(), key=lambda item: (len(item[0]), item[0])))
 
 
 def _spread(per_trial_effect: ActiveEffect) -> dict[str, dict[str, Any]]:

@@ -11,9 +11,11 @@ from types import SimpleNamespace
 import pytest
 
 from bns.cli.main import main
+from bns.diagnose import values
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report import tables
 from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.report.shown_paths import shown_paths
 from bns.diagnose.report.tables import error_table
@@ -220,3 +222,11 @@ def test_the_table_of_errors_has_every_model_of_the_answer(effects, terms, colum
     said = [cell.partition(" ")[0] for cell in table["rows"][0][1 : 1 + len(columns)]]
     assert said == [f"{1e3 * m.rms_m:.1f}" for m in models]
     assert ("change, 95 % (mm)" in table["columns"]) == (len(columns) > 1)
+
+
+def test_the_parameters_of_a_term_come_in_their_order_and_with_intervals(monkeypatch):
+    number = {"value": 0.5, "se": 0.01, "low": 0.48, "high": 0.52, "unit": "s", "at_bound": False}
+    monkeypatch.setattr(values, "numbers_of", lambda _: {"t": dict.fromkeys(("k0", "k10", "k2"), number)})
+    found = values.numbers_of_term(SimpleNamespace(fit=None, name="t"))
+    assert list(found) == ["k0", "k2", "k10"]
+    assert tables.in_line(found) == "k0 500 ms (480 to 520 ms); k2 500 ms (480 to 520 ms); k10 500 ms (480 to 520 ms)"

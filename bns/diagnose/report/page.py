@@ -28,6 +28,7 @@ from bns.diagnose.report.plain_language import certainty, headline, numbers_in_w
 from bns.diagnose.report.proposal_figure import plan_figure
 from bns.diagnose.report.proposal_text import proposal_lines
 from bns.diagnose.report.shown_paths import shown_paths
+from bns.diagnose.values import numbers_of_term
 from bns.errors import DataError
 from bns.physics.model import Model
 
@@ -140,7 +141,7 @@ def _terms(d: Diagnosis) -> list[dict[str, str]]:
             "words": said,
             "on": term.on,
             "term": term.term,
-            "numbers": ", ".join(f"{name} = {value:.3g}" for name, value in term.values.items()),
+            "numbers": tables.in_line(numbers_of_term(term)),
         }
         for said, term in zip(words, terms, strict=True)
     ]

@@ -108,21 +108,22 @@ def ranking_table(d: Diagnosis) -> Table:
     for c in d.selection.steps[0].ranking:
         e = c.paired_comparison
         fitted = numbers_of(c.fit).get(c.name, {})
-        values = [
-            f"{name} {' '.join(part for part in _shown(n) if part)}"
-            for name, n in fitted.items()
-            if n["value"] is not None
-        ]
         known = np.isfinite(e.elpd_diff)
         gain = (
             [f"{e.elpd_diff:.3g}", f"{e.elpd_diff - 1.96 * e.dse:.3g} to {e.elpd_diff + 1.96 * e.dse:.3g}"]
             if known
             else ["none", ""]
         )
-        rows.append([c.name, *gain, f"{e.p_value:.2g}", "; ".join(values), c.rejected_because])
+        rows.append([c.name, *gain, f"{e.p_value:.2g}", in_line(fitted), c.rejected_because])
     return _table(
         ["effect", "gain per trial (log-likelihood)", "95 %", "p-value", "fitted parameters (95 %)", "why not considered"], rows
     )
+
+
+def in_line(numbers: Mapping[str, Mapping[str, Any]]) -> str:
+    """Names, values and intervals in one line."""
+    known = {name: n for name, n in numbers.items() if n["value"] is not None}
+    return "; ".join(f"{name} {' '.join(part for part in _shown(n) if part)}" for name, n in known.items())
 
 
 def _shown(number: Mapping[str, Any]) -> tuple[str, str]:

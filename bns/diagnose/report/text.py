@@ -14,7 +14,7 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.values import numbers_of, ties_of
+from bns.diagnose.values import numbers_of, numbers_of_term, ties_of
 from bns.physics.decoys import DECOYS
 
 _VERDICTS = {
@@ -63,7 +63,7 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
             yield f"  {side} wheel: {value:.5g} of the drawing's size (95 %: {low:.5g} to {high:.5g})"
     for term in d.terms or ((d.formula,) if d.formula else ()):
         yield f"\ncandidate term {term.name}, added to {term.on}: {term.term}"
-        yield from _intervals({term.name: numbers_of(term.fit)[term.name]})
+        yield from _intervals({term.name: numbers_of_term(term)})
     if d.notes:
         yield "\nnotes:"
         yield from (f"  - {note}" for note in d.notes)
