@@ -49,6 +49,8 @@ def test_a_robot_that_is_stuck_has_no_commands_in_another_unit(table):
     rng = np.random.default_rng(4)
     stuck = table.assign(x_m=0.1 + 0.002 * rng.normal(size=len(table)), y_m=0.002 * rng.normal(size=len(table)))
     assert len(checked(stuck)[0]) == len(table)
+    for alike in (stuck.iloc[:40], stuck.assign(left_m_s=0.1, right_m_s=0.1)):  # a single window; windows that are all the same
+        assert len(checked(alike)[0]) == len(alike)
 
 
 @pytest.mark.parametrize(("column", "told"), [("left_m_s", 1), ("right_m_s", 1)])

@@ -327,7 +327,7 @@ def _units(table: pd.DataFrame) -> None:
         raise DataError(
             f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {unit}; they must be metres."
         )
-    if 0 < ratio < _SLOWEST and np.corrcoef(ways[:, 0], ways[:, 1])[0, 1] > _ALIKE:
+    if 0 < ratio < _SLOWEST and _correlation(ways[:, 0], ways[:, 1]) > _ALIKE:
         hundredths = 0.7 < 100 * ratio < 1.4
         looks = "cm/s" if hundredths else f"rad/s of wheels with a radius of {1e3 * ratio:.0f} mm, or a device's units"
         raise DataError(
@@ -371,6 +371,11 @@ def _turns_as_degrees(table: pd.DataFrame) -> bool:
 
 def _ratio(commanded: np.ndarray, seen: np.ndarray) -> float:
     return float(seen.sum() / commanded.sum()) if commanded.sum() > 0 else float("nan")
+
+
+def _correlation(one: np.ndarray, other: np.ndarray) -> float:
+    """Of two series; 0 where one of them never changes."""
+    return float(np.corrcoef(one, other)[0, 1]) if one.std() > 0 and other.std() > 0 else 0.0
 
 
 def _driven(table: pd.DataFrame) -> np.ndarray:
