@@ -241,3 +241,11 @@ def test_commands_without_a_unit_in_their_names_are_read_from_how_far_the_robot_
     assert guess.mapping["columns"]["right_m_s"] == {"from": right, **entry}
     assert len(guess.remarks) == (remark is not None)
     assert remark is None or remark in guess.remarks[0]
+
+
+def test_pauses_between_trials_are_not_driven_and_positions_far_apart_are_no_metres(table):
+    foreign = pd.DataFrame({"time": table.t_s + 500.0 * table.trial.astype(int), "cmd_L": 100 * table.left_m_s})
+    foreign = foreign.assign(cmd_R=100 * table.right_m_s, x=table.x_m, y=table.y_m, yaw=table.heading_rad).ffill()
+    assert guessed(foreign).mapping["columns"]["left_m_s"] == {"from": "cmd_L", "unit": "cm/s"}
+    in_mm = foreign.assign(x=1000 * foreign.x, y=1000 * foreign.y)
+    assert guessed(in_mm).mapping["columns"]["left_m_s"] == {"from": "cmd_L"}

@@ -143,6 +143,11 @@ def test_what_extends_another_is_no_candidate_of_its_own_and_its_part_none_besid
     assert [e.name for e in extending.simple(EFFECTS, EFFECTS.values(), accepted)] == left
 
 
+def test_where_the_simpler_effect_is_excluded_nothing_goes_back_to_it():
+    assert extending.extended(EFFECTS, "inertia-lag") == ("motor-lag",)
+    assert extending.extended({"inertia-lag": EFFECTS["inertia-lag"]}, "inertia-lag") == ()
+
+
 def test_an_effect_extends_what_is_accepted_or_what_could_stand_for_it():
     fit, far, near = object(), SimpleNamespace(loss=3.0), SimpleNamespace(loss=2.0)
     exchanges = [("wheelbase", "motor-lag", far), ("clock-offset", "motor-lag", near), ("clock-offset", "side-slip", near)]

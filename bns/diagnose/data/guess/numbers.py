@@ -43,14 +43,12 @@ def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any]) -> float | No
     good = np.isfinite(t) & np.isfinite(x) & np.isfinite(y)
     if good.sum() < 3 or np.ptp(x[good]) > _LARGEST_M or np.ptp(y[good]) > _LARGEST_M:
         return None
-    step = np.append(np.diff(t), 0.0)
-    usual = 3.0 * np.nanmedian(step[step > 0]) if (step > 0).any() else 0.0
-    lasts = np.where((step > 0) & (step <= usual), step, 0.0)  # not from trial to trial
+    lasts = np.maximum(np.append(np.diff(t), 0.0), 0.0)
     way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(np.abs(left + right) / 2) * lasts)[:-1]])
     every = max(round(_WINDOW_S / np.median(lasts[lasts > 0])), 1) if (lasts > 0).any() else 1
     at = np.flatnonzero(good)[::every]
     a, b = at[:-1], at[1:]
-    near = (t[b] > t[a]) & (t[b] - t[a] < 3.0 * _WINDOW_S)
+    near = (t[b] > t[a]) & (t[b] - t[a] < 3.0 * _WINDOW_S)  # not from trial to trial
     went, told = np.hypot(x[b] - x[a], y[b] - y[a])[near].sum(), (way[b] - way[a])[near].sum()
     return float(went / told) if went > 0 and told > 0 else None
 
