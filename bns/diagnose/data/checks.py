@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
+from bns.diagnose.data.mapping import UNITS
 from bns.diagnose.data.merge_topics import without_commands
 from bns.diagnose.data.odd_commands import half_told, never_told
 from bns.diagnose.settings import DEFAULTS
@@ -28,7 +29,7 @@ _LONGEST_TRIAL_S = DEFAULTS.data.longest_trial_s
 _LARGEST = DEFAULTS.data.largest_number
 _FINER = DEFAULTS.data.finer_units
 _UNTOLD_RATIO = DEFAULTS.data.untold_ratio
-_LENGTHS = ((39.37, "inches"), (100.0, "centimetres"), (1000.0, "millimetres"))
+_LENGTHS = [(UNITS[unit][1], name) for unit, name in (("in", "inches"), ("cm", "centimetres"), ("mm", "millimetres"))]
 _SLOWEST = DEFAULTS.data.slowest_ratio
 _ALIKE = DEFAULTS.data.in_proportion
 FASTEST_M_S = DEFAULTS.data.fastest_m_s
@@ -322,8 +323,8 @@ def _units(table: pd.DataFrame) -> None:
         raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
     if speed > FASTEST_M_S:
         raise DataError(f"Commands of up to {speed:g} m/s: left_m_s and right_m_s look like mm/s or a device's units.")
-    if _LENGTHS[0][0] / 1.25 < ratio < _LENGTHS[-1][0] * 3:
-        unit = min(_LENGTHS, key=lambda one: abs(np.log(one[0] / ratio)))[1]
+    if _LENGTHS[-1][0] / 3 < 1 / max(ratio, 1e-9) < _LENGTHS[0][0] * 1.25:
+        unit = min(_LENGTHS, key=lambda one: abs(np.log(one[0] * ratio)))[1]
         raise DataError(
             f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {unit}; they must be metres."
         )

@@ -218,15 +218,16 @@ class StepwiseSelection:
         place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges(problem, fit, accepted))
         tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *left, *(self._worth[name] for name in place)])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
-        chosen = self._chosen(problem, fit, tried[len(DECOYS) :], decoy_threshold, place)
+        of = len(self.catalogue) - len(accepted) if self.predictor.screening is not None else 0
+        chosen = self._chosen(problem, fit, tried[len(DECOYS) :], decoy_threshold, place, of)
         lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in (*accepted, *place)]
         if chosen[0].selected or not lone:
             return chosen
         first, tried = chosen[0], each(partial(self._tried, problem, fit, {}), lone)
-        step, problem, fit = self._chosen(problem, fit, tried, decoy_threshold, {})
+        step, problem, fit = self._chosen(problem, fit, tried, decoy_threshold, {}, of)
         ranking = sorted((*first.ranking, *step.ranking), key=lambda c: -c.paired_comparison.elpd_diff)
         passed_over = step.passed_over or first.passed_over
-        return replace(step, ranking=tuple(ranking), passed_over=passed_over, of=first.of), problem, fit
+        return replace(step, ranking=tuple(ranking), passed_over=passed_over), problem, fit
 
     def _chosen(
         self,
@@ -235,10 +236,9 @@ class StepwiseSelection:
         tried: Sequence[Candidate],
         decoy_threshold: float,
         place: Mapping[str, tuple[str, Fit]],
+        of: int,
     ) -> tuple[SelectionStep, Problem, Fit]:
         """The best candidate that earns its place; one that takes another's (``place``) must lower the error, too."""
-        added = len(fit.model.effects) - len(self.model.effects)
-        of = len(self.catalogue) - added if self.predictor.screening is not None else 0
         if self.predictor.screening is not None:
             tried = self._worked_out(problem, fit, tried)
         ranking = sorted(tried, key=lambda c: -c.paired_comparison.elpd_diff)

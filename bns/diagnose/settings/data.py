@@ -106,6 +106,12 @@ class Data:
         "or lag lose less than half), and are proposed in cm/s or mm/s within the second one: a device's own units are of any "
         f"size; {BY_HAND}.",
     )
+    guess_window_s: float = setting(
+        1.0,
+        "s",
+        "How far the robot went is measured over about this time: long enough that the noise of a pose is small, short "
+        f"enough that a path is nearly straight; {BY_HAND}.",
+    )
     guess_largest_m: float = setting(
         100.0,
         "m",

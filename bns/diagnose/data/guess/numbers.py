@@ -14,10 +14,10 @@ from bns.measurements import COMMANDS
 
 SCALE = "SCALE_M_S"
 """Stands where the speed is that one unit of a device stands for."""
-_SPEEDS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}
+_SPEEDS = {name: UNITS[name][1] for name in ("m/s", "cm/s", "mm/s")}
 _WITHIN = DEFAULTS.data.guess_speed_within
 _LARGEST_M = DEFAULTS.data.guess_largest_m
-_WINDOW_S = 1.0
+_WINDOW_S = DEFAULTS.data.guess_window_s
 
 
 def unit_of_speeds(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, Any]:
