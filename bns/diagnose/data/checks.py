@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
-from bns.diagnose.data.mapping import UNITS
+from bns.diagnose.data.mapping import SIZES
 from bns.diagnose.data.merge_topics import without_commands
 from bns.diagnose.data.odd_commands import half_told, never_told
 from bns.diagnose.settings import DEFAULTS
@@ -29,7 +29,7 @@ _LONGEST_TRIAL_S = DEFAULTS.data.longest_trial_s
 _LARGEST = DEFAULTS.data.largest_number
 _FINER = DEFAULTS.data.finer_units
 _UNTOLD_RATIO = DEFAULTS.data.untold_ratio
-_LENGTHS = [(UNITS[unit][1], name) for unit, name in (("in", "inches"), ("cm", "centimetres"), ("mm", "millimetres"))]
+_LENGTHS = [(SIZES[unit], name) for unit, name in (("in", "inches"), ("cm", "centimetres"), ("mm", "millimetres"))]
 _SLOWEST = DEFAULTS.data.slowest_ratio
 _ALIKE = DEFAULTS.data.in_proportion
 FASTEST_M_S = DEFAULTS.data.fastest_m_s

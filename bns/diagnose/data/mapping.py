@@ -41,6 +41,8 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "deg/s": ("rad/s", math.pi / 180),
 }
 """Unit -> what it measures in SI units, and its size."""
+SIZES = {unit: size for unit, (_, size) in UNITS.items()}
+"""Unit -> its size in SI units."""
 FORWARD, TURN = "forward_m_s", "turn_rad_s"
 """Speeds of the body, from which those of the wheels follow where a log has no others."""
 _SI = {

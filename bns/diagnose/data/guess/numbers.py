@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.data.mapping import UNITS
+from bns.diagnose.data.mapping import SIZES
 from bns.diagnose.settings import DEFAULTS
 from bns.measurements import COMMANDS
 
 SCALE = "SCALE_M_S"
 """Stands where the speed is that one unit of a device stands for."""
-_SPEEDS = {name: UNITS[name][1] for name in ("m/s", "cm/s", "mm/s")}
+_SPEEDS = {name: SIZES[name] for name in ("m/s", "cm/s", "mm/s")}
 _WITHIN = DEFAULTS.data.guess_speed_within
 _LARGEST_M = DEFAULTS.data.guess_largest_m
 _WINDOW_S = DEFAULTS.data.guess_window_s
@@ -55,4 +55,4 @@ def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any]) -> float | No
 
 def _in_si(table: pd.DataFrame, entry: Mapping[str, Any], with_unit: bool) -> np.ndarray:
     numbers = pd.to_numeric(table[entry["from"]], errors="coerce").to_numpy(float)
-    return numbers * (UNITS[entry["unit"]][1] if with_unit and "unit" in entry else 1.0)
+    return numbers * (SIZES[entry["unit"]] if with_unit and "unit" in entry else 1.0)
