@@ -111,10 +111,16 @@ def test_a_robot_that_goes_ahead_more_slowly_than_it_turns_is_described_beside_i
 
 
 @pytest.mark.slow
-def test_with_the_response_the_error_falls_to_the_noise():
-    answer = diagnose(ringing(), NOMINAL).as_json()
-    assert answer["verdict"] == "unlisted"
-    assert answer["effects"] == []
+@pytest.mark.parametrize(
+    ("barred", "verdict", "effects", "errors"),
+    [
+        ((), "effects", ["controller-overshoot"], "error"),
+        (("controller-overshoot",), "unlisted", [], "error_with_terms"),
+    ],
+)
+def test_with_the_effect_or_the_response_the_error_falls_to_the_noise(barred, verdict, effects, errors):
+    answer = diagnose(ringing(), NOMINAL, barred=barred).as_json()
+    assert (answer["verdict"], answer["effects"]) == (verdict, effects)
     for horizon in ("1s", "5s", "trial"):
-        error = answer["error_with_terms"][horizon]
+        error = answer[errors][horizon]
         assert error["after"] < 1.5 * error["noise_floor"] < error["before"], horizon
