@@ -28,7 +28,7 @@ from bns.diagnose.select.equivalents import equivalent_pairs
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.values import before_and_after, dependence_values, numbers_of, ranked_values, ties_of
+from bns.diagnose.values import before_and_after, dependence_values, numbers_of, numbers_of_term, ranked_values, ties_of
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
@@ -149,7 +149,7 @@ class Diagnosis:
                 "signal": term.signal,
                 "in_words": words,
                 "values": {k: plain(v) for k, v in term.values.items()},
-                "parameters": numbers_of(term.fit)[term.name],
+                "parameters": numbers_of_term(term),
                 "elpd_diff": plain(term.paired_comparison.elpd_diff),
             }
             for term, words in zip(self.terms, self.terms_in_words, strict=True)
