@@ -29,6 +29,7 @@ VALUES: dict[str, dict[str, float]] = {
     "battery-sag": {"rate_per_s": -0.01, "per_volt": 0.0},
     "camera-rotation": {"angle_rad": 0.2},
     "camera-scale": {"factor": 1.1},
+    "caster-drag": {"friction_m_s": 0.03, "damping_m": 0.01, "trail_m": 0.02, "pivot_m": -0.05},
     "caster-swing": {"loss": 0.6, "trail_m": 0.03},
     "clock-drift": {"rate": 0.02},
     "clock-offset": {"offset_s": 0.4},

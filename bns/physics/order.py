@@ -32,6 +32,7 @@ ORDER = (
     "understeer",
     "side-slip",
     "caster-swing",
+    "caster-drag",
     "floor-patch",
     "slope-load",
     "tether-load",

@@ -8,7 +8,14 @@ import numpy as np
 from scipy.signal import lfilter
 
 from tests.hidden_effects.cause import Body, Cause, Moment
-from tests.hidden_effects.listed_floor import CasterSwing, FloorPatch, LensDistortion, QuadraticTurnSlip, TiltedCamera
+from tests.hidden_effects.listed_floor import (
+    CasterDrag,
+    CasterSwing,
+    FloorPatch,
+    LensDistortion,
+    QuadraticTurnSlip,
+    TiltedCamera,
+)
 from tests.hidden_effects.listed_loads import ControllerOvershoot, ForceLimit, InertiaLag, SlopeLoad, TetherLoad
 from tests.hidden_effects.listed_motors import (
     Backlash,
@@ -274,6 +281,7 @@ LISTED: dict[str, type[Cause]] = {
     "wheel-eccentricity": WheelEccentricity,
     "backlash": Backlash,
     "caster-swing": CasterSwing,
+    "caster-drag": CasterDrag,
     "wheelbase": Wheelbase,
     "yaw-bias": YawBias,
     "turn-slip": TurnSlip,

@@ -10,6 +10,10 @@ from tests.hidden_effects.cause import Body, Cause, Moment
 
 NEAR_M = 1e-4
 """Two points of the robot, so far apart, show where a picture says that it heads."""
+BASE_M = 0.0884
+FINE = 4
+SLOW_RAD_S = 0.1
+"""Of the robot (Khepera III), m; parts of a step; below this rate a hinge's dry friction fades."""
 
 
 @dataclass
@@ -54,6 +58,34 @@ class CasterSwing(Cause):
             out[:, i] = wheels[:, i] * (1 - self.loss * np.sin(off / 2) ** 2)[:, None]
             caster = caster + off * np.minimum(speed * moment.step_s / self.trail_m, 1.0)
         return out
+
+
+@dataclass
+class CasterDrag(Cause):
+    """A caster's hinge that resists: its angle in small steps, the mean of eight robots whose casters point all ways at first."""
+
+    friction_m_s: float
+    damping_m: float
+    trail_m: float
+    pivot_m: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        angle = np.linspace(0, 2 * np.pi, 8, endpoint=False) * np.ones((len(body.forward), 1))
+        forward, turn = np.array(body.forward), np.array(body.turn)
+        for i in range(forward.shape[1]):
+            v, w = body.forward[:, i, None], body.turn[:, i, None]
+            push, twist = 0.0, 0.0
+            for _ in range(FINE):
+                hinge = np.stack([v + 0 * angle, w * self.pivot_m + 0 * angle])  # velocity of the hinge, ahead and left
+                across = hinge[1] * np.cos(angle) - hinge[0] * np.sin(angle)
+                rate = across / self.trail_m - w
+                torque = self.friction_m_s * rate / (np.abs(rate) + SLOW_RAD_S) + self.damping_m * rate
+                push = push + (torque * np.sin(angle)).mean(axis=1) / FINE
+                twist = twist + (torque * (self.trail_m - self.pivot_m * np.cos(angle))).mean(axis=1) / FINE
+                angle = angle + rate * moment.step_s / FINE
+            forward[:, i] += push
+            turn[:, i] += twist / (BASE_M / 2) ** 2
+        return body._replace(forward=forward, turn=turn)
 
 
 class Picture(Cause):

@@ -20,6 +20,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     ),
     "backlash": ({"gap_m": 0.004}, {"gap_m": 0.01}),
     "caster-swing": ({"loss": 0.3, "trail_m": 0.03}, {"loss": 0.6, "trail_m": 0.05}),
+    "caster-drag": (
+        {"friction_m_s": 0.005, "damping_m": 0.002, "trail_m": 0.015, "pivot_m": -0.05},
+        {"friction_m_s": 0.015, "damping_m": 0.004, "trail_m": 0.03, "pivot_m": -0.05},
+    ),
     "heating": ({"loss_per_m": 0.03, "cool_s": 60.0}, {"loss_per_m": 0.05, "cool_s": 90.0}),
     "warm-up": ({"loss": 0.08, "time_s": 4.0}, {"loss": 0.25, "time_s": 3.0}),
     "stribeck": ({"width_m_s": 0.02, "fade_m_s": 0.04}, {"width_m_s": 0.04, "fade_m_s": 0.05}),
@@ -54,7 +58,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
 """Medium and strong, of the Khepera."""
 ALIKE = {"slope-load": ("tether-load",)}
 """What would stand in for an effect that is taken out: a slope is a cable from far away."""
-TURNING = {"backlash", "caster-swing", "dead-band", "stribeck"}
+TURNING = {"backlash", "caster-drag", "caster-swing", "dead-band", "stribeck"}
 """Effects that show only where wheels reverse or turn slowly."""
 
 TRIPLES: tuple[dict[str, Parameters], ...] = (
