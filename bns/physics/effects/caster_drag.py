@@ -59,8 +59,8 @@ EFFECT = Effect(
         Parameter("trail_m", "m", 5e-4, 1.0, (1e-3, 0.1), 0.01, "from the hinge to the caster's wheel", size_power=1.0),
         Parameter("pivot_m", "m", -2.0, 2.0, (-0.2, 0.2), -0.0442, "from the axle forward to the hinge", size_power=1.0),
     ),
-    equation="d(psi)/dt = s = (omega·p·cos(psi) - v·sin(psi))/trail - omega; q = f·s/(|s| + 0.1 rad/s) + k·s; v' = v + q·sin(psi), "
-    "omega' = omega + q·(trail - p·cos(psi))·4/b^2; mean over eight directions psi at the start",
+    equation="d(psi)/dt = s = (omega·p·cos(psi) - v·sin(psi))/trail - omega; q = f·s/(|s| + 0.1 rad/s) + k·s; "
+    "v' = v + q·sin(psi), omega' = omega + q·(trail - p·cos(psi))·4/b^2; mean over eight directions psi at the start",
     residuals="After each change between forward, backward and turning, the robot is pushed aside and slowed for some trails "
     "of the caster, by nearly the same speed whether it is fast or slow; long commands of one kind fit.",
     lookalikes=("caster-swing", "backlash", "motor-lag"),
