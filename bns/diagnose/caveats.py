@@ -22,6 +22,8 @@ MOST_EFFECTS = DEFAULTS.select.most_effects
 LEAST_FALL = DEFAULTS.select.least_fall
 NOTABLE = DEFAULTS.verdict.notable
 CHANCE = DEFAULTS.residuals.chance
+WORST_SHARE = DEFAULTS.residuals.worst_share
+SHOWN = DEFAULTS.report.moments
 
 
 def notes_on(
@@ -109,6 +111,14 @@ def on_worst(both: WithoutWorst) -> str:
     return f"{begun}; with them the verdict would be {said}. Check what happened there; `--without` excludes them."
 
 
+def on_many_apart(trials: Sequence[str]) -> str:
+    """On trials that are unlike the rest and too many to be left out."""
+    return (
+        f"Unlike all others as a whole: trials {', '.join(trials)}. They are more than {WORST_SHARE:.0%} of all trials, so they "
+        "count: what happened there may happen again. `--without` excludes them."
+    )
+
+
 def _no_lower(with_terms: PairedErrors) -> str:
     """What to do with a term with which the error does not fall at all horizons."""
     if not with_terms.rose_at:
@@ -158,8 +168,9 @@ def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
             f"{r.correlation:+.2f}): something oscillates or drifts that no logged variable shows."
         )
     if rest.outliers:
-        worst = ", ".join(f"trial {o.trial} at {o.t_s:.2f} s" for o in rest.outliers[:3])
+        worst = "; ".join(o.in_words for o in rest.outliers[:SHOWN])
+        more = ", and so on" if len(rest.outliers) > SHOWN else ""
         yield (
-            f"{len(rest.outliers)} of {len(tracks)} trials have moments with more than {FAR:g} times the usual error "
-            f"({worst}): check what happened there."
+            f"{len(rest.outliers)} of {len(tracks)} trials have moments with more than {FAR:g} times the usual error: check what "
+            f"happened there ({worst}{more})."
         )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.diagnose.caveats import notes_on, on_worst
+from bns.diagnose.caveats import notes_on, on_many_apart, on_worst
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
 from bns.diagnose.estimate.fit import Fit
@@ -23,7 +23,7 @@ from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.residuals.words import in_words
-from bns.diagnose.residuals.worst_trials import WithoutWorst, standing_out
+from bns.diagnose.residuals.worst_trials import WithoutWorst, far_off, most_left_out, standing_out
 from bns.diagnose.select.equivalents import equivalent_pairs
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
@@ -119,6 +119,15 @@ class Diagnosis:
         }
 
     @property
+    def behaviour(self) -> tuple[str, ...]:
+        """What no effect explains, in clauses: moments that stand out, then the terms."""
+        moments = self.rest.outliers
+        if not moments or self.selection is None:
+            return self.terms_in_words
+        share = f"{len(moments)} of {len(self.selection.problem.predictor.tracks)} trials"
+        return f"in {share} something happens for a moment; the worst is {moments[0].in_words}", *self.terms_in_words
+
+    @property
     def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:
         """The numbers of the effects: where terms were found, as fitted beside these, which keep them from being biased.
 
@@ -189,7 +198,8 @@ def diagnose(
     ``alone`` is told what an effect earns by itself as soon as that is known, by several threads; a later search may correct it.
 
     Where the held-out error does not fall with all effects, the worst are withdrawn until it does. A few trials that are unlike
-    the rest count nothing in the fits of a second search, whose end is presented; errors are always those of all trials.
+    the rest count nothing in the fits of a second search, whose end is presented; errors are always those of all trials. Where
+    others stand out beside them, so that they are more than a few, all count.
     """
     found = _diagnosed(predictor, model, extra, tick, barred, alone)
     if found.selection is None or not isinstance(predictor, WheelPredictor) or predictor.tracks.relative:
@@ -198,6 +208,11 @@ def diagnose(
     if not len(wild):
         return found
     without = _diagnosed(predictor.not_counting(wild.tolist()), model, extra, tick, barred, alone, found.selection)
+    if without.selection is not None:
+        hidden = far_off(without.selection.problem, without.selection.fit)
+        if len(hidden) and len(wild) + len(hidden) > most_left_out(len(predictor.tracks)):
+            every = [predictor.tracks.names[i] for i in (*wild, *hidden)]
+            return replace(found, notes=(on_many_apart(every), *found.notes))
     names = tuple(predictor.tracks.names[i] for i in wild)
     both = WithoutWorst(names, (found.verdict, found.effects), (without.verdict, without.effects))
     return replace(without, without_worst=both, notes=(on_worst(both), *without.notes))

@@ -1,5 +1,6 @@
 """A few bad trials do not turn a verdict, and are named."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -7,6 +8,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.residuals.worst_trials import most_left_out, standing_out
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
@@ -49,6 +51,35 @@ def test_more_than_the_worst_few_are_a_phenomenon():
     bad = hidden(wheelbase={"factor": 0.6})
     assert wild_of(with_bad(NOMINAL, bad, trials=30, of_them=1)) == ["100"]
     assert wild_of(with_bad(NOMINAL, bad, trials=30, of_them=4)) == []
+
+
+def held_from(table, shares):
+    """The robot is held from a share of each of these trials to its end: number -> share."""
+    out, rng = table.copy(), np.random.default_rng(4)
+    for trial, share in shares.items():
+        rows = out.index[out.trial == trial]
+        still = rows[int(share * len(rows)) :]
+        for name in ("x_m", "y_m", "heading_rad"):
+            out.loc[still, name] = out.loc[still[0], name] + rng.normal(0.0, 0.002, len(still))
+    return out
+
+
+def test_the_worst_trials_hide_the_next_ones_and_together_they_count():
+    """Two are held for nearly a whole trial, two for its last part: beside the first, the others look like the rest."""
+    table = held_from(measured(NOMINAL, trials=40, seed=2), {3: 0.05, 17: 0.05, 22: 0.9, 31: 0.9})
+    predictor = WheelPredictor(tracks_of(table))
+    found = diagnose(predictor, NOMINAL)
+    assert found.verdict == "unlisted"
+    assert found.without_worst is None
+    note = next(note for note in found.notes if "Unlike all others" in note)
+    assert "more than 3% of all trials" in note
+    assert {"3", "17", "22", "31"} == set(note.split("trials ")[1].split(".")[0].split(", "))
+    assert {o.trial for o in found.rest.outliers} == {"3", "17", "22", "31"}
+    worst = found.rest.outliers[0]
+    assert worst.moved_m < 0.01 < worst.predicted_m
+    assert found.behaviour[0].startswith("in 4 of 40 trials something happens for a moment")
+    assert worst.in_words in found.behaviour[0]
+    assert f"It behaves like this: {found.behaviour[0]}." in diagnosis_text(found)
 
 
 def test_what_does_not_count_bends_no_number_and_is_judged():

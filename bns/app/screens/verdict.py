@@ -45,7 +45,7 @@ def verdict_html(result: DiagnoseResult, others: Sequence[Rival]) -> str:
     """All of it; every text is escaped."""
     d = result.diagnosis
     sure = certainty(d)
-    words = "".join(f"<br>It behaves like this: {escape(each)}." for each in d.terms_in_words)
+    words = "".join(f"<br>It behaves like this: {escape(each)}." for each in d.behaviour)
     sizes = found_numbers(result.to_json()["parameters"])
     either = "".join(f"<br>or{found_numbers(other.numbers)}" for other in others)
     then = _then(result)

@@ -101,6 +101,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "headline": headline(d),
         "certainty": certainty(d),
         "numbers": numbers_in_words(d.selection.fit, d.effects, d.numbers) if d.selection is not None else [],
+        "moments": d.behaviour[: len(d.behaviour) - len(d.terms_in_words)],
         "terms": _terms(d),
         "improvement": tables.improvement_text(d),
         "competing_models": _competing_models(m),

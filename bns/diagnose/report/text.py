@@ -50,7 +50,7 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
     else:
         yield _VERDICTS[d.verdict].format(effects=" and ".join(d.effects) or "nothing listed")
     if d.selection is not None:
-        yield from (f"It behaves like this: {words}." for words in d.terms_in_words)
+        yield from (f"It behaves like this: {words}." for words in d.behaviour)
         yield from _numbers(d)
         for group in ties_of(d.selection):
             yield "cannot be told apart: " + ", ".join(group)

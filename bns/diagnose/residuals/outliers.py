@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracking_noise import robust_sd
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
-from bns.diagnose.residuals.unforeseen import unforeseen_way
+from bns.diagnose.residuals.unforeseen import unforeseen_way, ways
 from bns.diagnose.settings import DEFAULTS
 
 WIDTH = DEFAULTS.residuals.outlier_frames
@@ -35,11 +35,31 @@ _CLIP = DEFAULTS.residuals.clip
 
 @dataclass(frozen=True)
 class Outlier:
-    """The worst window of a trial that has one which stands out: when it began, and how far off it is."""
+    """The worst window of a trial that has one which stands out, and what the robot did in it.
+
+    When it began in its trial, how long it lasted, how far off it is (robust standard deviations of all windows), where it
+    began, and how far the robot came and turned from its beginning to its end, by the track and by the model.
+    """
 
     trial: str
     t_s: float
     size: float
+    lasted_s: float
+    x_m: float
+    y_m: float
+    moved_m: float
+    turned_rad: float
+    predicted_m: float
+    predicted_rad: float
+
+    @property
+    def in_words(self) -> str:
+        """All of it in a clause."""
+        turned, predicted = (round(np.degrees(angle)) for angle in (self.turned_rad, self.predicted_rad))
+        return (
+            f"trial {self.trial} at {self.t_s:.2f} s, near ({self.x_m:.2f}, {self.y_m:.2f}) m: moved {1e3 * self.moved_m:.0f} mm "
+            f"and turned {turned}° in {self.lasted_s:.2f} s, predicted {1e3 * self.predicted_m:.0f} mm and {predicted}°"
+        )
 
 
 def outliers(problem: Problem, fit: Fit) -> list[Outlier]:
@@ -56,8 +76,24 @@ def outliers(problem: Problem, fit: Fit) -> list[Outlier]:
     moved = _moved(problem, fit, start)
     order = [i for i in np.argsort(-size) if size[i] > FAR and moved[i] > MOVED]
     worst = {int(tracks.trial[start[i]]): i for i in reversed(order)}
-    found = [Outlier(tracks.names[t], float(tracks.own_s[start[i]]), float(size[i])) for t, i in worst.items()]
-    return sorted(found, key=lambda o: -o.size) if len(found) >= TRIALS else []
+    if len(worst) < TRIALS:
+        return []
+    found = [_outlier(problem, fit, int(start[i]), float(size[i])) for i in worst.values()]
+    return sorted(found, key=lambda o: -o.size)
+
+
+def _outlier(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
+    tracks, begin, end = problem.predictor.tracks, start - 1, start + WIDTH - 1
+    driven, off = (way[0] for way in ways(problem, fit, np.array([begin]), np.array([end])))
+    way, turned = np.hypot(*(driven + off)[:2]), driven[2] + off[2]
+    x, y, _ = tracks.pose[begin]
+    return Outlier(
+        tracks.names[int(tracks.trial[start])],
+        float(tracks.own_s[start]),
+        size,
+        float(tracks.own_s[end] - tracks.own_s[begin]),
+        *(float(v) for v in (x, y, way, turned, np.hypot(*driven[:2]), driven[2])),
+    )
 
 
 def _windows(first: NDArray[np.int64]) -> NDArray[np.int64]:

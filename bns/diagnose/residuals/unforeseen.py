@@ -28,6 +28,11 @@ def unforeseen_way(problem: Problem, fit: Fit, begin: NDArray[np.int64], end: ND
 
     In the robot's frame where a window begins. Only the poses at both ends are used.
     """
+    return ways(problem, fit, begin, end)[1]
+
+
+def ways(problem: Problem, fit: Fit, begin: NDArray[np.int64], end: NDArray[np.int64]) -> tuple[Array, Array]:
+    """The model's way, and the track's beyond it, both (windows, 3); arguments and frame as of `unforeseen_way`."""
     tracks, steps = problem.predictor.tracks, problem.predictor.steps(fit.model)
     driven = np.zeros((len(begin), 3))
     for k in range(1, int((end - begin).max(initial=0)) + 1):
@@ -35,8 +40,10 @@ def unforeseen_way(problem: Problem, fit: Fit, begin: NDArray[np.int64], end: ND
         c, s = np.cos(driven[:, 2]), np.sin(driven[:, 2])
         driven += np.stack([c * forward - s * left, s * forward + c * left, turn], axis=1)
     drift = np.cumsum(steps.drift_m, axis=0)
-    east, north = (tracks.pose[end, :2] - tracks.pose[begin, :2] - drift[end] + drift[begin]).T
     c, s = np.cos(tracks.pose[begin, 2]), np.sin(tracks.pose[begin, 2])
+    east, north = (drift[end] - drift[begin]).T
+    driven[:, :2] += np.stack([c * east + s * north, c * north - s * east], axis=1)
+    east, north = (tracks.pose[end, :2] - tracks.pose[begin, :2]).T
     turned = tracks.pose[end, 2] - tracks.pose[begin, 2] - driven[:, 2]
     off = [c * east + s * north - driven[:, 0], c * north - s * east - driven[:, 1], np.angle(np.exp(1j * turned))]
-    return np.stack(off, axis=1)
+    return driven, np.stack(off, axis=1)

@@ -2,6 +2,8 @@
 
 A robust loss bounds what one frame does, not what a whole trial does; a few bad trials widen the noise that is estimated and
 hide what all others show. They stand out by their mean loss a frame, compared with how that varies among trials.
+The worst of them can hide the next: so they are looked for again without them. If they are then more than a few, the robot
+does so at times, and they count.
 """
 
 from __future__ import annotations
@@ -40,10 +42,18 @@ def most_left_out(trials: int) -> int:
 
 def standing_out(problem: Problem, fit: Fit) -> NDArray[np.int64]:
     """Trials that are far worse predicted than the rest, the worst first; none where they are more than the worst `SHARE`."""
-    frames = np.diff(problem.predictor.tracks.first)
-    usual = np.log(np.maximum(fit.held_out / np.maximum(frames, 1), 1e-12))
+    wild = far_off(problem, fit)
+    return wild if len(wild) <= most_left_out(len(fit.losses)) else wild[:0]
+
+
+def far_off(problem: Problem, fit: Fit) -> NDArray[np.int64]:
+    """All trials that are far worse predicted than the rest, the worst first, of those that count in the fit."""
+    tracks, counted = problem.predictor.tracks, problem.predictor.counted
+    frames, there = np.diff(tracks.first), np.arange(len(fit.losses))
+    if counted is not None:
+        there = there[counted[tracks.first[:-1]] > 0]
+    usual = np.log(np.maximum(fit.held_out[there] / np.maximum(frames[there], 1), 1e-12))
     off = usual - np.median(usual)
     spread = max(float(robust_sd(off)), 1.0 / np.sqrt(float(np.median(frames))))
     order = np.argsort(-off)
-    wild = order[off[order] > FAR * spread]
-    return wild if len(wild) <= most_left_out(len(frames)) else wild[:0]
+    return np.asarray(there[order[off[order] > FAR * spread]])

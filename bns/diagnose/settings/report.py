@@ -24,6 +24,7 @@ class Report:
         f"marker, not an error of the model; {BY_HAND}.",
     )
     rows: int = setting(8, "rows", f"Rows of a ranking in the terminal; {BY_HAND}.")
+    moments: int = setting(4, "trials", f"Largest number of trials whose moment that stands out is described; {BY_HAND}.")
     network_bins: int = setting(8, "bins", f"Bins of a figure of networks' errors; {BY_HAND}.")
     large: float = setting(1.0, "s or m", "From one second or one metre on, values are not shown in ms or mm.")
     causes: int = setting(3, "causes", f"Largest number of causes in a headline; {BY_HAND}.")
