@@ -17,6 +17,7 @@ from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.jointed.model import JointedModel
+from bns.physics.model import Model
 
 MOST_EFFECTS = DEFAULTS.select.most_effects
 LEAST_FALL = DEFAULTS.select.least_fall
@@ -40,11 +41,7 @@ def notes_on(
     ``terms``, ``slight``: the terms in words.
     """
     selection = found.selection
-    for name, why in selection.implausible.items():
-        yield (
-            f"{name} fits best, but with an implausible value: {why}. No other set predicts as "
-            "well; check it by an independent measurement."
-        )
+    yield from (implausible_text(selection, name) for name in selection.implausible)
     if len(selection.accepted) >= MOST_EFFECTS:
         yield f"The search ends at {MOST_EFFECTS} effects; more may be missing."
     if found.imitating:
@@ -83,6 +80,16 @@ def notes_on(
     for c in selection.steps[0].ranking:
         if c.rejected_because and c.paired_comparison.elpd_diff > NOTABLE * float(selection.nominal.losses.mean()):
             yield f"{c.name} was not considered: {c.rejected_because}."
+
+
+def implausible_text(selection: SelectionResult, name: str) -> str:
+    """What to say of an accepted effect whose numbers no robot should have."""
+    said = f"{name} fits best, but with an implausible value: {selection.implausible[name]}. No other set predicts as well; "
+    model = selection.fit.model
+    if name != "wheelbase" or not isinstance(model, Model):
+        return f"{said}check it by an independent measurement."
+    really = model.wheelbase_m * model.values_of(name)["factor"]
+    return f"{said}is the wheelbase really {model.wheelbase_m:.3g} m, and not {really:.3g} m?"
 
 
 def _on_slight(unseen: bool, slight: Sequence[str]) -> Iterator[str]:

@@ -15,8 +15,10 @@ from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.check_robot import hint_on_wheelbase
 from bns.diagnose.predict.horizons import Errors
 from bns.diagnose.predict.paired_errors import PairedErrors, judged_windows, noise_json, paired_errors, plain
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
@@ -65,6 +67,8 @@ class Comparison:
     curves: tuple[Curve, ...]
     near: str
     scores: Mapping[str, Mapping[str, float]]
+    hint: str = ""
+    """A question about the wheelbase, where one factor on all turns would make most of the error go."""
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values."""
@@ -84,6 +88,7 @@ class Comparison:
                 for p in self.residual_dependence
             ],
             "worst": [vars(w) for w in self.worst],
+            "hint": self.hint,
             "networks": {name: dict(score) for name, score in self.scores.items()},
         }
 
@@ -127,6 +132,7 @@ def compare(
         tuple(_curves(predictor, errors[predictor.near], dependence, np.random.default_rng(seed))),
         predictor.near,
         predictor.scores(),
+        hint_on_wheelbase(predictor, model) if isinstance(predictor, WheelPredictor) else "",
     )
 
 

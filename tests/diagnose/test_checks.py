@@ -146,3 +146,13 @@ def test_turns_of_more_than_half_a_round_between_two_poses_are_not_held_against_
     speeds = {"left_m_s": np.append(np.full(40, 0.02), np.nan), "right_m_s": np.append(np.full(40, 0.206), np.nan)}
     table = pd.DataFrame({"trial": 0, "t_s": np.cumsum(np.append(0.0, lasts)), **speeds, **pose})
     checked(table.assign(x_m=0.02 * np.arange(41)))
+
+
+def test_minutes_are_told_from_inches_and_degrees():
+    good = measured(NOMINAL, trials=6, seed=3)
+    with pytest.raises(DataError, match="t_s looks like minutes"):
+        checked(good.assign(t_s=good.t_s / 60))
+    for size, degrees, text in ((39.37, 1, "look like inches"), (39.37, 57.3, "look like inches"), (1, 57.3, "like degrees")):
+        other = good.assign(x_m=good.x_m * size, y_m=good.y_m * size, heading_rad=good.heading_rad * degrees)
+        with pytest.raises(DataError, match=text):
+            checked(other)

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bns.diagnose.comparison import compare
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.check_robot import check_same_robot
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -39,3 +40,16 @@ def test_another_wheelbase_is_another_robot(factor):
     other = replace(NOMINAL, wheelbase_m=factor * NOMINAL.wheelbase_m)
     with pytest.raises(DataError, match=r"A wheelbase of 0.088\d* m would fit: --wheelbase 0.088"):
         check_same_robot(predictor(NOMINAL), other)
+
+
+@pytest.mark.parametrize(("factor", "asked"), [(1.0, False), (1.1, False), (1.5, True), (1.81, True), (0.6, False)])
+def test_compare_asks_about_a_wheelbase_that_is_probably_wrong(factor, asked):
+    other = replace(NOMINAL, wheelbase_m=factor * NOMINAL.wheelbase_m)
+    hint = compare(predictor(hidden(motor_lag={"tau_s": 0.1})), other).hint
+    assert ("Is the wheelbase right?" in hint) == asked
+    assert not asked or float(hint.split("--wheelbase ")[1].rstrip(".")) == pytest.approx(NOMINAL.wheelbase_m, rel=0.15)
+
+
+@pytest.mark.parametrize("tau_s", [0.25, 0.6])
+def test_compare_does_not_take_a_lag_for_a_wheelbase(tau_s):
+    assert compare(predictor(hidden(motor_lag={"tau_s": tau_s})), NOMINAL).hint == ""

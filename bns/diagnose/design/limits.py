@@ -6,8 +6,8 @@ from typing import cast
 
 import numpy as np
 
-from bns.diagnose.data.checks import FASTEST_M_S
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.data.units import FASTEST_M_S
 from bns.diagnose.design.sequences import MARGIN_M, Arena, Bounds
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError

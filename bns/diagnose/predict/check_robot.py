@@ -17,6 +17,8 @@ from bns.physics.model import Model
 from bns.robots import robot_names
 
 _FACTOR = DEFAULTS.predict.robot_factor
+_HINT = DEFAULTS.predict.robot_hint
+_HINT_EXPLAINED = DEFAULTS.predict.robot_hint_explained
 _EXPLAINED = DEFAULTS.predict.robot_explained
 _FEWEST = DEFAULTS.predict.robot_fewest
 _CLEAR_M = DEFAULTS.predict.robot_clear_m
@@ -41,22 +43,10 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
     if len(start) < _FEWEST:
         return
     steps = predictor.steps(model).body
-    turn = np.concatenate([[0.0], np.cumsum(steps[:, 2])])[1:]
-    predicted = turn[end] - turn[start]
-    heading = tracks.pose[end, 2] - tracks.pose[start, 2]
-    # where the model says that the turn is small enough, it can be told from one more round
-    clear = (np.abs(predicted) < _ARC_RAD) & (np.abs(predicted) > 0.05)
-    seen = (heading + np.pi) % (2 * np.pi) - np.pi
-    if clear.sum() >= _FEWEST:
-        ratio = _scale(seen[clear], predicted[clear])
-        # motors that follow late also turn by another share in a second, but no one factor makes the model right
-        explained = np.abs(seen - ratio * predicted)[clear].sum() < _EXPLAINED * np.abs(seen - predicted)[clear].sum()
-        if explained and (ratio > _FACTOR or 0 < ratio < 1 / _FACTOR):
-            raise DataError(
-                f"The robot turns {ratio:.2f} times as far as a model with a wheelbase of {model.wheelbase_m:g} m predicts. "
-                f"Is this its model? A wheelbase of {model.wheelbase_m / ratio:.3g} m would fit: "
-                f"--wheelbase {model.wheelbase_m / ratio:.3g}."
-            )
+    predicted = _turn_predicted(steps, start, end)
+    ratio = _turn_ratio(tracks, predicted, start, end, _EXPLAINED)
+    if ratio > _FACTOR or 0 < ratio < 1 / _FACTOR:
+        raise DataError(_on_turns(model, ratio, "Is this its model?"))
     way = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])[1:]
     straight = (np.abs(predicted) < 0.3) & (way[end] - way[start] > 0.02)
     if straight.sum() >= _FEWEST:
@@ -73,6 +63,49 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
             )
     arcs = np.abs(predicted) < _ARC_RAD
     _check_directions(tracks, start[arcs], end[arcs], np.cumsum(steps[:, 0]))
+
+
+def hint_on_wheelbase(predictor: Predictor, model: Model) -> str:
+    """What to say of a wheelbase that is probably too large, if not so much that the data must be another robot's; else "".
+
+    A robot that turns less than its model predicts may as well have motors that lag, or slip.
+    """
+    start, end = windows(predictor.tracks, "1s")
+    if len(start) < _FEWEST:
+        return ""
+    predicted = _turn_predicted(predictor.steps(model).body, start, end)
+    ratio = _turn_ratio(predictor.tracks, predicted, start, end, _HINT_EXPLAINED)
+    return _on_turns(model, ratio, "Is the wheelbase right?") if ratio > _HINT else ""
+
+
+def _on_turns(model: Model, ratio: float, question: str) -> str:
+    fits = f"{model.wheelbase_m / ratio:.3g}"
+    return (
+        f"The robot turns {ratio:.2f} times as far as a model with a wheelbase of {model.wheelbase_m:g} m predicts. {question} "
+        f"A wheelbase of {fits} m would fit: --wheelbase {fits}."
+    )
+
+
+def _turn_predicted(steps: Array, start: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
+    """Turn of windows (windows,), rad, from the steps of a model (frames, 3)."""
+    turn = np.concatenate([[0.0], np.cumsum(steps[:, 2])])[1:]
+    return turn[end] - turn[start]
+
+
+def _turn_ratio(
+    tracks: Tracks, predicted: Array, start: NDArray[np.int64], end: NDArray[np.int64], explained: float
+) -> float:
+    """How many times as far as predicted the robot turns; 1 where no factor leaves less than this share of the deviation."""
+    heading = tracks.pose[end, 2] - tracks.pose[start, 2]
+    # where the model says that the turn is small enough, it can be told from one more round
+    clear = (np.abs(predicted) < _ARC_RAD) & (np.abs(predicted) > 0.05)
+    seen = (heading + np.pi) % (2 * np.pi) - np.pi
+    if clear.sum() < _FEWEST:
+        return 1.0
+    ratio = _scale(seen[clear], predicted[clear])
+    # motors that follow late also turn by another share in a second, but no one factor makes the model right
+    left = np.abs(seen - ratio * predicted)[clear].sum() / max(float(np.abs(seen - predicted)[clear].sum()), 1e-12)
+    return ratio if left < explained else 1.0
 
 
 def _check_directions(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.int64], forward_m: Array) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bns.diagnose.adding import ExtendedModel
+from bns.diagnose.caveats import implausible_text
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
 from bns.diagnose.diagnosis import Diagnosis
@@ -49,6 +50,8 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
         yield f"Missing from the model: {' and '.join(d.effects)}, and something that no listed effect explains."
     else:
         yield _VERDICTS[d.verdict].format(effects=" and ".join(d.effects) or "nothing listed")
+    odd = [implausible_text(d.selection, name) for name in d.selection.implausible] if d.selection is not None else []
+    yield from odd
     if d.selection is not None:
         yield from (f"It behaves like this: {words}." for words in d.behaviour)
         yield from _numbers(d)
@@ -64,9 +67,10 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
     for term in d.terms or ((d.formula,) if d.formula else ()):
         yield f"\ncandidate term {term.name}, added to {term.on}: {term.term}"
         yield from _intervals({term.name: numbers_of_term(term)})
-    if d.notes:
+    notes = [note for note in d.notes if note not in odd]
+    if notes:
         yield "\nnotes:"
-        yield from (f"  - {note}" for note in d.notes)
+        yield from (f"  - {note}" for note in notes)
 
 
 def _numbers(d: Diagnosis) -> Iterator[str]:
@@ -162,11 +166,14 @@ def _comparison(c: Comparison) -> Iterator[str]:
     for horizon, e in c.errors.items():
         if e["windows"]:
             noise = f"{1e3 * c.noise_floor_m(horizon):10.2f}" if np.isfinite(c.noise_floor_m(horizon)) else f"{'?':>10}"
+            scatter = f" ±{1e3 * e['position_se_m']:4.2f}" if c.trials > 1 else f"{'':6}"
             yield (
-                f"  {horizon:10}{1e3 * e['position_m']:8.2f} ±{1e3 * e['position_se_m']:4.2f}{1e3 * e['forward_m']:10.2f}"
+                f"  {horizon:10}{1e3 * e['position_m']:8.2f}{scatter}{1e3 * e['forward_m']:10.2f}"
                 f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{noise}{e['windows']:9.0f}"
             )
     yield "  (noise: error that tracking noise alone would cause; the scatter of the drive is not included)"
+    if c.hint:
+        yield f"  {c.hint}"
     yield "\nwhere it fails: fraction of the loss that a free curve along each variable would remove, on held-out trials:"
     yield f"  {'variable':30}{'velocity':16}{'fraction':>14}{'p':>10}"
     for p in c.residual_dependence[:_SHOWN]:

@@ -88,6 +88,24 @@ class Data:
         "Correlation of commanded and tracked distances per second above which they are in proportion; the noise of a "
         f"robot that is stuck does not correlate; {BY_HAND}.",
     )
+    hundredths_ratio: tuple[float, float] = setting(
+        (0.007, 0.014),
+        "1",
+        "A robot that goes between these many times as far as commanded has commands in cm/s: a hundredth, less what robots "
+        f"lose by slip and lag, or more by larger wheels; {BY_HAND}.",
+    )
+    lengths_beyond: tuple[float, float] = setting(
+        (1.25, 3.0),
+        "factor",
+        "A robot that goes at least as many times as far as commanded as inches in a metre, less the first factor, and at most "
+        f"as many as millimetres, times the second one, has positions in such a unit; {BY_HAND}.",
+    )
+    minutes_ratio: tuple[float, float] = setting(
+        (49.0, 77.0),
+        "1",
+        "A robot that drives this many times as fast as commanded, and turns as much faster, has times in minutes. The bounds "
+        "are halfway, by ratio, to positions in inches (39) and centimetres (100).",
+    )
     degrees_rad_m: float = setting(
         150.0,
         "rad/m",

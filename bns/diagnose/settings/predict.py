@@ -155,6 +155,17 @@ class Predict:
         "Skid-steered robots turn as if their wheelbase were up to twice as large; beyond this factor, the model is "
         "of another robot or the units are wrong.",
     )
+    robot_hint: float = setting(
+        1.25,
+        "1",
+        "If the robot turns this many times as far as predicted, `compare` asks whether the wheelbase is right; "
+        f"{BY_HAND}.",
+    )
+    robot_hint_explained: float = setting(
+        0.5,
+        "1",
+        f"It asks if this factor reduces the deviation of turns to less than this fraction; {BY_HAND}.",
+    )
     robot_explained: float = setting(
         0.25,
         "1",

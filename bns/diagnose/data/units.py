@@ -1,0 +1,152 @@
+"""Are lengths, times, headings and speeds in the units that a table must have? What was commanded, beside what was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from bns.diagnose.data.mapping import SIZES
+from bns.diagnose.data.merge_topics import without_commands
+from bns.diagnose.settings import DEFAULTS
+from bns.errors import DataError
+from bns.measurements import COMMANDS, POSE
+
+FASTEST_M_S = DEFAULTS.data.fastest_m_s
+_LONG_STEP_S = DEFAULTS.data.long_step_s
+_LONGEST_TRIAL_S = DEFAULTS.data.longest_trial_s
+_FINER = DEFAULTS.data.finer_units
+_UNTOLD_RATIO = DEFAULTS.data.untold_ratio
+_LENGTHS = [(SIZES[unit], name) for unit, name in (("in", "inches"), ("cm", "centimetres"), ("mm", "millimetres"))]
+_SLOWEST = DEFAULTS.data.slowest_ratio
+_ALIKE = DEFAULTS.data.in_proportion
+_DEGREES_AT_LEAST = DEFAULTS.data.degrees_rad_m
+_MINUTES = DEFAULTS.data.minutes_ratio
+_HUNDREDTHS = DEFAULTS.data.hundredths_ratio
+_BEYOND = DEFAULTS.data.lengths_beyond
+
+
+def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> None:
+    """Compare what was commanded with what was seen: units show as factors. DataError names the column and the unit.
+
+    ``trials``: names and row numbers.
+    """
+    pauses = table["t_s"].diff()
+    step = float(pauses[pauses > 0].median())
+    if step > _LONG_STEP_S:  # before anything is done second by second
+        unit = next(unit for least, unit in _FINER if step > least)
+        raise DataError(f"Successive rows are {step:g} s apart: t_s looks like {unit}; it must be seconds.")
+    _check_length(table)
+    ways = _driven(table, trials)
+    speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
+    ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
+    untold = without_commands(table)
+    if untold > 0.5 and ratio > _UNTOLD_RATIO:
+        raise DataError(
+            f"In {untold:.0%} of the rows with a pose no command is in force, but the robot goes {ratio:.1f} times as far as "
+            "commanded. Are the commands in separate rows? `hold_commands_s: .inf` in the mapping of `bns import` keeps "
+            "each until the next."
+        )
+    if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
+        raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
+    if speed > FASTEST_M_S:
+        raise DataError(f"Commands of up to {speed:g} m/s: left_m_s and right_m_s look like mm/s or a device's units.")
+    if _turns_as_degrees(table) and _MINUTES[0] < _speed_ratio(table) < _MINUTES[1]:
+        raise DataError(
+            "The robot drives and turns about sixty times as fast as commanded: t_s looks like minutes; it must be seconds. In a "
+            "mapping of `bns import`, give scale: 60."
+        )
+    if _LENGTHS[-1][0] / _BEYOND[1] < 1 / max(ratio, 1e-9) < _LENGTHS[0][0] * _BEYOND[0]:
+        unit = min(_LENGTHS, key=lambda one: abs(np.log(one[0] * ratio)))[1]
+        raise DataError(
+            f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {unit}; they must be metres."
+        )
+    if 0 < ratio < _SLOWEST and _correlation(ways[:, 0], ways[:, 1]) > _ALIKE:
+        hundredths = _HUNDREDTHS[0] < ratio < _HUNDREDTHS[1]
+        looks = "cm/s" if hundredths else f"rad/s of wheels with a radius of {1e3 * ratio:.0f} mm, or a device's units"
+        raise DataError(
+            f"The robot went {ratio:.2g} times as far as commanded, in proportion: left_m_s and right_m_s look like {looks}; "
+            "they must be metres per second. In a mapping of `bns import`, give "
+            f"{'unit: cm/s' if hundredths else 'scale: METRES (a radius)'}."
+        )
+    if _turns_as_degrees(table):
+        raise DataError("Headings change far more than the wheels can turn the robot: heading_rad looks like degrees.")
+    if len(ways) and np.abs(ways[:, 2]).sum() > 0.3:
+        told, seen = ways[
+            np.abs(ways[:, 2]) <= np.median(np.abs(ways[ways[:, 2] != 0, 2])), 2:
+        ].T  # larger ones may be rounds
+        same = float(told @ seen / np.sqrt((told @ told) * (seen @ seen) + 1e-300))
+        if same < -0.5:
+            raise DataError(
+                "The robot turns opposite to the wheels: heading_rad must run counter-clockwise, "
+                "or left_m_s and right_m_s are exchanged."
+            )
+
+
+def _check_length(table: pd.DataFrame) -> None:
+    times = table.groupby("trial", sort=False)["t_s"]
+    lasted = times.max() - times.min()
+    if lasted.max() > _LONGEST_TRIAL_S:
+        raise DataError(
+            f"Trial {lasted.idxmax()} lasts {lasted.max():g} s, from its first t_s to its last; {_LONGEST_TRIAL_S:g} s are "
+            "allowed. Is one of its times wrong?"
+        )
+
+
+def _turns_as_degrees(table: pd.DataFrame) -> bool:
+    """Typical change of heading from row to row over that of the wheels' way: one over the wheelbase, in radians."""
+    commanded = (table[COMMANDS[1]] - table[COMMANDS[0]]).shift() * _spans(table)
+    return _typical(commanded.abs(), table["heading_rad"].diff().abs()) > _DEGREES_AT_LEAST
+
+
+def _speed_ratio(table: pd.DataFrame) -> float:
+    """Typical distance from row to row over the one commanded."""
+    commanded = (table[COMMANDS[0]] + table[COMMANDS[1]]).shift() / 2 * _spans(table)
+    return _typical(commanded.abs(), pd.Series(np.hypot(table["x_m"].diff(), table["y_m"].diff()), table.index))
+
+
+def _spans(table: pd.DataFrame) -> pd.Series[float]:
+    """Time since the row before, s; none at the first row of a trial."""
+    return table["t_s"].diff().where(table["trial"].eq(table["trial"].shift()))
+
+
+def _typical(commanded: pd.Series[float], seen: pd.Series[float]) -> float:
+    """Median of seen over commanded, where much was commanded."""
+    wide = commanded > commanded[commanded > 0].quantile(0.5)
+    return float((seen[wide] / commanded[wide]).median())
+
+
+def _ratio(commanded: np.ndarray, seen: np.ndarray) -> float:
+    return float(seen.sum() / commanded.sum()) if commanded.sum() > 0 else float("nan")
+
+
+def _correlation(one: np.ndarray, other: np.ndarray) -> float:
+    """Of two series; 0 where one of them never changes."""
+    return float(np.corrcoef(one, other)[0, 1]) if one.std() > 0 and other.std() > 0 else 0.0
+
+
+def _driven(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> np.ndarray:
+    """For windows of about a second (windows, 4): way and turn commanded (base of 1 m), way and turn seen.
+
+    A trial that is shorter than that, such as a single motion of a sensor, is a window.
+    """
+    times, commands, poses = table["t_s"].to_numpy(), table[list(COMMANDS)].to_numpy(), table[list(POSE)].to_numpy()
+    found = [np.zeros((0, 4))]
+    for _, at in trials:
+        t, pose = times[at], poses[at]
+        left, right = np.nan_to_num(commands[at]).T
+        span = np.append(np.diff(t), 0.0)
+        way = np.concatenate([[0], np.cumsum((np.abs(left + right) / 2 * span)[:-1])])
+        turn = np.concatenate([[0], np.cumsum(((right - left) * span)[:-1])])
+        seen = np.flatnonzero(np.isfinite(pose).all(axis=1))
+        if not len(seen):
+            continue
+        marks = seen[np.unique(np.searchsorted(t[seen], np.arange(t[0], t[-1] + 1e-9, 1.0)).clip(max=len(seen) - 1))]
+        marks = seen[[0, -1]] if len(marks) < 2 and len(seen) > 1 else marks
+        heading = np.zeros(len(t))
+        heading[seen] = np.unwrap(pose[seen, 2])
+        a, b = marks[:-1], marks[1:]
+        went = np.hypot(*(pose[b, :2] - pose[a, :2]).T)
+        found.append(np.column_stack([way[b] - way[a], went, turn[b] - turn[a], heading[b] - heading[a]]))
+    return np.concatenate(found)
