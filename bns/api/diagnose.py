@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from bns.api.common.shown import Shown
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.adding import documented
+from bns.diagnose.design.competing_models import Rival, rivals_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.diagnosis import diagnose as find
 from bns.diagnose.report.text import diagnosis_text
@@ -93,6 +95,11 @@ class DiagnoseResult(Shown):
         """Further remarks on the verdict, a sentence or two each."""
         return self.diagnosis.notes
 
+    @cached_property
+    def rivals(self) -> tuple[Rival, ...]:
+        """After a tie: the other explanations with their parameters, the best first; fitted when first asked for."""
+        return rivals_of(self.diagnosis)
+
     @property
     def ranking(self) -> pd.DataFrame:
         """Gain of each effect when added alone, the best first: one row per effect, indexed by name.
@@ -137,11 +144,15 @@ class DiagnoseResult(Shown):
 
     def summary(self) -> str:
         """Verdict first; then numbers, errors, ranking, notes."""
-        return changes_text(self.settings) + diagnosis_text(self.diagnosis)
+        return changes_text(self.settings) + diagnosis_text(self.diagnosis, self.rivals)
 
     def to_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""
-        return {**self.diagnosis.as_json(), "provenance": provenance(self.ready.model, self.ready.log.sha256, self.settings)}
+        return {
+            **self.diagnosis.as_json(),
+            "rivals": [rival.as_json() for rival in self.rivals],
+            "provenance": provenance(self.ready.model, self.ready.log.sha256, self.settings),
+        }
 
     def plot(self, ax: Axes | None = None, most: int = 12) -> Axes:
         """Gain of each effect on held-out trials, with 95 % intervals. DataError if there were too few data for a search."""

@@ -253,6 +253,18 @@ def test_a_diagnosis_in_frames(found):
         few.plot()
 
 
+def test_the_other_explanations_of_a_tie_have_numbers(found):
+    answer, text = found.to_json(), found.summary()
+    assert sorted(rival["effects"] for rival in answer["rivals"]) == sorted(answer["explanations"][1:]) != []
+    for rival in found.rivals:
+        assert f"or {' and '.join(rival.names)}:" in text
+        for name, numbers in rival.numbers.items():
+            assert name in rival.names
+            for parameter, number in numbers.items():
+                assert number["low"] < number["value"] < number["high"]
+                assert f"  {name}: {parameter} = {number['value']:.5g}" in text
+
+
 def test_what_is_added_lowers_the_error_step_by_step(log):
     added = bns.add(log, ["dead-zone", bns.effects().index[0]], "khepera")
     assert added.errors.index.tolist() == ["as given", "dead-zone", "acceleration-limit", "tracking noise"]

@@ -12,11 +12,11 @@ import panel as pn
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.app.jobs import Jobs
 from bns.app.parts import WIDE, button, heading, row
-from bns.app.screens.verdict import Rival, rivals, verdict_html
+from bns.app.screens.verdict import verdict_html
 from bns.app.screens.working import Working
 from bns.app.switches import Term
 from bns.app.tab import Tab
-from bns.diagnose.design.competing_models import MOST_TIED
+from bns.diagnose.design.competing_models import MOST_TIED, Rival
 
 SwitchTo = Callable[[tuple[str, ...], tuple[Term, ...], tuple[str, ...]], None]
 """Called with the effects and terms to switch on, and with those to switch off."""
@@ -93,7 +93,7 @@ class DiagnosisPart:
         known = self._others if self._of is result else ()
         self._say(result, known)
         if result.verdict == "tie" and not known:
-            self._jobs.run("fitting the alternatives", lambda: rivals(result), partial(self._say, result), self._work.fail)
+            self._jobs.run("fitting the alternatives", lambda: result.rivals, partial(self._say, result), self._work.fail)
         self._found()
 
     def _say(self, result: DiagnoseResult, others: Sequence[Rival]) -> None:

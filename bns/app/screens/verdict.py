@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from html import escape
-from typing import Any
 
 from bns.api.diagnose import DiagnoseResult
 from bns.app.html import found_errors, found_numbers, mm
-from bns.diagnose.design.competing_models import competing_models_of
+from bns.diagnose.design.competing_models import Rival
 from bns.diagnose.report.plain_language import certainty, headline
 from bns.diagnose.report.tables import ahead
-from bns.diagnose.values import numbers_of
 
 _SWITCH_ON = "Switch it on, see the error fall in the table, then save the extended model on the Next screen."
 _EITHER = (
@@ -22,23 +19,6 @@ _EITHER = (
 _UNLISTED = (
     "The screen “Where it fails” shows where and when the rest occurs. A formula of your own, below the effects, can describe it."
 )
-
-
-@dataclass(frozen=True)
-class Rival:
-    """An explanation that fits as well as the one that was accepted: its effects, and their parameters as fitted."""
-
-    names: tuple[str, ...]
-    numbers: Mapping[str, Mapping[str, Mapping[str, Any]]]
-
-
-def rivals(result: DiagnoseResult) -> tuple[Rival, ...]:
-    """Of a tie, with the numbers that `bns report` gives; none after any other verdict."""
-    if result.verdict != "tie":
-        return ()
-    others = competing_models_of(result.diagnosis)[1:]
-    fitted = [(other.names, numbers_of(other.fit)) for other in others]
-    return tuple(Rival(names, {n: numbers[n] for n in names if n in numbers}) for names, numbers in fitted)
 
 
 def verdict_html(result: DiagnoseResult, others: Sequence[Rival]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit import Fit, Problem
@@ -14,6 +15,7 @@ from bns.diagnose.residuals.symbolic import NAME as FORMULA
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.values import numbers_of
 from bns.physics.effect import Effect
 from bns.physics.model import Model
 
@@ -56,6 +58,26 @@ def competing_models_of(d: Diagnosis) -> tuple[CompetingModel, ...]:
     others = [CompetingModel(names, refitted(problem, selection.fit, names, effects)) for names in sets]
     others.sort(key=lambda competitor: float(competitor.fit.held_out.sum()))
     return (first, *others[: (MOST_TIED if selection.competing_models else MOST) - 1])
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An explanation that fits as well as the one that was accepted: its effects, and their parameters as fitted."""
+
+    names: tuple[str, ...]
+    numbers: Mapping[str, Mapping[str, Mapping[str, Any]]]
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values: ``effects`` and ``parameters`` as those of a diagnosis."""
+        return {"effects": list(self.names), "parameters": self.numbers}
+
+
+def rivals_of(d: Diagnosis) -> tuple[Rival, ...]:
+    """Of a tie, the best first; none after any other verdict."""
+    if d.verdict != "tie":
+        return ()
+    fitted = [(other.names, numbers_of(other.fit)) for other in competing_models_of(d)[1:]]
+    return tuple(Rival(names, {n: numbers[n] for n in names if n in numbers}) for names, numbers in fitted)
 
 
 def model_pairs_of(d: Diagnosis, competing_models: Sequence[CompetingModel]) -> tuple[tuple[int, int], ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.caveats import implausible_text
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
+from bns.diagnose.design.competing_models import Rival
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
@@ -39,12 +40,12 @@ def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
     return "\n".join([f"{many} in the data (rows of the table are counted from 0):", *lines])
 
 
-def diagnosis_text(d: Diagnosis) -> str:
-    """Verdict first; then numbers, errors, ranking, notes."""
-    return "\n".join(_diagnosis(d))
+def diagnosis_text(d: Diagnosis, rivals: Sequence[Rival] = ()) -> str:
+    """Verdict first; then numbers, also those of explanations that fit as well, errors, ranking, notes."""
+    return "\n".join(_diagnosis(d, rivals))
 
 
-def _diagnosis(d: Diagnosis) -> Iterator[str]:
+def _diagnosis(d: Diagnosis, rivals: Sequence[Rival]) -> Iterator[str]:
     yield f"verdict: {d.verdict}"
     if d.verdict == "unlisted" and d.effects:
         yield f"Missing from the model: {' and '.join(d.effects)}, and something that no listed effect explains."
@@ -55,6 +56,9 @@ def _diagnosis(d: Diagnosis) -> Iterator[str]:
     if d.selection is not None:
         yield from (f"It behaves like this: {words}." for words in d.behaviour)
         yield from _numbers(d)
+        for rival in rivals:
+            yield f"or {' and '.join(rival.names)}:"
+            yield from _intervals(rival.numbers, d.selection.fit.model.catalogue())
         for group in ties_of(d.selection):
             yield "cannot be told apart: " + ", ".join(group)
         yield from _errors(d.errors_with_terms or d.errors)
