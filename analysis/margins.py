@@ -120,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         rows = margins(Results(wanted.results), wanted.sweep)
     except BnsError as fault:
-        print(f"error: {fault}", file=sys.stderr)
+        print(f"analysis.margins: {fault}", file=sys.stderr)
         return fault.exit_code
     table = summary(rows)
     print(table.to_string(index=False))

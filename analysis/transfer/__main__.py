@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             publish(frame.to_csv(index=False).encode(), wanted.out / f".{name}.part", wanted.out / name)
         picture = transfer_figure(drives, compared, _labels(wanted.reference), wanted.out / "transfer", robot.name)
     except BnsError as fault:
-        print(f"error: {fault}", file=sys.stderr)
+        print(f"analysis.transfer: {fault}", file=sys.stderr)
         return fault.exit_code
     print(f"{described(table, labels)}\nfigure: {picture}")
     return 0

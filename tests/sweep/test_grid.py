@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bns.errors import SpecError
-from bns.sweep.expand.grid import Sweep, load_sweep
+from bns.sweep.expand.grid import Sweep, load_sweep, load_sweeps
 from bns.tasks import task_names
 
 HEAD = "name: demo\nrobot: khepera\n"
@@ -185,3 +185,15 @@ def test_every_task_of_the_robot_can_be_named(tmp_path):
     tasks = task_names("khepera")
     sweep = sweep_of(tmp_path, f"grid: {{task: [{', '.join(tasks)}]}}")
     assert tuple(combo["task"] for combo in sweep.combos) == tasks
+
+
+def test_two_files_of_one_name_are_not_carried_out_together(tmp_path):
+    files = [tmp_path / "one.yaml", tmp_path / "other.yaml"]
+    for seeds, file in enumerate(files, start=1):
+        file.write_text(f"name: both\nrobot: khepera\nseeds: {seeds}\n")
+    with pytest.raises(SpecError, match=r"other\.yaml: the sweep is named both, like that of .*one\.yaml"):
+        load_sweeps(files)
+    files[1].write_text("name: other\nrobot: khepera\n")
+    assert [sweep.name for sweep in load_sweeps(files)] == ["both", "other"]
+    with pytest.raises(SpecError, match="named both"):
+        load_sweeps([files[0], files[0]])

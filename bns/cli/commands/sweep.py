@@ -70,7 +70,7 @@ def sweep(options: argparse.Namespace) -> int:
     """Runs of sweep files, one file after the other, on one budget."""
     from bns.sweep.confirm import in_turn
     from bns.sweep.executors import load_executor
-    from bns.sweep.expand.grid import load_sweep
+    from bns.sweep.expand.grid import load_sweeps
     from bns.sweep.forecast.plan import plan as forecast
     from bns.sweep.progress import SweepProgress
     from bns.sweep.ranking.until import run_until_ranked
@@ -82,7 +82,7 @@ def sweep(options: argparse.Namespace) -> int:
     asked = {name: value for name in ("confidence", "within") if (value := getattr(options, name)) is not None}
     if asked and not options.until:
         raise SpecError(f"{' and '.join(f'--{name}' for name in asked)}: only with --until ranking")
-    files = [load_sweep(file) for file in options.files]
+    files = load_sweeps(options.files)
     sweeps = in_turn(files, options.results, options.confirm_top)
     backend = load_executor(backend_name(options))
     with SweepProgress() as bar:
@@ -114,12 +114,12 @@ def sweep(options: argparse.Namespace) -> int:
 
 def plan(options: argparse.Namespace) -> int:
     """A table of costs; nothing is written."""
-    from bns.sweep.expand.grid import load_sweep
+    from bns.sweep.expand.grid import load_sweeps
     from bns.sweep.forecast.cost import MACHINES, Cost, Machine, cost_table
     from bns.sweep.forecast.plan import plan as planned
     from bns.sweep.jobs.cores import cores
 
-    plans = [planned(load_sweep(file), options.results, 1) for file in options.files]
+    plans = [planned(file, options.results, 1) for file in load_sweeps(options.files)]
     costs, machines = [Cost.of(each) for each in plans], (Machine("here", 1, cores()), *MACHINES)
     if options.json:
         sweeps = [

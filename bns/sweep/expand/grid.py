@@ -81,6 +81,20 @@ def load_sweep(path: str | Path) -> Sweep:
     return parse_sweep(read_text(path), path)
 
 
+def load_sweeps(paths: Iterable[str | Path]) -> list[Sweep]:
+    """Several sweep files that are carried out or estimated together; SpecError where two have one name."""
+    found: dict[str, Sweep] = {}
+    for path in paths:
+        sweep = load_sweep(path)
+        other = found.setdefault(sweep.name, sweep)
+        if other is not sweep:
+            raise SpecError(
+                f"{path}: the sweep is named {sweep.name}, like that of {other.path}, so their runs would count as those of one "
+                "sweep. Give one of them another name, or carry them out one after the other."
+            )
+    return list(found.values())
+
+
 def parse_sweep(text: str, path: Path) -> Sweep:
     """The sweep that a file's text describes; ``path`` is for messages."""
     root = parse_yaml(text, path)
