@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
@@ -151,6 +151,7 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
     logged = {*tracks.extra, *(("session_s",) if tracks.start_known else ())}
     yield from (effect.caveat for effect in chain if effect.caveat and not logged.intersection(effect.explained_by))
     yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
+    yield from _on_times(selection, tracks, names)
     per_trial_effect = selection.fit.model.per_trial_effect
     if per_trial_effect is not None:
         own = np.array(per_trial_effect.trial_values)
@@ -159,6 +160,23 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
             "held-out trials are judged with the clock fitted to other poses of the same trial. "
             "A delay common to all trials cannot be distinguished from the clocks."
         )
+
+
+def _on_times(selection: SelectionResult, tracks: Tracks, names: Collection[str]) -> Iterator[str]:
+    """On times that are shorter than the one between poses, where no command was logged between poses."""
+    step_s = tracks.commands_at_poses_s
+    if step_s is None:
+        return
+    for active in selection.fit.model.effects:
+        for parameter, value in zip(active.effect.parameters, active.values, strict=True):
+            if active.effect.name in names and parameter.unit == "s" and 0 < abs(value) < step_s:
+                yield (
+                    f"{active.effect.name}: {parameter.name} = {value:.3g} s is shorter than the {step_s:.3g} s between poses, "
+                    "and in this log commands change only in rows that have a pose. If a row holds the command of its time, each "
+                    f"command began up to {step_s:.3g} s earlier than it seems, which looks like a clock that is off by half of "
+                    "that. Log each command in a row of its own, with the time at which it was sent."
+                )
+                return
 
 
 def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:

@@ -2,10 +2,16 @@
 
 from types import SimpleNamespace
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from bns.diagnose.caveats import _no_lower
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
+from bns.diagnose.predict.wheels import WheelPredictor
+from tests.diagnose.worlds import NOMINAL, measured
 
 
 @pytest.mark.parametrize(
@@ -24,3 +30,31 @@ def test_an_error_that_may_have_changed_by_luck_neither_fell_nor_rose():
     changes = {"command": Change(-0.01, -0.02, -0.005), "1s": Change(-0.01, -0.02, 0.01), "trial": Change(0.1, 0.05, 0.2)}
     errors = PairedErrors({h: SimpleNamespace(total=change) for h, change in changes.items()}, None, 20)
     assert (errors.fell_at, errors.rose_at) == (("command",), ("trial",))
+
+
+def thinned(every):
+    """A robot that does what it is told, its poses and commands logged together in one frame of so many."""
+    table = measured(NOMINAL, trials=30, seed=5, noise=(0.0005, 0.002))
+    table = pd.concat([rows.iloc[::every] for _, rows in table.groupby("trial")], ignore_index=True)
+    return WheelPredictor(tracks_of(table))
+
+
+def test_a_clock_that_comes_from_commands_logged_with_poses_is_said_to():
+    """A command between two poses seems to begin with the second one: half an interval late on average."""
+    found = diagnose(thinned(4), NOMINAL)
+    assert found.effects == ("clock-offset",)
+    assert found.numbers["clock-offset"]["offset_s"]["value"] == pytest.approx(-0.08 + 0.02, abs=0.01)
+    assert any("shorter than the 0.16 s between poses" in note for note in found.notes)
+
+
+def test_commands_between_poses_are_seen():
+    table = measured(NOMINAL, trials=6, seed=5)
+    assert tracks_of(table).commands_at_poses_s == pytest.approx(0.04)
+    lost = table.copy()
+    lost.loc[lost.index % 3 == 0, ["x_m", "y_m", "heading_rad"]] = np.nan
+    assert tracks_of(lost).commands_at_poses_s is None
+    few = table.copy()
+    few.loc[few.index % 37 == 0, ["x_m", "y_m", "heading_rad"]] = np.nan
+    assert tracks_of(few).commands_at_poses_s == pytest.approx(0.04)
+    still = table.assign(left_m_s=0.1, right_m_s=0.1)
+    assert tracks_of(still).commands_at_poses_s is None

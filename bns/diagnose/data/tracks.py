@@ -16,6 +16,9 @@ from bns.diagnose.data.checks import left_out_rows, own_rows, rows_by_trial
 from bns.diagnose.settings import DEFAULTS
 from bns.measurements import BEFORE, COMMANDS, LEFT_OUT, POSE, RUN_UP, SESSION
 
+_SAME_S = DEFAULTS.data.same_time_s
+_AT_POSES = DEFAULTS.data.at_poses_share
+
 Array = NDArray[np.float64]
 
 MOST_FRAMES = DEFAULTS.data.most_frames
@@ -57,6 +60,20 @@ class Tracks:
     def timed(self) -> bool:
         """Are frames seen at times of their own, so that a clock can be wrong?"""
         return True
+
+    @cached_property
+    def commands_at_poses_s(self) -> float | None:
+        """Typical time between poses, s, if nearly all commands begin when a pose was taken; None if they begin between poses."""
+        ends = np.cumsum(self.duration_s, axis=1)
+        changes = (np.diff(self.left_m_s, axis=1) != 0) | (np.diff(self.right_m_s, axis=1) != 0)
+        changes &= self.duration_s[:, 1:] > 0
+        trials = [(self.t_s[a:b], ends[k, :-1][changes[k]]) for k, (a, b) in enumerate(pairwise(self.first))]
+        if not changes.any() or any(len(seen) < 2 for seen, _ in trials):
+            return None
+        off = [np.abs(seen[np.searchsorted(seen, told - _SAME_S).clip(max=len(seen) - 1)] - told) for seen, told in trials]
+        if (np.concatenate(off) <= _SAME_S).mean() < _AT_POSES:
+            return None
+        return float(np.median(np.concatenate([np.diff(seen) for seen, _ in trials])))
 
     @cached_property
     def own_s(self) -> Array:

@@ -88,6 +88,13 @@ class Data:
         "Correlation of commanded and tracked distances per second above which they are in proportion; the noise of a "
         f"robot that is stuck does not correlate; {BY_HAND}.",
     )
+    same_time_s: float = setting(1e-6, "s", "Times that differ by less are the same: the rest is rounding.")
+    at_poses_share: float = setting(
+        0.9,
+        "1",
+        "If at least this fraction of the commands begin exactly when a pose was taken, commands were logged with the "
+        f"poses only; a few poses are always lost; {BY_HAND}.",
+    )
     hundredths_ratio: tuple[float, float] = setting(
         (0.007, 0.014),
         "1",
