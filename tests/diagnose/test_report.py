@@ -24,6 +24,7 @@ from bns.physics.effects import effect_named
 from bns.physics.formula import formula_effect
 from bns.physics.order import ORDER
 from bns.registry import EFFECTS
+from tests.diagnose.test_worst_trials import held_from
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -109,6 +110,14 @@ def test_every_verdict_has_a_page_that_needs_nothing_else(page_of, verdict):
 )
 def test_the_first_screen_says_it_plainly(page_of, verdict, said):
     assert said in first_screen(page_of(verdict))
+
+
+@pytest.mark.slow
+def test_moments_that_stand_out_are_on_the_first_screen(tmp_path):
+    data, out = tmp_path / "held.csv", tmp_path / "held.html"
+    write_measurements(held_from(measured(NOMINAL, trials=40, seed=2), {3: 0.05, 17: 0.05, 22: 0.9, 31: 0.9}), data)
+    assert main(["report", str(data), "--model", "khepera", "--minutes", "2", "-o", str(out)]) == 0
+    assert re.search(r"In 4 of 40 trials something happens for a moment; the worst is trial \d+ at", first_screen(out))
 
 
 def test_a_trial_that_begins_at_a_mistaken_marker_is_shown_last():
