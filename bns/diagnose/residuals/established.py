@@ -25,6 +25,8 @@ from bns.diagnose.residuals.along_variables import residual_dependence
 from bns.diagnose.residuals.grammar import (
     NAME,
     PLACE,
+    RESPONSE,
+    SHIFTS,
     SPEED_THERE,
     STEPPED,
     Earned,
@@ -105,7 +107,7 @@ def established(
     state = _pruned(predictor, state, level)
     state = _without_needless_terms(predictor, state, accepted, level)
     state = _pruned(predictor, state, level, _alone(predictor, given, state))
-    state = _restored(predictor, state, accepted, level)
+    state = _without_shifts(predictor, _restored(predictor, state, accepted, level))
     terms = tuple(replace(term, fit=state.fit) for term in state.terms)
     return Established(state.names, terms, state.problem, state.fit)
 
@@ -202,6 +204,14 @@ def _without_needless_terms(
 
 def _leaves_something(problem: Problem, fit: Fit) -> bool:
     return unexplained(problem, fit, residual_dependence(problem, fit)).any
+
+
+def _without_shifts(predictor: Predictor, state: _State) -> _State:
+    """Without the effects that a free response in time contains, however well they do beside its coarse steps."""
+    if any(term.signal == RESPONSE for term in state.terms):
+        for name in set(state.names) & set(SHIFTS):
+            state = state.without(predictor, name, state.problem.fit(state.fit.model.without(name)))
+    return state
 
 
 def _restored(predictor: Predictor, state: _State, accepted: Mapping[str, Effect], level: float) -> _State:

@@ -26,6 +26,8 @@ from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, formula_effect
 
 NAME = "unlisted"
 RESPONSE = "response of each wheel in time"
+SHIFTS = ("clock-offset", "command-delay")
+"""Effects that shift all motion in time: beside a free response in time (`RESPONSE`) nothing tells their number from it."""
 RESPONSE_OF = {"v": "response of the forward velocity in time", "w": "response of the turning velocity in time"}
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 SPEED_THERE = "forward speed at a place"
