@@ -76,6 +76,14 @@ def test_a_ringing_controller_is_described():
     assert float(said.group(2)) == pytest.approx(peak_s, abs=0.1)
 
 
+def test_beside_a_free_response_no_shift_in_time_is_named():
+    """A response in time contains each shift: an offset that suits its coarse steps better says nothing of a clock."""
+    predictor = ringing()
+    found = established(predictor, NOMINAL, {"clock-offset": listed(NOMINAL, None, predictor.tracks)["clock-offset"]}, True)
+    assert [term.signal for term in found.terms] == [RESPONSE]
+    assert found.names == ()
+
+
 @pytest.mark.parametrize("term", ["k * (ago(0.1, 0.2) - ago(0.4, 0.7))", "-k * ago(0.2, 0.4)"])
 def test_what_is_no_response_to_a_step_is_not_described_as_one(term):
     """A term that overshoots by more than the step, or ends in the other direction."""
