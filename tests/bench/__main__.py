@@ -24,6 +24,7 @@ PARTS = {
     "reading": "reading a study for a figure",
     "figures": "drawing a whole study",
     "page": "bns explore in a browser",
+    "commands": "start, diagnosis, comparison and import from the command line",
 }
 
 
