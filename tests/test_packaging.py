@@ -6,9 +6,13 @@ import sys
 import tarfile
 import tomllib
 import zipfile
+from contextlib import suppress
 from email import message_from_string
+from importlib import metadata
 
 import pytest
+from packaging.specifiers import SpecifierSet
+from packaging.version import Version
 
 import bns
 from bns.extras import LIBRARIES
@@ -129,3 +133,15 @@ def test_figures_are_drawn_from_what_is_installed(installed, tmp_path):
     )
     assert done.returncode == 2, done.stderr
     assert "bns: there are no runs in" in done.stderr
+
+
+def test_what_setup_pins_runs_on_the_oldest_python_that_is_promised():
+    """A pin that needs a later bug-fix release of Python ends setup on a distribution's own Python (Debian 12: 3.11.2)."""
+    oldest = Version(PROJECT["requires-python"].removeprefix(">=") + ".0")
+    pins = [line.split("==")[0] for line in (ROOT / "constraints.txt").read_text().splitlines() if "==" in line]
+    needs = {}
+    for name in pins:
+        with suppress(metadata.PackageNotFoundError):
+            needs[name] = metadata.metadata(name).get("Requires-Python") or ""
+    assert len(needs) > 100
+    assert {name: needed for name, needed in needs.items() if not SpecifierSet(needed).contains(oldest)} == {}

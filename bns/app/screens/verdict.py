@@ -26,7 +26,7 @@ def verdict_html(result: DiagnoseResult, others: Sequence[Rival]) -> str:
     d = result.diagnosis
     sure = certainty(d)
     words = "".join(f"<br>It behaves like this: {escape(each)}." for each in d.behaviour)
-    sizes = found_numbers(result.to_json()["parameters"])
+    sizes = found_numbers(d.numbers)
     either = "".join(f"<br>or{found_numbers(other.numbers)}" for other in others)
     then = _then(result)
     said = f"<b>{escape(headline(d))}</b> {escape(sure)}{sizes}{either}{words}" + (f"<br>{then}" if then else "")
