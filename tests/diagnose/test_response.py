@@ -76,6 +76,7 @@ def test_a_ringing_controller_is_described():
     assert float(said.group(2)) == pytest.approx(peak_s, abs=0.1)
 
 
+@pytest.mark.slow
 def test_beside_a_free_response_no_shift_in_time_is_named():
     """A response in time contains each shift: an offset that suits its coarse steps better says nothing of a clock."""
     predictor = ringing()
