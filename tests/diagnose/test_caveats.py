@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose.caveats import _no_lower
+from bns.diagnose.caveats import _no_lower, _on_times
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
@@ -58,3 +58,11 @@ def test_commands_between_poses_are_seen():
     assert tracks_of(few).commands_at_poses_s == pytest.approx(0.04)
     still = table.assign(left_m_s=0.1, right_m_s=0.1)
     assert tracks_of(still).commands_at_poses_s is None
+
+
+@pytest.mark.parametrize(("tau_s", "said"), [(0.03, True), (0.3, False)])
+def test_only_times_shorter_than_that_between_poses_are_doubted(tau_s, said):
+    selection = SimpleNamespace(fit=SimpleNamespace(model=NOMINAL.with_effect("motor-lag", tau_s=tau_s)))
+    tracks = tracks_of(measured(NOMINAL, trials=3, seed=5))
+    assert bool(list(_on_times(selection, tracks, {"motor-lag"}))) == said
+    assert not list(_on_times(selection, tracks, {"wheelbase"}))

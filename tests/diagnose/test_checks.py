@@ -152,7 +152,8 @@ def test_minutes_are_told_from_inches_and_degrees():
     good = measured(NOMINAL, trials=6, seed=3)
     with pytest.raises(DataError, match="t_s looks like minutes"):
         checked(good.assign(t_s=good.t_s / 60))
-    for size, degrees, text in ((39.37, 1, "look like inches"), (39.37, 57.3, "look like inches"), (1, 57.3, "like degrees")):
-        other = good.assign(x_m=good.x_m * size, y_m=good.y_m * size, heading_rad=good.heading_rad * degrees)
+    inches, degrees = "x_m and y_m look like inches", "heading_rad looks like degrees"
+    for size, turn, text in ((39.37, 1, inches), (55, 1, inches), (39.37, 57.3, inches), (1, 57.3, degrees)):
+        other = good.assign(x_m=good.x_m * size, y_m=good.y_m * size, heading_rad=good.heading_rad * turn)
         with pytest.raises(DataError, match=text):
             checked(other)

@@ -53,3 +53,9 @@ def test_compare_asks_about_a_wheelbase_that_is_probably_wrong(factor, asked):
 @pytest.mark.parametrize("tau_s", [0.25, 0.6])
 def test_compare_does_not_take_a_lag_for_a_wheelbase(tau_s):
     assert compare(predictor(hidden(motor_lag={"tau_s": tau_s})), NOMINAL).hint == ""
+
+
+def test_compare_asks_only_from_a_factor_on():
+    other = replace(NOMINAL, wheelbase_m=1.15 * NOMINAL.wheelbase_m)
+    assert compare(predictor(NOMINAL), other).hint == ""
+    assert compare(predictor(NOMINAL), replace(NOMINAL, wheelbase_m=1.35 * NOMINAL.wheelbase_m)).hint != ""

@@ -44,3 +44,14 @@ def test_a_caster_drags_only_until_it_trails_behind_its_hinge():
     assert changed[:, 50:60].max() < 2e-4  # 15 cm on, it trails whatever its direction was
     assert changed[:, 61:80].max() > 1e-3  # it swings round
     assert changed[:, 115:].max() < 2e-4
+
+
+def test_dry_friction_is_alike_in_coarse_and_in_fine_steps():
+    """While the caster swings round, in two steps of a camera and in 320."""
+    ways = []
+    for steps in (2, 320):
+        step = np.full((1, steps), 0.16 / steps)
+        forward, yaw = np.full((1, steps), 0.15), np.full((1, steps), 0.8)
+        found = swivelled(forward, yaw, step, np.array([2.0]), 0.01, 0.0, 0.015, -0.05)
+        ways.append([float((one * step).sum()) for one in found])
+    np.testing.assert_allclose(ways[0], ways[1], rtol=1e-3)

@@ -66,7 +66,6 @@ class Tracks:
         """Typical time between poses, s, if nearly all commands begin when a pose was taken; None if they begin between poses."""
         ends = np.cumsum(self.duration_s, axis=1)
         changes = (np.diff(self.left_m_s, axis=1) != 0) | (np.diff(self.right_m_s, axis=1) != 0)
-        changes &= self.duration_s[:, 1:] > 0
         trials = [(self.t_s[a:b], ends[k, :-1][changes[k]]) for k, (a, b) in enumerate(pairwise(self.first))]
         if not changes.any() or any(len(seen) < 2 for seen, _ in trials):
             return None

@@ -47,13 +47,10 @@ def standing_out(problem: Problem, fit: Fit) -> NDArray[np.int64]:
 
 
 def far_off(problem: Problem, fit: Fit) -> NDArray[np.int64]:
-    """All trials that are far worse predicted than the rest, the worst first, of those that count in the fit."""
-    tracks, counted = problem.predictor.tracks, problem.predictor.counted
-    frames, there = np.diff(tracks.first), np.arange(len(fit.losses))
-    if counted is not None:
-        there = there[counted[tracks.first[:-1]] > 0]
-    usual = np.log(np.maximum(fit.held_out[there] / np.maximum(frames[there], 1), 1e-12))
+    """All trials that are far worse predicted than the rest, the worst first; what does not count in the fit has no loss."""
+    frames = np.diff(problem.predictor.tracks.first)
+    usual = np.log(np.maximum(fit.held_out / np.maximum(frames, 1), 1e-12))
     off = usual - np.median(usual)
     spread = max(float(robust_sd(off)), 1.0 / np.sqrt(float(np.median(frames))))
     order = np.argsort(-off)
-    return np.asarray(there[order[off[order] > FAR * spread]])
+    return np.asarray(order[off[order] > FAR * spread])
