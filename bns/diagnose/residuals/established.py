@@ -209,7 +209,7 @@ def _leaves_something(problem: Problem, fit: Fit) -> bool:
 def _without_shifts(predictor: Predictor, state: _State) -> _State:
     """Without the effects that a free response in time contains, however well they do beside its coarse steps."""
     if any(term.signal == RESPONSE for term in state.terms):
-        for name in set(state.names) & set(SHIFTS):
+        for name in [shift for shift in SHIFTS if shift in state.names]:
             state = state.without(predictor, name, state.problem.fit(state.fit.model.without(name)))
     return state
 
