@@ -12,6 +12,7 @@ from bns.errors import SpecError
 from bns.spec import RunSpec
 from bns.store.archive.read import connect_archives, stored_archives
 from bns.store.read.reader import finished, load
+from bns.store.read.snapshot import snapshot
 from bns.sweep.expand.grid import Sweep, parse_sweep
 
 if TYPE_CHECKING:  # a third of a second to load, and a sweep needs no table
@@ -51,8 +52,11 @@ def sweep_status(results: Path) -> list[SweepRow]:
 
     ``mean_wall_s`` is the mean of the runs that are done, NaN without any.
     """
-    runs = _with_archived(results, _that_count(results, load(results, "runs", columns=["run_id", *_COLUMNS])))
-    files = _newest_files(load(results, "specs", columns=["sweep", "written_at", "text"]))
+    if stored_archives(results) and snapshot(results).is_empty:
+        runs, files = _only_archived(results), {}
+    else:
+        runs = _with_archived(results, _that_count(results, load(results, "runs", columns=["run_id", *_COLUMNS])))
+        files = _newest_files(load(results, "specs", columns=["sweep", "written_at", "text"]))
     return [row for name in sorted({*runs["sweep"], *files}) for row in _rows(name, runs[runs["sweep"] == name], files)]
 
 
@@ -66,13 +70,20 @@ def _with_archived(results: Path, runs: pd.DataFrame) -> pd.DataFrame:
     """``runs`` and those that only archives have; with a column ``archived``."""
     import pandas as pd  # noqa: PLC0415  # as above
 
-    runs, files = runs.assign(archived=False), stored_archives(results)
-    if not files:
+    runs = runs.assign(archived=False)
+    if not stored_archives(results):
         return runs
-    with connect_archives(files) as connection:
-        kept = connection.execute("SELECT run_id, sweep, task, status, spec FROM runs").df().assign(archived=True)
-    both = pd.concat([runs, kept], ignore_index=True)  # those of the store come first
+    both = pd.concat([runs, _only_archived(results)], ignore_index=True)  # those of the store come first
     return both.drop_duplicates(["sweep", "run_id"]).reset_index(drop=True)
+
+
+def _only_archived(results: Path) -> pd.DataFrame:
+    """The runs of all archives; when they began, and how long they took, is not kept there."""
+    import pandas as pd  # noqa: PLC0415  # as above
+
+    with connect_archives(stored_archives(results)) as connection:
+        kept = connection.execute("SELECT run_id, sweep, task, status, spec FROM runs").df()
+    return kept.assign(started_at=pd.Series(dtype="datetime64[us, UTC]"), wall_s=float("nan"), archived=True)
 
 
 def _rows(name: str, runs: pd.DataFrame, files: dict[str, Sweep]) -> list[SweepRow]:

@@ -92,6 +92,18 @@ def test_runs_that_only_an_archive_has_count_as_the_sweep_counts_them(tmp_path):
     assert again.new == 7
 
 
+def test_an_archive_alone_is_shown_as_well(tmp_path):
+    serial(sweep_of(tmp_path), tmp_path / "there", limit=5)
+    before = sweep_status(tmp_path / "there")
+    archive(tmp_path / "there", tmp_path / "here" / "archived" / "part.parquet")
+    rows = sweep_status(tmp_path / "here")
+    assert [(r.sweep, r.task, r.done + r.failed, r.archived) for r in rows] == [
+        (r.sweep, r.task, r.done + r.failed, r.done + r.failed) for r in before if r.done + r.failed
+    ]
+    assert all(r.total is None and r.last is None for r in rows)
+    assert str(rows[0].archived) in status_table(rows).splitlines()[1].split()
+
+
 def test_status_of_a_sweep_half_done(tmp_path):
     serial(sweep_of(tmp_path), tmp_path, limit=5)
     assert sum(row.remaining for row in sweep_status(tmp_path)) == 7
