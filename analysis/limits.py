@@ -23,7 +23,8 @@ from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, lettered, style
 
 PUBLISHED = Path(__file__).parents[1] / "results" / "published"
 SWEEP, PHYSICS, BASE = "noise", "noise-physics", "bns+margin=0.03"
-APPROACHES = ("bns", BASE, "bns+noise=16")
+APPROACHES = ("bns", BASE, "bns+noise=16", "bns+noise=16+margin=0.01+renew=10")
+_COLOURS = (OKABE_ITO[0], OKABE_ITO[4], OKABE_ITO[1], OKABE_ITO[2])
 LAST, EARLY, LATEST = 5, 20, 5
 """Evaluations at the end and at the beginning that are averaged, and those that a point of a curve is the mean of."""
 _PLACES = {"simulated": "networks", "quiet": "world without noise", "noisy": "world"}
@@ -116,7 +117,7 @@ def drawn(rows: pd.DataFrame, found: pd.DataFrame, possible: pd.DataFrame) -> Fi
     axes = figure.subplots(2, 3, sharey=True)
     for column, task in enumerate(ceiling.TASKS):
         most = float(possible[possible.task == task].success.iloc[0])
-        for approach, colour in zip(APPROACHES, (OKABE_ITO[0], OKABE_ITO[4], OKABE_ITO[1]), strict=True):
+        for approach, colour in zip(APPROACHES, _COLOURS, strict=True):
             _curve(axes[0, column], rows[(rows.task == task) & (rows.approach == approach)], approach, colour)
         _bars(axes[1, column], found[found.task == task])
         for ax in axes[:, column]:
@@ -125,7 +126,7 @@ def drawn(rows: pd.DataFrame, found: pd.DataFrame, possible: pd.DataFrame) -> Fi
         axes[0, column].set(xlabel="evaluation in the world", ylim=(0, 102), title=title)
     axes[0, 0].set_ylabel("successful runs (%)")
     axes[1, 0].set_ylabel("success of the final controllers (%)")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=5)
     return figure
 
 
@@ -139,12 +140,11 @@ def _curve(ax: Axes, own: pd.DataFrame, approach: str, colour: str) -> None:
 
 def _bars(ax: Axes, found: pd.DataFrame) -> None:
     for number, approach in enumerate(APPROACHES):
-        own, at = found[found.approach == approach].iloc[0], np.arange(len(_PLACES)) + 0.27 * (number - 1)
+        own, at = found[found.approach == approach].iloc[0], np.arange(len(_PLACES)) + 0.2 * (number - 1.5)
         heights = [own[place] for place in _PLACES]
         below = [own[place] - own[f"{place}_low"] for place in _PLACES]
         above = [own[f"{place}_high"] - own[place] for place in _PLACES]
-        colour = (OKABE_ITO[0], OKABE_ITO[4], OKABE_ITO[1])[number]
-        ax.bar(at, heights, 0.25, yerr=(below, above), color=colour, error_kw={"elinewidth": 0.8, "ecolor": GREY})
+        ax.bar(at, heights, 0.18, yerr=(below, above), color=_COLOURS[number], error_kw={"elinewidth": 0.8, "ecolor": GREY})
     ax.set_xticks(range(len(_PLACES)), [name.replace(" without", "\nwithout") for name in _PLACES.values()])
 
 

@@ -97,6 +97,12 @@ def test_a_diagnosis_loads_nothing_that_only_figures_and_formulas_need():
     assert set(done.stdout.split()) & {"matplotlib", "sklearn", "scipy.stats", "torch"} == set()
 
 
+def test_the_catalogue_is_listed_without_tables_and_special_functions():
+    code = "import sys; from bns.cli.main import main; main(['effects', '--json']); print('\\n', *sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(done.stdout.splitlines()[-1].split()) & {"pandas", "scipy.special", "scipy.optimize", "torch"} == set()
+
+
 def test_status_as_json(results, capsys):
     [row] = answer(capsys, "status", "--json", "--results", results)
     assert (row["sweep"], row["task"], row["done"], row["failed"], row["total"]) == ("grid", "circle", 2, 0, None)

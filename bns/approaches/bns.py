@@ -41,6 +41,10 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     (`bns.approaches.parts.noisy`). Noise grows and shrinks by tenths as the margin does: under all of it, no controller
     reaches anything on networks that have hardly learned.
 
+    ``renew``: once the fittest controller has not reached all goals in simulation for so many rounds, all controllers give way
+    to random ones; the networks stay. A population that converged on poor networks hardly gets away from there: on the way to a
+    goal that is missing, each further command costs fitness until it is reached. Its successor starts on networks that know more.
+
     ``ensemble``: so many networks for each displacement (`bns.approaches.parts.ensemble`). ``use``: evolution works on
     their mean, on the one that thinks worst of a controller, or on one of them, drawn for each round.
 
@@ -57,6 +61,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     options: ClassVar[Options] = {
         "margin": Option(0.0, 0.0, 1.0, "m by which goals become narrower in evolution, all around"),
         "noise": Option(0, 0, 1000, "simulations of each controller under noise; 0: one without"),
+        "renew": Option(0, 0, 1000, "rounds without a controller that reaches all goals until a new population; 0: never"),
         "ensemble": Option(1, 1, 100, "networks for each displacement"),
         "use": Choice("mean", USES, "what evolution works on where networks are several"),
         "informed": Option(0.0, 0.0, 1.0, "fraction of the population, fittest first, of which the most informative is driven"),
@@ -68,7 +73,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     def __init__(self, setting: Setting, trainer: Learner, arcs: Arcs | None = None) -> None:
         """Goals as wide as they are; arcs: the model whose errors the trainer learns."""
         self._arcs = arcs
-        self._narrowed = self._rounds = 0
+        self._narrowed = self._rounds = self._in_vain = 0
         self._surprise = Surprise(setting.number("restart"))
         self._latest: deque[np.ndarray] = deque(maxlen=SNAPSHOTS)
         if setting.options["margin"]:
@@ -129,11 +134,14 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         self.train()
         self.copy()
         self._latest.append(self.weights)
+        if self._in_vain and self._in_vain == self.setting.whole("renew"):
+            self._renew()
         self.evolve()
-        if self.setting.options["margin"] or self.setting.options["noise"]:
+        if any(self.setting.options[name] for name in ("margin", "noise", "renew")):
             scores, best = self.evolver.scores, self.evolver.order[0]
             all_reached = scores.goals_reached[best] == len(self.setting.task.goals_m)
             self._narrowed = min(self._narrowed + 1, STEPS) if all_reached else max(self._narrowed - 1, 0)
+            self._in_vain = 0 if all_reached else self._in_vain + 1
 
     def simulator_now(self) -> Simulator:
         """The networks, or what ``use`` makes of several."""
@@ -154,6 +162,13 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
             found = most_certain(simulator, evolver.population, evolver.order, self.setting.task, key, step)
             self._chosen = step, evolver.population.controller(found)
         return self._chosen[1].copy()
+
+    def _renew(self) -> None:
+        """Random controllers in the places of all; the evolution that follows scores them."""
+        spec, key = self.setting.spec, self.setting.own_key(f"renewal {self._rounds}")
+        others = self.setting.robot.initial_population(key, spec.population_size, spec.min_commands, spec.max_commands)
+        self.evolver.replace(np.arange(spec.population_size), others)
+        self._in_vain = 0
 
     def _on(self, weights: np.ndarray) -> Simulator:
         """These networks, after the model where there is one, and under noise where that is asked for."""

@@ -17,7 +17,7 @@ from bns.diagnose.estimate.clocks.trial_clock_test import with_trial_clocks
 from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.fit_set import Tried, fit_set
-from bns.diagnose.estimate.plausibility import implausible
+from bns.diagnose.estimate.plausibility import implausible, with_unit
 from bns.diagnose.estimate.problem import given_steps, problem_for
 from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.parallel import one_thread_each
@@ -160,7 +160,8 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
         if number.effect not in added:
             continue
         if value in {p.low, p.high} and value != p.neutral:
-            yield f"{number.effect}: {p.name} is at its bound, {value:g} {p.unit}: the data require more than the model allows."
+            at = f"{p.name} is at its bound, {value:g}{with_unit(p)}"
+            yield f"{number.effect}: {at}: the data require more than the model allows."
     for name in sorted(added):
         why = implausible(fit, name, bounds=False)
         if why:
@@ -173,12 +174,9 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
 
 
 def does_nothing(fit: Fit, name: str) -> bool:
-    """Whether the first number of an effect cannot be told from neutral: the others say how, not whether, it acts."""
-    for index, number in enumerate(fit.free):
-        if number.effect == name and np.isfinite(number.parameter.neutral):
-            low, high = fit.interval(index)
-            return bool(low <= number.parameter.neutral <= high)
-    return False
+    """Whether no number of an effect can be told from neutral; a limit that is found is not infinite."""
+    own = [(fit.interval(index), number.parameter.neutral) for index, number in enumerate(fit.free) if number.effect == name]
+    return bool(own) and all(bool(low <= neutral <= high) for (low, high), neutral in own)
 
 
 def _written(model: Model, name: str, written: Mapping[str, str]) -> Model:

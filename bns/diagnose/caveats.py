@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
+from scipy.special import stdtr
 
-from bns.diagnose.data.tracks import Tracks
+from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import PairedErrors
@@ -16,6 +17,7 @@ from bns.diagnose.residuals.worst_trials import WithoutWorst
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
+from bns.diagnose.values import ties_of
 from bns.physics.jointed.model import JointedModel
 from bns.physics.model import Model
 
@@ -25,6 +27,8 @@ NOTABLE = DEFAULTS.verdict.notable
 CHANCE = DEFAULTS.residuals.chance
 WORST_SHARE = DEFAULTS.residuals.worst_share
 SHOWN = DEFAULTS.report.moments
+FEWEST_CLOCKS = 5
+"""Clocks of trials from which one would believe a line."""
 
 
 def notes_on(
@@ -109,13 +113,15 @@ def _on_slight(unseen: bool, slight: Sequence[str]) -> Iterator[str]:
 
 def on_worst(both: WithoutWorst) -> str:
     """What becomes of a verdict with and without trials that are unlike the rest."""
-    those = f"{'trial' if len(both.trials) == 1 else 'trials'} {', '.join(both.trials)}"
-    begun = f"Unlike all others as a whole: {those}. They do not count in the fits, but are part of the errors shown"
+    one = len(both.trials) == 1
+    counts, them = ("It does not count in the fits, but is", "it") if one else ("They do not count in the fits, but are", "them")
+    those = f"{'trial' if one else 'trials'} {', '.join(both.trials)}"
+    begun = f"Unlike all others as a whole: {those}. {counts} part of the errors shown"
     if both.same:
-        return f"{begun}; the verdict is the same with them. Check what happened there; `--without` excludes them."
+        return f"{begun}; the verdict is the same with {them}. Check what happened there; `--without` excludes {them}."
     verdict, effects = both.with_them
     said = f"{verdict} ({', '.join(effects)})" if effects else verdict
-    return f"{begun}; with them the verdict would be {said}. Check what happened there; `--without` excludes them."
+    return f"{begun}; with {them} the verdict would be {said}. Check what happened there; `--without` excludes {them}."
 
 
 def on_many_apart(trials: Sequence[str]) -> str:
@@ -144,9 +150,10 @@ def _no_lower(with_terms: PairedErrors) -> str:
 def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
     names = {*selection.accepted, *(name for competitor in selection.competing_models for name in competitor)}
     known = known_effects(selection)
+    tied = {name for group in ties_of(selection) for name in group if not all(known[one].of_measuring for one in group)}
     for name in sorted(names):
         if known[name].of_measuring:
-            yield f"{name} is an error of the measurement, not of the robot."
+            yield f"{name} {'would be' if name in tied else 'is'} an error of the measurement, not of the robot."
     chain = sorted((known[name] for name in names), key=lambda effect: (effect.place, effect.name))
     logged = {*tracks.extra, *(("session_s",) if tracks.start_known else ())}
     yield from (effect.caveat for effect in chain if effect.caveat and not logged.intersection(effect.explained_by))
@@ -159,6 +166,23 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
             f"{per_trial_effect.effect.name} has a separate value in each trial, {own.min():+.3f} to {own.max():+.3f} s; "
             "held-out trials are judged with the clock fitted to other poses of the same trial. "
             "A delay common to all trials cannot be distinguished from the clocks."
+        )
+        if tracks.start_known:
+            yield from _on_drift(per_trial_effect.effect.name, tracks.start_s, own)
+
+
+def _on_drift(name: str, start_s: Array, own_s: Array) -> Iterator[str]:
+    """On clocks of trials that move along the session."""
+    trials = len(own_s)
+    if trials < FEWEST_CLOCKS or np.ptp(start_s) == 0.0 or np.ptp(own_s) == 0.0:
+        return
+    r = float(np.corrcoef(start_s, own_s)[0, 1])
+    t = abs(r) * np.sqrt((trials - 2) / max(1.0 - r * r, 1e-12))
+    if 2.0 * float(stdtr(trials - 2, -t)) < CHANCE:
+        rate = r * float(own_s.std() / start_s.std())
+        yield (
+            f"The values of {name} change by {3600 * rate:+.3g} s per hour of the session (correlation {r:+.2f}): the clocks "
+            f"run at rates that differ by {1e6 * abs(rate):.3g} parts in a million."
         )
 
 

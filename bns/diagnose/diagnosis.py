@@ -35,6 +35,7 @@ from bns.physics.model import Model
 VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
 FEW_TRIALS = DEFAULTS.verdict.few_trials
 _HINT = DEFAULTS.verdict.hint
+OFTEN = DEFAULTS.verdict.often
 
 
 @dataclass(frozen=True)
@@ -124,8 +125,9 @@ class Diagnosis:
         moments = self.rest.outliers
         if not moments or self.selection is None:
             return self.terms_in_words
-        share = f"{len(moments)} of {len(self.selection.problem.predictor.tracks)} trials"
-        return f"in {share} something happens for a moment; the worst is {moments[0].in_words}", *self.terms_in_words
+        trials = len(self.selection.problem.predictor.tracks)
+        what = "something happens for a moment" if len(moments) < OFTEN * trials else "the error is large for moments, as by rule"
+        return f"in {len(moments)} of {trials} trials {what}; the worst is {moments[0].in_words}", *self.terms_in_words
 
     @property
     def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:
@@ -245,6 +247,8 @@ def _diagnosed(
         shared = StepwiseSelection(predictor, model, extra, tick, barred, own_clocks=False)
         without = outcome_of(_from_better_numbers(shared.run(), before), predictor, model, tick)
         found = found if predicts_better_throughout(found, without) else without
+    if found.fewer and not found.terms:
+        found = replace(found, selection=search.competing(found.selection))
     left = found.rest.any or bool(found.terms)
     words = tuple(in_words(term, predictor) for term in found.terms)
     hint = _hint(found.selection, len(predictor.tracks))

@@ -65,6 +65,11 @@ class Outcome:
     """The first term; without terms, a formula fitted to the variable along which most is left, where it earns something."""
 
     @property
+    def fewer(self) -> bool:
+        """Did the search end with more effects than stand?"""
+        return bool(self.withdrawn or self.imitating or self.negligible)
+
+    @property
     def own_clocks(self) -> bool:
         """Has each trial a clock of its own?"""
         return self.selection.fit.model.per_trial_effect is not None
@@ -181,11 +186,13 @@ def _negligible(selection: SelectionResult) -> tuple[str, ...]:
     """As `negligible`; not asked where trials have clocks of their own.
 
     Of bodies whose cycles scatter each in its own way, an effect alone is judged, too: it can be certain by the cycles that
-    hardly scatter, while the error, which all make, does not fall.
+    hardly scatter, while the error, which all make, does not fall. And so it is beside effects that the model has: whether two
+    effects are found at once, or one after the other, is no reason to name the second.
     """
     if selection.fit.model.per_trial_effect is not None:
         return ()
-    return negligible(selection, fewest=1 if selection.problem.predictor.luck is None else 0)
+    alone = selection.problem.predictor.luck is None and not selection.nominal.model.effects
+    return negligible(selection, fewest=1 if alone else 0)
 
 
 def _beside_the_floor(

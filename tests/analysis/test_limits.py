@@ -72,7 +72,8 @@ def rows_of(shares):
 
 
 def test_the_table_compares_pairs_at_the_end_and_over_the_last_five():
-    table = limits.compared(rows_of([[0, 0, 1, 2, 3, 5], [1, 2, 3, 4, 5, 5], [2, 3, 4, 5, 5, 5]])).set_index(["task", "approach"])
+    shares = [[0, 0, 1, 2, 3, 5], [1, 2, 3, 4, 5, 5], [2, 3, 4, 5, 5, 5], [5] * 6]
+    table = limits.compared(rows_of(shares)).set_index(["task", "approach"])
     plain, new = table.loc["circle", "bns"], table.loc["circle", limits.APPROACHES[2]]
     assert (plain.runs, plain.end, new.end) == (6, pytest.approx(400 / 6), 100)
     assert new["last"] == pytest.approx(100 * 24 / 30)
@@ -94,6 +95,6 @@ def test_what_limits_is_by_approach_and_the_picture_has_a_column_for_each_task()
     found = limits.limits(drives)
     assert found[["simulated", "quiet", "noisy"]].iloc[0].tolist() == pytest.approx([80, 60, 20])
     possible = pd.DataFrame({"task": ceiling.TASKS, "success": [99.0, 98.0, 95.0]})
-    figure = limits.drawn(rows_of([[0] * 6, [1] * 6, [2] * 6]), found, possible)
+    figure = limits.drawn(rows_of([[0] * 6, [1] * 6, [2] * 6, [3] * 6]), found, possible)
     assert len(figure.axes) == 6
     assert [line.get_ydata()[0] for ax in figure.axes[3:] for line in ax.lines if len(line.get_ydata()) == 2] == [99, 98, 95]

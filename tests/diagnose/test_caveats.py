@@ -1,16 +1,19 @@
 """What a note advises follows from the errors at every horizon."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose.caveats import _no_lower, _on_times
+from bns.diagnose.caveats import _no_lower, _on_drift, _on_effects, _on_times, on_worst
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.worst_trials import WithoutWorst
+from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, measured
 
 
@@ -30,6 +33,42 @@ def test_an_error_that_may_have_changed_by_luck_neither_fell_nor_rose():
     changes = {"command": Change(-0.01, -0.02, -0.005), "1s": Change(-0.01, -0.02, 0.01), "trial": Change(0.1, 0.05, 0.2)}
     errors = PairedErrors({h: SimpleNamespace(total=change) for h, change in changes.items()}, None, 20)
     assert (errors.fell_at, errors.rose_at) == (("command",), ("trial",))
+
+
+@pytest.mark.parametrize(
+    ("trials", "same", "said"),
+    [
+        (("7",), True, "trial 7. It does not count in the fits, but is part of the errors shown; the verdict is the same"),
+        (("7",), False, "with it the verdict would be tie (clock-offset)"),
+        (("7", "9"), False, "trials 7, 9. They do not count in the fits, but are part of the errors shown; with them the"),
+    ],
+)
+def test_trials_that_are_left_out_are_one_or_several(trials, same, said):
+    effects = ("clock-offset",)
+    assert said in on_worst(WithoutWorst(trials, ("tie", effects), ("tie" if same else "effects", effects)))
+
+
+@pytest.mark.parametrize(("rate", "scatter_s", "said"), [(1e-4, 5e-3, True), (0.0, 5e-3, False), (1e-4, 0.5, False)])
+def test_clocks_that_move_along_the_session_are_said_to(monkeypatch, rate, scatter_s, said):
+    monkeypatch.setattr("bns.diagnose.caveats.known_effects", lambda _: {})
+    start_s = np.arange(40.0) * 35.0
+    own_s = 0.02 + rate * start_s + scatter_s * np.random.default_rng(2).normal(size=40)
+    notes = list(_on_drift("clock-offset", start_s, own_s))
+    assert bool(notes) == said
+    if said:
+        assert re.search(r"by \+0\.3[4-8]\d* s per hour of the session .* differ by (9\d|10\d)(\.\d+)? parts in a mill", notes[0])
+    for known in (True, False):  # else trials are taken to follow each other without a pause
+        tracks = SimpleNamespace(extra={}, start_known=known, start_s=start_s, commands_at_poses_s=None)
+        assert sum("parts in a million" in note for note in _on_effects(with_clocks(own_s), tracks)) == (said and known)
+    assert list(_on_drift("clock-offset", start_s[:4], own_s[:4])) == []
+    assert list(_on_drift("clock-offset", 0 * start_s, own_s)) == []
+
+
+def with_clocks(own_s):
+    """A search that accepted nothing but clocks of trials."""
+    clocks = SimpleNamespace(effect=effect_named("clock-offset"), trial_values=tuple(own_s))
+    model = SimpleNamespace(per_trial_effect=clocks, effects=())
+    return SimpleNamespace(accepted=(), competing_models=(), steps=(), fit=SimpleNamespace(model=model))
 
 
 def thinned(every):

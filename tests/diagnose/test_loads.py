@@ -66,6 +66,17 @@ def test_wheels_that_lag_alike_keep_the_simple_lag():
     assert extended, "the longer effect was never tried"
 
 
+def test_ramps_of_velocity_and_turn_rate_are_told_from_limits_of_each_wheel():
+    """As the velocity smoothers of ROS have them, with a lag of the motors behind."""
+    ramps = {"forward_m_s2": 0.3, "turn_rad_s2": 4.0}
+    found = selected(hidden(velocity_ramp=ramps, motor_lag={"tau_s": 0.06}))
+    assert set(found.accepted) == {"velocity-ramp", "motor-lag"}
+    assert found.fit.model.values_of("velocity-ramp") == pytest.approx(ramps, rel=0.05)
+    assert found.fit.model.values_of("motor-lag")["tau_s"] == pytest.approx(0.06, rel=0.1)
+    single = selected(hidden(acceleration_limit={"max_m_s2": 0.3}))
+    assert single.accepted == ("acceleration-limit",)
+
+
 def test_an_extension_equals_what_it_extends_where_its_own_numbers_are_neutral():
     for effect in all_effects().values():
         if effect.extends:

@@ -16,7 +16,14 @@ from tests.hidden_effects.listed_floor import (
     QuadraticTurnSlip,
     TiltedCamera,
 )
-from tests.hidden_effects.listed_loads import ControllerOvershoot, ForceLimit, InertiaLag, SlopeLoad, TetherLoad
+from tests.hidden_effects.listed_loads import (
+    ControllerOvershoot,
+    ForceLimit,
+    InertiaLag,
+    SlopeLoad,
+    TetherLoad,
+    VelocityRamp,
+)
 from tests.hidden_effects.listed_motors import (
     Backlash,
     CommandQuantisation,
@@ -275,6 +282,7 @@ LISTED: dict[str, type[Cause]] = {
     "motor-lag": MotorLag,
     "acceleration-limit": AccelerationLimit,
     "force-limit": ForceLimit,
+    "velocity-ramp": VelocityRamp,
     "inertia-lag": InertiaLag,
     "controller-overshoot": ControllerOvershoot,
     "heating": Heating,

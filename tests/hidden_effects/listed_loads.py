@@ -43,6 +43,26 @@ class ForceLimit(Cause):
 
 
 @dataclass
+class VelocityRamp(Cause):
+    """A drive that approaches commanded velocity and turn rate in small parts of a step, none larger than its limits allow."""
+
+    forward_m_s2: float
+    turn_rad_s2: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        told = np.stack([wheels.sum(axis=2) / 2, (wheels[..., 1] - wheels[..., 0]) / BASE_M])
+        most = np.array([self.forward_m_s2, self.turn_rad_s2])[:, None] * moment.step_s / FINE
+        out, now = np.empty_like(told), np.zeros_like(told[..., 0])
+        for i in range(told.shape[2]):
+            summed = np.zeros_like(now)
+            for _ in range(FINE):
+                then = np.minimum(np.maximum(told[..., i], now - most), now + most)
+                summed, now = summed + (now + then) / 2, then
+            out[..., i] = summed / FINE
+        return np.stack([out[0] - out[1] * BASE_M / 2, out[0] + out[1] * BASE_M / 2], axis=2)
+
+
+@dataclass
 class InertiaLag(Cause):
     """Forces in proportion to what each wheel lacks, on one body with mass and inertia."""
 

@@ -41,6 +41,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"per_m2": 0.08, "x_m": 0.7, "y_m": 0.4},
     ),
     "force-limit": ({"max_m_s2": 0.4, "turn_ratio": 2.5}, {"max_m_s2": 0.2, "turn_ratio": 4.0}),
+    "velocity-ramp": (
+        {"forward_m_s2": 0.3, "turn_rad_s2": 8.0},
+        {"forward_m_s2": 0.15, "turn_rad_s2": 3.0},
+    ),
     "inertia-lag": ({"tau_s": 0.12, "turn_ratio": 0.5}, {"tau_s": 0.25, "turn_ratio": 0.3}),
     "slope-load": (
         {"x_m_s": 0.003, "y_m_s": -0.002, "behind_share": 0.05, "at_rest": 0.0},

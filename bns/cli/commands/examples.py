@@ -21,15 +21,15 @@ def add_commands(command: Adder) -> None:
 
 def effects(options: argparse.Namespace) -> int:
     """The catalogue."""
-    from bns.api.effects import effects as catalogue
+    from bns.api.effects import rows
 
-    table = catalogue()
+    listed = rows()
     if options.json:
-        print(as_json(table.reset_index().to_dict("records")))
+        print(as_json(listed))
         return 0
-    wide = max(map(len, table.index))
-    for row in table.itertuples():
-        print(f"{row.Index:{wide}}  {row.meaning} [{row.stage}]\n{'':{wide}}  {row.parameters}; {row.bounds}")
+    wide = max(len(row["effect"]) for row in listed)
+    for row in listed:
+        print(f"{row['effect']:{wide}}  {row['meaning']} [{row['stage']}]\n{'':{wide}}  {row['parameters']}; {row['bounds']}")
     return 0
 
 

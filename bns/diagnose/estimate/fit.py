@@ -38,6 +38,7 @@ _ROUNDS = DEFAULTS.estimate.fit_rounds
 _SETTLED = DEFAULTS.estimate.fit_settled
 _TRUSTED = DEFAULTS.estimate.fit_trusted
 _LOOKS = DEFAULTS.estimate.look_rounds
+_RULED = DEFAULTS.estimate.slope_ruled
 
 
 @dataclass(frozen=True)
@@ -329,6 +330,21 @@ class Problem:
         return eliminate_clocks(self, at.model, at.whitened, out)
 
     def _slope(self, at: _Point, free: Sequence[FreeParameter], j: int, by: float) -> Array:
+        """A column of the Jacobian, (frames, 3). Where one trial rules it, each trial's slope to the flatter side.
+
+        Far from the truth the filter begins anew in some trials (`innovations`), and a change of the number by a thousandth can
+        move where: a jump, whose slope says that this trial alone knows the number.
+        """
+        slope = self._difference(at, free, j, by)
+        steepness = self.per_trial((slope**2).sum(axis=1))
+        p, other = free[j].parameter, free[j].of(at.model) - by
+        if steepness.max() <= _RULED * steepness.sum() or not p.low <= other <= p.high:
+            return slope
+        back = self._difference(at, free, j, -by)
+        flatter = self.per_trial((back**2).sum(axis=1)) < steepness
+        return np.where(flatter[self._trial][:, None], back, slope)
+
+    def _difference(self, at: _Point, free: Sequence[FreeParameter], j: int, by: float) -> Array:
         changed = moved_by(at.model, free, by * np.eye(len(free))[j])
         slope: Array = (self.whitened(changed) - at.whitened) / by
         return slope

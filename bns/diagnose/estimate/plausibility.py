@@ -26,13 +26,15 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
             continue
         value, (low, high) = float(fit.values[index]), fit.interval(index)
         if bounds and _stopped(p, value):
-            return f"{p.name} is at its bound, {value:g}{_unit(p)}"
+            return f"{p.name} is at its bound, {value:g}{with_unit(p)}"
         if np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
-            return f"{p.name} = {value:g}{_unit(p)} is outside of the plausible range, {p.plausible[0]:g} to {p.plausible[1]:g}"
+            least, most = p.plausible
+            return f"{p.name} = {value:g}{with_unit(p)} is outside of the plausible range, {least:g} to {most:g}"
     return ""
 
 
-def _unit(p: Parameter) -> str:
+def with_unit(p: Parameter) -> str:
+    """The unit behind a blank; nothing for a bare number."""
     return "" if p.unit == "1" else f" {p.unit}"
 
 

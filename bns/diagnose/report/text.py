@@ -48,9 +48,9 @@ def diagnosis_text(d: Diagnosis, rivals: Sequence[Rival] = ()) -> str:
 def _diagnosis(d: Diagnosis, rivals: Sequence[Rival]) -> Iterator[str]:
     yield f"verdict: {d.verdict}"
     if d.verdict == "unlisted" and d.effects:
-        yield f"Missing from the model: {' and '.join(d.effects)}, and something that no listed effect explains."
+        yield f"Missing from the model: {_named(d)}, and something that no listed effect explains."
     else:
-        yield _VERDICTS[d.verdict].format(effects=" and ".join(d.effects) or "nothing listed")
+        yield _VERDICTS[d.verdict].format(effects=enumerated(d.effects) or "nothing listed")
     odd = [implausible_text(d.selection, name) for name in d.selection.implausible] if d.selection is not None else []
     yield from odd
     if d.selection is not None:
@@ -77,6 +77,18 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival]) -> Iterator[str]:
         yield from (f"  - {note}" for note in notes)
 
 
+def enumerated(names: Sequence[str]) -> str:
+    """Names with commas, and "and" before the last."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+def _named(d: Diagnosis) -> str:
+    """The accepted effects, each with those that these measurements cannot tell from it."""
+    ties = ties_of(d.selection) if d.selection is not None else []
+    others = {name: [one for one in group if one != name] for group in ties for name in group}
+    return enumerated([f"{name} (or {' or '.join(others[name])})" if others.get(name) else name for name in d.effects])
+
+
 def _numbers(d: Diagnosis) -> Iterator[str]:
     assert d.selection is not None
     yield from _intervals(d.numbers, d.selection.fit.model.catalogue())
@@ -94,7 +106,10 @@ def _intervals(
 
 
 def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
-    return f"  {effect}: {name} = {n['value']:.5g}{_unit(n)} (95 %: {n['low']:.5g} to {n['high']:.5g})"
+    said = f"  {effect}: {name} = {n['value']:.5g}{_unit(n)}"
+    if n["low"] == n["high"]:
+        return f"{said} (no interval: it is at a bound, or no small change of it changes the loss)"
+    return f"{said} (95 %: {n['low']:.5g} to {n['high']:.5g})"
 
 
 def _unit(number: Mapping[str, Any]) -> str:

@@ -31,6 +31,8 @@ SHIFTS = ("clock-offset", "command-delay")
 RESPONSE_OF = {"v": "response of the forward velocity in time", "w": "response of the turning velocity in time"}
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 SPEED_THERE = "forward speed at a place"
+TRAVEL = "direction of travel"
+"""Where the robot drives to: its heading, or the opposite where it reverses."""
 CHANCE = DEFAULTS.residuals.chance
 LEAST = DEFAULTS.residuals.least
 LARGE, LARGE_Z = DEFAULTS.residuals.large, DEFAULTS.residuals.large_z
@@ -135,6 +137,8 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     turns = ("cos(heading)", "sin(heading)", "cos(2*heading)", "sin(2*heading)")
     uphill = ("moving * cos(heading)", "moving * sin(heading)")  # a slope on which wheels do not slip sideways
     yield Family("heading", "v", (*(f"v * {t}" for t in turns), *uphill))
+    if float((seen["left_m_s"] + seen["right_m_s"]).min()) < 0.0:
+        yield Family(TRAVEL, "v", ("v", *(f"abs(v) * {t}" for t in turns)))  # a carpet's nap, forwards and backwards
     yield Family("heading", "w", tuple(f"moving * {t}" for t in turns))
     yield Family("heading", SHARE, turns)  # both wheels alike: a carpet's nap
     (x0, x1), (y0, y1) = (np.quantile(predictor.tracks.pose[:, i], [0.02, 0.98]) for i in (0, 1))

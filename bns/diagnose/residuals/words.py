@@ -8,7 +8,7 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_KNOTS_S, RESPONSE_OF
+from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_KNOTS_S, RESPONSE_OF, TRAVEL
 from bns.diagnose.residuals.symbolic import Formula
 from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, value_of
 
@@ -76,6 +76,13 @@ def _heading(term: Formula, _: Predictor) -> str:
     low, high = (int(i) for i in (share.argmin(), share.argmax()))
     at = [f"{_slower(-share[i])} at a heading of {np.degrees(grid[i]):.0f}°" for i in (low, high)]
     return ", ".join(at)
+
+
+def _travel(term: Formula, _: Predictor) -> str:
+    grid = np.linspace(-np.pi, np.pi, _POINTS)
+    share = _curve(term, "heading", grid, v=1.0)
+    low, high = (int(i) for i in (share.argmin(), share.argmax()))
+    return ", ".join(f"{_slower(-share[i])} when it travels towards {np.degrees(grid[i]):.0f}°" for i in (low, high))
 
 
 def _reversal(term: Formula, _: Predictor) -> str:
@@ -177,6 +184,7 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("time in the trial", "share"): _time_in_trial,
     ("time of the session", "share"): _session,
     ("heading", "share"): _heading,
+    (TRAVEL, "v"): _travel,
     ("distance since each wheel reversed", "wheels"): _reversal,
     ("direction of motion", "share"): _swing,
     ("speed of each wheel", "wheels"): _speed,

@@ -172,6 +172,17 @@ class StepwiseSelection:
             tried.add(frozenset(accepted))
         return self._ended(problem, fit, accepted, steps)
 
+    def competing(self, found: SelectionResult) -> SelectionResult:
+        """The result of this search with fewer effects than it ended with, and the explanations that compete with what is left.
+
+        Those of the search competed with all of its effects. Trials with clocks of their own, and terms, are not asked.
+        """
+        if not found.accepted or found.competing_models or found.fit.model.per_trial_effect is not None:
+            return found
+        self._exchanged = self._entry = None
+        models = self._competing_models(found.problem, found.fit, found.accepted)
+        return replace(found, competing_models=tuple(names for names, _ in models))
+
     def stands(self, before: SelectionResult) -> SelectionResult | None:
         """The end of another search as the end of this one, if it is one here as well; else None.
 

@@ -29,6 +29,12 @@ class Estimate:
         "The Jacobian is used for another step if the last step achieved this fraction of the predicted decrease. "
         "It came with a change that saved a third of the CPU time; parameters moved by at most 0.08 standard errors.",
     )
+    slope_ruled: float = setting(
+        0.9,
+        "1",
+        "Fraction of a column of the Jacobian (sum of squares) from which one trial is suspected of a jump of the loss, and the "
+        "slope to the other side is asked as well. In the log where this was found, a jump held 0.9998; by hand.",
+    )
     valley_better: float = setting(
         0.5,
         "log-likelihood",

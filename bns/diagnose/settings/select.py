@@ -166,6 +166,12 @@ class Verdict:
         "A candidate whose p-value is within this factor of the threshold is a sign that more trials would decide; "
         f"{BY_HAND}.",
     )
+    often: float = setting(
+        1 / 3,
+        "1",
+        "From this fraction of the trials on, moments with large errors are called the rule and not something that happens; "
+        f"{BY_HAND}.",
+    )
     notable: float = setting(
         0.01,
         "1",

@@ -30,15 +30,17 @@ EFFECT = Effect(
             3.2,
             (-3.15, 3.15),
             0.0,
-            "rotation of positions relative to headings, counter-clockwise positive",
+            "rotation of positions relative to headings, counter-clockwise positive; of markers that are mounted turned, the "
+            "opposite of their angle on the robot",
             resolution=2e-3,
         ),
     ),
     equation="x' = x·cos(phi) - y·sin(phi), y' = x·sin(phi) + y·cos(phi)",
     residuals="The robot appears to drive at a constant angle to its heading, also in reverse.",
     lookalikes=("side-slip", "marker-offset"),
-    sentence="the tracker's positions are rotated relative to its headings",
-    measurement="lay a straight edge along heading zero, track both of its ends, and measure its angle to the x axis",
+    sentence="the tracker's positions are rotated relative to its headings (its axes are turned, or the markers on the robot)",
+    measurement="compare the tracked heading with a straight edge along the robot; or "
+    "lay a straight edge along heading zero, track both of its ends, and measure its angle to the x axis",
     apply=apply,
     starts=tuple(
         (sign * a,)

@@ -17,7 +17,9 @@ EFFECT = Effect(
     name="clock-drift",
     stage="clock",
     parameters=(
-        Parameter("rate", "1", -0.2, 0.2, (-0.02, 0.02), 0.0, "seconds that the tracker's clock gains per second"),
+        Parameter(
+            "rate", "1", -0.2, 0.2, (-0.02, 0.02), 0.0, "seconds that the tracker's clock gains per second since the trial began"
+        ),
     ),
     equation="pose'(t) = pose(t - rate·t)",
     residuals="The track leads or lags behind the commands by a time that grows during the trial; changes of speed show it.",

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import i0e, i1e
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
@@ -138,6 +137,8 @@ def _phases(columns: Array, off: Array, used: NDArray[np.bool_], lag: int) -> tu
 
     How sure: the expected cosine of the phase's error.
     """
+    from scipy.special import i0e, i1e  # noqa: PLC0415  # takes long to load, and most models have no such wheel
+
     fitted = _fitted(columns, off, used, lag)
     pair = fitted.values[:, :_WAVES]
     length2, unsure = (v[:, ::2] + v[:, 1::2] for v in (pair**2, fitted.variance[:, :_WAVES]))

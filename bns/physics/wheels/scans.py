@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.engine.jit import exact
+from bns.engine.pose_filter import slope
 from bns.physics.signals import Array
 
 _CIN_TERMS = 13
@@ -85,7 +86,10 @@ def _decays(fall: float, apart: float, square: float, h: float) -> tuple[float, 
 
 @exact
 def delayed(target: Array, step_s: Array, delay_s: float) -> Array:
-    """Mean over each step of target(t - delay), 0 before the start: the way of the target ``delay_s`` ago, differenced; exact."""
+    """Mean over each step of target(t - delay), 0 before the start: the way of the target ``delay_s`` ago, differenced.
+
+    Exact for what is constant in each step and changes at most every other step; of what varies, `slope` tells how in a step.
+    """
     mean = np.zeros_like(target)
     for row in range(target.shape[0]):
         now = way = then = 0.0
@@ -102,7 +106,10 @@ def delayed(target: Array, step_s: Array, delay_s: float) -> Array:
                 k += 1
             at = way
             if ended > now and k < target.shape[1]:
-                at += target[row, k] * (ended - now)
+                into, whole = ended - now, step_s[row, k]
+                at += target[row, k] * into
+                if into < whole:
+                    at -= slope(target, step_s, row, k) * into * (whole - into) / 2.0
             if ended <= 0.0:
                 at = 0.0
             mean[row, i] = (at - then) / h

@@ -1,0 +1,150 @@
+"""What stands once a search has lost effects: its ties, its words; and what is asked of one effect beside those of a model."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bns.diagnose import outcome
+from bns.diagnose.adding import does_nothing, warnings_on
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.parameters import FreeParameter
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.text import _with_interval, diagnosis_text, enumerated
+from bns.diagnose.residuals.outliers import Outlier
+from bns.diagnose.residuals.unexplained import Unexplained
+from bns.diagnose.select.result import SelectionResult
+from bns.diagnose.select.stepwise import StepwiseSelection
+from bns.physics.effects import effect_named
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+@pytest.fixture(scope="module")
+def late():
+    return WheelPredictor(tracks_of(measured(hidden(clock_offset={"offset_s": 0.08}), trials=16, seed=3)))
+
+
+def standing(predictor, *names, competing=()):
+    """A result that ended in these effects, as if others had been withdrawn from it."""
+    problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named(name) for name in names])
+    return SelectionResult(problem, problem.fit(NOMINAL), fit, names, (), competing)
+
+
+def test_what_competes_with_what_is_left_is_asked_again(late):
+    search = StepwiseSelection(late, NOMINAL)
+    found = search.competing(standing(late, "clock-offset"))
+    assert found.competing_models == (("command-delay",),)
+    assert search.competing(found) is found
+    nothing = replace(found, accepted=(), competing_models=())
+    assert search.competing(nothing) is nothing
+
+
+def test_a_diagnosis_whose_search_lost_an_effect_keeps_its_tie(late, monkeypatch):
+    """A stand-in for the judgement that withdraws: of a clock and a gain, the gain goes, with all that competed with both."""
+    plain = outcome.outcome_of
+
+    def losing(searched, *rest):
+        assert set(searched.accepted) & {"clock-offset", "command-delay"}
+        found = plain(searched, *rest)
+        kept = found.selection.only(found.selection.accepted)
+        return replace(found, selection=kept, withdrawn=("speed-gain",))
+
+    monkeypatch.setattr("bns.diagnose.diagnosis.outcome_of", losing)
+    found = diagnose(late, NOMINAL)
+    assert found.verdict == "tie"
+    assert {*found.effects, *found.selection.competing_models[0]} == {"clock-offset", "command-delay"}
+
+
+@pytest.mark.parametrize(("given", "fewest"), [(NOMINAL, 1), (NOMINAL.with_effect("wheelbase", factor=1.0), 0)])
+def test_beside_effects_of_the_model_one_alone_is_judged_as_well(late, monkeypatch, given, fewest):
+    asked = []
+    monkeypatch.setattr(outcome, "negligible", lambda _, fewest: asked.append(fewest) or ())
+    one = standing(late, "clock-offset")
+    outcome._negligible(replace(one, nominal=replace(one.nominal, model=given)))
+    assert asked == [fewest]
+
+
+def test_an_unlisted_verdict_names_what_cannot_be_told_from_an_effect(late):
+    rest = Unexplained((), None, ())
+    tied = standing(late, "clock-offset", competing=(("command-delay",),))
+    said = diagnosis_text(Diagnosis("unlisted", replace(tied, steps=_no_steps()), rest=rest)).splitlines()[1]
+    assert said == "Missing from the model: clock-offset (or command-delay), and something that no listed effect explains."
+
+
+def _no_steps():
+    return (SimpleNamespace(ranking=(), decoy_threshold=0.0, selected="", passed_over="", of=0, instead_of=""),)
+
+
+@pytest.mark.parametrize(
+    ("moments", "said"), [(3, "something happens for a moment"), (9, "the error is large for moments, as by rule")]
+)
+def test_moments_in_many_trials_are_the_rule(late, moments, said):
+    outlier = next(iter(_outliers(1)))
+    found = Diagnosis("unlisted", standing(late, "clock-offset"), rest=Unexplained((), None, (outlier,) * moments))
+    assert found.behaviour[0].startswith(f"in {moments} of 16 trials {said}; the worst is ")
+
+
+def _outliers(count):
+    fields = dict.fromkeys(Outlier.__dataclass_fields__, 0.0)
+    for _ in range(count):
+        yield Outlier(**fields | {"trial": "3"})
+
+
+def test_names_are_enumerated():
+    assert [enumerated(names) for names in ((), ("a",), ("a", "b"), ("a", "b", "c"))] == ["", "a", "a and b", "a, b and c"]
+
+
+def test_a_number_without_an_interval_says_why():
+    number = {"value": 50.0, "low": 50.0, "high": 50.0, "unit": "1"}
+    said = _with_interval("force-limit", "turn_ratio", number)
+    assert said.endswith("= 50 (no interval: it is at a bound, or no small change of it changes the loss)")
+    assert _with_interval("motor-lag", "tau_s", number | {"low": 40.0, "unit": "s"}).endswith("= 50 s (95 %: 40 to 50)")
+
+
+def test_a_limit_that_is_found_does_something_whatever_its_ratio():
+    robot = hidden(acceleration_limit={"max_m_s2": 0.3})
+    predictor = WheelPredictor(tracks_of(measured(robot, trials=12, seed=3, speeds=(-0.2, 0.2))))
+    effect = effect_named("force-limit")
+    _, fit, _ = fit_set(predictor, NOMINAL, [effect])
+    low, high = fit.interval([f.parameter.name for f in fit.free].index("turn_ratio"))
+    assert low < 1.0 < high
+    assert not does_nothing(fit, "force-limit")
+
+
+def test_a_bare_number_at_its_bound_has_no_unit():
+    ratio = next(p for p in effect_named("force-limit").parameters if p.name == "turn_ratio")
+    limit = effect_named("force-limit").parameters[0]
+    fit = SimpleNamespace(
+        free=(FreeParameter("force-limit", limit), FreeParameter("force-limit", ratio)),
+        values=np.array([0.3, ratio.high]),
+        interval=lambda index: (0.2, 0.4) if index == 0 else (10.0, 50.0),
+    )
+    errors = SimpleNamespace(horizons={"1s": SimpleNamespace(models=())})
+    said = list(warnings_on(fit, [(effect_named("force-limit"), {})], errors))
+    assert any(one.startswith("force-limit: turn_ratio is at its bound, 50: the data require") for one in said)
+
+
+def test_a_jump_of_the_loss_in_one_trial_is_no_slope(late, monkeypatch):
+    """Beyond the number's place something begins anew in trial 4, as the filter does in a trial that goes astray."""
+    problem, fit, _ = fit_set(late, NOMINAL, [effect_named("motor-lag")])
+    plain, place = problem.whitened, fit.model.values_of("motor-lag")["tau_s"]
+    there = late.tracks.trial == 4
+
+    def jumping(model):
+        out = plain(model).copy()
+        if model.values_of("motor-lag")["tau_s"] > place:
+            out[there] += 50.0
+        return out
+
+    monkeypatch.setattr(problem, "whitened", jumping)
+    at = problem._point(fit.model)
+    slope = problem._slope(at, fit.free, 0, 1e-3)
+    np.testing.assert_allclose(slope[there], (at.whitened - plain(_moved(fit, -1e-3)))[there] / 1e-3)
+    np.testing.assert_allclose(slope[~there], (plain(_moved(fit, 1e-3)) - at.whitened)[~there] / 1e-3)
+
+
+def _moved(fit, by):
+    return fit.model.with_values({"motor-lag": {"tau_s": fit.model.values_of("motor-lag")["tau_s"] + by}})
