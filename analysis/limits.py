@@ -126,7 +126,7 @@ def drawn(rows: pd.DataFrame, found: pd.DataFrame, possible: pd.DataFrame) -> Fi
         axes[0, column].set(xlabel="evaluation in the world", ylim=(0, 102), title=title)
     axes[0, 0].set_ylabel("successful runs (%)")
     axes[1, 0].set_ylabel("success of the final controllers (%)")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
 

@@ -65,6 +65,8 @@ PAST: Mapping[str, str] = {
 }
 """A function in a term on `WITH_PAST`: its arguments are times in seconds, the smaller first."""
 WITH_PAST = (*WHICH_WHEELS, "v", "w")
+_MAGNITUDES = tuple((sign * size,) for size in (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0) for sign in (1.0, -1.0))
+"""Where the fit of a nonlinear term's only number begins: far from it a limit limits nothing, and no slope leads back."""
 RECENT_S = 0.15
 NEVER_M = 1e3
 LARGEST = 1e9
@@ -119,7 +121,7 @@ def formula_effect(
             Parameter(p, "1", -LARGEST, LARGEST, (-10.0, 10.0), 0.0 if linear or p == unknown[0] else 1.0, "of a formula")
             for p in unknown
         ),
-        starts=((0.0,) * len(unknown),) if linear else (),
+        starts=((0.0,) * len(unknown),) if linear else _MAGNITUDES if len(unknown) == 1 else (),
         equation=f"{on}' = {on} + {term}",
         residuals="as the formula says",
         lookalikes=(),

@@ -47,9 +47,20 @@ def test_one_number_starts_on_a_grid_two_along_their_axes_and_three_where_those_
 )
 def test_a_sum_of_numbers_times_something_starts_at_nothing(term, linear):
     effect = formula_effect("mine", term, "wheels" if "u" in term else "v")
-    assert bool(effect.starts) == linear
+    assert bool(effect.starts) == (linear or len(effect.parameters) == 1)
     if linear:
         assert set(effect.neutral.values()) == {0.0}
+
+
+@pytest.mark.parametrize("per_volt", [0.004, 0.0435])
+def test_the_only_number_of_a_limit_is_found_whatever_its_size(per_volt):
+    """From 0.1 on the limit would be 1.2 m/s, far above all commands: there no slope leads back."""
+    table = measured(hidden(speed_limit={"max_m_s": 12 * per_volt}), trials=12, seed=3, speeds=(0.0, 20 * per_volt))
+    predictor = WheelPredictor(tracks_of(table.assign(battery_v=12.0)))
+    effect = formula_effect("sag", "max(min(u, k*battery_v), -k*battery_v) - u", "wheels", columns=["battery_v"])
+    problem = problem_for(predictor, NOMINAL)
+    fit = fit_with(problem, problem.fit(NOMINAL), effect)
+    assert fit.model.values_of("sag")["k"] == pytest.approx(per_volt, rel=0.02)
 
 
 def test_seven_numbers_are_found_at_once():
