@@ -27,8 +27,7 @@ NOTABLE = DEFAULTS.verdict.notable
 CHANCE = DEFAULTS.residuals.chance
 WORST_SHARE = DEFAULTS.residuals.worst_share
 SHOWN = DEFAULTS.report.moments
-FEWEST_CLOCKS = 5
-"""Clocks of trials from which one would believe a line."""
+FEWEST_CLOCKS = DEFAULTS.verdict.fewest_clocks
 
 
 def notes_on(

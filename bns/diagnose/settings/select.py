@@ -166,6 +166,12 @@ class Verdict:
         "A candidate whose p-value is within this factor of the threshold is a sign that more trials would decide; "
         f"{BY_HAND}.",
     )
+    fewest_clocks: int = setting(
+        5,
+        "trials",
+        "With fewer trials, a line through their clocks is not told from luck, whatever its p-value; "
+        f"{BY_HAND}.",
+    )
     often: float = setting(
         1 / 3,
         "1",
