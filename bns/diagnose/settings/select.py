@@ -169,7 +169,7 @@ class Verdict:
     fewest_clocks: int = setting(
         5,
         "trials",
-        "With fewer trials, a line through their clocks is not told from luck, whatever its p-value; "
+        "With fewer trials, nothing is said of clocks that change along the session, whatever the p-value; "
         f"{BY_HAND}.",
     )
     often: float = setting(
