@@ -39,6 +39,7 @@ VALUES: dict[str, dict[str, float]] = {
     "controller-overshoot": {"tau_s": 0.15, "lead_s": 0.1, "swing_s": 0.3, "turn_ratio": 1.0},
     "dead-zone": {"width_m_s": 0.02},
     "floor-patch": {"x_m": 0.35, "y_m": 0.0, "radius_m": 0.12, "loss": 0.3},
+    "wheel-patch": {"x_m": 0.35, "y_m": 0.0, "radius_m": 0.12, "loss": 0.3, "apart_share": 1.0},
     "floor-slope": {"x_m_s": 0.0, "y_m_s": -0.01},
     "force-limit": {"max_m_s2": 0.15, "turn_ratio": 4.0},
     "velocity-ramp": {"forward_m_s2": 0.1, "turn_rad_s2": 1.5},

@@ -35,6 +35,7 @@ ORDER = (
     "caster-swing",
     "caster-drag",
     "floor-patch",
+    "wheel-patch",
     "slope-load",
     "tether-load",
     DECOYS,

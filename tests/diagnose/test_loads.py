@@ -8,6 +8,7 @@ import pytest
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.starts import fit_extended
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select import extending, stepwise
 from bns.diagnose.select.stepwise import StepwiseSelection
@@ -75,6 +76,32 @@ def test_ramps_of_velocity_and_turn_rate_are_told_from_limits_of_each_wheel():
     assert found.fit.model.values_of("motor-lag")["tau_s"] == pytest.approx(0.06, rel=0.1)
     single = selected(hidden(acceleration_limit={"max_m_s2": 0.3}))
     assert single.accepted == ("acceleration-limit",)
+
+
+PATCH = {"x_m": 0.05, "y_m": -0.05, "radius_m": 0.25, "loss": 0.4}
+
+
+@pytest.mark.parametrize(("apart", "named"), [(1.0, "wheel-patch"), (0.0, "floor-patch")])
+def test_a_patch_that_slows_each_wheel_is_told_from_one_that_slows_the_robot(apart, named):
+    table = measured(hidden(wheel_patch=PATCH | {"apart_share": apart}), trials=30, seed=11, commands=8)
+    predictor = WheelPredictor(tracks_of(table))
+    relevant = {"floor-patch", "wheel-patch", "speed-gain", "wheelbase", "tether-pull"}
+    found = StepwiseSelection(predictor, NOMINAL, barred=tuple(set(all_effects()) - relevant)).run()
+    assert found.accepted == (named,)
+    truth = PATCH | ({"apart_share": 1.0} if apart else {})
+    assert found.fit.model.values_of(named) == pytest.approx(truth, abs=0.03)
+
+
+def test_an_extension_with_a_jagged_loss_is_looked_for_from_lower_places(monkeypatch):
+    """The patch of the whole robot lies elsewhere and is weaker: from its numbers a fit ends in the first of many valleys."""
+    table = measured(hidden(wheel_patch=PATCH | {"apart_share": 1.0}), trials=12, seed=3, commands=8)
+    predictor = WheelPredictor(tracks_of(table))
+    problem, whole, _ = fit_set(predictor, NOMINAL, [effect_named("floor-patch")])
+    found = fit_extended(problem, whole, effect_named("wheel-patch"))
+    monkeypatch.setattr("bns.diagnose.estimate.starts.lower_place", lambda *_: None)
+    first = fit_extended(problem, whole, effect_named("wheel-patch"))
+    assert found.loss < first.loss - 1.0
+    assert found.model.values_of("wheel-patch")["apart_share"] == pytest.approx(1.0, abs=0.1)
 
 
 def test_an_extension_equals_what_it_extends_where_its_own_numbers_are_neutral():

@@ -15,6 +15,7 @@ from tests.hidden_effects.listed_floor import (
     LensDistortion,
     QuadraticTurnSlip,
     TiltedCamera,
+    WheelPatch,
 )
 from tests.hidden_effects.listed_loads import (
     ControllerOvershoot,
@@ -296,6 +297,7 @@ LISTED: dict[str, type[Cause]] = {
     "turn-slip-quadratic": QuadraticTurnSlip,
     "side-slip": SideSlip,
     "floor-patch": FloorPatch,
+    "wheel-patch": WheelPatch,
     "slope-load": SlopeLoad,
     "tether-load": TetherLoad,
     "floor-slope": FloorSlope,

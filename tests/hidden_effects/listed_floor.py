@@ -32,6 +32,19 @@ class FloorPatch(Cause):
 
 
 @dataclass
+class WheelPatch(FloorPatch):
+    """The same, slowing a wheel where it is itself; a complex number points from the robot's centre to its left wheel."""
+
+    apart_share: float = 1.0
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        here, to_left = x + 1j * y - (self.x_m + 1j * self.y_m), 0.5j * BASE_M * np.exp(1j * heading)
+        left, right = (1 - self.loss * (np.abs(here + s * self.apart_share * to_left) < self.radius_m) for s in (1, -1))
+        rolled = left * (body.forward - body.turn * BASE_M / 2), right * (body.forward + body.turn * BASE_M / 2)
+        return body._replace(forward=sum(rolled) / 2, turn=(rolled[1] - rolled[0]) / BASE_M)
+
+
+@dataclass
 class QuadraticTurnSlip(Cause):
     """Turning costs forward speed, with the square of the turn rate."""
 

@@ -33,6 +33,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"x_m": 0.8, "y_m": 0.5, "radius_m": 0.35, "loss": 0.12},
         {"x_m": 0.6, "y_m": 0.6, "radius_m": 0.3, "loss": 0.35},
     ),
+    "wheel-patch": (
+        {"x_m": 0.8, "y_m": 0.5, "radius_m": 0.2, "loss": 0.35, "apart_share": 1.0},
+        {"x_m": 0.6, "y_m": 0.6, "radius_m": 0.3, "loss": 0.5, "apart_share": 1.0},
+    ),
     "command-rate": ({"period_s": 0.2}, {"period_s": 0.5}),
     "command-quantisation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
     "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06}),
@@ -60,7 +64,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     ),
 }
 """Medium and strong, of the Khepera."""
-ALIKE = {"slope-load": ("tether-load",)}
+ALIKE = {"slope-load": ("tether-load",), "wheel-patch": ("floor-patch",)}
 """What would stand in for an effect that is taken out: a slope is a cable from far away."""
 TURNING = {"backlash", "caster-drag", "caster-swing", "dead-band", "stribeck"}
 """Effects that show only where wheels reverse or turn slowly."""

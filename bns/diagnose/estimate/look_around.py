@@ -1,7 +1,7 @@
-"""Is there a lower place beside where a fit ended? The loss of a body has many small valleys, and a fit ends in the first.
+"""Is there a lower place beside where a fit ended? Where the loss has many small valleys, a fit ends in the first.
 
 A body that is simulated bumps and slips a little differently at every value of a number: the loss of a stiffness went down by 17
-from 0.76 to 0.70, over a rise of 2 between them.
+from 0.76 to 0.70, over a rise of 2 between them. Likewise a wheel that crosses the rim of a patch of floor.
 """
 
 from __future__ import annotations

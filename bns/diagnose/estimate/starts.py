@@ -11,6 +11,7 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.fit import Fit, Problem, StartingPoint
+from bns.diagnose.estimate.look_around import lower_place
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
@@ -21,6 +22,7 @@ _SHARES = DEFAULTS.estimate.start_shares
 NOTHING = DEFAULTS.estimate.start_nothing
 _LIMITS = DEFAULTS.estimate.start_limits
 _MOST = DEFAULTS.estimate.start_most
+_LOOKS = DEFAULTS.estimate.look_rounds
 
 
 def listed(
@@ -78,7 +80,19 @@ def fit_extended(problem: Problem, base: Fit, effect: Effect) -> Fit:
     neutral = {name: [value] for name, value in {**effect.neutral, **given}.items()}
     starts = product(*(neutral[p.name] + (list(_grid(p)) if p.name in varied else []) for p in effect.parameters))
     models = [base.model.without(gone).with_active(effect, values) for values in starts]
-    return problem.fit(min(models, key=problem.loss))
+    fit = problem.fit(min(models, key=problem.loss))
+    return _from_lower_places(problem, fit) if any(p.jagged for p in own) else fit
+
+
+def _from_lower_places(problem: Problem, fit: Fit) -> Fit:
+    """The fit again from each lower place that is seen from its end, while it ends lower there."""
+    for _ in range(_LOOKS):
+        there = lower_place(problem.loss, fit.model, fit.free, fit.loss)
+        again = fit if there is None else problem.fit(there)
+        if again.loss >= fit.loss:
+            break
+        fit = again
+    return fit
 
 
 def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None = None) -> StartingPoint:

@@ -25,16 +25,24 @@ def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float) -> B
     """All velocities times 1 - ``loss`` within ``radius_m`` of the centre."""
     if body.place is None:
         return body  # first round of a simulation: nobody knows yet where the robot goes
-    east, north, heading = body.place[..., 0] - x_m, body.place[..., 1] - y_m, body.place[..., 2]
+    return body.scaled(1.0 - loss * share_inside(body, body.place[..., :2], body.forward_m_s, (x_m, y_m), radius_m, loss))
+
+
+def share_inside(
+    body: Body, place: Array, speed_m_s: Array, centre_m: tuple[float, float], radius_m: float, loss: float
+) -> Array:
+    """For which share of each step a point of the robot at ``place`` (batch, steps, 2), with that speed, is on the patch."""
+    assert body.place is not None
+    east, north, heading = place[..., 0] - centre_m[0], place[..., 1] - centre_m[1], body.place[..., 2]
     away = np.hypot(east, north)
-    half = np.zeros_like(away) if body.step_s is None else body.forward_m_s * body.step_s / 2.0
+    half = np.zeros_like(away) if body.step_s is None else speed_m_s * body.step_s / 2.0
     outwards = half * (east * np.cos(heading) + north * np.sin(heading)) / np.maximum(away, 1e-9)
     inside, rim = np.ones_like(away), _RIM * body.wheelbase_m
     for _ in range(_ROUNDS):
         reach = np.hypot(outwards * (1.0 - loss * inside), rim)
         way = np.clip((radius_m - away) / (2.0 * reach) + 0.5, 0.0, 1.0)
         inside = way / (way + (1.0 - loss) * (1.0 - way))  # what is slower takes longer
-    return body.scaled(1.0 - loss * inside)
+    return inside
 
 
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
