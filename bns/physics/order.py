@@ -20,10 +20,10 @@ ORDER = (
     "acceleration-limit",  # exact for commands, which are constant in a step: so before delay and lag
     "force-limit",
     "velocity-ramp",
+    "command-delay",
     "motor-lag",
     "inertia-lag",
     "controller-overshoot",
-    "command-delay",  # late is late, before or after these; a lag takes speeds as constant in a step, which late ones are not
     "heating",  # by the work that the wheels really do
     "wheel-eccentricity",
     "backlash",

@@ -8,8 +8,10 @@ import pytest
 
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict import wheels
-from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.predict.wheels import WheelPredictor, _chain
+from bns.physics.effects import effect_named
 from bns.physics.formula import formula_effect
+from bns.physics.model import ActiveEffect
 from tests.diagnose.worlds import NOMINAL, measured
 
 
@@ -93,3 +95,24 @@ def test_what_the_body_does_is_worked_out_without_turning_the_wheels_again(monke
     assert len(turns) == 1
     predictor.steps(model.with_effect("motor-lag", tau_s=0.2))
     assert len(turns) == 2
+
+
+LATE_AND_LAGGING = {"command-delay": {"delay_s": 0.077}, "motor-lag": {"tau_s": 0.08}, "backlash": {"gap_m": 0.002}}
+
+
+@pytest.mark.parametrize("order", [("command-delay", "motor-lag", "backlash"), ("motor-lag", "command-delay", "backlash")])
+def test_a_delay_acts_behind_the_lags_wherever_a_model_has_it(order):
+    effects = [effect_named(name) for name in order]
+    model = replace(NOMINAL, effects=tuple(ActiveEffect(e, tuple(LATE_AND_LAGGING[e.name].values())) for e in effects))
+    assert [effect.name for effect, *_ in _chain(model, ("wheel",))] == ["motor-lag", "command-delay", "backlash"]
+    assert [effect.name for effect, *_ in _chain(model.without("motor-lag"), ("wheel",))] == ["command-delay", "backlash"]
+
+
+def test_a_late_command_and_a_late_clock_are_alike_beside_a_lag_in_long_steps():
+    tracks = tracks_of(measured(NOMINAL, trials=3, seed=5))
+    predictor = WheelPredictor(tracks, dt_s=0.1)
+    lagging = NOMINAL.with_effect("motor-lag", tau_s=0.08)
+    late, clock = lagging.with_effect("command-delay", delay_s=0.077), lagging.with_effect("clock-offset", offset_s=0.077)
+    apart = predictor.steps(late.arranged()).body - predictor.steps(clock.arranged()).body
+    changed = predictor.steps(late.arranged()).body - predictor.steps(lagging).body
+    assert np.abs(apart).max() < 0.03 * np.abs(changed).max()

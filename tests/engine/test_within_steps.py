@@ -69,13 +69,14 @@ def test_a_late_command_before_and_behind_a_lag_is_the_same_in_coarse_steps():
     told = np.full((1, 14), SPEED)
     ends = np.cumsum(steps[0])
     true = np.array([lagged(SPEED, max(t - late_s, 0.0)) for t in ends])
-    behind = np.cumsum(delayed(first_order(told, steps, TAU_S), steps, late_s)[0]) * STEP_S
-    before = np.cumsum(first_order(delayed(told, steps, late_s), steps, TAU_S)[0]) * STEP_S
+    behind = np.cumsum(delayed(first_order(told, steps, TAU_S), steps, late_s, True)[0]) * STEP_S
+    before = np.cumsum(first_order(delayed(told, steps, late_s, False), steps, TAU_S)[0]) * STEP_S
     assert np.abs(before - true).max() > 2e-3
     assert np.abs(behind - true)[1:].max() < 3e-4  # 0.8 mm without the slopes within steps
 
 
-def test_a_late_jump_is_exact():
+@pytest.mark.parametrize("varying", [False, True])
+def test_a_late_jump_is_exact(varying):
     steps = np.array([[0.1, 0.1, 0.05, 0.15, 0.1, 0.1]])
     told = np.array([[0.3, 0.3, -0.2, -0.2, 0.5, 0.5]])
     ends, late_s = np.cumsum(steps[0]), 0.037
@@ -86,4 +87,4 @@ def test_a_late_jump_is_exact():
     begins = np.concatenate([[0.0], ends[:-1]])
     true = [quad(lambda t: speed(t - late_s), a, b, points=[x + late_s for x in (0.0, *ends) if a < x + late_s < b])[0]
             for a, b in zip(begins, ends, strict=True)]  # fmt: skip
-    np.testing.assert_allclose(delayed(told, steps, late_s)[0] * steps[0], true, atol=1e-9)
+    np.testing.assert_allclose(delayed(told, steps, late_s, varying)[0] * steps[0], true, atol=1e-9)

@@ -33,6 +33,7 @@ _KEPT = 500_000
 """Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
 _UNDONE = DEFAULTS.predict.picture_rounds
 _MOVING = ("wheel", "body")
+_DELAY, _LAGS = "command-delay", ("motor-lag", "inertia-lag", "controller-overshoot")
 
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
 """Effects that act, their values, and those of each trial."""
@@ -239,7 +240,16 @@ class WheelPredictor:
 
 
 def _chain(model: Model, stages: Sequence[str]) -> Chain:
-    return tuple((a.effect, a.values, a.trial_values) for a in model.effects if a.effect.stage in stages)
+    """The effects of some stages; a delay of commands behind the lags.
+
+    Late is late, before or behind them. But a lag takes a speed as constant in a step, which a late command is not where it
+    begins within one: behind the lag the error is that of a late clock, which does the same.
+    """
+    effects = [a for a in model.effects if a.effect.stage in stages]
+    lags = [i for i, a in enumerate(effects) if a.effect.name in _LAGS]
+    for i in [i for i, a in enumerate(effects) if a.effect.name == _DELAY and lags and i < lags[-1]]:
+        effects.insert(lags[-1], effects.pop(i))
+    return tuple((a.effect, a.values, a.trial_values) for a in effects)
 
 
 def _model_of(wheelbase_m: float, chain: Chain) -> Model:

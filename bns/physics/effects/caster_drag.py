@@ -67,6 +67,7 @@ EFFECT = Effect(
     sentence="the caster's hinge resists while it swings round, and its wheel pushes the robot sideways",
     measurement="pull the caster round with a spring balance, or replace it with a sliding button and repeat some trials",
     apply=apply,
+    revision=2,
     needs="track",
     starts=tuple((0.004, 0.002, trail, pivot) for trail in (0.005, 0.012, 0.03) for pivot in (-0.0442, 0.0442)),
 )

@@ -10,11 +10,15 @@ from bns.physics.wheels.scans import delayed
 
 
 def apply(wheels: Wheels, delay_s: float) -> Wheels:
-    """Each wheel's speed, ``delay_s`` later, averaged over each step: the distance driven is exact."""
+    """Each wheel's speed, ``delay_s`` later, averaged over each step: the distance driven is exact.
+
+    Where tracks are followed steps are long, and what a lag did before varies within them.
+    """
+    varying = wheels.conditions.seen is not None
     return replace(
         wheels,
-        left_m_s=delayed(wheels.left_m_s, wheels.step_s, delay_s),
-        right_m_s=delayed(wheels.right_m_s, wheels.step_s, delay_s),
+        left_m_s=delayed(wheels.left_m_s, wheels.step_s, delay_s, varying),
+        right_m_s=delayed(wheels.right_m_s, wheels.step_s, delay_s, varying),
     )
 
 

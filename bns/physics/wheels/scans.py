@@ -85,10 +85,10 @@ def _decays(fall: float, apart: float, square: float, h: float) -> tuple[float, 
 
 
 @exact
-def delayed(target: Array, step_s: Array, delay_s: float) -> Array:
+def delayed(target: Array, step_s: Array, delay_s: float, varying: bool) -> Array:
     """Mean over each step of target(t - delay), 0 before the start: the way of the target ``delay_s`` ago, differenced.
 
-    Exact for what is constant in each step and changes at most every other step; of what varies, `slope` tells how in a step.
+    Exact for what is constant in each step; of what is ``varying`` in it, `slope` tells how.
     """
     mean = np.zeros_like(target)
     for row in range(target.shape[0]):
@@ -108,7 +108,7 @@ def delayed(target: Array, step_s: Array, delay_s: float) -> Array:
             if ended > now and k < target.shape[1]:
                 into, whole = ended - now, step_s[row, k]
                 at += target[row, k] * into
-                if into < whole:
+                if varying and into < whole:
                     at -= slope(target, step_s, row, k) * into * (whole - into) / 2.0
             if ended <= 0.0:
                 at = 0.0
