@@ -126,7 +126,8 @@ class Diagnosis:
         if not moments or self.selection is None:
             return self.terms_in_words
         trials = len(self.selection.problem.predictor.tracks)
-        what = "something happens for a moment" if len(moments) < OFTEN * trials else "the error is large for moments, as by rule"
+        often = "the error is large at some moments, too often for accidents"
+        what = often if len(moments) >= OFTEN * trials else "something happens for a moment"
         return f"in {len(moments)} of {trials} trials {what}; the worst is {moments[0].in_words}", *self.terms_in_words
 
     @property
@@ -247,7 +248,7 @@ def _diagnosed(
         shared = StepwiseSelection(predictor, model, extra, tick, barred, own_clocks=False)
         without = outcome_of(_from_better_numbers(shared.run(), before), predictor, model, tick)
         found = found if predicts_better_throughout(found, without) else without
-    if found.fewer and not found.terms:
+    if found.fewer and not found.terms and isinstance(predictor, WheelPredictor):  # of a body it would take minutes
         found = replace(found, selection=search.competing(found.selection))
     left = found.rest.any or bool(found.terms)
     words = tuple(in_words(term, predictor) for term in found.terms)

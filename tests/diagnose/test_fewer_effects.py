@@ -79,7 +79,8 @@ def _no_steps():
 
 
 @pytest.mark.parametrize(
-    ("moments", "said"), [(3, "something happens for a moment"), (9, "the error is large for moments, as by rule")]
+    ("moments", "said"),
+    [(3, "something happens for a moment"), (9, "the error is large at some moments, too often for accidents")],
 )
 def test_moments_in_many_trials_are_the_rule(late, moments, said):
     outlier = next(iter(_outliers(1)))

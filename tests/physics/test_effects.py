@@ -13,8 +13,9 @@ from bns.physics.effect import STAGES, number
 from bns.physics.effects import all_effects, effect_named
 from bns.physics.model import Model
 from bns.physics.order import ORDER
-from bns.physics.signals import Body, Flow, Stamps, View, Wheels
+from bns.physics.signals import Body, Conditions, Flow, Stamps, View, Wheels
 from bns.physics.wheels.differential_drive import observe, simulate
+from bns.physics.wheels.scans import delayed
 from bns.registry import EFFECTS
 
 SIGNALS = dict(zip(STAGES, (Wheels, Body, Flow, Stamps, View), strict=True))
@@ -177,3 +178,14 @@ def test_every_effect_says_how_to_confirm_it_on_the_bench(name):
     effect = all_effects()[name]
     assert len(effect.measurement.split()) >= 4
     assert effect.sentence
+
+
+@pytest.mark.parametrize("tracked", [False, True])
+def test_what_varies_within_a_step_is_late_as_it_varies_only_where_tracks_are_followed(tracked):
+    """Runs keep their numbers: worlds are driven in steps so short that it makes no difference."""
+    steps, ramp = np.full((1, 8), 0.1), 0.05 * np.arange(1.0, 9.0)[None]
+    seen = np.zeros((1, 8, 3)) if tracked else None
+    late = effect_named("command-delay").apply(Wheels(steps, ramp, -ramp, 0.1, Conditions(seen=seen)), delay_s=0.04)
+    np.testing.assert_array_equal(late.left_m_s, delayed(ramp, steps, 0.04, tracked))
+    np.testing.assert_array_equal(late.right_m_s, -late.left_m_s)
+    assert (delayed(ramp, steps, 0.04, True) != delayed(ramp, steps, 0.04, False)).any()

@@ -175,7 +175,7 @@ class Verdict:
     often: float = setting(
         1 / 3,
         "1",
-        "From this fraction of the trials on, moments with large errors are called the rule and not something that happens; "
+        "From this fraction of the trials on, moments with large errors are called too frequent for accidents; "
         f"{BY_HAND}.",
     )
     notable: float = setting(
