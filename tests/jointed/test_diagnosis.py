@@ -175,7 +175,9 @@ def test_effects_of_a_body_may_be_negligible(monkeypatch, clocks):
     monkeypatch.setattr(outcome, "negligible", lambda selection, fewest: ("floor-slope", "tether-pull")[fewest:])
     body = SimpleNamespace(screening=64, luck=object())
     model = SimpleNamespace(per_trial_effect="clock-offset" if clocks else None)
-    selection = SimpleNamespace(fit=SimpleNamespace(model=model), problem=SimpleNamespace(predictor=body), predictor=body)
+    bare = SimpleNamespace(model=SimpleNamespace(effects=()))
+    fit = SimpleNamespace(model=model)
+    selection = SimpleNamespace(fit=fit, nominal=bare, problem=SimpleNamespace(predictor=body), predictor=body)
     assert outcome._negligible(selection) == (() if clocks else ("floor-slope", "tether-pull"))
     body.luck = None  # wheels: an effect alone is judged by the error of the model as given
     assert outcome._negligible(selection) == (() if clocks else ("tether-pull",))

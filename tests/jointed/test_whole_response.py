@@ -40,7 +40,7 @@ def stepped(model):
 
 def test_a_wide_slope_is_that_of_the_side_where_less_changes():
     problem, number = Problem.__new__(Problem), FreeParameter("speed-gain", GAIN.parameters[0])
-    problem.whitened, problem.predictor = stepped, SimpleNamespace(tracks=SimpleNamespace(extra={}))
+    problem.whitened, problem.predictor = stepped, SimpleNamespace(tracks=SimpleNamespace(extra={}), luck=object())
     model = load_model("khepera").with_effect("speed-gain", gain=0.801)
     at = _Point(model, stepped(model), 0.0)
     (narrow,) = (problem._slope(at, [number], 0, by) for by in increments(number, 0.801))

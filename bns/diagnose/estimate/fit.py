@@ -333,9 +333,12 @@ class Problem:
         """A column of the Jacobian, (frames, 3). Where one trial rules it, each trial's slope to the flatter side.
 
         Far from the truth the filter begins anew in some trials (`innovations`), and a change of the number by a thousandth can
-        move where: a jump, whose slope says that this trial alone knows the number.
+        move where: a jump, whose slope says that this trial alone knows the number. Bodies, which have no such filter, have wide
+        slopes instead.
         """
         slope = self._difference(at, free, j, by)
+        if self.predictor.luck is not None:
+            return slope
         steepness = self.per_trial((slope**2).sum(axis=1))
         p, other = free[j].parameter, free[j].of(at.model) - by
         if steepness.max() <= _RULED * steepness.sum() or not p.low <= other <= p.high:
