@@ -1,4 +1,4 @@
-"""A population that reaches nothing for long begins anew: ``approach: bns+renew=...``."""
+"""A population that reaches nothing for long is replaced: ``approach: bns+renew=...``."""
 
 import numpy as np
 import pytest

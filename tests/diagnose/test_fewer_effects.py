@@ -129,7 +129,7 @@ def test_a_bare_number_at_its_bound_has_no_unit():
 
 
 def test_a_jump_of_the_loss_in_one_trial_is_no_slope(late, monkeypatch):
-    """Beyond the number's place something begins anew in trial 4, as the filter does in a trial that goes astray."""
+    """Beyond the number's place something is reset in trial 4, as the filter does in a trial that goes astray."""
     problem, fit, _ = fit_set(late, NOMINAL, [effect_named("motor-lag")])
     plain, place = problem.whitened, fit.model.values_of("motor-lag")["tau_s"]
     there = late.tracks.trial == 4

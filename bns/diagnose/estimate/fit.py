@@ -332,7 +332,7 @@ class Problem:
     def _slope(self, at: _Point, free: Sequence[FreeParameter], j: int, by: float) -> Array:
         """A column of the Jacobian, (frames, 3). Where one trial rules it, each trial's slope to the flatter side.
 
-        Far from the truth the filter begins anew in some trials (`innovations`), and a change of the number by a thousandth can
+        Far from the truth the filter is reset in some trials (`innovations`), and a change of the number by a thousandth can
         move where: a jump, whose slope says that this trial alone knows the number. Bodies, which have no such filter, have wide
         slopes instead.
         """
