@@ -50,6 +50,14 @@ def test_an_extension_that_is_needed_no_longer_goes_back_to_the_simple_effect():
     assert {a.effect.name for a in fit.model.effects} == set(accepted)
 
 
+def test_an_extension_that_just_came_in_goes_back_where_the_simple_effect_does_as_well_from_its_numbers():
+    """The simple one had ended in another valley of its loss, and only so did the longer one look better."""
+    predictor = WheelPredictor(tracks_of(measured(hidden(motor_lag={"tau_s": 0.2}), trials=12, seed=3, speeds=(-0.2, 0.2))))
+    problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named("inertia-lag")])
+    search = stepwise.StepwiseSelection(predictor, NOMINAL)
+    assert search._backward_step(problem, fit, ("inertia-lag",))[2] == ("motor-lag",)
+
+
 def test_an_extension_that_lowers_no_error_certainly_goes_back_as_well(monkeypatch):
     hiding = hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}, wheelbase={"factor": 1.08})
     predictor = WheelPredictor(tracks_of(measured(hiding, trials=12, seed=3, speeds=(-0.2, 0.2))))

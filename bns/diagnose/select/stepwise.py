@@ -347,9 +347,11 @@ class StepwiseSelection:
             believed = not self._rejected(
                 fit, name, bounds=False
             )  # at a bound it may be: there it does, and earns, nothing
-            if believed and name == newest and not at_bound(fit, name):  # an exchange since may have left it nothing to do
+            parts = extended(self.catalogue, name)
+            # an exchange since may have left it nothing to do; and what it extends may do as well from its numbers
+            if believed and name == newest and not at_bound(fit, name) and not parts:
                 continue
-            simpler, parts = reduced(self.catalogue, problem, fit, name), extended(self.catalogue, name)
+            simpler = reduced(self.catalogue, problem, fit, name)
             needless = bool(parts) and not certainly_better((problem, simpler), (problem, fit))
             if not believed or needless or not self._earned_over(problem, simpler, fit, name):
                 accepted = tuple(a for a in accepted if a != name) + parts
