@@ -69,20 +69,16 @@ def overview(effects: list[Effect]) -> str:
 def joints() -> str:
     """The effects of bodies on joints: a table without pictures."""
     loaded = [(name, JOINT_EFFECTS.load(name)) for name in JOINT_EFFECTS.names()]
-    parts = [(name, getattr(part, "effect", part)) for name, part in loaded]
+    parts = [(name, getattr(part, "anywhere", part)) for name, part in loaded]
     rows = [
-        f"| {name} | {_placed(e.in_words)} | {_code(e.equation)} | {_placed(e.measurement)} |" for name, e in parts
+        f"| {name} | {_cell(e.in_words)} | {_code(e.equation)} | {_cell(e.measurement)} |" for name, e in parts
     ]
     head = ["| effect | what happens | equation | confirm it on the bench |", "|---|---|---|---|"]
     return "\n".join([_JOINTS_HEAD, *head, *rows, ""])
 
 
-def _placed(text: str) -> str:
-    """A sentence about "the joint", where it names one of many."""
-    words = {"the marker {site}": "a marker", "{joint}": "a joint", "{link}": "a link", "{site}": "a marker", "|": "\\|"}
-    for there, here in words.items():
-        text = text.replace(there, here)
-    return text
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def _code(text: str) -> str:

@@ -35,7 +35,10 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the generated pages to those of the folder docs/."""
+    """Add the generated pages to those of the folder docs/, where a few have stand-ins for readers without the site."""
     for path, content in generated():
+        stand_in = files.get_file_from_path(path)
+        if stand_in is not None:
+            files.remove(stand_in)
         files.append(File.generated(config, path, content=content))
     return files

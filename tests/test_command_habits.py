@@ -210,7 +210,19 @@ def test_effects_are_listed(capsys):
     assert [row["effect"] for row in rows] == list(all_effects())
     assert all(row["equation"] and row["parameters"] for row in rows)
     assert main(["effects"]) == 0
-    assert "tau_s (s): time constant" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "tau_s (s): time constant" in said
+    assert "of bodies on joints: camera-scale" in said
+
+
+def test_an_effect_is_shown_with_all_that_is_known_of_it(capsys):
+    [lag] = answer(capsys, "effects", "motor-lag", "--json")
+    assert lag["equation"] == all_effects()["motor-lag"].equation
+    assert [one["of"] for one in answer(capsys, "effects", "floor-slope", "--json")] == ["wheels", "bodies on joints"]
+    assert main(["effects", "weak-joint"]) == 0
+    assert "of: bodies on joints" in capsys.readouterr().out
+    assert main(["effects", "motor-lg"]) == 2
+    assert "Did you mean 'motor-lag'?" in capsys.readouterr().err
 
 
 def test_example_fills_a_new_folder_and_no_other(tmp_path, capsys):

@@ -194,3 +194,10 @@ def test_choices_name_files_that_exist():
     assert len(files) > 20
     for file in files:
         assert (ROOT / "bns" / file).exists() or (ROOT / file).exists(), file
+
+
+def test_links_of_the_documents_lead_somewhere_without_the_site():
+    files = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "results").glob("*.md")]
+    links = [(file, link) for file in files for link in re.findall(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)", file.read_text("utf-8"))]
+    assert len(links) > 100
+    assert [(file.name, link) for file, link in links if not (file.parent / link).exists()] == []

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects import all_effects
+from bns.registry import JOINT_EFFECTS
 
 if TYPE_CHECKING:  # a quarter of a second to load, and the command needs no table
     import pandas as pd
@@ -26,6 +28,35 @@ def effects() -> pd.DataFrame:
 def rows() -> list[dict[str, str]]:
     """The same, a dictionary an effect, with its name as ``effect``."""
     return [_row(effect) for effect in all_effects().values()]
+
+
+def joint_names() -> list[str]:
+    """Names of the effects of bodies on joints (the snake, or an MJCF model)."""
+    return list(JOINT_EFFECTS.names())
+
+
+def described(name: str) -> list[dict[str, str]]:
+    """All that is known of an effect: its row, how to measure it and tell it apart; two if wheels and joints have one each.
+
+    Raises:
+        ModelError: there is no such effect.
+    """
+    wheels, joints = all_effects(), joint_names()
+    found = [("wheels", wheels[name])] if name in wheels else []
+    part = JOINT_EFFECTS.load(name) if name in joints else None  # one for the body, or one for each joint, link or point
+    found += [("bodies on joints", getattr(part, "anywhere", part))] if part is not None else []
+    if not found:
+        raise ModelError(unknown_name("effect", name, sorted({*wheels, *joints})))
+    return [
+        {
+            **_row(effect),
+            "of": of,
+            "measurement": effect.measurement,
+            "told_apart": " ".join(effect.beside.values()),
+            "extends": effect.extends,
+        }
+        for of, effect in found
+    ]
 
 
 def _row(effect: Effect) -> dict[str, str]:

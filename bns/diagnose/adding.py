@@ -111,7 +111,7 @@ def add_effects(
     names = (AS_GIVEN, *(effect.name for effect, _ in effects))
     windows, fit = memory.windows or PairedWindows(predictor), judged[-1][1]
     errors = windows.errors(list(zip(names, steps, strict=True)))
-    warnings = tuple(warnings_on(fit, effects, errors))
+    warnings = (*warnings_on(fit, effects, errors), *fitted_again(model, fit))
     return ExtendedModel(fit, documented(fit, model, measured, errors), errors, warnings, steps)
 
 
@@ -171,6 +171,19 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
     for before, after in pairwise(next(iter(errors.horizons.values())).models):
         if not errors.between(before.name, after.name):
             yield f"with {after.name}, the error on held-out trials does not fall."
+
+
+def fitted_again(before: Model, fit: Fit) -> Iterator[str]:
+    """The effects whose numbers were measured or published, with those that they have now."""
+    for active in (a for a in before.effects if a.basis in {"measured", "published"}):
+        name, own = active.effect.name, fit.model.values_of(active.effect.name)
+        changed = {p.name: p for p in active.effect.parameters if own.get(p.name) != active.by_name[p.name]}
+        was, now = (
+            ", ".join(f"{key} = {values[key]:.5g}{with_unit(p)}" for key, p in changed.items())
+            for values in (active.by_name, own)
+        )
+        if changed:
+            yield f"{name} was {active.basis} ({was}); its parameters were fitted again with the others: {now}."
 
 
 def does_nothing(fit: Fit, name: str) -> bool:

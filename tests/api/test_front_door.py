@@ -272,6 +272,12 @@ def test_what_is_added_lowers_the_error_step_by_step(log):
     assert [active.effect.name for active in added.model.effects] == added.to_json()["effects"]
     with pytest.raises(bns.ModelError, match="already has dead-zone"):
         bns.add(log, "dead-zone", added.model)
+    lag = bns.Model("khepera").with_effect("motor-lag", basis="measured", tau_s=0.1)
+    after = bns.add(log, "dead-zone", lag)
+    now = after.model.values_of("motor-lag")["tau_s"]
+    said = f"motor-lag was measured (tau_s = 0.1 s); its parameters were fitted again with the others: tau_s = {now:.5g} s."
+    assert after.warnings[-1] == said
+    assert not any("fitted again" in warning for warning in added.warnings)
     mine = bns.Effect("my-drag", "body", (bns.Parameter("k", "s", -1, 1, (-0.5, 0.5), 0.0, "drag"),), "", "", (), _drag)
     assert bns.add(log, mine, "khepera").errors.index[1] == "my-drag"
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -273,3 +274,21 @@ def test_effects_that_leave_something_do_not_replace_a_curve_that_leaves_nothing
     accepted = {"dead-zone": listed(NOMINAL, None, predictor.tracks)["dead-zone"]}
     ended = _without_needless_terms(predictor, state, accepted, 0.01)
     assert (ended.names, ended.terms == state.terms) == (((), True) if effects_leave_something else (("dead-zone",), False))
+
+
+@pytest.mark.parametrize(
+    ("term", "said"),
+    [("-0.05 * u", "a wheel is slower by 5.00% than its command at all speeds"), ("-0.5 * u * abs(u)", "not proportional")],
+)
+def test_a_wheel_that_is_slower_by_one_share_is_not_called_out_of_proportion(term, said):
+    stand_in = SimpleNamespace(on="wheels", term=term, values={}, signal="speed of each wheel")
+    assert said in in_words(stand_in, predictor_of(NOMINAL))
+
+
+def test_a_formula_that_is_no_part_of_the_model_is_called_a_hint():
+    predictor = predictor_of(NOMINAL)
+    found, problem = diagnose(predictor, NOMINAL), problem_for(predictor, NOMINAL)
+    hint = fitted(problem, problem.fit(NOMINAL), "v", "k * v", "drag")
+    text = diagnosis_text(replace(found, formula=hint))
+    assert "hint, not part of the extended model: candidate term drag, added to v: k * v" in text
+    assert "bns add LOG drag --term 'k * v' --on v --model MODEL -o NEW.yaml" in text

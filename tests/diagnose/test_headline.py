@@ -45,6 +45,10 @@ def test_effects_come_before_what_is_not_explained(monkeypatch):
     assert headline(found).startswith("Missing from the model: ")
     said = headline(replace(found, verdict="unlisted"))
     assert said == headline(found)[:-1] + ", and something that none of the known effects explains."
+    tied = replace(found.selection, competing_models=(("wheel-mismatch",),))
+    either = headline(replace(found, verdict="unlisted", selection=tied))
+    cause, other = (effect_named(name).in_words for name in ("yaw-bias", "wheel-mismatch"))
+    assert either.startswith(f"Missing from the model: either {cause}, or {other}; and also something that none")
     bare = headline(replace(found, verdict="unlisted", selection=replace(found.selection, accepted=())))
     assert bare == "Something is missing from the model that none of the known effects explains."
 

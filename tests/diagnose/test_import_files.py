@@ -249,3 +249,57 @@ def test_pauses_between_trials_are_not_driven_and_positions_far_apart_are_no_met
     assert guessed(foreign).mapping["columns"]["left_m_s"] == {"from": "cmd_L", "unit": "cm/s"}
     in_mm = foreign.assign(x=1000 * foreign.x, y=1000 * foreign.y)
     assert guessed(in_mm).mapping["columns"]["left_m_s"] == {"from": "cmd_L"}
+
+
+@pytest.mark.parametrize("unit", [1.0, 180 / np.pi], ids=["rad", "deg"])
+@pytest.mark.parametrize(
+    "convention",
+    [{}, {"zero_deg": 90}, {"clockwise": True}, {"clockwise": True, "zero_deg": 90}, {"clockwise": True, "zero_deg": 180}],
+    ids=str,
+)
+def test_how_headings_are_counted_is_read_from_where_the_robot_drove(table, convention, unit):
+    turned = table.heading_rad - np.radians(convention.get("zero_deg", 0))
+    heading = np.mod(-turned if "clockwise" in convention else turned, 2 * np.pi) * unit
+    foreign = pd.DataFrame({"time": table.t_s, "cmd_l_mps": table.left_m_s, "cmd_r_mps": table.right_m_s})
+    foreign = foreign.assign(x=table.x_m, y=table.y_m, compass=heading)
+    body = foreign.drop(columns=["cmd_l_mps", "cmd_r_mps"]).assign(v=(table.left_m_s + table.right_m_s) / 2, omega=0.0)
+    guess, of_body = guessed(foreign), guessed(body)
+    assert guess.mapping["columns"]["heading_rad"] == {"from": "compass", **({"unit": "deg"} if unit > 1 else {}), **convention}
+    assert of_body.mapping["columns"]["heading_rad"] == guess.mapping["columns"]["heading_rad"]
+    assert any("How the heading is counted is guessed" in remark for remark in guess.remarks) == bool(convention)
+
+
+def test_a_path_that_hardly_turns_tells_no_convention(table):
+    one = table.assign(trial=0, t_s=0.1 * np.arange(len(table)), left_m_s=0.1, right_m_s=0.1, y_m=0.0, heading_rad=0.01)
+    one["x_m"] = 0.1 * one.t_s
+    foreign = one.rename(columns={"left_m_s": "l", "right_m_s": "r", "x_m": "x", "y_m": "y", "heading_rad": "yaw"})
+    assert guessed(foreign).mapping["columns"]["heading_rad"] == {"from": "yaw"}
+
+
+def test_times_and_motor_steps_are_known_by_their_short_names(table):
+    foreign = pd.DataFrame({"ms": 1e3 * table.t_s, "steps_l": 1e4 * table.left_m_s, "steps_r": 1e4 * table.right_m_s})
+    rates = foreign.rename(columns={"steps_l": "left_steps_per_s", "steps_r": "right_steps_per_s"})
+    columns, of_rates = (guessed(one).mapping["columns"] for one in (foreign, rates))
+    assert columns["t_s"] == {"from": "ms", "unit": "ms"}
+    assert columns["left_m_s"] == {"from": "steps_l", "scale": "METRES_A_COUNT", "counts": True}
+    assert of_rates["right_m_s"] == {"from": "right_steps_per_s", "scale": "METRES_A_COUNT"}
+
+
+def test_a_proposal_is_printed_and_can_be_saved(tmp_path, table, capsys):
+    log = tmp_path / "my log.csv"
+    table.rename(columns={"t_s": "time", "x_m": "x", "y_m": "y", "heading_rad": "yaw"}).to_csv(log, index=False)
+    assert main(["import", str(log), "-o", str(tmp_path / "m.csv")]) == 2
+    assert f"bns import '{log}' --propose > '{log}.import.yaml'" in capsys.readouterr().err
+    assert main(["import", str(log), "--propose"]) == 0
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    assert not (tmp_path / "m.csv").exists()
+    log.with_name("my log.csv.import.yaml").write_text(shown.out)
+    assert main(["import", str(log), "-o", str(tmp_path / "m.csv")]) == 0
+    assert len(load_measured(tmp_path / "m.csv").tracks) == 3
+
+
+def test_import_asks_for_a_table_to_write(tmp_path, table, capsys):
+    table.to_csv(tmp_path / "m.csv", index=False)
+    assert main(["import", str(tmp_path / "m.csv")]) == 2
+    assert "Give -o FILE" in capsys.readouterr().err

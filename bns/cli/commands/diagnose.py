@@ -44,9 +44,13 @@ def add_commands(command: Adder) -> None:
         "-o",
         "--output",
         type=Path,
-        required=True,
         metavar="FILE",
-        help="table to write (.csv or .parquet); without a mapping, a proposed mapping is printed and nothing is written",
+        help="table to write (.csv or .parquet)",
+    )
+    read.add_argument(
+        "--propose",
+        action="store_true",
+        help="print a proposed mapping (YAML) and write nothing: bns import LOG --propose > LOG.import.yaml",
     )
     held = command("compare", compare, "show how large the errors of a model are, and where they occur")
     found = command(
@@ -156,11 +160,17 @@ def import_(options: argparse.Namespace) -> int:
     """A log as a table of measurements; the mapping is kept beside it."""
     import yaml
 
-    from bns.diagnose.data.import_log import import_log, refuse_to_overwrite
+    from bns.diagnose.data.import_log import import_log, proposal, refuse_to_overwrite
     from bns.diagnose.data.mapping import load_mapping, mapping_beside
     from bns.diagnose.report.text import findings_text
+    from bns.errors import DataError
     from bns.measurements import check_table_name, write_measurements
 
+    if options.propose:
+        print(proposal(options.data), end="")
+        return 0
+    if options.output is None:
+        raise DataError("Give -o FILE, the table to write (.csv or .parquet), or --propose, which prints a mapping.")
     check_table_name(options.output)
     first = options.data[0]
     given = load_mapping(options.map) if options.map else None

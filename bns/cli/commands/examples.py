@@ -11,6 +11,7 @@ from bns.cli.options.option_types import as_json
 def add_commands(command: Adder) -> None:
     """The parsers of these commands."""
     listed = command("effects", effects, "list the physical effects that a model can lack")
+    listed.add_argument("name", nargs="?", metavar="EFFECT", help="show this effect alone, with all that is known of it")
     listed.add_argument("--json", action="store_true", help="print a list of JSON objects, one per effect")
     what = "copy sample files into a new folder: a log, a sweep, notebooks and a script; with robot: a package for your own robot"
     begun = command("example", example, what)
@@ -20,9 +21,14 @@ def add_commands(command: Adder) -> None:
 
 
 def effects(options: argparse.Namespace) -> int:
-    """The catalogue."""
-    from bns.api.effects import rows
+    """The catalogue, or one effect."""
+    from bns.api.effects import described, joint_names, rows
 
+    if options.name is not None:
+        known = described(options.name)
+        texts = ("\n".join(f"{key.replace('_', ' ')}: {text}" for key, text in one.items() if text) for one in known)
+        print(as_json(known) if options.json else "\n\n".join(texts))
+        return 0
     listed = rows()
     if options.json:
         print(as_json(listed))
@@ -30,6 +36,7 @@ def effects(options: argparse.Namespace) -> int:
     wide = max(len(row["effect"]) for row in listed)
     for row in listed:
         print(f"{row['effect']:{wide}}  {row['meaning']} [{row['stage']}]\n{'':{wide}}  {row['parameters']}; {row['bounds']}")
+    print(f"\nof bodies on joints: {', '.join(joint_names())}\nbns effects EFFECT shows one with all that is known of it")
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,18 +90,30 @@ def _checked(path: Path, table: pd.DataFrame, mapping: Mapping[str, Any] | None)
     return Imported(table, usable["trial"].nunique(), tuple(findings), mapping)
 
 
+def proposal(files: Sequence[Path]) -> str:
+    """The mapping that names and numbers suggest for the first file, joined with the others by time: YAML with comments."""
+    first, *others = files
+    return guessed(read_table(first), _tables(first, others)).text
+
+
 def _proposed(first: Path, table: pd.DataFrame, others: Sequence[Path]) -> str:
     """What is in the files, and the mapping that their names suggest."""
-    tables = {_beside(path, first): read_table(path) for path in others}
+    tables = _tables(first, others)
     guess = guessed(table, tables)
     columns = [f"{first} has the columns {', '.join(map(str, table.columns))}"]
     columns += [f"{name} has the columns {', '.join(map(str, one.columns))}" for name, one in tables.items()]
     several = f" It joins {len(files)} files by time." if len(files := [first, *others]) > 1 else ""
+    command = shlex.join(["bns", "import", *map(str, files), "--propose"])
     return (
         f"There is no mapping next to {first}. {'; '.join(columns)}. Write {first.name}.import.yaml, or give such a file with "
         f"--map; docs/logs.md lists all possible entries.{several} "
-        f"A proposal, guessed from the names; check it line by line:\n\n{guess.text}"
+        f"A proposal, guessed from names and numbers; check it line by line "
+        f"({command} > {shlex.quote(f'{first}.import.yaml')} saves it):\n\n{guess.text}"
     )
+
+
+def _tables(first: Path, others: Sequence[Path]) -> dict[str, pd.DataFrame]:
+    return {_beside(path, first): read_table(path) for path in others}
 
 
 def _beside(path: Path, first: Path) -> str:

@@ -69,10 +69,11 @@ def numbers_in_words(
 def headline(d: Diagnosis) -> str:
     """The verdict in one sentence or two."""
     said = _all_of(d, d.effects)
-    if d.verdict == "tie" and d.selection is not None:
+    if d.selection is not None and (d.verdict == "tie" or (d.verdict == "unlisted" and d.selection.competing_models)):
         causes = [_all_of(d, names) for names in (d.selection.accepted, *d.selection.competing_models)]
         some = causes[:_CAUSES] + (["something else"] if len(causes) > _CAUSES else [])
-        return f"Missing from the model: either {', or '.join(some)}. These measurements cannot decide which."
+        rest = "; and also something that none of the known effects explains" if d.verdict == "unlisted" else ""
+        return f"Missing from the model: either {', or '.join(some)}{rest}. These measurements cannot decide which."
     return {
         "none": "Nothing is missing from the model that these measurements could show.",
         "effects": f"Missing from the model: {said}.",

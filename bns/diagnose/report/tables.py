@@ -115,9 +115,9 @@ def ranking_table(d: Diagnosis) -> Table:
             else ["none", ""]
         )
         rows.append([c.name, *gain, f"{e.p_value:.2g}", in_line(fitted), c.rejected_because])
-    return _table(
-        ["effect", "gain per trial (log-likelihood)", "95 %", "p-value", "fitted parameters (95 %)", "why not considered"], rows
-    )
+    alone = "parameters of this effect alone (95 %)"
+    columns = ["effect", "gain per trial (log-likelihood)", "95 %", "p-value", alone, "why not considered"]
+    return _table(columns, rows)
 
 
 def in_line(numbers: Mapping[str, Mapping[str, Any]]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -68,9 +69,14 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival]) -> Iterator[str]:
         yield from _intervals(numbers_of(d.calibration))
         for side, (value, low, high) in wheel_sizes(d.calibration).items():
             yield f"  {side} wheel: {value:.5g} of the drawing's size (95 %: {low:.5g} to {high:.5g})"
-    for term in d.terms or ((d.formula,) if d.formula else ()):
-        yield f"\ncandidate term {term.name}, added to {term.on}: {term.term}"
+    hints = (d.formula,) if d.formula and not d.terms else ()
+    for term in (*d.terms, *hints):
+        kind = "hint, not part of the extended model: candidate term" if hints else "candidate term"
+        yield f"\n{kind} {term.name}, added to {term.on}: {term.term}"
         yield from _intervals({term.name: numbers_of_term(term)})
+    for hint in hints:
+        words = f"bns add LOG {hint.name} --term {shlex.quote(hint.term)} --on {hint.on} --model MODEL -o NEW.yaml"
+        yield f"    to try it: {words}"
     notes = [note for note in d.notes if note not in odd]
     if notes:
         yield "\nnotes:"

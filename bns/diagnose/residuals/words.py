@@ -10,9 +10,11 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_KNOTS_S, RESPONSE_OF, TRAVEL
 from bns.diagnose.residuals.symbolic import Formula
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, value_of
 
 _POINTS = 400
+_ALIKE = DEFAULTS.report.same_share
 _WAYS = ({"lately10": 1.0, "lately100": 1.0}, {"lately10": 0.0, "lately100": 1.0})
 """Of a wheel that drove a metre just now; and of one that did so more than 10 s ago."""
 
@@ -110,6 +112,9 @@ def _speed(term: Formula, predictor: Predictor) -> str:
         at, got = np.append(at, -fastest), np.append(got, back)
     pairs = ", ".join(f"{a:.3g} m/s gives {b:.3g} m/s" for a, b in zip(at, got, strict=True))
     whose = {LEFT: "the left wheel", RIGHT: "the right wheel"}.get(term.on, "a wheel")
+    shares = got / at
+    if np.ptp(shares) < _ALIKE:
+        return f"{whose} is {_slower(1.0 - float(shares[-1]))} than its command at all speeds ({pairs})"
     return f"{whose}'s speed is not proportional to its command: {pairs}"
 
 

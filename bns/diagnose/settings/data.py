@@ -137,6 +137,13 @@ class Data:
         "How far the robot went is measured over about this time: long enough that the noise of a pose is small, short "
         f"enough that a path is nearly straight; {BY_HAND}.",
     )
+    guess_headings: tuple[float, float] = setting(
+        (0.8, 0.6),
+        "1",
+        "Headings are said to run clockwise, or from another axis, where directions of travel agree with that reading by at "
+        "least the first number, and with the opposite sense of rotation by at most the second one: lengths of the mean of "
+        f"unit vectors, 1 where all agree, near 0 on a path that turns by a round; {BY_HAND}.",
+    )
     guess_largest_m: float = setting(
         100.0,
         "m",

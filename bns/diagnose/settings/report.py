@@ -28,5 +28,11 @@ class Report:
     network_bins: int = setting(8, "bins", f"Bins of a figure of networks' errors; {BY_HAND}.")
     large: float = setting(1.0, "s or m", "From one second or one metre on, values are not shown in ms or mm.")
     causes: int = setting(3, "causes", f"Largest number of causes in a headline; {BY_HAND}.")
+    same_share: float = setting(
+        0.005,
+        "1",
+        "Where a wheel's speed divided by its command differs by less than this from speed to speed, the words say that it is "
+        f"slower or faster by one share, and not that it is out of proportion; {BY_HAND}.",
+    )
     frame_s: float = setting(0.1, "s", f"Time between the points of a planned path that is drawn; {BY_HAND}.")
     planned_trials: int = setting(3, "trials", f"Proposed trials that a figure shows; {BY_HAND}.")

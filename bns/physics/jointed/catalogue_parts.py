@@ -31,6 +31,15 @@ class _Placed:
         """As of any effect, and where."""
         return self.effect.apply
 
+    @property
+    def anywhere(self) -> Effect:
+        """The effect at any of its places; its sentences say "a joint", "a link" or "a marker"."""
+        sentence, measurement = (
+            text.replace("the marker {site}", "a marker").format(joint="a joint", link="a link", site="a marker")
+            for text in (self.effect.sentence, self.effect.measurement)
+        )
+        return replace(self.effect, sentence=sentence, measurement=measurement)
+
     def _at(self, name: str, words: dict[str, str], place: dict[str, Any]) -> Effect:
         return replace(
             self.effect,

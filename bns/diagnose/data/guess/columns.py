@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.data.guess.numbers import unit_of_speeds
+from bns.diagnose.data.guess.numbers import heading_convention, unit_of_speeds
 from bns.diagnose.data.guess.words import QUATERNIONS, WORDS, rank, source, unit_of, words_of
 from bns.diagnose.data.mapping import DURATION, FORWARD, TURN, UNITS
 from bns.diagnose.settings import DEFAULTS
@@ -20,7 +20,8 @@ RADIUS, METRES_A_COUNT = "RADIUS_M", "METRES_A_COUNT"
 _STEPS = DEFAULTS.data.guess_units
 _LARGE_RAD = DEFAULTS.data.guess_degrees
 _KINDS = {"t_s": "s", "x_m": "m", "y_m": "m", "heading_rad": "rad", TURN: "rad/s"}
-_COUNTS = re.compile(r"\b(ticks?|counts?|encoders?|enc)\b")
+_COUNTS = re.compile(r"\b(ticks?|counts?|encoders?|enc|steps?|pulses?)\b")
+_A_SECOND = re.compile(r"\b(s|sec|second|hz|rate|speed|vel|velocity)$")
 
 
 def of_columns(table: pd.DataFrame) -> dict[str, Any]:
@@ -41,7 +42,9 @@ def of_columns(table: pd.DataFrame) -> dict[str, Any]:
             entries[column] = {"from": found, **unit_of_column(column, found, table[found])}
     entries = _whole(entries)
     by_numbers = unit_of_speeds(table, entries)
-    return {name: {**entry, **(by_numbers if name in COMMANDS else {})} for name, entry in entries.items()}
+    counted_from = heading_convention(table, entries)
+    more = {**dict.fromkeys(COMMANDS, by_numbers), "heading_rad": counted_from}
+    return {name: {**entry, **more.get(name, {})} for name, entry in entries.items()}
 
 
 def motions_of(table: pd.DataFrame) -> dict[str, Any] | None:
@@ -85,7 +88,7 @@ def _each(words: tuple[str, ...], names: Mapping[str, str]) -> Iterator[str]:
 def _speed(said: str) -> dict[str, Any]:
     """How a wheel's column becomes m/s, where its name tells that it is none."""
     if _COUNTS.search(said):
-        return {"scale": METRES_A_COUNT, "counts": True}
+        return {"scale": METRES_A_COUNT} if _A_SECOND.search(said) else {"scale": METRES_A_COUNT, "counts": True}
     turning = unit_of(said) in {"rad/s", "deg/s"} or re.search(r"\b(phi|wl|wr|omega|rad s)\b", said)
     return {"scale": RADIUS} if turning else {}
 

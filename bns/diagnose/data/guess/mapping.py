@@ -119,6 +119,9 @@ def _apart(table: pd.DataFrame, entries: Entries) -> bool:
 def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
     yield from _lacks(entries)
     yield from _placeholders(entries)
+    heading = entries.get("heading_rad", {})
+    if {"clockwise", "zero_deg"} & set(heading):
+        yield "How the heading is counted is guessed from where the robot drove: check it."
     left = entries.get(COMMANDS[0], {})
     if "unit" in left and unit_of(words_of(str(left["from"]))) is None:
         yield f"That the commands are in {left['unit']} is guessed from how far the robot went: check it."
@@ -159,4 +162,4 @@ def _placeholders(entries: Entries) -> Iterator[str]:
     if RADIUS in scales:
         yield f"Fill in {RADIUS}, the radius of the wheels: their speeds are in rad/s."
     if METRES_A_COUNT in scales:
-        yield f"Fill in {METRES_A_COUNT}, the distance in metres that a wheel drives for one count of its encoder."
+        yield f"Fill in {METRES_A_COUNT}, the distance in metres that a wheel drives for one count of its encoder (motor step)."

@@ -1,4 +1,4 @@
-"""What the sizes of numbers tell where names do not: the unit of the wheels' speeds, from how far the robot went."""
+"""What the sizes of numbers tell where names do not: the unit of the wheels' speeds, and from where headings are counted."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.data.mapping import SIZES
+from bns.diagnose.data.mapping import FORWARD, SIZES
 from bns.diagnose.settings import DEFAULTS
 from bns.measurements import COMMANDS
 
@@ -18,6 +18,7 @@ _SPEEDS = {name: SIZES[name] for name in ("m/s", "cm/s", "mm/s")}
 _WITHIN = DEFAULTS.data.guess_speed_within
 _LARGEST_M = DEFAULTS.data.guess_largest_m
 _WINDOW_S = DEFAULTS.data.guess_window_s
+_AGREE, _DISAGREE = DEFAULTS.data.guess_headings
 
 
 def unit_of_speeds(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, Any]:
@@ -36,10 +37,10 @@ def unit_of_speeds(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str,
 
 def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any]) -> float | None:
     """How far the robot went, over what the two columns of commands add up to; None where that cannot be said."""
-    needed = ("t_s", "x_m", "y_m", *COMMANDS)
-    if not set(needed) <= set(entries) or any(not isinstance(entries[name]["from"], str) for name in needed):
+    numbers = _columns(table, entries, ("t_s", "x_m", "y_m", *COMMANDS))
+    if numbers is None:
         return None
-    t, x, y, left, right = (_in_si(table, entries[name], name not in COMMANDS) for name in needed)
+    t, x, y, left, right = numbers
     good = np.isfinite(t) & np.isfinite(x) & np.isfinite(y)
     if good.sum() < 3 or np.ptp(x[good]) > _LARGEST_M or np.ptp(y[good]) > _LARGEST_M:
         return None
@@ -51,6 +52,46 @@ def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any]) -> float | No
     near = (t[b] > t[a]) & (t[b] - t[a] < 3.0 * _WINDOW_S)  # not from trial to trial
     went, told = np.hypot(x[b] - x[a], y[b] - y[a])[near].sum(), (way[b] - way[a])[near].sum()
     return float(went / told) if went > 0 and told > 0 else None
+
+
+def heading_convention(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, Any]:
+    """What an entry for the heading lacks: ``clockwise``, and the quarter turns of ``zero_deg``; from where the robot drove.
+
+    Nothing where that cannot be said: with no commands that tell forwards from backwards, or on a path that hardly turns.
+    """
+    told = COMMANDS if set(COMMANDS) <= set(entries) else (FORWARD,)
+    numbers = _columns(table, entries, ("t_s", "x_m", "y_m", "heading_rad", *told))
+    if numbers is None:
+        return {}
+    t, x, y, heading, *speeds = numbers
+    good = np.flatnonzero(np.isfinite(t) & np.isfinite(x) & np.isfinite(y) & np.isfinite(heading))
+    lasts = np.diff(t[good])
+    if not (lasts > 0).any():
+        return {}
+    driven = np.concatenate([[0.0], np.cumsum(np.nan_to_num(sum(speeds)))[:-1]])  # its sign in a window: forwards or backwards
+    at = good[:: max(round(_WINDOW_S / np.median(lasts[lasts > 0])), 1)]
+    a, b = at[:-1], at[1:]
+    way = np.hypot(x[b] - x[a], y[b] - y[a])
+    moved = (t[b] > t[a]) & (t[b] - t[a] < 3.0 * _WINDOW_S) & (driven[b] != driven[a])
+    if not moved.any():
+        return {}
+    moved &= way >= 0.5 * np.median(way[moved])
+    a, b = a[moved], b[moved]
+    towards = np.arctan2(y[b] - y[a], x[b] - x[a]) + np.where(driven[b] > driven[a], 0.0, np.pi)
+    middle = np.angle(np.exp(1j * heading[a]) + np.exp(1j * heading[b]))
+    means = {cw: complex(np.exp(1j * (towards + (middle if cw else -middle))).mean()) for cw in (False, True)}
+    clockwise = abs(means[True]) > abs(means[False])
+    if abs(means[clockwise]) < _AGREE or abs(means[not clockwise]) > _DISAGREE:
+        return {}
+    quarters = round(float(np.angle(means[clockwise])) / (np.pi / 2)) % 4
+    return ({"clockwise": True} if clockwise else {}) | ({"zero_deg": 90 * quarters} if quarters else {})
+
+
+def _columns(table: pd.DataFrame, entries: Mapping[str, Any], names: tuple[str, ...]) -> list[np.ndarray] | None:
+    """These columns in SI units, the commands as they are; None where one is missing or is made of several."""
+    if not set(names) <= set(entries) or any(not isinstance(entries[name]["from"], str) for name in names):
+        return None
+    return [_in_si(table, entries[name], name not in COMMANDS) for name in names]
 
 
 def _in_si(table: pd.DataFrame, entry: Mapping[str, Any], with_unit: bool) -> np.ndarray:

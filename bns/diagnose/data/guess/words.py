@@ -9,7 +9,7 @@ from bns.diagnose.data.mapping import FORWARD, TURN, UNITS
 
 WORDS: dict[str, tuple[str, ...]] = {
     "trial": ("trial", "run", "episode", "experiment"),
-    "t_s": ("t", "t s", "time", "stamp", "timestamp"),
+    "t_s": ("t", "t s", "time", "stamp", "timestamp", "ms", "us", "ns"),
     "left_m_s": ("left", "vleft", "vl", "wl", "phi l", "l"),
     "right_m_s": ("right", "vright", "vr", "wr", "phi r", "r"),
     FORWARD: ("v", "linear x", "twist x", "vx", "forward velocity", "linear velocity", "forward", "speed", "velocity"),
@@ -30,7 +30,8 @@ _MEASURED = ("odom", "odometry", "encoder", "joint states", "measured", "wheel o
 
 _SHORT = {"mps": "m s", "mmps": "mm s", "cmps": "cm s", "mms": "mm s", "cms": "cm s", "kmh": "km h"}
 _SHORT |= {"radps": "rad s", "degps": "deg s", "dps": "deg s"}
-"""Units of speeds written as one word."""
+_SHORT |= {"millis": "ms", "msec": "ms", "micros": "us", "usec": "us", "nanos": "ns", "nsec": "ns"}
+"""Units of speeds and times as they are written in one word."""
 
 
 def words_of(name: str) -> str:
