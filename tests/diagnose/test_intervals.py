@@ -7,11 +7,11 @@ import pytest
 
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.estimate.fit import jackknife_covariance
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.jagged import _drawn, _middle_of_least, _searched, with_jagged
 from bns.diagnose.estimate.normal_equations import normal_equations
 from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.significance import jackknife_covariance
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from tests.diagnose.worlds import NOMINAL, hidden, measured

@@ -144,7 +144,7 @@ def test_a_rival_must_have_earned_its_place(monkeypatch, name, values, competing
     problem, fit = search._refit_with_noise(NOMINAL.with_effect("camera-scale", factor=1.05))
     tried = problem.fit(NOMINAL.with_effect(name, **values))
     monkeypatch.setattr("bns.diagnose.select.stepwise.indistinguishable", lambda *_: True)
-    monkeypatch.setattr(search, "_exchanges", lambda *_: [("camera-scale", name, tried)])
+    monkeypatch.setattr(search._exchanges, "of", lambda *_: [("camera-scale", name, tried)])
     assert len(search._competing_models(problem, fit, ("camera-scale",))) == competing_models
 
 
@@ -241,13 +241,13 @@ def test_what_could_stand_in_place_of_the_newest_effect_is_known_from_the_round_
     _, search, end = with_a_gain
     fits = {}
     for known in (True, False):
-        search._exchanged = None
+        search._exchanges.forget()
         with monkeypatch.context() as patched:
             if known:  # no start is looked for again
-                patched.setattr("bns.diagnose.select.stepwise.best_start", lambda *_: pytest.fail("looked for"))
+                patched.setattr("bns.diagnose.select.exchanges.best_start", lambda *_: pytest.fail("looked for"))
             else:
-                patched.setattr(search, "_entry", None)
-            found = search._exchanges(end.problem, end.fit, end.accepted)
+                patched.setattr(search._exchanges, "entry", None)
+            found = search._exchanges.of(end.problem, end.fit, end.accepted)
         fits[known] = {name: fit.loss for _, name, fit in found}
     assert set(fits[False]) <= set(fits[True])
     assert fits[False]

@@ -27,7 +27,7 @@ from bns.diagnose.estimate.normal_equations import (
     normal_equations_by_trial,
 )
 from bns.diagnose.estimate.parameters import FreeParameter, active_mask, increment, increments, moved_by
-from bns.diagnose.estimate.significance import PairedComparison, paired_elpd_diff, sign_flip_p
+from bns.diagnose.estimate.significance import PairedComparison, chance, jackknife_covariance, paired_elpd_diff
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
@@ -364,33 +364,6 @@ def _reaching(way: Array, columns: Array) -> Array:
     out = columns.copy()
     out[..., int(np.argmax(alike))] = way
     return out
-
-
-def jackknife_covariance(steps: Array) -> Array:
-    """Covariance (p, p) of p numbers, from how much each moves when one trial is left out, ``steps`` (trials, p).
-
-    A trial that decides much pulls the fit towards itself, so that its gradient there says too little of its scatter: with sums
-    of gradients alone, intervals are too narrow where few trials decide. MacKinnon, Nielsen and Webb, Journal of Applied
-    Econometrics 38(5), 2023: "Fast and reliable jackknife and bootstrap methods for cluster-robust inference" (CV3).
-    """
-    trials = len(steps)
-    centred = steps - steps.mean(axis=0)
-    out: Array = centred.T @ centred * ((trials - 1) / trials)
-    return out
-
-
-def chance(joint: NormalEquations, base_numbers: int) -> float:
-    """`sign_flip_p` of an addition to a fitted model, whose own numbers are the first ``base_numbers`` of the normal equations.
-
-    What these could do as well is taken out of the others first.
-    """
-    scores, curvature = joint.gradients, joint.curvatures.sum(axis=0)
-    shared = (
-        np.linalg.pinv(curvature[:base_numbers, :base_numbers], hermitian=True)
-        @ curvature[:base_numbers, base_numbers:]
-    )
-    left = curvature[base_numbers:, base_numbers:] - curvature[base_numbers:, :base_numbers] @ shared
-    return sign_flip_p(scores[:, base_numbers:] - scores[:, :base_numbers] @ shared, left)
 
 
 def _predicted_decrease(step: Array, curvature: Array, gradient: Array) -> float:

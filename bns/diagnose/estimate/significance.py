@@ -9,6 +9,7 @@ from itertools import count
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.normal_equations import NormalEquations
 from bns.diagnose.settings import DEFAULTS
 
 FLIPS = DEFAULTS.estimate.flips
@@ -58,6 +59,33 @@ def sign_flip_p(scores: Array, curvature: Array) -> float:
     sums = _signs(len(scores)) @ apart
     by_luck = np.einsum("fk,fk->f", sums, sums)
     return float((1 + np.count_nonzero(by_luck >= observed * (1 - 1e-9))) / (1 + FLIPS))
+
+
+def jackknife_covariance(steps: Array) -> Array:
+    """Covariance (p, p) of p numbers, from how much each moves when one trial is left out, ``steps`` (trials, p).
+
+    A trial that decides much pulls the fit towards itself, so that its gradient there says too little of its scatter: with sums
+    of gradients alone, intervals are too narrow where few trials decide. MacKinnon, Nielsen and Webb, Journal of Applied
+    Econometrics 38(5), 2023: "Fast and reliable jackknife and bootstrap methods for cluster-robust inference" (CV3).
+    """
+    trials = len(steps)
+    centred = steps - steps.mean(axis=0)
+    out: Array = centred.T @ centred * ((trials - 1) / trials)
+    return out
+
+
+def chance(joint: NormalEquations, base_numbers: int) -> float:
+    """`sign_flip_p` of an addition to a fitted model, whose own numbers are the first ``base_numbers`` of the normal equations.
+
+    What these could do as well is taken out of the others first.
+    """
+    scores, curvature = joint.gradients, joint.curvatures.sum(axis=0)
+    shared = (
+        np.linalg.pinv(curvature[:base_numbers, :base_numbers], hermitian=True)
+        @ curvature[:base_numbers, base_numbers:]
+    )
+    left = curvature[base_numbers:, base_numbers:] - curvature[base_numbers:, :base_numbers] @ shared
+    return sign_flip_p(scores[:, base_numbers:] - scores[:, :base_numbers] @ shared, left)
 
 
 @lru_cache

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem, chance
+from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_after
-from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
+from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, chance, paired_elpd_diff
 from bns.diagnose.parallel import each
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter

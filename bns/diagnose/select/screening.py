@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem, chance
+from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.problem import problem_with_noise
+from bns.diagnose.estimate.significance import chance
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 from bns.physics.jointed.pieced import PiecedEffect

@@ -7,7 +7,7 @@ or beyond what is plausible is rejected with its reason.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 
 from bns.diagnose.data.tracks import Array
@@ -19,11 +19,12 @@ from bns.diagnose.estimate.clocks.trial_clock_test import (
 )
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.plausibility import at_bound, implausible
-from bns.diagnose.estimate.problem import problem_for, settled_problem
+from bns.diagnose.estimate.problem import settled_problem
 from bns.diagnose.estimate.significance import MIN_Z
-from bns.diagnose.estimate.starts import best_start, fit_extended, fit_with, listed
+from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.select.exchanges import Entry, Exchanges
 from bns.diagnose.select.extending import extended, reduced, simple, to_extend
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.negligible import certainly_better
@@ -37,30 +38,9 @@ from bns.physics.model import Model
 FALSE_ALARM = DEFAULTS.select.false_alarm
 MIN_Z_STRETCHES = DEFAULTS.estimate.min_z_stretches
 MIN_GAIN = DEFAULTS.select.min_gain
-SCREEN = DEFAULTS.select.screen
 BEHIND = DEFAULTS.select.behind
-BEHIND_LOSS = DEFAULTS.select.behind_loss
 CLOCKS_CHANCE = DEFAULTS.select.clocks_chance
 MOST = DEFAULTS.select.most_effects
-
-
-@dataclass(frozen=True)
-class _Entry:
-    """A round in which an effect came in: the problem and the fit before it, what was accepted then, and the round."""
-
-    problem: Problem
-    base: Fit
-    accepted: tuple[str, ...]
-    step: SelectionStep
-
-    def of(self, name: str, accepted: Collection[str]) -> bool:
-        """Did ``name`` come in then, beside what else is accepted now?"""
-        return name == self.step.selected and {*self.accepted, name} == set(accepted)
-
-    @property
-    def fits(self) -> dict[str, Fit]:
-        """Of every candidate of the round."""
-        return {c.name: c.fit for c in self.step.ranking}
 
 
 class StepwiseSelection:
@@ -83,8 +63,7 @@ class StepwiseSelection:
         self._barred, self._own_clocks = barred, own_clocks
         self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
-        self._exchanged: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
-        self._entry: _Entry | None = None
+        self._exchanges = Exchanges(predictor, self.catalogue, self._worth, tick)
         self._all_believed = False
         self._least_z = MIN_Z if predictor.luck is None else MIN_Z_STRETCHES
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
@@ -97,7 +76,8 @@ class StepwiseSelection:
         result = self._run(before)
         if not any(step.passed_over for step in result.steps):
             return result
-        believed, self._all_believed, self._exchanged = result, True, None
+        believed, self._all_believed = result, True
+        self._exchanges.forget()
         bold = self._run()
         self._all_believed = False
         return bold if bold.accepted and predicts_better(believed, bold) else believed
@@ -114,7 +94,7 @@ class StepwiseSelection:
         self.model = self._bare_with_clocks(clocks.fit.model, given)
         added = self.catalogue.pop(_per_trial_effect(self.model), None)
         self._worth.pop(_per_trial_effect(self.model), None)
-        self._exchanged = None
+        self._exchanges.forget()
         result = self._select()
         still = compare_clocks(result.problem, result.problem.fit(with_shared_clock(result.fit.model)), result.fit)
         if still is None or not self._clocks_earned(still, result.fit):
@@ -163,7 +143,7 @@ class StepwiseSelection:
             steps.append(step)
             if not step.selected:
                 break
-            self._entry = _Entry(*before, accepted, step)
+            self._exchanges.entry = Entry(*before, accepted, step)
             accepted = (*(a for a in accepted if a != step.instead_of), step.selected)
             problem, fit, accepted = self._exchange_step(problem, fit, accepted)
             problem, fit, accepted = self._backward_step(problem, fit, accepted)
@@ -179,7 +159,8 @@ class StepwiseSelection:
         """
         if not found.accepted or found.competing_models or found.fit.model.per_trial_effect is not None:
             return found
-        self._exchanged = self._entry = None
+        self._exchanges.forget()
+        self._exchanges.entry = None
         models = self._competing_models(found.problem, found.fit, found.accepted)
         return replace(found, competing_models=tuple(names for names, _ in models))
 
@@ -226,7 +207,7 @@ class StepwiseSelection:
         Where there is none, the best of those that extend an effect which does nothing by itself here.
         """
         left = self._worth_a_fit(problem, fit, accepted)
-        place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges(problem, fit, accepted))
+        place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges.of(problem, fit, accepted))
         tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *left, *(self._worth[name] for name in place)])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
         of = len(self.catalogue) - len(accepted) if self.predictor.screening is not None else 0
@@ -325,7 +306,7 @@ class StepwiseSelection:
         barred: set[str] = set()
         for _ in range(len(accepted) if len(accepted) > 1 else 0):
             best, new, comes = fit, accepted, ""
-            for name, other, tried in self._exchanges(problem, fit, accepted):
+            for name, other, tried in self._exchanges.of(problem, fit, accepted):
                 better = other not in barred and tried.held_out.sum() < best.held_out.sum() - 0.5
                 if better and self._may_stay(problem, tried, other):
                     best, new, comes = tried, tuple(other if a == name else a for a in accepted), other
@@ -366,52 +347,6 @@ class StepwiseSelection:
     def _earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:
         return self._earned(Candidate(name, fit, problem.paired_comparison(lacking, fit)), lacking, 0.0)
 
-    def _exchanges(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
-        """Every accepted effect exchanged for every other one that might do the same."""
-        if self._exchanged is not None and self._exchanged[0] is problem and self._exchanged[1] == accepted:
-            return self._exchanged[2]
-        result = []
-        for name in accepted:
-            others = simple(self.catalogue, self._worth.values(), accepted)
-            entry = self._entry if self._entry and self._entry.of(name, accepted) else None
-            if entry and self.predictor.screening is None:  # tried already, when it was chosen among them
-                loose, lacking, known = entry.problem, entry.base, entry.fits
-            else:
-                model, known = fit.model.without(name), {}
-                loose = problem_for(self.predictor, model)
-                lacking = loose.fit(model)
-            reached = loose.loss(fit.model)
-            fits = each(partial(self._in_place, problem, fit, loose, lacking, reached, known), others)
-            result += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
-        self._exchanged = (problem, accepted, result)
-        return result
-
-    def _in_place(
-        self,
-        problem: Problem,
-        fit: Fit,
-        loose: Problem,
-        lacking: Fit,
-        reached: float,
-        known: Mapping[str, Fit],
-        effect: Effect,
-    ) -> Fit | None:
-        """The fit with the effect in the place of one that was taken away (``lacking``); None if it does too little of its work.
-
-        First under the noise of the model without either (``loose``): under the small noise of a good model, one that is far off
-        pulls on nothing. ``reached``: the loss there with what was taken away; ``known``: fits there.
-        """
-        fitted = known.get(effect.name)
-        if fitted is None:
-            start = best_start(loose, lacking, effect)
-            if lacking.loss - start.loss < SCREEN * (lacking.loss - reached):
-                return None
-            self.tick(effect.name)
-            fitted = loose.fit(start.model, nearby=start.jacobian_by_parameter)
-        if fitted.loss - reached > max(BEHIND * (lacking.loss - reached), BEHIND_LOSS):
-            return None
-        return problem.fit(fitted.model, nearby=fit.jacobian_by_parameter)
-
     def _competing_models(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
     ) -> list[tuple[tuple[str, ...], Fit]]:
@@ -421,7 +356,7 @@ class StepwiseSelection:
         """
         competing_models: list[tuple[tuple[str, ...], Fit]] = []
         lacking = cache(partial(without, problem, fit))
-        for name, other, tried in self._exchanges(problem, fit, accepted):
+        for name, other, tried in self._exchanges.of(problem, fit, accepted):
             # at a bound it may be: a tether from ever farther away is a slope
             may = not self._rejected(tried, other, bounds=False) and self._earned_over(
                 problem, lacking(name), tried, other
