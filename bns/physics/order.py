@@ -25,6 +25,7 @@ ORDER = (
     "inertia-lag",
     "controller-overshoot",
     "heating",  # by the work that the wheels really do
+    "wheel-diameters",
     "wheel-eccentricity",
     "backlash",
     "wheelbase",

@@ -22,8 +22,18 @@ from bns.diagnose.residuals.established import (
     established,
     left_over,
 )
-from bns.diagnose.residuals.grammar import families, ranked, rounding, significant
-from bns.diagnose.residuals.symbolic import fitted
+from bns.diagnose.residuals.grammar import (
+    CHANGES,
+    RESPONSE,
+    RESPONSE_OF,
+    STRAIGHT,
+    families,
+    may_join,
+    ranked,
+    rounding,
+    significant,
+)
+from bns.diagnose.residuals.symbolic import fitted, free_name
 from bns.diagnose.residuals.words import in_words
 from bns.physics.formula import formula_effect
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -292,3 +302,52 @@ def test_a_formula_that_is_no_part_of_the_model_is_called_a_hint():
     text = diagnosis_text(replace(found, formula=hint))
     assert "hint, not part of the extended model: candidate term drag, added to v: k * v" in text
     assert "bns add LOG drag --term 'k * v' --on v --model MODEL -o NEW.yaml" in text
+
+
+def test_a_family_earns_the_same_beside_a_term_of_any_name():
+    """A term of the model had the name of the additions that are tried, and went while they were."""
+    predictor = predictor_of(warming(-0.2, wheelbase={"factor": 1.1}))
+    family = next(f for f in families(predictor, NOMINAL.wheelbase_m) if (f.signal, f.on) == ("speed and turn", "w"))
+    problem = problem_for(predictor, NOMINAL)
+    fits = [fitted(problem, problem.fit(NOMINAL), "share", "k * exp(-tau / 2)", name).fit for name in ("unlisted", "any")]
+    one, other = (ranked(problem, fit, [family])[0].paired_comparison for fit in fits)
+    assert one == other
+    assert one.elpd_diff > 0.0
+
+
+def test_a_model_that_was_extended_before_keeps_its_term():
+    predictor = predictor_of(warming(-0.2))
+    problem = problem_for(predictor, NOMINAL)
+    before = fitted(problem, problem.fit(NOMINAL), "w", "k * moving * cos(heading)").fit.model
+    found = established(predictor, before, {})
+    assert [term.name for term in found.terms] == ["unlisted-2"]
+    assert {a.effect.name for a in found.fit.model.effects} == {"unlisted", "unlisted-2"}
+    assert free_name(found.fit.model) == "unlisted-3"
+
+
+def test_of_answers_to_past_commands_only_one_is_a_term_or_one_each_of_motion_and_turn():
+    predictor = predictor_of(NOMINAL)
+    every = families(predictor, NOMINAL.wheelbase_m)
+    past = [f for f in every if f.signal in {RESPONSE, CHANGES, *RESPONSE_OF.values()}]
+    left = {(f.signal, f.on): [g.on for g in may_join([(f.signal, f.on)], past)] for f in past}
+    assert left == {
+        (CHANGES, "wheels"): [],
+        (RESPONSE, "wheels"): [],
+        (RESPONSE_OF["v"], "v"): ["w"],
+        (RESPONSE_OF["w"], "w"): ["v"],
+    }
+    assert len(may_join([], every)) == len(every)
+    assert len(may_join([(CHANGES, "wheels")], every)) == len(every) - len(past)
+
+
+def test_a_heading_that_drifts_on_straight_lines_alone_is_described():
+    """A gyro with a bias holds the heading, and only while both wheels are told the same."""
+    held = formula_effect("held", "k * moving * max(1 - abs(w) / 0.05, 0)", "w")
+    table = measured(NOMINAL.with_active(held, (0.03,)), trials=30, seed=11, commands=8, speeds=BOTH_WAYS, straight=0.5)
+    predictor = WheelPredictor(tracks_of(table))
+    found = established(predictor, NOMINAL, {"yaw-bias": listed(NOMINAL, None, predictor.tracks)["yaw-bias"]})
+    assert (found.names, [term.signal for term in found.terms]) == ((), [STRAIGHT])
+    rates = re.findall(r"\+([\d.]+) °/s at", in_words(found.terms[0], predictor))
+    assert [float(rate) for rate in rates] == pytest.approx([np.degrees(0.03)] * 2, rel=0.15)
+    straight_never = predictor_of(NOMINAL)
+    assert STRAIGHT not in {f.signal for f in families(straight_never, NOMINAL.wheelbase_m)}

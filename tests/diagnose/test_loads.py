@@ -86,6 +86,38 @@ def test_ramps_of_velocity_and_turn_rate_are_told_from_limits_of_each_wheel():
     assert single.accepted == ("acceleration-limit",)
 
 
+@pytest.mark.parametrize("named", ["wheel-diameters", "wheel-mismatch"])
+def test_diameters_behind_a_limit_are_told_from_commands_that_differ_before_it(named):
+    """Where both motors are at their limit, larger wheels drive farther; and wheels that are told more do not."""
+    effects = ("acceleration-limit", "wheel-mismatch", "wheel-diameters", "wheelbase", "yaw-bias")
+    robot = hidden(**{named.replace("-", "_"): {"ratio": 0.95}}, acceleration_limit={"max_m_s2": 0.25}).arranged()
+    table = measured(robot, trials=20, seed=5)
+    predictor = WheelPredictor(tracks_of(table))
+    search = StepwiseSelection(predictor, NOMINAL, barred=tuple(set(all_effects()) - set(effects)))
+    found = search.run()
+    assert set(found.accepted) == {"acceleration-limit", named}
+    assert found.fit.model.values_of(named)["ratio"] == pytest.approx(0.95, abs=0.004)
+    assert not found.competing_models
+    assert search.stands(found) is not None
+
+
+def test_without_limits_diameters_are_a_mismatch_and_no_tie():
+    effects = ("motor-lag", "wheel-mismatch", "wheel-diameters", "wheelbase", "yaw-bias")
+    table = measured(hidden(wheel_mismatch={"ratio": 0.95}, motor_lag={"tau_s": 0.1}), trials=20, seed=5)
+    search = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL, barred=tuple(set(all_effects()) - set(effects)))
+    found = search.run()
+    assert (set(found.accepted), found.competing_models) == ({"motor-lag", "wheel-mismatch"}, ())
+
+
+def test_an_effect_is_a_variant_if_it_has_no_parameters_of_its_own():
+    catalogue = all_effects()
+    assert [name for name in catalogue if extending.variant(catalogue, name)] == ["wheel-diameters"]
+    before, after = (SimpleNamespace(held_out=np.array(losses)) for losses in ((5.0, 9.0), (5.0, 5.9)))
+    assert extending.fits_better(before, after)
+    assert not extending.fits_better(before, SimpleNamespace(held_out=np.array((5.0, 6.1))))
+    assert not extending.fits_better(after, before)
+
+
 PATCH = {"x_m": 0.05, "y_m": -0.05, "radius_m": 0.25, "loss": 0.4}
 
 

@@ -19,16 +19,22 @@ def hidden(**effects):
     return model
 
 
-def measured(model, trials=16, seed=0, noise=(0.0015, 0.005), jitter=0.004, ends_only=False, commands=5, speeds=(0.02, 0.2)):
-    """A table of measurements of a model's robot: random commands, motors that vary a little, a camera at 25 Hz."""
+def measured(
+    model, trials=16, seed=0, noise=(0.0015, 0.005), jitter=0.004, ends_only=False, commands=5, speeds=(0.02, 0.2), straight=0.0
+):
+    """A table of measurements of a model's robot: random commands, motors that vary a little, a camera at 25 Hz.
+
+    ``straight``: the share of commands in which both wheels are told the same.
+    """
     rng = np.random.default_rng(seed)
-    return pd.concat(
-        [_trial(model, i, rng, noise, jitter, ends_only, commands, speeds) for i in range(trials)], ignore_index=True
-    )
+    kind = (noise, jitter, ends_only, commands, speeds, straight)
+    return pd.concat([_trial(model, i, rng, *kind) for i in range(trials)], ignore_index=True)
 
 
-def _trial(model, number, rng, noise, jitter, ends_only, commands, speeds):
+def _trial(model, number, rng, noise, jitter, ends_only, commands, speeds, straight):
     left, right = rng.uniform(*speeds, (2, commands))
+    if straight:
+        right = np.where(rng.uniform(size=commands) < straight, left, right)
     duration = np.round(rng.uniform(0.4, 2.0, commands) / FRAME_S) * FRAME_S
     scatter = 1 + jitter * rng.normal(size=(2, commands))
     start = [*rng.uniform(-0.4, 0.4, 2), rng.uniform(-3, 3)]

@@ -57,6 +57,16 @@ class WheelMismatch(Cause):
 
 
 @dataclass
+class WheelDiameters(Cause):
+    """As `WheelMismatch`, of what the motors have made of the command."""
+
+    ratio: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        return WheelMismatch(self.ratio).command(wheels)
+
+
+@dataclass
 class Wheelbase(Cause):
     """The wheels stand `factor` times as far apart."""
 
@@ -287,6 +297,7 @@ LISTED: dict[str, type[Cause]] = {
     "inertia-lag": InertiaLag,
     "controller-overshoot": ControllerOvershoot,
     "heating": Heating,
+    "wheel-diameters": WheelDiameters,
     "wheel-eccentricity": WheelEccentricity,
     "backlash": Backlash,
     "caster-swing": CasterSwing,

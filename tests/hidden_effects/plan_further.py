@@ -24,6 +24,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"friction_m_s": 0.005, "damping_m": 0.002, "trail_m": 0.015, "pivot_m": -0.05},
         {"friction_m_s": 0.015, "damping_m": 0.004, "trail_m": 0.03, "pivot_m": -0.05},
     ),
+    "wheel-diameters": ({"ratio": 0.95}, {"ratio": 1.12}),
     "heating": ({"loss_per_m": 0.03, "cool_s": 60.0}, {"loss_per_m": 0.05, "cool_s": 90.0}),
     "warm-up": ({"loss": 0.08, "time_s": 4.0}, {"loss": 0.25, "time_s": 3.0}),
     "stribeck": ({"width_m_s": 0.02, "fade_m_s": 0.04}, {"width_m_s": 0.04, "fade_m_s": 0.05}),
@@ -64,7 +65,9 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     ),
 }
 """Medium and strong, of the Khepera."""
-ALIKE = {"slope-load": ("tether-load",), "wheel-patch": ("floor-patch",)}
+BESIDE: dict[str, dict[str, Parameters]] = {"wheel-diameters": {"acceleration-limit": {"max_m_s2": 0.25}}}
+"""What an effect needs beside it to differ from a simpler one: without limits, diameters are a mismatch of commands."""
+ALIKE = {"slope-load": ("tether-load",), "wheel-patch": ("floor-patch",), "wheel-diameters": ("wheel-mismatch",)}
 """What would stand in for an effect that is taken out: a slope is a cable from far away."""
 TURNING = {"backlash", "caster-drag", "caster-swing", "dead-band", "stribeck"}
 """Effects that show only where wheels reverse or turn slowly."""
@@ -138,8 +141,9 @@ def _longer() -> Iterator[World]:
     for number, (name, strengths) in enumerate(LONGER.items()):
         for level, parameters in zip(("medium", "strong"), strengths, strict=True):
             plan = "mixed" if name in TURNING or (number + (level == "strong")) % 2 else "forward"
-            yield World(f"new-{name}-{level}", "new", {name: parameters}, plan=plan)
-            out = World(f"removed-{name}-{level}", "removed", unlisted={name: parameters}, plan=plan)
+            beside = BESIDE.get(name, {})
+            yield World(f"new-{name}-{level}", "new", {name: parameters, **beside}, plan=plan)
+            out = World(f"removed-{name}-{level}", "removed", beside, unlisted={name: parameters}, plan=plan)
             yield replace(out, barred=(name, *ALIKE.get(name, ())))
 
 

@@ -11,7 +11,7 @@ from tests.hidden_effects.camera import Camera, Layout, stamps
 from tests.hidden_effects.listed import LISTED
 from tests.hidden_effects.luck import luck
 from tests.hidden_effects.plan import LEVELS, STRENGTHS, UNLISTED, worlds
-from tests.hidden_effects.plan_further import LONGER
+from tests.hidden_effects.plan_further import ALIKE, BESIDE, LONGER
 from tests.hidden_effects.world import World, motor_jitter
 
 SMALL = World("small", "single", {"speed-gain": {"gain": 1.05}}, trials=3)
@@ -85,8 +85,9 @@ def test_the_plan_covers_every_effect_and_names_each_world_once():
     assert len({world.name for world in made}) == len(made)
     assert {name for world in made if world.family == "single" for name in world.hidden} == set(STRENGTHS)
     assert {name for world in made if not world.barred for name in world.unlisted} == set(UNLISTED)
-    assert {name for world in made if world.family == "new" for name in world.hidden} == set(LONGER)
-    assert {name for world in made for name in world.barred} == set(LONGER)
+    beside = {name for others in BESIDE.values() for name in others}
+    assert {name for world in made if world.family == "new" for name in world.hidden} == set(LONGER) | beside
+    assert {name for world in made for name in world.barred} == set(LONGER) | {n for others in ALIKE.values() for n in others}
     assert set(STRENGTHS) | set(LONGER) | {"command-delay"} == set(LISTED)
     assert sum(world.family == "single" for world in made) >= len(LEVELS) * len(STRENGTHS)
 

@@ -11,7 +11,6 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
-from bns.diagnose.residuals.symbolic import NAME as FORMULA
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
@@ -53,7 +52,7 @@ def competing_models_of(d: Diagnosis) -> tuple[CompetingModel, ...]:
     problem, first = selection.problem, CompetingModel(selection.accepted, selection.fit)
     effects = _effects(d)
     if d.formula is not None and not selection.competing_models:
-        return (first, CompetingModel((*selection.accepted, FORMULA), d.formula.fit))
+        return (first, CompetingModel((*selection.accepted, d.formula.name), d.formula.fit))
     sets: Iterable[tuple[str, ...]] = selection.competing_models or _nearest(selection)
     others = [CompetingModel(names, refitted(problem, selection.fit, names, effects)) for names in sets]
     others.sort(key=lambda competitor: float(competitor.fit.held_out.sum()))

@@ -23,7 +23,6 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.residuals.along_variables import residual_dependence
 from bns.diagnose.residuals.grammar import (
-    NAME,
     PLACE,
     RESPONSE,
     SHIFTS,
@@ -33,11 +32,12 @@ from bns.diagnose.residuals.grammar import (
     Family,
     certain,
     families,
+    may_join,
     ranked,
     rounding,
     significant,
 )
-from bns.diagnose.residuals.symbolic import Formula, fitted, patch
+from bns.diagnose.residuals.symbolic import Formula, fitted, free_name, patch
 from bns.diagnose.residuals.unexplained import unexplained
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
@@ -129,7 +129,7 @@ def _step(
     for curve in curves:
         if best and not _clearly_better(curve, earned[best], fit):
             break
-        term = _written_out(problem, fit, curve.family, len(state.terms))
+        term = _written_out(problem, fit, curve.family)
         if term is not None and _term_earns(term.paired_comparison, fit, level):
             return replace(state.settled(predictor, term.fit), terms=(*state.terms, term))
     if not best:
@@ -141,14 +141,13 @@ def _curves(problem: Problem, fit: Fit, grammar: Sequence[Family], terms: Sequen
     """Families that are significant beside a model and its terms, the best first."""
     if len(terms) >= TERMS or not grammar:
         return []
-    used = {(term.signal, term.on) for term in terms}
-    left = [*grammar, rounding(problem, fit)]
-    return significant(ranked(problem, fit, [family for family in left if (family.signal, family.on) not in used]))
+    used = [(term.signal, term.on) for term in terms]
+    return significant(ranked(problem, fit, may_join(used, [*grammar, rounding(problem, fit)])))
 
 
-def _written_out(problem: Problem, fit: Fit, family: Family, number: int) -> Formula | None:
+def _written_out(problem: Problem, fit: Fit, family: Family) -> Formula | None:
     """The family as a term; a round patch where it is a field over the floor and that does better."""
-    name = NAME if not number else f"{NAME}-{number + 1}"
+    name = free_name(fit.model)
     free = fitted(problem, fit, family.on, family.term, name, family.signal)
     over_floor = (family.signal, family.on) == (PLACE, SHARE) or family.signal == SPEED_THERE
     round_patch = patch(problem, fit, family.on, name) if over_floor else None

@@ -7,7 +7,7 @@ polynomial of speed and turn. All are written as formulas: whatever a family tur
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,19 +20,22 @@ from bns.diagnose.estimate.significance import MIN_Z, PairedComparison
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.along_variables import with_columns
+from bns.diagnose.residuals.symbolic import PROBE
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, formula_effect
 
-NAME = "unlisted"
 RESPONSE = "response of each wheel in time"
 SHIFTS = ("clock-offset", "command-delay")
 """Effects that shift all motion in time: beside a free response in time (`RESPONSE`) nothing tells their number from it."""
 RESPONSE_OF = {"v": "response of the forward velocity in time", "w": "response of the turning velocity in time"}
+CHANGES = "changes of speed of each wheel"
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 SPEED_THERE = "forward speed at a place"
 TRAVEL = "direction of travel"
 """Where the robot drives to: its heading, or the opposite where it reverses."""
+STRAIGHT = "straight lines"
+"""What happens only while both wheels are told the same, such as a heading that is held by a gyro."""
 CHANCE = DEFAULTS.residuals.chance
 LEAST = DEFAULTS.residuals.least
 LARGE, LARGE_Z = DEFAULTS.residuals.large, DEFAULTS.residuals.large_z
@@ -45,6 +48,8 @@ REVERSAL_KNOTS = DEFAULTS.residuals.reversal_knots
 RESPONSE_KNOTS_S = DEFAULTS.residuals.response_knots_s
 SURFACE_KNOTS = DEFAULTS.residuals.surface_knots
 SWING_KNOTS = DEFAULTS.residuals.swing_knots
+STRAIGHT_AT, STRAIGHT_WITHIN = DEFAULTS.residuals.straight_within
+STRAIGHT_SHARE = DEFAULTS.residuals.straight_share
 FLOOR_SIDE = DEFAULTS.residuals.floor_side
 _SMALL = 1e-4
 
@@ -96,6 +101,20 @@ def families(predictor: Predictor, wheelbase_m: float, response: bool = True) ->
     return found
 
 
+def may_join(terms: Iterable[tuple[str, str]], tried: Iterable[Family]) -> list[Family]:
+    """The families that may stand beside terms (signal, velocity): none twice, and one answer to past commands.
+
+    Free responses in time and changes of speed contain one another, so the words for one say nothing beside the other. Forward
+    velocity and turn rate may have one each.
+    """
+    used = set(terms)
+    signals = {signal for signal, _ in used}
+    past = {RESPONSE, CHANGES, *RESPONSE_OF.values()}
+    free = set(RESPONSE_OF.values()) if signals & past <= set(RESPONSE_OF.values()) else set()
+    barred = past - free if signals & past else set()
+    return [f for f in tried if (f.signal, f.on) not in used and f.signal not in barred]
+
+
 def _of_speed(fastest_m_s: float, reverses: bool) -> tuple[str, ...]:
     """A free curve of a wheel's own speed that is nothing at rest, odd but for a share of backward speeds."""
     hats = _hats("abs(u)", [share * fastest_m_s for share in SPEED_KNOTS])[1:]
@@ -116,9 +135,7 @@ def _surfaces(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
 
 def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
     """Families of what single motions have not: times, memories, places."""
-    yield Family(
-        "changes of speed of each wheel", WHEELS, ("fresh", "max(fresh, 0)", "fresh * abs(fresh)", "fresh * abs(u)")
-    )
+    yield Family(CHANGES, WHEELS, ("fresh", "max(fresh, 0)", "fresh * abs(fresh)", "fresh * abs(u)"))
     for signal, on, now in ((RESPONSE, WHEELS, "u"), *((signal, on, on) for on, signal in RESPONSE_OF.items())):
         yield Family(signal, on, tuple(f"(ago({a:g}, {b:g}) - {now})" for a, b in pairwise(RESPONSE_KNOTS_S)))
     if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0:
@@ -134,6 +151,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
         first, last = float(session.min()), float(session.max())
         times = [first + share * (last - first) for share in SESSION_KNOTS]
         yield Family("time of the session", SHARE, tuple(_hats("t", times)))
+    yield from _straight(seen, wheelbase_m)
     turns = ("cos(heading)", "sin(heading)", "cos(2*heading)", "sin(2*heading)")
     uphill = ("moving * cos(heading)", "moving * sin(heading)")  # a slope on which wheels do not slip sideways
     yield Family("heading", "v", (*(f"v * {t}" for t in turns), *uphill))
@@ -153,6 +171,17 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     askew = [f"v * {b} * {t}" for b in bends for t in turns[2:]]
     yield Family(PLACE, "v", (*(f"v * {b}" for b in bends), *askew))
     yield Family(PLACE, "s", tuple(askew))
+
+
+def _straight(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
+    """A turn on straight lines alone, at a rate of its own and one in proportion to the speed; of logs that have both."""
+    left, right = seen["left_m_s"], seen["right_m_s"]
+    sharpest = float(np.abs(right - left).max())
+    driven = np.maximum(np.abs(left), np.abs(right)) > 0.0
+    exact = np.abs(right - left)[driven] <= STRAIGHT_AT * sharpest
+    if sharpest > 0.0 and min(exact.mean(), 1.0 - exact.mean()) >= STRAIGHT_SHARE:
+        hat = f"max(1 - abs(w) / {STRAIGHT_WITHIN * sharpest / wheelbase_m:.4g}, 0)"
+        yield Family(STRAIGHT, "w", (f"moving * {hat}", f"v * {hat}"))
 
 
 def ranked(problem: Problem, fit: Fit, tried: Sequence[Family]) -> list[Earned]:
@@ -187,7 +216,7 @@ def rounding(problem: Problem, fit: Fit) -> Family:
     root = np.sqrt(weights(fit.whitened))[:, None]
     left = (fit.whitened * root).ravel()
 
-    effect = formula_effect(NAME, "k * (a * round(u / a) - u)", WHEELS)
+    effect = formula_effect(PROBE, "k * (a * round(u / a) - u)", WHEELS)
     assert [p.name for p in effect.parameters] == ["a", "k"]
 
     def pull(step: float) -> float:
@@ -213,7 +242,7 @@ def columns_of(problem: Problem, fit: Fit, family: Family) -> Array:
     """Change of the whitened innovations for each number of a family, (frames, 3, functions)."""
     out = np.empty((*fit.whitened.shape, len(family.functions)))
     for i, function in enumerate(family.functions):
-        effect = formula_effect(NAME, f"k * {function}", family.on)
+        effect = formula_effect(PROBE, f"k * {function}", family.on)
         out[..., i] = _column(problem, fit, effect, (_SMALL,))
     return out
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
+from itertools import count, product
 
 import numpy as np
 
@@ -27,6 +27,8 @@ from bns.physics.formula import formula_effect
 from bns.physics.model import Model
 
 NAME = "unlisted"
+PROBE = "probe"
+"""Name of an addition that is only tried: a model may hold a term called `NAME`, which must stay in it."""
 _ON = {"forward_m_s": "v", SHARE: "v", "sideways_m_s": "s", "yaw_rad_s": "w", "east_m_s": "east", "north_m_s": "north"}
 _CARRIERS = {
     "v": ("v", "moving"),
@@ -70,6 +72,12 @@ class Formula:
         return self.fit.model.values_of(self.name)
 
 
+def free_name(model: Model) -> str:
+    """The first of unlisted, unlisted-2, ... that no term of the model has; a model that was extended before has one already."""
+    taken = {active.effect.name for active in model.effects}
+    return next(name for n in count(1) if (name := NAME if n == 1 else f"{NAME}-{n}") not in taken)
+
+
 def best_formula(problem: Problem, fit: Fit, dependence: Sequence[ResidualDependence]) -> Formula | None:
     """The formula that earns most along the patterns that were found; None if none earns anything."""
     tried = each(partial(_tried, problem, fit), dependence[:3])
@@ -85,7 +93,7 @@ def _tried(problem: Problem, fit: Fit, pattern: ResidualDependence) -> list[Form
     terms = [f"{c} * {shape}" for c in _CARRIERS[on] for shape in _SHAPES.get(pattern.variable, ())]
     tried = [_sparse(problem, fit, on, [*_CARRIERS[on], *terms])] if terms else []
     if pattern.variable == "place":
-        tried.append(patch(problem, fit, SHARED if pattern.channel == SHARE else on))
+        tried.append(patch(problem, fit, SHARED if pattern.channel == SHARE else on, free_name(fit.model)))
     return [f for f in tried if f is not None]
 
 
@@ -95,7 +103,7 @@ def _sparse(problem: Problem, fit: Fit, on: str, terms: Sequence[str]) -> Formul
 
     usable, columns = [], []
     for term in terms:
-        effect = formula_effect(NAME, f"k * {term}", on)
+        effect = formula_effect(PROBE, f"k * {term}", on)
         try:
             columns.append(_column(problem, fit, effect))
         except ModelError:
@@ -106,9 +114,10 @@ def _sparse(problem: Problem, fit: Fit, on: str, terms: Sequence[str]) -> Formul
     keep = size > 1e-9 * size.max()
     matrix, usable = matrix[:, keep] / size[keep], [t for t, k in zip(usable, keep, strict=True) if k]
     target, best = -_weighted(fit, fit.whitened), None
-    for count in range(1, min(_TERMS_AT_MOST, len(usable)) + 1):
-        chosen = [usable[i] for i in np.flatnonzero(orthogonal_mp(matrix, target, n_nonzero_coefs=count))]
-        formula = fitted(problem, fit, on, " + ".join(f"k{i} * {t}" for i, t in enumerate(chosen)))
+    for most in range(1, min(_TERMS_AT_MOST, len(usable)) + 1):
+        chosen = [usable[i] for i in np.flatnonzero(orthogonal_mp(matrix, target, n_nonzero_coefs=most))]
+        term = " + ".join(f"k{i} * {t}" for i, t in enumerate(chosen))
+        formula = fitted(problem, fit, on, term, free_name(fit.model))
         if formula is None or (
             best is not None and formula.paired_comparison.elpd_diff < 1.1 * best.paired_comparison.elpd_diff
         ):
@@ -126,7 +135,7 @@ def patch(problem: Problem, fit: Fit, on: str, name: str = NAME) -> Formula | No
     for cx, cy in product(np.linspace(x0, x1, PATCH_SIDE), np.linspace(y0, y1, PATCH_SIDE)):
         for width in np.array(PATCH_RADII) * np.hypot(x1 - x0, y1 - y0):
             shape = _disc(f"(x - {cx:.3g})", f"(y - {cy:.3g})", f"{width:.3g}").replace("- -", "+ ")
-            column = _weighted(fit, _column(problem, fit, formula_effect(name, f"k * {carrier}{shape}", on)))
+            column = _weighted(fit, _column(problem, fit, formula_effect(PROBE, f"k * {carrier}{shape}", on)))
             pull, size = float(column @ left), max(float(column @ column), 1e-300)
             if best is None or pull**2 / size > best[0]:
                 best = (pull**2 / size, -pull / size, cx, cy, width)

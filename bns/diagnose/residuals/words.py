@@ -8,7 +8,15 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_KNOTS_S, RESPONSE_OF, TRAVEL
+from bns.diagnose.residuals.grammar import (
+    CHANGES,
+    RESPONSE,
+    RESPONSE_KNOTS_S,
+    RESPONSE_OF,
+    STRAIGHT,
+    STRAIGHT_AT,
+    TRAVEL,
+)
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, value_of
@@ -85,6 +93,16 @@ def _travel(term: Formula, _: Predictor) -> str:
     share = _curve(term, "heading", grid, v=1.0)
     low, high = (int(i) for i in (share.argmin(), share.argmax()))
     return ", ".join(f"{_slower(-share[i])} when it travels towards {np.degrees(grid[i]):.0f}°" for i in (low, high))
+
+
+def _straight(term: Formula, predictor: Predictor) -> str:
+    seen = predictor.variables()
+    speed = (seen["left_m_s"] + seen["right_m_s"]).ravel() / 2.0
+    straight = np.abs(seen["right_m_s"] - seen["left_m_s"]).ravel() <= STRAIGHT_AT * float(np.abs(speed).max())
+    at = [float(np.median(speed[straight & way])) for way in (speed > 0.0, speed < 0.0) if (straight & way).any()]
+    rates = [np.degrees(float(_curve(term, "v", np.array([v]), w=0.0, moving=1.0)[0])) for v in at]
+    said = [f"{rate:+.2g} °/s at {v:.2g} m/s" for rate, v in zip(rates, at, strict=True)]
+    return f"on straight lines, and only there, the robot also turns (to the left: +): {', '.join(said)}"
 
 
 def _reversal(term: Formula, _: Predictor) -> str:
@@ -190,6 +208,7 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("time of the session", "share"): _session,
     ("heading", "share"): _heading,
     (TRAVEL, "v"): _travel,
+    (STRAIGHT, "w"): _straight,
     ("distance since each wheel reversed", "wheels"): _reversal,
     ("direction of motion", "share"): _swing,
     ("speed of each wheel", "wheels"): _speed,
@@ -197,7 +216,7 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("speed of the right wheel", "right"): _speed,
     ("recent work of each wheel", "wheels"): _work,
     ("speed in steps", "wheels"): _steps,
-    ("changes of speed of each wheel", "wheels"): _changes,
+    (CHANGES, "wheels"): _changes,
     (RESPONSE, "wheels"): _response,
     **{(signal, on): _response for on, signal in RESPONSE_OF.items()},
 }

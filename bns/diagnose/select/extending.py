@@ -1,12 +1,17 @@
-"""Effects that contain a simpler one (`Effect.extends`): each comes in the place of that one, and goes back to it."""
+"""Effects that contain a simpler one (`Effect.extends`): each comes in the place of that one, and goes back to it.
+
+One that has no parameters beside those of the simpler one does the same elsewhere in the chain: the better fit of both counts.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 
+_EVIDENCE = DEFAULTS.select.variant_evidence
 Exchange = tuple[str, str, Fit]
 """An accepted name, the name of what takes its place, and the fit."""
 
@@ -15,6 +20,17 @@ def extended(catalogue: Mapping[str, Effect], name: str) -> tuple[str, ...]:
     """The name of the effect that this one extends, if it does and that one may be missing (it is in the catalogue)."""
     extends = catalogue[name].extends if name in catalogue else ""
     return (extends,) if extends in catalogue else ()
+
+
+def variant(catalogue: Mapping[str, Effect], name: str) -> bool:
+    """Whether an effect has the parameters of the one that it extends and no others: it acts at another place in the chain."""
+    parts = extended(catalogue, name)
+    return bool(parts) and {p.name for p in catalogue[name].parameters} == {p.name for p in catalogue[parts[0]].parameters}
+
+
+def fits_better(before: Fit, after: Fit) -> bool:
+    """Do trials held out speak for the second of two models with as many parameters, at odds of 20 to 1 (`variant_evidence`)?"""
+    return bool(before.held_out.sum() - after.held_out.sum() > _EVIDENCE)
 
 
 def simple(catalogue: Mapping[str, Effect], effects: Iterable[Effect], accepted: Collection[str]) -> list[Effect]:

@@ -25,7 +25,7 @@ from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.exchanges import Entry, Exchanges
-from bns.diagnose.select.extending import extended, reduced, simple, to_extend
+from bns.diagnose.select.extending import extended, fits_better, reduced, simple, to_extend, variant
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.negligible import certainly_better
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
@@ -176,7 +176,7 @@ class StepwiseSelection:
         if any(self._rejected(fit, name, bounds=False) for name in accepted):
             return None
         simpler = {name: reduced(self.catalogue, problem, fit, name) for name in accepted}
-        if not all(self._earned_over(problem, one, fit, name) for name, one in simpler.items()):
+        if not all(self._stays(problem, one, fit, name) for name, one in simpler.items()):
             return None
         if self._exchange_step(problem, fit, accepted)[2] != accepted:
             return None
@@ -236,14 +236,15 @@ class StepwiseSelection:
         ranking = sorted(tried, key=lambda c: -c.paired_comparison.elpd_diff)
         passed_over: list[Candidate] = []
         for index, candidate in enumerate(ranking):
-            if not self._earned(candidate, fit, decoy_threshold):
+            moved = candidate.name in place and variant(self.catalogue, candidate.name)
+            if not (fits_better(fit, candidate.fit) if moved else self._earned(candidate, fit, decoy_threshold)):
                 continue
             if candidate.rejected_because:
                 passed_over += [candidate] if implausible(candidate.fit, candidate.name, bounds=False) else []
                 continue
             settled = self._refit_with_noise(candidate.fit.model, problem.pose_filter.noise)
             gone = place.get(candidate.name, ("",))[0]
-            if gone and not certainly_better((problem, fit), settled):
+            if gone and not moved and not certainly_better((problem, fit), settled):
                 continue
             rejected_because = self._rejected(settled[1], candidate.name, bounds=False)
             if not rejected_because:
@@ -333,11 +334,16 @@ class StepwiseSelection:
             if believed and name == newest and not at_bound(fit, name) and not parts:
                 continue
             simpler = reduced(self.catalogue, problem, fit, name)
-            needless = bool(parts) and not certainly_better((problem, simpler), (problem, fit))
-            if not believed or needless or not self._earned_over(problem, simpler, fit, name):
+            moved = variant(self.catalogue, name)
+            needless = bool(parts) and not moved and not certainly_better((problem, simpler), (problem, fit))
+            if not believed or needless or not self._stays(problem, simpler, fit, name):
                 accepted = tuple(a for a in accepted if a != name) + parts
                 problem, fit = self._refit_with_noise(simpler.model, problem.pose_filter.noise)
         return problem, fit, accepted
+
+    def _stays(self, problem: Problem, simpler: Fit, fit: Fit, name: str) -> bool:
+        """Whether an effect still earns its place; one that only acts elsewhere than the simpler one, by the better fit."""
+        return fits_better(simpler, fit) if variant(self.catalogue, name) else self._earned_over(problem, simpler, fit, name)
 
     def _may_stay(self, problem: Problem, fit: Fit, name: str) -> bool:
         """Whether that effect of a fit would be taken as a newcomer: few trials that gain much do not bring one in."""

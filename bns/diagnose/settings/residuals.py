@@ -186,6 +186,18 @@ class Residuals:
         "Knots of a curve along the difference between the direction of motion and that over the last half "
         "wheelbase of distance (1: reversed); the curve is zero at the first knot.",
     )
+    straight_within: tuple[float, float] = setting(
+        (0.001, 0.1),
+        "of the sharpest turn",
+        "Commands whose turn is at most the first share are straight lines. A term for what happens on them alone fades out from "
+        f"none to the second share, because wheels that differ a little turn the robot a little; {BY_HAND}.",
+    )
+    straight_share: float = setting(
+        0.05,
+        "of the steps",
+        "Such a term is tried where at least this share of the driven steps are straight lines, and as many are turns; "
+        f"{BY_HAND}.",
+    )
     floor_side: int = setting(
         4, "bumps", f"Basis functions per side of a field over the floor that is written as a formula; {BY_HAND}."
     )

@@ -22,6 +22,12 @@ class Select:
         "Least gain that counts, as a fraction of the loss: robots without a missing effect vary by fractions of a "
         "percent from trial to trial.",
     )
+    variant_evidence: float = setting(
+        3.0,
+        "log-likelihood",
+        "An effect that has the parameters of another one and only acts at another place in the chain is taken instead of it if "
+        "held-out trials are more likely by this much, summed over all: odds of 20 to 1.",
+    )
     least_fall: float = setting(
         0.02,
         "1",
