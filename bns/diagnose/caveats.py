@@ -208,6 +208,12 @@ def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
             f"Left unexplained by listed effects: {p.channel} along {p.variable}, {p.share:.2%} of the loss on held-out trials "
             f"(p {'<' if p.paired_comparison.p_value < 1e-4 else '='} {max(p.paired_comparison.p_value, 1e-4):.2g})."
         )
+    if rest.command_times is not None:
+        yield (
+            "No model predicts when a single command takes effect. A lag, a late command or a late clock that is named beside "
+            "this may be the mean of such delays. Log when the robot carries out each command, or let its controller "
+            "acknowledge them."
+        )
     if rest.autocorrelation is not None:
         r = rest.autocorrelation
         after = f"{r.lag} frames later" if r.scale == "within" else "in the next command"

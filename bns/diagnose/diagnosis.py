@@ -111,6 +111,7 @@ class Diagnosis:
             "residual_dependence": [dependence_values(p) for p in self.residual_dependence],
             "without_worst": self._without_worst(),
             "outliers": [vars(o) for o in self.rest.outliers],
+            "command_times": vars(self.rest.command_times) if self.rest.command_times else None,
             "notes": list(self.notes),
             "calibration": numbers_of(self.calibration) if self.calibration else {},
             "wheel_sizes": {
@@ -121,14 +122,16 @@ class Diagnosis:
 
     @property
     def behaviour(self) -> tuple[str, ...]:
-        """What no effect explains, in clauses: moments that stand out, then the terms."""
-        moments = self.rest.outliers
+        """What no effect explains, in clauses: commands at times that scatter, moments that stand out, then the terms."""
+        moments, times = self.rest.outliers, self.rest.command_times
+        scattered = (times.in_words,) if times is not None else ()
         if not moments or self.selection is None:
-            return self.terms_in_words
+            return *scattered, *self.terms_in_words
         trials = len(self.selection.problem.predictor.tracks)
         often = "the error is large at some moments, too often for accidents"
         what = often if len(moments) >= OFTEN * trials else "something happens for a moment"
-        return f"in {len(moments)} of {trials} trials {what}; the worst is {moments[0].in_words}", *self.terms_in_words
+        worst = f"in {len(moments)} of {trials} trials {what}; the worst is {moments[0].in_words}"
+        return *scattered, worst, *self.terms_in_words
 
     @property
     def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:

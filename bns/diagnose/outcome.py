@@ -239,11 +239,12 @@ def _established(
         return None
     known = known_effects(selection)
     accepted = {name: known[name] for name in selection.accepted}
-    found = established(predictor, selection.nominal.model, accepted, response, selection.fit.model)
+    past = rest.command_times is None  # a response in time would describe the mean of delays that differ
+    found = established(predictor, selection.nominal.model, accepted, response, selection.fit.model, past)
     lost = set(selection.accepted) - set(found.names)
     if lost and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):
         # the effects predict better than what they are said to imitate: it is the terms that imitate
-        return replace(established(predictor, selection.fit.model, {}, False), names=selection.accepted)
+        return replace(established(predictor, selection.fit.model, {}, False, past=past), names=selection.accepted)
     return found
 
 

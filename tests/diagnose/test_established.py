@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bns.api.diagnose import DiagnoseResult
@@ -26,6 +27,7 @@ from bns.diagnose.residuals.grammar import (
     CHANGES,
     RESPONSE,
     RESPONSE_OF,
+    SESSION,
     STRAIGHT,
     families,
     may_join,
@@ -351,3 +353,21 @@ def test_a_heading_that_drifts_on_straight_lines_alone_is_described():
     assert [float(rate) for rate in rates] == pytest.approx([np.degrees(0.03)] * 2, rel=0.15)
     straight_never = predictor_of(NOMINAL)
     assert STRAIGHT not in {f.signal for f in families(straight_never, NOMINAL.wheelbase_m)}
+
+
+def test_what_changes_in_the_middle_of_a_session_is_described():
+    """A load was moved: one wheel has been slower since then. A voltage that sags over the session would imitate it."""
+    slow = NOMINAL.with_active(formula_effect("slow", "-k * u", "left"), (0.03,))
+    parts = [measured(robot, trials=20, seed=seed, speeds=BOTH_WAYS) for seed, robot in enumerate((NOMINAL, slow))]
+    table = pd.concat([parts[0], parts[1].assign(trial=parts[1]["trial"] + 20)], ignore_index=True)
+    table["session_s"] = table["t_s"] + 7.5 * table["trial"]
+    predictor = WheelPredictor(tracks_of(table))
+    assert predictor.tracks.start_known
+    catalogue = listed(NOMINAL, None, predictor.tracks)
+    found = established(predictor, NOMINAL, {name: catalogue[name] for name in ("battery-sag", "wheel-mismatch")})
+    assert [(term.signal, term.on) for term in found.terms] == [(SESSION, "left")]
+    assert found.names == ()
+    said = in_words(found.terms[0], predictor)
+    slower, at_s = re.fullmatch(r"the left wheel is slower by ([\d.]+)% at (\d+) s of the session.*", said).groups()
+    assert float(slower) == pytest.approx(3.0, rel=0.25)
+    assert float(at_s) > 150

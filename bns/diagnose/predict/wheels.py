@@ -71,6 +71,10 @@ class WheelPredictor:
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.tracks, self._dt_s)  # what it remembers is worked out again
 
+    def driving(self, tracks: Tracks) -> WheelPredictor:
+        """The predictor of other tracks, or of the same ones with other commands, on a grid that is as fine."""
+        return WheelPredictor(tracks, self._dt_s)
+
     def not_counting(self, trials: Collection[int]) -> WheelPredictor:
         """The same tracks, of which these trials count nothing in a fit; what is predicted of them is judged all the same."""
         out = copy(self)

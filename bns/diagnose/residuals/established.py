@@ -23,6 +23,7 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.residuals.along_variables import residual_dependence
 from bns.diagnose.residuals.grammar import (
+    PAST,
     PLACE,
     RESPONSE,
     SHIFTS,
@@ -89,14 +90,17 @@ def established(
     accepted: Mapping[str, Effect],
     response: bool | None = None,
     known: Model | None = None,
+    past: bool = True,
 ) -> Established:
     """The search with flexible terms; ``accepted``: the effects that a search without them ended in, ``known``: with its numbers.
 
-    ``response``: is the wheels' free response a candidate; by default where no effect was accepted.
+    ``response``: is the wheels' free response a candidate; by default where no effect was accepted. ``past``: is any answer to
+    past commands.
     """
     problem = problem_for(predictor, given)
     state, left = _State(problem, problem.fit(given), known=known), dict(accepted)
     grammar = families(predictor, given.wheelbase_m, not accepted if response is None else response)
+    grammar = grammar if past else [family for family in grammar if family.signal not in PAST]
     level = FALSE_ALARM / max(len(left) + len(grammar), 1)
     for _ in range(len(accepted) + TERMS):
         following = _step(predictor, state, left, grammar, level)

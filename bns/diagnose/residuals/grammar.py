@@ -29,7 +29,10 @@ RESPONSE = "response of each wheel in time"
 SHIFTS = ("clock-offset", "command-delay")
 """Effects that shift all motion in time: beside a free response in time (`RESPONSE`) nothing tells their number from it."""
 RESPONSE_OF = {"v": "response of the forward velocity in time", "w": "response of the turning velocity in time"}
+SESSION = "time of the session"
 CHANGES = "changes of speed of each wheel"
+PAST = frozenset({RESPONSE, CHANGES, *RESPONSE_OF.values()})
+"""Answers to past commands."""
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 SPEED_THERE = "forward speed at a place"
 TRAVEL = "direction of travel"
@@ -43,6 +46,7 @@ STEPS, FINER = DEFAULTS.residuals.rounding_steps
 STEPS_A_RANGE = DEFAULTS.residuals.rounding_range
 SPEED_KNOTS = DEFAULTS.residuals.speed_knots
 SESSION_KNOTS = DEFAULTS.residuals.session_knots
+LATER_KNOTS = DEFAULTS.residuals.session_change_knots
 TIME_KNOTS = DEFAULTS.residuals.time_knots
 REVERSAL_KNOTS = DEFAULTS.residuals.reversal_knots
 RESPONSE_KNOTS_S = DEFAULTS.residuals.response_knots_s
@@ -109,9 +113,8 @@ def may_join(terms: Iterable[tuple[str, str]], tried: Iterable[Family]) -> list[
     """
     used = set(terms)
     signals = {signal for signal, _ in used}
-    past = {RESPONSE, CHANGES, *RESPONSE_OF.values()}
-    free = set(RESPONSE_OF.values()) if signals & past <= set(RESPONSE_OF.values()) else set()
-    barred = past - free if signals & past else set()
+    free = set(RESPONSE_OF.values()) if signals & PAST <= set(RESPONSE_OF.values()) else set()
+    barred = PAST - free if signals & PAST else set()
     return [f for f in tried if (f.signal, f.on) not in used and f.signal not in barred]
 
 
@@ -150,7 +153,11 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
         session = predictor.tracks.session_s
         first, last = float(session.min()), float(session.max())
         times = [first + share * (last - first) for share in SESSION_KNOTS]
-        yield Family("time of the session", SHARE, tuple(_hats("t", times)))
+        yield Family(SESSION, SHARE, tuple(_hats("t", times)))
+        # what has changed since the session began: a load that was moved, a tyre that was pumped
+        later = _hats("t", [first + share * (last - first) for share in LATER_KNOTS])[1:]
+        for on, now in ((LEFT, "u"), (RIGHT, "u"), ("w", "w")):
+            yield Family(SESSION, on, tuple(f"{now} * {h}" for h in later))
     yield from _straight(seen, wheelbase_m)
     turns = ("cos(heading)", "sin(heading)", "cos(2*heading)", "sin(2*heading)")
     uphill = ("moving * cos(heading)", "moving * sin(heading)")  # a slope on which wheels do not slip sideways

@@ -1,4 +1,4 @@
-"""What a fitted model leaves unexplained, seen in three ways: along variables, along time, and in moments that stand out.
+"""What a fitted model leaves unexplained, seen in four ways: along variables, along time, in moments, at changes of command.
 
 Each sees faults that the others miss, and each has a least size, since honest robots are not alike from trial to trial either.
 """
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.residuals.along_variables import ResidualDependence, significant_dependence
 from bns.diagnose.residuals.autocorrelation import Autocorrelation, autocorrelations
+from bns.diagnose.residuals.command_times import CommandTimes, command_times
 from bns.diagnose.residuals.outliers import Outlier, outliers
 
 
@@ -21,11 +22,13 @@ class Unexplained:
     residual_dependence: tuple[ResidualDependence, ...]
     autocorrelation: Autocorrelation | None
     outliers: tuple[Outlier, ...]
+    command_times: CommandTimes | None = None
+    """The scatter of the times at which commands take effect: no model predicts it."""
 
     @property
     def any(self) -> bool:
         """Something is."""
-        return bool(self.residual_dependence or self.autocorrelation or self.outliers)
+        return bool(self.residual_dependence or self.autocorrelation or self.outliers or self.command_times)
 
 
 NOTHING = Unexplained((), None, ())
@@ -39,4 +42,5 @@ def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence]) 
         tuple(significant_dependence(list(seen))),
         largest if largest.significant else None,
         tuple(outliers(problem, fit)),
+        command_times(problem, fit),
     )

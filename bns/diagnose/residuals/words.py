@@ -13,6 +13,7 @@ from bns.diagnose.residuals.grammar import (
     RESPONSE,
     RESPONSE_KNOTS_S,
     RESPONSE_OF,
+    SESSION,
     STRAIGHT,
     STRAIGHT_AT,
     TRAVEL,
@@ -67,7 +68,11 @@ def _along(term: Formula, name: str, grid: Array, what: str) -> str:
     """A share of all velocities along a signal, where it is lowest and highest."""
     share = _curve(term, name, grid)
     low, high = int(share.argmin()), int(share.argmax())
-    return f"{_slower(-share[low])} at {grid[low]:.3g} s {what}, {_slower(-share[high])} at {grid[high]:.3g} s"
+    return f"{_slower(-share[low])} at {_seconds(grid[low])} {what}, {_slower(-share[high])} at {_seconds(grid[high])}"
+
+
+def _seconds(time_s: float) -> str:
+    return f"{time_s:.3g} s" if abs(time_s) < 100.0 else f"{time_s:.0f} s"
 
 
 def _time_in_trial(term: Formula, predictor: Predictor) -> str:
@@ -77,7 +82,13 @@ def _time_in_trial(term: Formula, predictor: Predictor) -> str:
 
 def _session(term: Formula, predictor: Predictor) -> str:
     t_s = predictor.tracks.session_s
-    return _along(term, "t", np.linspace(float(t_s.min()), float(t_s.max()), _POINTS), "of the session")
+    grid = np.linspace(float(t_s.min()), float(t_s.max()), _POINTS)
+    if term.on == SHARE:
+        return _along(term, "t", grid, "of the session")
+    share = _curve(term, "t", grid, u=1.0, w=1.0)
+    most = int(np.abs(share).argmax())
+    whose = {LEFT: "the left wheel is", RIGHT: "the right wheel is"}.get(term.on, "the robot's turning is")
+    return f"{whose} {_slower(-share[most])} at {_seconds(grid[most])} of the session than at its beginning"
 
 
 def _heading(term: Formula, _: Predictor) -> str:
@@ -205,7 +216,7 @@ def _largest(term: Formula, predictor: Predictor) -> str:
 
 _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("time in the trial", "share"): _time_in_trial,
-    ("time of the session", "share"): _session,
+    **{(SESSION, on): _session for on in (SHARE, LEFT, RIGHT, "w")},
     ("heading", "share"): _heading,
     (TRAVEL, "v"): _travel,
     (STRAIGHT, "w"): _straight,

@@ -156,6 +156,12 @@ class Residuals:
         "Knots of a free curve along the session, denser at its beginning: motors warm up within a few trials; "
         f"{BY_HAND}.",
     )
+    session_change_knots: tuple[float, ...] = setting(
+        (0.0, 0.25, 0.5, 0.75, 1.0),
+        "of the session",
+        "Knots of a free curve of what has changed since the session began, of each wheel and of turns: a load is moved at any "
+        f"time; it is nothing at the first; {BY_HAND}.",
+    )
     time_knots: tuple[float, ...] = setting(
         (0.0, 0.04, 0.1, 0.22, 0.45, 1.0),
         "of the longest trial",
@@ -197,6 +203,34 @@ class Residuals:
         "of the steps",
         "Such a term is tried where at least this share of the driven steps are straight lines, and as many are turns; "
         f"{BY_HAND}.",
+    )
+    command_shift_s: float = setting(
+        0.01, "s", f"How far each change of command is shifted, to see along which direction the poses answer; {BY_HAND}."
+    )
+    command_shifts: tuple[float, int] = setting(
+        (0.2, 21),
+        "s, number",
+        "Where the times of commands scatter, each is shifted by up to the first number either way, in so many steps, to find "
+        f"when it took effect; {BY_HAND}.",
+    )
+    command_window_s: float = setting(
+        0.6,
+        "s",
+        f"Poses up to this long after a change of command say when it took effect, and as many later ones serve for comparison; "
+        f"{BY_HAND}.",
+    )
+    command_well_known: float = setting(
+        0.75,
+        "of the changes",
+        "The delays of single commands are judged where they are known best: small changes of speed say little of when they "
+        f"happened; {BY_HAND}.",
+    )
+    command_fewest: int = setting(30, "changes", f"Fewest changes of command from which a scatter is concluded; {BY_HAND}.")
+    command_times_usual: float = setting(
+        6.0,
+        "1",
+        "Variance of the commands' delays, over what the same direction shows later in the commands, from which their scatter is "
+        "certain. Logs of simulated robots with other faults have 0.9 to 2.6, with commands that are polled or lost 18 to 68.",
     )
     floor_side: int = setting(
         4, "bumps", f"Basis functions per side of a field over the floor that is written as a formula; {BY_HAND}."

@@ -1,0 +1,83 @@
+"""Commands that take effect now sooner, now later: the scatter is measured, said, and not described as a response in time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.text import diagnosis_text
+from bns.diagnose.residuals.command_times import FEWEST, command_times
+from tests.diagnose.worlds import FRAME_S, NOMINAL, hidden, measured
+
+LATEST = 4
+"""Frames by which a command may be late."""
+
+
+def late(table, seed=0, latest=LATEST):
+    """The log of a robot that carries out each command up to so many frames after it was sent."""
+    rng, parts = np.random.default_rng(seed), []
+    for _, rows in table.groupby("trial", sort=False):
+        told = rows[["left_m_s", "right_m_s"]].to_numpy().copy()
+        for k in np.flatnonzero((np.diff(told, axis=0) != 0).any(axis=1)) + 1:
+            told[max(k - int(rng.integers(latest + 1)), 0) : k] = told[k]
+        parts.append(rows.assign(left_m_s=told[:, 0], right_m_s=told[:, 1]))
+    return pd.concat(parts, ignore_index=True)
+
+
+def times_in(table, model=NOMINAL):
+    predictor = WheelPredictor(tracks_of(table))
+    problem = problem_for(predictor, model)
+    return command_times(problem, problem.fit(model))
+
+
+@pytest.fixture(scope="module")
+def table():
+    return measured(NOMINAL, trials=30, seed=3, speeds=(-0.2, 0.2), commands=8)
+
+
+def test_the_scatter_is_that_of_the_delays(table):
+    found = times_in(late(table), hidden(command_delay={"delay_s": LATEST * FRAME_S / 2}))
+    spread_s = FRAME_S * np.sqrt(((LATEST + 1) ** 2 - 1) / 12)
+    assert found.sd_s == pytest.approx(spread_s, rel=0.12)
+    assert found.high_s - found.low_s == pytest.approx(LATEST * FRAME_S, rel=0.15)
+    assert f"standard deviation {1e3 * found.sd_s:.0f} ms" in found.in_words
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        NOMINAL,
+        hidden(command_delay={"delay_s": 0.1}),
+        hidden(motor_lag={"tau_s": 0.15}),
+        hidden(acceleration_limit={"max_m_s2": 0.4}),
+        hidden(backlash={"gap_m": 0.004}),
+        hidden(wheelbase={"factor": 1.1}, speed_gain={"gain": 0.93}),
+    ],
+    ids=lambda robot: "+".join(a.effect.name for a in robot.effects) or "nothing",
+)
+def test_other_faults_are_no_scatter(robot):
+    """Nothing of them is in the model: a delay makes all commands late alike, a limit the large changes most."""
+    assert times_in(measured(robot, trials=30, seed=3, speeds=(-0.2, 0.2), commands=8)) is None
+
+
+def test_few_changes_of_command_say_nothing(table):
+    few = late(table[table.trial < FEWEST // 12])
+    assert times_in(few) is None
+
+
+def test_it_is_said_and_no_response_in_time_is_offered_for_it(table):
+    found = diagnose(WheelPredictor(tracks_of(late(table))), NOMINAL)
+    assert found.verdict == "unlisted"
+    assert found.behaviour[0].startswith("commands take effect at times that scatter")
+    assert not any("response" in term.signal or "changes of speed" in term.signal for term in found.terms)
+    assert any(note.startswith("No model predicts when a single command takes effect") for note in found.notes)
+    assert found.as_json()["command_times"]["sd_s"] == found.rest.command_times.sd_s
+    assert "commands take effect at times that scatter" in diagnosis_text(found)
+    plain = replace(found, rest=replace(found.rest, command_times=None))
+    assert plain.as_json()["command_times"] is None
+    assert plain.behaviour == found.behaviour[1:]
