@@ -297,6 +297,18 @@ def test_a_wheel_that_is_slower_by_one_share_is_not_called_out_of_proportion(ter
     assert said in in_words(stand_in, predictor_of(NOMINAL))
 
 
+@pytest.mark.parametrize(
+    ("on", "term", "said"),
+    [
+        ("v", "0.004 * moving * cos(heading - 0.8) + 0 * v", "+4 mm/s at a heading of 46°, -4 mm/s at a heading of -134°"),
+        ("w", "0.02 * moving * sin(heading)", "+1.1 °/s at a heading of 90°, -1.1 °/s at a heading of -90°"),
+    ],
+)
+def test_where_a_slope_helps_and_where_it_brakes_is_said(on, term, said):
+    stand_in = SimpleNamespace(on=on, term=term, values={}, signal="heading")
+    assert in_words(stand_in, predictor_of(NOMINAL)).endswith(said)
+
+
 def test_a_formula_that_is_no_part_of_the_model_is_called_a_hint():
     predictor = predictor_of(NOMINAL)
     found, problem = diagnose(predictor, NOMINAL), problem_for(predictor, NOMINAL)

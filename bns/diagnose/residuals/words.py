@@ -99,6 +99,18 @@ def _heading(term: Formula, _: Predictor) -> str:
     return ", ".join(at)
 
 
+def _by_heading(term: Formula, predictor: Predictor) -> str:
+    """Of forward velocity at a usual speed, or of the turn rate: where it is largest, and where least."""
+    seen = predictor.variables()
+    usual = float(np.median(np.abs(seen["left_m_s"] + seen["right_m_s"]).ravel() / 2.0))
+    grid = np.linspace(-np.pi, np.pi, _POINTS)
+    change = _curve(term, "heading", grid, v=usual, moving=1.0)
+    size, unit = (np.degrees(change), "°/s") if term.on == "w" else (1e3 * change, "mm/s")
+    at = [f"{size[i]:+.2g} {unit} at a heading of {np.degrees(grid[i]):.0f}°" for i in (change.argmax(), change.argmin())]
+    speed = "" if term.on == "w" else f" at {usual:.2g} m/s"
+    return f"{_VELOCITIES[term.on]}{speed} depends on heading: {at[0]}, {at[1]}"
+
+
 def _travel(term: Formula, _: Predictor) -> str:
     grid = np.linspace(-np.pi, np.pi, _POINTS)
     share = _curve(term, "heading", grid, v=1.0)
@@ -218,6 +230,8 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("time in the trial", "share"): _time_in_trial,
     **{(SESSION, on): _session for on in (SHARE, LEFT, RIGHT, "w")},
     ("heading", "share"): _heading,
+    ("heading", "v"): _by_heading,
+    ("heading", "w"): _by_heading,
     (TRAVEL, "v"): _travel,
     (STRAIGHT, "w"): _straight,
     ("distance since each wheel reversed", "wheels"): _reversal,
