@@ -70,6 +70,7 @@ def test_few_changes_of_command_say_nothing(table):
     assert times_in(few) is None
 
 
+@pytest.mark.slow
 def test_it_is_said_and_no_response_in_time_is_offered_for_it(table):
     found = diagnose(WheelPredictor(tracks_of(late(table))), NOMINAL)
     assert found.verdict == "unlisted"

@@ -297,6 +297,16 @@ def test_a_wheel_that_is_slower_by_one_share_is_not_called_out_of_proportion(ter
     assert said in in_words(stand_in, predictor_of(NOMINAL))
 
 
+def test_where_the_floor_brakes_is_said():
+    predictor = predictor_of(NOMINAL)
+    term = "-0.1 * exp(-((x - 0.2)**2 + (y + 0.1)**2) / 0.02)"
+    words = in_words(SimpleNamespace(on="share", term=term, values={}, signal="place"), predictor)
+    found = re.match(r"the robot is slower by ([\d.]+)% near \(([-\d.]+), ([-\d.]+)\) m, ", words)
+    assert [float(text) for text in found.groups()] == pytest.approx([10.0, 0.2, -0.1], abs=0.05)
+    moving = in_words(SimpleNamespace(on="v", term=f"v * {term}", values={}, signal="forward speed at a place"), predictor)
+    assert moving.startswith("the robot is in forward motion slower by ")
+
+
 @pytest.mark.parametrize(
     ("on", "term", "said"),
     [
@@ -354,6 +364,7 @@ def test_of_answers_to_past_commands_only_one_is_a_term_or_one_each_of_motion_an
     assert len(may_join([(CHANGES, "wheels")], every)) == len(every) - len(past)
 
 
+@pytest.mark.slow
 def test_a_heading_that_drifts_on_straight_lines_alone_is_described():
     """A gyro with a bias holds the heading, and only while both wheels are told the same."""
     held = formula_effect("held", "k * moving * max(1 - abs(w) / 0.05, 0)", "w")
@@ -367,6 +378,7 @@ def test_a_heading_that_drifts_on_straight_lines_alone_is_described():
     assert STRAIGHT not in {f.signal for f in families(straight_never, NOMINAL.wheelbase_m)}
 
 
+@pytest.mark.slow
 def test_what_changes_in_the_middle_of_a_session_is_described():
     """A load was moved: one wheel has been slower since then. A voltage that sags over the session would imitate it."""
     slow = NOMINAL.with_active(formula_effect("slow", "-k * u", "left"), (0.03,))

@@ -192,6 +192,8 @@ def test_single_poses_have_a_page_that_says_what_is_wrong(tmp_path):
         ((-0.03, -0.04, -0.02, "rad"), ("-1.7°", "-2.3 to -1.1°")),
         ((1.06, 1.055, 1.065, "1"), ("1.060", "1.055 to 1.065")),
         ((0.5, None, None, "m"), ("500 mm", "")),
+        ((1547.4, 1547.4, 1547.4001, "s"), ("1547 s", "")),
+        ((0.0, 0.0, 0.0, "s"), ("0 ms", "")),
     ],
 )
 def test_numbers_are_rounded_to_what_is_known_of_them(number, said):

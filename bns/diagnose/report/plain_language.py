@@ -12,7 +12,7 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.values import numbers_of
+from bns.diagnose.values import numbers_of, without_width
 
 _UNITS = {"s": (1e3, "ms"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "rad": (57.29578, "°"), "rad/s": (57.29578, "°/s")}
 """SI unit -> factor and unit for people."""
@@ -25,7 +25,8 @@ def figures_in_words(value: float, low: float | None, high: float | None, unit: 
     factor, shown = _UNITS.get(unit, (1.0, "" if unit == "1" else unit))
     if unit in {"s", "m"} and abs(value) >= _LARGE:
         factor, shown = 1.0, unit
-    numbers = [factor * v for v in (value, low, high) if v is not None and np.isfinite(v)]
+    ends = () if low is None or high is None or without_width(low, high) else (low, high)
+    numbers = [factor * v for v in (value, *ends) if v is not None and np.isfinite(v)]
     if not numbers:
         return "not known", ""
     spread = max(numbers) - min(numbers)
@@ -38,7 +39,9 @@ def figures_in_words(value: float, low: float | None, high: float | None, unit: 
 
 
 def _digits(size: float) -> int:
-    """Decimals that show two figures of a size."""
+    """Decimals that show two figures of a size; none of nothing."""
+    if size == 0.0:
+        return 0
     return int(np.clip(1 - np.floor(np.log10(max(size, 1e-12))), 0, 8))
 
 

@@ -17,7 +17,7 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.values import numbers_of, numbers_of_term, ties_of
+from bns.diagnose.values import numbers_of, numbers_of_term, ties_of, without_width
 from bns.physics.decoys import DECOYS
 
 _VERDICTS = {
@@ -55,7 +55,8 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival]) -> Iterator[str]:
     odd = [implausible_text(d.selection, name) for name in d.selection.implausible] if d.selection is not None else []
     yield from odd
     if d.selection is not None:
-        yield from (f"It behaves like this: {words}." for words in d.behaviour)
+        begun = "Beyond these effects, the robot behaves like this" if d.effects else "It behaves like this"
+        yield from (f"{begun}: {words}." for words in d.behaviour)
         yield from _numbers(d)
         for rival in rivals:
             yield f"or {' and '.join(rival.names)}:"
@@ -113,7 +114,7 @@ def _intervals(
 
 def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
     said = f"  {effect}: {name} = {n['value']:.5g}{_unit(n)}"
-    if n["low"] == n["high"]:
+    if without_width(n["low"], n["high"]):
         return f"{said} (no interval: it is at a bound, or no small change of it changes the loss)"
     return f"{said} (95 %: {n['low']:.5g} to {n['high']:.5g})"
 

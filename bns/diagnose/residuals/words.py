@@ -10,10 +10,12 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.grammar import (
     CHANGES,
+    PLACE,
     RESPONSE,
     RESPONSE_KNOTS_S,
     RESPONSE_OF,
     SESSION,
+    SPEED_THERE,
     STRAIGHT,
     STRAIGHT_AT,
     TRAVEL,
@@ -99,6 +101,16 @@ def _heading(term: Formula, _: Predictor) -> str:
     return ", ".join(at)
 
 
+def _at_places(term: Formula, predictor: Predictor) -> str:
+    """Of a share or a forward speed that depends on the place: where, of all places that were seen, it is least and largest."""
+    pose = predictor.tracks.pose
+    x, y = pose[:: max(len(pose) // 4000, 1), :2].T
+    share = np.broadcast_to(value_of(term.term, {**term.values, "x": x, "y": y, "v": 1.0, "moving": 1.0}), x.shape)
+    what = "" if term.on == SHARE else " in forward motion"
+    at = [f"{_slower(-share[i])} near ({x[i]:.2f}, {y[i]:.2f}) m" for i in (int(share.argmin()), int(share.argmax()))]
+    return f"the robot is{what} {at[0]}, {at[1]}"
+
+
 def _by_heading(term: Formula, predictor: Predictor) -> str:
     """Of forward velocity at a usual speed, or of the turn rate: where it is largest, and where least."""
     seen = predictor.variables()
@@ -151,6 +163,7 @@ def _speed(term: Formula, predictor: Predictor) -> str:
     back = -fastest + _curve(term, "u", np.array([-fastest]), since=NEVER_M)
     if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0 and abs(back[0] + got[-1]) > 0.01 * fastest:
         at, got = np.append(at, -fastest), np.append(got, back)
+    got = np.where(got * at < 0.0, 0.0, got)  # a knot may lie a little beyond rest: the wheel stands
     pairs = ", ".join(f"{a:.3g} m/s gives {b:.3g} m/s" for a, b in zip(at, got, strict=True))
     whose = {LEFT: "the left wheel", RIGHT: "the right wheel"}.get(term.on, "a wheel")
     shares = got / at
@@ -230,6 +243,8 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("time in the trial", "share"): _time_in_trial,
     **{(SESSION, on): _session for on in (SHARE, LEFT, RIGHT, "w")},
     ("heading", "share"): _heading,
+    (PLACE, "share"): _at_places,
+    (SPEED_THERE, "v"): _at_places,
     ("heading", "v"): _by_heading,
     ("heading", "w"): _by_heading,
     (TRAVEL, "v"): _travel,

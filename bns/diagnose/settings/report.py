@@ -28,6 +28,9 @@ class Report:
     network_bins: int = setting(8, "bins", f"Bins of a figure of networks' errors; {BY_HAND}.")
     large: float = setting(1.0, "s or m", "From one second or one metre on, values are not shown in ms or mm.")
     causes: int = setting(3, "causes", f"Largest number of causes in a headline; {BY_HAND}.")
+    no_width: float = setting(
+        1e-5, "1", f"An interval whose ends differ by less than this share says nothing and is not shown; {BY_HAND}."
+    )
     same_share: float = setting(
         0.005,
         "1",
