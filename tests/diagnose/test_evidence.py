@@ -1,5 +1,7 @@
 """Chances are what they say, and fits say how well they know."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,32 @@ def test_trials_that_pull_together_are_no_luck():
     scores = 1.0 + 0.1 * np.random.default_rng(2).normal(size=(20, 1))
     assert sign_flip_p(scores, scores.T @ scores) < 1e-4
     assert sign_flip_p(np.zeros((20, 1)), np.zeros((1, 1))) == 1.0
+
+
+def test_the_chance_of_numbers_that_depend_on_one_another_is_that_of_all_signs():
+    """Against every one of the 1,024 ways to flip ten trials."""
+    rng = np.random.default_rng(3)
+    curvature = np.array([[4.0, 1.9, 0.3], [1.9, 1.0, 0.1], [0.3, 0.1, 9.0]])
+    inverse = np.linalg.inv(curvature)
+    for shift in (0.0, 0.6, 1.2):
+        scores = rng.multivariate_normal([shift, 0.3 * shift, 0.0], curvature, size=10)
+        signs = np.array(list(product([-1.0, 1.0], repeat=10)))
+        sums = signs @ scores
+        statistic = np.einsum("fk,kl,fl->f", sums, inverse, sums)
+        exact = (statistic >= statistic[-1] * (1 - 1e-9)).mean()  # the last has no sign flipped
+        assert sign_flip_p(scores, curvature) == pytest.approx(exact, abs=0.015)
+
+
+def test_one_step_of_least_squares_from_nothing_ends_near_the_fit():
+    predictor = WheelPredictor(tracks_of(measured(hidden(wheelbase={"factor": 1.03}, yaw_bias={"rate_rad_s": 0.02}), trials=12)))
+    problem = problem_for(predictor, NOMINAL)
+    base = problem.fit(NOMINAL)
+    model = NOMINAL.with_effect("wheelbase", factor=1.0).with_effect("yaw-bias", rate_rad_s=0.0)
+    there, best = problem.gauss_newton_step(model, base).model, problem.fit(model).model
+    for name in ("wheelbase", "yaw-bias"):
+        (step,), (fitted,) = there.values_of(name).values(), best.values_of(name).values()
+        neutral = 1.0 if name == "wheelbase" else 0.0
+        assert step - neutral == pytest.approx(fitted - neutral, rel=0.15)
 
 
 def test_gain_is_paired_by_trial():

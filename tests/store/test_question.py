@@ -8,6 +8,7 @@ import pytest
 
 from bns.errors import StoreError
 from bns.store import StoreWarning, Writer, load, query
+from bns.store.read import question
 
 from .synthetic import records
 
@@ -153,3 +154,11 @@ def test_damaged_page_is_named_and_not_read(store):
     path.write_bytes(data)
     with pytest.warns(StoreWarning, match=f"{path.name} is skipped: it is damaged: its digest is not .* bns compact"):
         assert load(store).empty
+
+
+def test_rows_are_counted_over_all_batches(store, monkeypatch):
+    monkeypatch.setattr(question, "MOST_ROWS", 4000)
+    monkeypatch.setattr(question, "_ROWS_AT_ONCE", 2048)
+    assert len(query(store, "SELECT * FROM range(3900)")) == 3900
+    with pytest.raises(StoreError, match="more than 2048 rows; 4000 rows"):
+        query(store, "SELECT * FROM range(6000)")
