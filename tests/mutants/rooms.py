@@ -1,7 +1,10 @@
 """The rooms where numbers are made, and the tests nearest to each."""
 
 ROOMS: dict[str, tuple[str, str]] = {
-    "engine": ("bns/engine/[!_rj]*.py bns/engine/rprop.py", "tests/engine tests/robots/test_snake_breeding.py tests/diagnose/test_pose_filter.py"),
+    "engine": (
+        "bns/engine/[!_rj]*.py bns/engine/rprop.py",
+        "tests/engine tests/robots/test_snake_breeding.py tests/diagnose/test_pose_filter.py",
+    ),
     "tasks": (
         "bns/tasks/__init__.py bns/robots/khepera/robot.py",
         "tests/robots/test_task_files.py tests/robots/test_khepera.py tests/robots/test_contract.py",
