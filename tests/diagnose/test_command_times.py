@@ -65,6 +65,17 @@ def test_other_faults_are_no_scatter(robot):
     assert times_in(measured(robot, trials=30, seed=3, speeds=(-0.2, 0.2), commands=8)) is None
 
 
+def test_trials_that_count_nothing_have_no_say(table):
+    predictor = WheelPredictor(tracks_of(late(table)))
+    model = hidden(command_delay={"delay_s": LATEST * FRAME_S / 2})
+    without = predictor.not_counting(range(5))
+    problem = problem_for(without, model)
+    found = command_times(problem, problem.fit(model))
+    every = times_in(late(table), model)
+    assert found.commands == pytest.approx(every.commands * 25 / 30, rel=0.1)
+    assert found.sd_s == pytest.approx(every.sd_s, rel=0.2)
+
+
 def test_few_changes_of_command_say_nothing(table):
     few = late(table[table.trial < FEWEST // 12])
     assert times_in(few) is None

@@ -63,7 +63,9 @@ def command_times(problem: Problem, fit: Fit) -> CommandTimes | None:
     predictor = problem.predictor
     if not isinstance(predictor, WheelPredictor) or predictor.tracks.relative:
         return None
-    changes = list(_changes(predictor.tracks))
+    tracks, counted = predictor.tracks, predictor.counted
+    ignored = set() if counted is None else set(tracks.trial[counted == 0.0].tolist())
+    changes = [change for change in _changes(tracks) if change.trial not in ignored]
     if len(changes) < FEWEST:
         return None
     clear = _scattered(problem, fit, predictor, changes)
