@@ -12,6 +12,7 @@ from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.residuals.command_times import FEWEST, command_times
+from bns.physics.formula import formula_effect
 from tests.diagnose.worlds import FRAME_S, NOMINAL, hidden, measured
 
 LATEST = 4
@@ -56,6 +57,7 @@ def test_the_scatter_is_that_of_the_delays(table):
         hidden(motor_lag={"tau_s": 0.15}),
         hidden(acceleration_limit={"max_m_s2": 0.4}),
         hidden(backlash={"gap_m": 0.004}),
+        NOMINAL.with_active(formula_effect("slow-left", "k * (ago(0, 0.2) - u)", "left"), (1.0,)),
         hidden(wheelbase={"factor": 1.1}, speed_gain={"gain": 0.93}),
     ],
     ids=lambda robot: "+".join(a.effect.name for a in robot.effects) or "nothing",

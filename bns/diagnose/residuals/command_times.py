@@ -2,8 +2,9 @@
 
 Each change of command is shifted a little, which shows along which direction the innovations after it answer; how far they lie
 in that direction says how late this one command was. A delay, a lag, or a limit that the model lacks makes all of them late, by
-times that depend on how large the change is: that is taken out. What is left is compared with the same direction later in the
-same command, where nothing changes: errors of a tracker and of the model are as large there.
+times that depend on the change (how large it is, of which wheel, whether it is a turn or reverses, how soon it follows): that is
+taken out. What is left is compared with the same direction later in the same command, where nothing changes: errors of a tracker
+and of the model are as large there.
 """
 
 from __future__ import annotations
@@ -48,12 +49,16 @@ class CommandTimes:
 
 @dataclass(frozen=True)
 class _Change:
-    """One change of command: its trial, when, the frames after it, and the frames of the same command later (None: too few)."""
+    """One change of command: its trial and number, the frames after it, and those later in the command (None: too few).
+
+    ``kind``: on what a fault that is the same in every change may depend: 1, its size (m/s), the left wheel's share of it, how
+    alike both wheels change (1: ahead, -1: on the spot), which wheels reverse, and how soon it follows the one before.
+    """
 
     trial: int
     command: int
     number: int
-    size_m_s: float
+    kind: tuple[float, ...]
     after: slice
     later: slice | None
 
@@ -93,8 +98,18 @@ def _changes(tracks: Tracks) -> Iterator[_Change]:
                 continue
             inside = 2 * b - a <= len(t_s) and t_s[2 * b - a - 1] < following
             later = slice(first + b, first + 2 * b - a) if inside else None
-            size = np.hypot(*(np.diff(side[trial, k : k + 2])[0] for side in (tracks.left_m_s, tracks.right_m_s)))
-            yield _Change(trial, int(k), number, float(size), slice(first + a, first + b), later)
+            since_s = begins - (ends[trial, which[number - 1]] if number else 0.0)
+            speeds = np.stack([tracks.left_m_s[trial, k : k + 2], tracks.right_m_s[trial, k : k + 2]])
+            yield _Change(trial, int(k), number, _kind(speeds, float(since_s)), slice(first + a, first + b), later)
+
+
+def _kind(speeds: Array, since_s: float) -> tuple[float, ...]:
+    """As `_Change.kind`; ``speeds`` (2, 2) of the left and the right wheel, before and after."""
+    by = [float(v) for v in speeds[:, 1] - speeds[:, 0]]
+    square = by[0] ** 2 + by[1] ** 2
+    reverse = [float(v) for v in speeds[:, 0] * speeds[:, 1] < 0.0]
+    soon = float(np.exp(-since_s / WINDOW_S))
+    return 1.0, float(np.sqrt(square)), by[0] ** 2 / square, 2 * by[0] * by[1] / square, *reverse, soon
 
 
 def _scattered(
@@ -115,8 +130,7 @@ def _scattered(
     if np.isfinite(usual).sum() < FEWEST:
         return None
     root_of = np.sqrt(known[clear])
-    size = np.array([c.size_m_s for c in changes])[clear]
-    design = np.stack([root_of, root_of * size], axis=1)  # late alike, or the later the larger the change
+    design = root_of[:, None] * np.array([c.kind for c in changes])[clear]
     standard = seen[clear] / root_of
     apart = standard - design @ np.linalg.lstsq(design, standard, rcond=None)[0]
     noise = float(np.nanmean((usual / root_of) ** 2))
