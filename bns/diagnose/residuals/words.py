@@ -104,7 +104,7 @@ def _heading(term: Formula, _: Predictor) -> str:
 def _at_places(term: Formula, predictor: Predictor) -> str:
     """Of a share or a forward speed that depends on the place: where, of all places that were seen, it is least and largest."""
     pose = predictor.tracks.pose
-    x, y = pose[:: max(len(pose) // 4000, 1), :2].T
+    x, y = pose[:: max(len(pose) // (10 * _POINTS), 1), :2].T
     share = np.broadcast_to(value_of(term.term, {**term.values, "x": x, "y": y, "v": 1.0, "moving": 1.0}), x.shape)
     what = "" if term.on == SHARE else " in forward motion"
     at = [f"{_slower(-share[i])} near ({x[i]:.2f}, {y[i]:.2f}) m" for i in (int(share.argmin()), int(share.argmax()))]
