@@ -349,19 +349,15 @@ def test_a_model_that_was_extended_before_keeps_its_term():
     assert free_name(found.fit.model) == "unlisted-3"
 
 
-def test_of_answers_to_past_commands_only_one_is_a_term_or_one_each_of_motion_and_turn():
+def test_of_answers_to_past_commands_only_one_is_a_term():
     predictor = predictor_of(NOMINAL)
     every = families(predictor, NOMINAL.wheelbase_m)
     past = [f for f in every if f.signal in {RESPONSE, CHANGES, *RESPONSE_OF.values()}]
-    left = {(f.signal, f.on): [g.on for g in may_join([(f.signal, f.on)], past)] for f in past}
-    assert left == {
-        (CHANGES, "wheels"): [],
-        (RESPONSE, "wheels"): [],
-        (RESPONSE_OF["v"], "v"): ["w"],
-        (RESPONSE_OF["w"], "w"): ["v"],
-    }
+    assert len(past) == 4
+    assert all(may_join([(f.signal, f.on)], past) == [] for f in past)
     assert len(may_join([], every)) == len(every)
     assert len(may_join([(CHANGES, "wheels")], every)) == len(every) - len(past)
+    assert len(may_join([("heading", "v")], every)) == len(every) - 1
 
 
 @pytest.mark.slow

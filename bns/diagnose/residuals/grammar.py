@@ -108,13 +108,11 @@ def families(predictor: Predictor, wheelbase_m: float, response: bool = True) ->
 def may_join(terms: Iterable[tuple[str, str]], tried: Iterable[Family]) -> list[Family]:
     """The families that may stand beside terms (signal, velocity): none twice, and one answer to past commands.
 
-    Free responses in time and changes of speed contain one another, so the words for one say nothing beside the other. Forward
-    velocity and turn rate may have one each.
+    Free responses in time and changes of speed contain one another, so the words for one say nothing beside the other; and beside
+    those of forward velocity and of turns together a lag of the wheels has no number of its own.
     """
     used = set(terms)
-    signals = {signal for signal, _ in used}
-    free = set(RESPONSE_OF.values()) if signals & PAST <= set(RESPONSE_OF.values()) else set()
-    barred = PAST - free if signals & PAST else set()
+    barred = PAST if any(signal in PAST for signal, _ in used) else frozenset()
     return [f for f in tried if (f.signal, f.on) not in used and f.signal not in barred]
 
 
