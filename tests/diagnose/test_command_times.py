@@ -58,6 +58,7 @@ def test_the_scatter_is_that_of_the_delays(table):
         hidden(acceleration_limit={"max_m_s2": 0.4}),
         hidden(backlash={"gap_m": 0.004}),
         NOMINAL.with_active(formula_effect("slow-left", "k * (ago(0, 0.2) - u)", "left"), (1.0,)),
+        NOMINAL.with_active(formula_effect("slow-turns", "k * (ago(0, 0.3) - w)", "w"), (1.0,)),
         hidden(wheelbase={"factor": 1.1}, speed_gain={"gain": 0.93}),
     ],
     ids=lambda robot: "+".join(a.effect.name for a in robot.effects) or "nothing",

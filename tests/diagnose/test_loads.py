@@ -101,6 +101,18 @@ def test_diameters_behind_a_limit_are_told_from_commands_that_differ_before_it(n
     assert search.stands(found) is not None
 
 
+def test_what_only_acts_elsewhere_needs_no_gain_of_its_own_but_the_better_fit(monkeypatch):
+    robot = hidden(wheel_diameters={"ratio": 0.95}, acceleration_limit={"max_m_s2": 0.25}).arranged()
+    predictor = WheelPredictor(tracks_of(measured(robot, trials=20, seed=5)))
+    accepted = ("acceleration-limit", "wheel-mismatch")
+    search = StepwiseSelection(predictor, NOMINAL, barred=tuple(set(all_effects()) - {*accepted, "wheel-diameters"}))
+    problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named(name) for name in accepted])
+    monkeypatch.setattr(search, "_earned", lambda *_: False)
+    step, problem, fit = search._forward_step(problem, fit, accepted)
+    assert (step.selected, step.instead_of) == ("wheel-diameters", "wheel-mismatch")
+    assert search._stays(problem, extending.reduced(search.catalogue, problem, fit, step.selected), fit, step.selected)
+
+
 def test_without_limits_diameters_are_a_mismatch_and_no_tie():
     effects = ("motor-lag", "wheel-mismatch", "wheel-diameters", "wheelbase", "yaw-bias")
     table = measured(hidden(wheel_mismatch={"ratio": 0.95}, motor_lag={"tau_s": 0.1}), trials=20, seed=5)
