@@ -30,7 +30,7 @@ WELL_KNOWN = DEFAULTS.residuals.command_well_known
 
 @dataclass(frozen=True)
 class CommandTimes:
-    """How far single commands are early (-) or late (+) beside the others, s: standard deviation, 5 and 95 % of ``commands``."""
+    """How early (-) or late (+) single ``commands`` are, relative to the others, s: standard deviation, 5 and 95 %."""
 
     sd_s: float
     low_s: float

@@ -108,8 +108,8 @@ def families(predictor: Predictor, wheelbase_m: float, response: bool = True) ->
 def may_join(terms: Iterable[tuple[str, str]], tried: Iterable[Family]) -> list[Family]:
     """The families that may stand beside terms (signal, velocity): none twice, and one answer to past commands.
 
-    Free responses in time and changes of speed contain one another, so the words for one say nothing beside the other; and beside
-    those of forward velocity and of turns together a lag of the wheels has no number of its own.
+    Free responses in time and changes of speed contain one another, so the words for one say nothing next to the other; and next
+    to those of forward velocity and of turns together a lag of the wheels has no number of its own.
     """
     used = set(terms)
     barred = PAST if any(signal in PAST for signal, _ in used) else frozenset()

@@ -59,7 +59,7 @@ class Exchanges:
         self._known: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
 
     def forget(self) -> None:
-        """Begin a search anew, with another model or other effects; what the last round tried still serves."""
+        """Begin another search, with another model or other effects; what the last round tried still serves."""
         self._known = None
 
     def of(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
