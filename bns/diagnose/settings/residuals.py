@@ -230,7 +230,7 @@ class Residuals:
         6.0,
         "1",
         "Variance of the commands' delays, over what the same direction shows later in the commands, from which their scatter is "
-        "certain. Logs of simulated robots with other faults have at most 2, with commands that are polled or lost 12 to 20.",
+        "certain. Logs of simulated robots with other faults have at most 3, with commands that are polled or lost 12 to 20.",
     )
     floor_side: int = setting(
         4, "bumps", f"Basis functions per side of a field over the floor that is written as a formula; {BY_HAND}."
