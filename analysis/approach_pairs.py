@@ -55,14 +55,30 @@ def scores(runs: pd.DataFrame, evals: pd.DataFrame) -> pd.DataFrame:
     return runs.assign(late=runs.success_late, minutes=-until.minutes.where(until.ended, np.inf).to_numpy())
 
 
-def improvement(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Probability that a run of ``one`` is better than a run of ``other``, ties counted half: (..., n) and (..., m) give (...).
+def improvement(one: np.ndarray, other: np.ndarray) -> float:
+    """Probability that a run of ``one`` (n,) is better than a run of ``other`` (m,), ties counted half.
 
     Times n and m it is the statistic of Mann and Whitney (1947); averaged over tasks it is the probability of improvement
     of Agarwal et al., "Deep Reinforcement Learning at the Edge of the Statistical Precipice" (2021).
     """
-    a, b = one[..., :, None], other[..., None, :]
-    return ((a > b).mean(axis=(-2, -1)) + (a == b).mean(axis=(-2, -1)) / 2).astype(float)
+    return float(_wins(one, other).mean())
+
+
+def _wins(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """1 where the run of the row is better than that of the column, a half where they are equal; (n, m)."""
+    return (one[:, None] > other) + (one[:, None] == other) / 2
+
+
+def _times_drawn(places: np.ndarray) -> np.ndarray:
+    """How often each place was drawn, (draws, n), of the places drawn, (draws, n)."""
+    draws, n = places.shape
+    of_all = (places + n * np.arange(draws)[:, None]).ravel()
+    return np.bincount(of_all, minlength=draws * n).reshape(draws, n).astype(float)
+
+
+def _summed(wins: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Wins of all pairs in each draw, (draws,): ``one`` (draws, n), ``other`` (draws, m) say how often each run is in it."""
+    return np.einsum("dm,dm->d", one @ wins, other)
 
 
 def compared(by_task: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict[str, float]:
@@ -79,10 +95,12 @@ def compared(by_task: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict[str, 
     at = float(np.mean([improvement(a, b) for a, b in by_task.values()]))
     boot, exchanged = np.zeros(DRAWS), np.zeros(DRAWS)
     for a, b in by_task.values():
-        drawn = [scores[random.integers(0, len(scores), (DRAWS, len(scores)))] for scores in (a, b)]
-        boot += improvement(*drawn) / len(by_task)
-        swap = random.random((DRAWS, len(a))) < 0.5  # a fair coin
-        exchanged += improvement(np.where(swap, b, a), np.where(swap, a, b)) / len(by_task)
+        n = len(a)
+        often = [_times_drawn(random.integers(0, n, (DRAWS, n))) for _ in (a, b)]
+        boot += _summed(_wins(a, b), *often) / n**2 / len(by_task)
+        swap = (random.random((DRAWS, n)) < 0.5).astype(float)  # a fair coin
+        both, picked = np.concatenate([a, b]), np.hstack([1 - swap, swap])
+        exchanged += _summed(_wins(both, both), picked, 1 - picked) / n**2 / len(by_task)
     extreme = np.count_nonzero(np.abs(exchanged - 0.5) >= abs(at - 0.5) - 1e-12)
     low, high = band(boot)
     return {"probability": at, "low": float(low), "high": float(high), "p": (1 + extreme) / (1 + DRAWS)}
