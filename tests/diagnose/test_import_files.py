@@ -294,7 +294,14 @@ def test_a_proposal_is_printed_and_can_be_saved(tmp_path, table, capsys):
     shown = capsys.readouterr()
     assert shown.err == ""
     assert not (tmp_path / "m.csv").exists()
-    log.with_name("my log.csv.import.yaml").write_text(shown.out)
+    mapping = log.with_name("my log.csv.import.yaml")
+    assert main(["import", str(log), "--propose", "-o", str(tmp_path / "m.csv")]) == 2
+    assert "is no name for a mapping" in capsys.readouterr().err
+    assert main(["import", str(log), "--propose", "-o", str(mapping)]) == 0
+    assert mapping.read_text() == shown.out
+    assert main(["import", str(log), "--propose", "-o", str(mapping)]) == 2
+    assert "may have been corrected by hand" in capsys.readouterr().err
+    assert not (tmp_path / "m.csv").exists()
     assert main(["import", str(log), "-o", str(tmp_path / "m.csv")]) == 0
     assert len(load_measured(tmp_path / "m.csv").tracks) == 3
 

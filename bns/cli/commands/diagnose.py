@@ -45,12 +45,12 @@ def add_commands(command: Adder) -> None:
         "--output",
         type=Path,
         metavar="FILE",
-        help="table to write (.csv or .parquet)",
+        help="table to write (.csv or .parquet); with --propose the mapping (.yaml)",
     )
     read.add_argument(
         "--propose",
         action="store_true",
-        help="print a proposed mapping (YAML) and write nothing: bns import LOG --propose > LOG.import.yaml",
+        help="print a proposed mapping (YAML), or write it to -o FILE: bns import LOG --propose -o LOG.import.yaml",
     )
     held = command("compare", compare, "show how large the errors of a model are, and where they occur")
     found = command(
@@ -160,14 +160,21 @@ def import_(options: argparse.Namespace) -> int:
     """A log as a table of measurements; the mapping is kept beside it."""
     import yaml
 
-    from bns.diagnose.data.import_log import import_log, proposal, refuse_to_overwrite
+    from bns.diagnose.data.import_log import check_new_mapping, import_log, proposal, refuse_to_overwrite
     from bns.diagnose.data.mapping import load_mapping, mapping_beside
     from bns.diagnose.report.text import findings_text
     from bns.errors import DataError
     from bns.measurements import check_table_name, write_measurements
 
     if options.propose:
-        print(proposal(options.data), end="")
+        if options.output is not None:
+            check_new_mapping(options.output)
+        proposed = proposal(options.data)
+        if options.output is None:
+            print(proposed, end="")
+        else:
+            options.output.write_text(proposed, encoding="utf-8")
+            print(f"Wrote {options.output}, a proposed mapping: check it line by line.")
         return 0
     if options.output is None:
         raise DataError("Give -o FILE, the table to write (.csv or .parquet), or --propose, which prints a mapping.")

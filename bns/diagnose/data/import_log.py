@@ -52,6 +52,14 @@ def refuse_to_overwrite(
             raise DataError(f"{output} is what is imported ({source}); nothing was written. Give another file with -o.")
 
 
+def check_new_mapping(output: Path) -> None:
+    """DataError if a proposed mapping may not be written there: a mapping that was checked by hand is not replaced."""
+    if output.suffix not in {".yaml", ".yml"}:
+        raise DataError(f"{output} is no name for a mapping: with --propose give -o FILE.yaml, e.g. LOG.import.yaml.")
+    if output.exists():
+        raise DataError(f"{output} exists and may have been corrected by hand; nothing was written. Give another file with -o.")
+
+
 def import_log(files: Sequence[Path], mapping: Mapping[str, Any] | None = None) -> Imported:
     """The first of the files, joined with the others by time, under ``mapping`` or the one that lies beside the first.
 
