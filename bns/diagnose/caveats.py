@@ -75,7 +75,7 @@ def notes_on(
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
         yield f"A candidate term: {formula.on} + {formula.term} with {values}."
     yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
-    if terms and with_terms is not None and not with_terms.falls:
+    if terms and with_terms is not None and (with_terms.rose_in_the_end or not with_terms.falls):
         yield _no_lower(with_terms)
     if hint is not None:
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
@@ -133,16 +133,17 @@ def on_many_apart(trials: Sequence[str]) -> str:
 
 def _no_lower(with_terms: PairedErrors) -> str:
     """What to do with a term with which the error does not fall at all horizons."""
-    if not with_terms.rose_at:
+    if not with_terms.rose_in_the_end:
         return (
             "Adding it does not clearly improve predictions of held-out trials: it describes the robot, but is not needed in the "
             "model."
         )
-    rose, fell = (" and ".join(IN_WORDS.get(h, h) for h in names) for names in (with_terms.rose_at, with_terms.fell_at))
+    both = with_terms.rose_in_the_end, with_terms.fell_in_the_end
+    rose, fell = (" and ".join(IN_WORDS.get(h, h) for h in names) for names in both)
     though = f", though it falls over {fell}" if fell else ""
     return (
-        f"With it, the error on held-out trials rises over {rose}{though}. It describes the robot, but do not add it to a "
-        "model that has to predict that far."
+        f"With it, the error on held-out trials rises over {rose}{though}. It describes the robot, but the extended model does "
+        "without it."
     )
 
 

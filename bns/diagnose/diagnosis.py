@@ -90,6 +90,11 @@ class Diagnosis:
         """The model with the effects and all terms, fitted together: `errors_with_terms` are of it; None without terms."""
         return self.terms[0].fit.model if self.terms else None
 
+    @property
+    def terms_raise_the_error(self) -> bool:
+        """Does the error on held-out trials certainly rise with the terms, at any horizon? They are not added then."""
+        return bool(self.errors_with_terms and self.errors_with_terms.rose_in_the_end)
+
     def as_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""
         selection = self.selection
@@ -135,7 +140,7 @@ class Diagnosis:
 
     @property
     def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """The numbers of the effects: where terms were found, as fitted beside these, which keep them from being biased.
+        """The numbers of the effects: where terms were found that may be added, as fitted beside these, which keep them unbiased.
 
         Of single relative motions: as calibrated together, since an effect that was not accepted has a number there, too.
         """
@@ -144,7 +149,7 @@ class Diagnosis:
         if self.calibration is not None and not self.terms:
             together = numbers_of(self.calibration)
             return {name: together.get(name, values) for name, values in numbers_of(self.selection.fit).items()}
-        fit = self.terms[0].fit if self.terms else self.selection.fit
+        fit = self.terms[0].fit if self.terms and not self.terms_raise_the_error else self.selection.fit
         own = {term.name for term in self.terms}
         return {name: values for name, values in numbers_of(fit).items() if name not in own}
 

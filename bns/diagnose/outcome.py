@@ -249,11 +249,18 @@ def _established(
 
 
 def _without_negligible(found: Established, selection: SelectionResult, predictor: Predictor) -> Established:
-    """Without the effects that lower no held-out error of the model with the terms; as it is where there are no terms."""
-    if not found.terms or not found.names:
+    """Without the effects, and the terms, that lower no held-out error of the model with all of them.
+
+    As it is where there are no terms. Where no term lowers any by itself, all stay: they are judged together later.
+    """
+    if not found.terms:
         return found
-    beside = replace(selection, problem=found.problem, fit=found.fit, accepted=found.names)
-    if not (tiny := negligible(beside, fewest=0)):
+    own = {term.name for term in found.terms}
+    beside = replace(selection, problem=found.problem, fit=found.fit, accepted=(*found.names, *own))
+    tiny = set(negligible(beside, fewest=0))
+    if own <= tiny:
+        tiny -= own
+    if not tiny:
         return found
     model = found.fit.model
     for name in tiny:
@@ -261,7 +268,8 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
     problem = problem_for(predictor, model, found.problem.pose_filter.noise)
     fit = problem.fit(model)
     names = tuple(name for name in found.names if name not in tiny)
-    return Established(names, tuple(replace(term, fit=fit) for term in found.terms), problem, fit)
+    terms = tuple(replace(term, fit=fit) for term in found.terms if term.name not in tiny)
+    return Established(names, terms, problem, fit)
 
 
 def _matters(errors: PairedErrors) -> bool:

@@ -7,9 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import bns.api.diagnose as asked_of
+import bns.diagnose.diagnosis as said_by
+from bns.api.diagnose import DiagnoseResult
 from bns.diagnose.caveats import _no_lower, _on_drift, _on_effects, _on_times, on_worst
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosis import Diagnosis, diagnose
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.worst_trials import WithoutWorst
@@ -22,17 +25,34 @@ from tests.diagnose.worlds import NOMINAL, measured
     [
         ((), (), "is not needed in the model"),
         (("trial",), ("command", "1s"), "rises over the whole trial, though it falls over one command and 1 second"),
-        (("5s", "trial"), (), "rises over 5 seconds and the whole trial. It describes the robot, but do not add it"),
+        (("5s", "trial"), (), "5 seconds and the whole trial. It describes the robot, but the extended model does without"),
     ],
 )
 def test_a_term_with_which_an_error_rises_must_not_be_added(rose, fell, said):
-    assert said in _no_lower(SimpleNamespace(rose_at=rose, fell_at=fell))
+    assert said in _no_lower(SimpleNamespace(rose_in_the_end=rose, fell_in_the_end=fell))
 
 
 def test_an_error_that_may_have_changed_by_luck_neither_fell_nor_rose():
     changes = {"command": Change(-0.01, -0.02, -0.005), "1s": Change(-0.01, -0.02, 0.01), "trial": Change(0.1, 0.05, 0.2)}
-    errors = PairedErrors({h: SimpleNamespace(total=change) for h, change in changes.items()}, None, 20)
-    assert (errors.fell_at, errors.rose_at) == (("command",), ("trial",))
+    errors = PairedErrors({h: SimpleNamespace(total=None, changes=(change,)) for h, change in changes.items()}, None, 20)
+    assert (errors.fell_in_the_end, errors.rose_in_the_end) == (("command",), ("trial",))
+
+
+@pytest.mark.parametrize(("low", "high", "added"), [(0.001, 0.02, False), (-0.001, 0.02, True)])
+def test_terms_with_which_an_error_rises_are_in_no_extended_model(monkeypatch, low, high, added):
+    """The fits are mocked: with the term the gain is 0.8, without it 0.9."""
+    fits = {name: SimpleNamespace(model=name) for name in ("without", "with")}
+    monkeypatch.setattr(said_by, "numbers_of", lambda fit: {"speed-gain": 0.8 if fit is fits["with"] else 0.9})
+    monkeypatch.setattr(asked_of, "documented", lambda fit, *_: fit.model)
+    monkeypatch.setattr(asked_of, "Model", lambda model: model)
+    errors = PairedErrors({"trial": SimpleNamespace(total=None, changes=(Change(0.01, low, high),))}, None, 20)
+    found = Diagnosis(
+        "unlisted", SimpleNamespace(fit=fits["without"], accepted=("speed-gain",)), errors_with_terms=errors,
+        terms=(SimpleNamespace(fit=fits["with"], name="unlisted"),),
+    )  # fmt: skip
+    result = DiagnoseResult(SimpleNamespace(model=None, measured=None), found)
+    assert found.numbers == {"speed-gain": 0.8 if added else 0.9}
+    assert result.extended == ("with" if added else "without")
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from bns.diagnose.residuals.established import (
     _restored,
     _State,
     _step,
+    _without_idle_terms,
     _without_needless_terms,
     established,
     left_over,
@@ -29,6 +30,7 @@ from bns.diagnose.residuals.grammar import (
     RESPONSE_OF,
     SESSION,
     STRAIGHT,
+    SURFACE,
     families,
     may_join,
     ranked,
@@ -41,6 +43,7 @@ from bns.physics.formula import formula_effect
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 BOTH_WAYS = (-0.2, 0.2)
+FOUND_TOGETHER = ("speed of each wheel", "wheels"), ("time in the trial", "share")
 
 
 def predictor_of(model, **how):
@@ -257,7 +260,7 @@ def test_an_effect_that_leaves_metres_behind_does_not_stand_in_place_of_a_curve(
 def test_an_effect_stands_in_place_of_its_curve_beside_another_curve_that_stays(warm_up):
     predictor = predictor_of(warming(warm_up, dead_zone={"width_m_s": 0.02}))
     catalogue = listed(NOMINAL, None, predictor.tracks)
-    state = drawn_by_curves(predictor, ("speed of each wheel", "wheels"), ("time in the trial", "share"))
+    state = drawn_by_curves(predictor, *FOUND_TOGETHER)
     ended = _restored(predictor, state, {"dead-zone": catalogue["dead-zone"]}, 0.01)
     assert (ended.names, [term.signal for term in ended.terms]) == (("dead-zone",), ["time in the trial"])
     low, high = ended.fit.interval([f.effect for f in ended.fit.free].index("dead-zone"))
@@ -286,6 +289,30 @@ def test_effects_that_leave_something_do_not_replace_a_curve_that_leaves_nothing
     accepted = {"dead-zone": listed(NOMINAL, None, predictor.tracks)["dead-zone"]}
     ended = _without_needless_terms(predictor, state, accepted, 0.01)
     assert (ended.names, ended.terms == state.terms) == (((), True) if effects_leave_something else (("dead-zone",), False))
+
+
+def test_a_share_of_motion_over_speed_and_turn_contains_a_share_of_all_motion():
+    """Else a gain beside it would be the number of the one corner that it lacks: slow motion."""
+    predictor = predictor_of(hidden())
+    surface = next(f for f in families(predictor, NOMINAL.wheelbase_m) if (f.signal, f.on) == (SURFACE, "share"))
+    term = formula_effect("surface", surface.term, "share")
+    all_alike = NOMINAL.with_active(term, tuple(-0.1 for _ in term.parameters))
+    gain = NOMINAL.with_active(listed(NOMINAL, None, predictor.tracks)["speed-gain"], (0.9,))
+    np.testing.assert_allclose(predictor.steps(all_alike).body, predictor.steps(gain).body, atol=1e-5)
+
+
+def test_a_term_that_is_idle_beside_later_ones_goes(monkeypatch):
+    """Also where a step that leaves one trial out overshoots, so that held-out trials seem to gain by it."""
+    predictor = predictor_of(warming(-0.2))
+    state = drawn_by_curves(predictor, ("time in the trial", "share"), ("speed and turn", "s"))
+    ended = _without_idle_terms(predictor, state, 0.01)
+    assert [term.name for term in ended.terms] == ["term-1"]
+    assert _without_idle_terms(predictor, ended, 0.01) is ended
+    certain = SimpleNamespace(elpd_diff=20.0, dse=2.0, p_value=1e-5, z=10.0)
+    monkeypatch.setattr("bns.diagnose.estimate.fit.Problem.paired_comparison", lambda *_: certain)
+    assert [term.name for term in _without_idle_terms(predictor, state, 0.01).terms] == ["term-1"]
+    both = drawn_by_curves(predictor_of(warming(-0.2, dead_zone={"width_m_s": 0.02})), *FOUND_TOGETHER)
+    assert _without_idle_terms(both.problem.predictor, both, 0.01) is both
 
 
 @pytest.mark.parametrize(

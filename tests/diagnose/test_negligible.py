@@ -127,6 +127,24 @@ def test_with_a_term_in_the_model_an_effect_that_lowers_no_error_is_not_named():
     assert outcome._without_negligible(alone, searched, seen) is alone
 
 
+@pytest.mark.parametrize(("tiny", "kept"), [((), (1, 2)), (("unlisted-2",), (1,)), (("unlisted", "unlisted-2"), (1, 2))])
+def test_of_several_terms_those_that_lower_no_error_go_but_never_all(monkeypatch, tiny, kept):
+    """Which are negligible is mocked."""
+    seen = WheelPredictor(tracks_of(measured(hidden(), trials=12)))
+    problem = problem_for(seen, NOMINAL)
+    one = fitted(problem, problem.fit(NOMINAL), "v", "k * v * abs(v)", "unlisted", "speed and turn")
+    two = fitted(problem, one.fit, "w", "k * w * abs(w)", "unlisted-2", "speed and turn")
+    found = Established((), (replace(one, fit=two.fit), two), problem, two.fit)
+    asked = []
+    monkeypatch.setattr(outcome, "negligible", lambda selection, fewest: asked.append((selection.accepted, fewest)) or tiny)
+    ended = outcome._without_negligible(found, SelectionResult(problem, one.fit, one.fit, (), ()), seen)
+    assert [(set(names), fewest) for names, fewest in asked] == [({"unlisted", "unlisted-2"}, 0)]
+    names = [("unlisted", "unlisted-2")[i - 1] for i in kept]
+    assert [term.name for term in ended.terms] == names
+    assert all(term.fit is ended.fit for term in ended.terms)
+    assert {active.effect.name for active in ended.fit.model.effects} == set(names)
+
+
 @pytest.mark.parametrize(
     ("error_m", "outliers", "counts"), [(0.0013, (), False), (0.0015, (), True), (0.0013, ("a moment",), True)]
 )

@@ -121,14 +121,14 @@ class PairedErrors:
         return _falls([e.total for e in self.horizons.values() if e.total is not None])
 
     @property
-    def fell_at(self) -> tuple[str, ...]:
-        """Horizons at which the error certainly falls from the first model to the last."""
-        return tuple(h for h, e in self.horizons.items() if e.total is not None and e.total.fell)
+    def fell_in_the_end(self) -> tuple[str, ...]:
+        """Horizons at which the error certainly falls from the last model but one to the last."""
+        return tuple(h for h, e in self.horizons.items() if e.changes and e.changes[-1].fell)
 
     @property
-    def rose_at(self) -> tuple[str, ...]:
-        """Horizons at which it certainly rises."""
-        return tuple(h for h, e in self.horizons.items() if e.total is not None and e.total.rose)
+    def rose_in_the_end(self) -> tuple[str, ...]:
+        """Horizons at which it certainly rises there."""
+        return tuple(h for h, e in self.horizons.items() if e.changes and e.changes[-1].rose)
 
     def between(self, before: str, after: str) -> bool:
         """Does the error fall from one model to the one that follows it? As `falls`."""

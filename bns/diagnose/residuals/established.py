@@ -112,6 +112,7 @@ def established(
     state = _without_needless_terms(predictor, state, accepted, level)
     state = _pruned(predictor, state, level, _alone(predictor, given, state))
     state = _without_shifts(predictor, _restored(predictor, state, accepted, level))
+    state = _without_idle_terms(predictor, state, level)
     terms = tuple(replace(term, fit=state.fit) for term in state.terms)
     return Established(state.names, terms, state.problem, state.fit)
 
@@ -202,6 +203,27 @@ def _without_needless_terms(
         ):
             terms = tuple(one for one in state.terms if one.name != term.name)
             state = _pruned(predictor, _State(problem, without, tuple(accepted), terms, state.known), level)
+    return state
+
+
+def _without_idle_terms(predictor: Predictor, state: _State, level: float) -> _State:
+    """Without the terms that earn nothing beside what came in after them, the least first; the last one stays.
+
+    Nor may one earn on held-out trials what it does not in those that it was fitted to: a model without it may have a trial that
+    rules it, and the one step that leaves this trial out then overshoots.
+    """
+    while len(state.terms) > 1:
+        lacking = {
+            term.name: state.problem.fit(state.fit.model.without(term.name), nearby=state.fit.jacobian_by_parameter)
+            for term in state.terms
+        }
+        fitted_share = {name: 1.0 - state.fit.loss / one.loss for name, one in lacking.items()}
+        least = min(fitted_share, key=lambda name: fitted_share[name])
+        comparison = state.problem.paired_comparison(lacking[least], state.fit)
+        if fitted_share[least] > MIN_GAIN and _term_earns(comparison, lacking[least], level):
+            break
+        others = tuple(term for term in state.terms if term.name != least)
+        state = replace(state.settled(predictor, lacking[least]), terms=others)
     return state
 
 

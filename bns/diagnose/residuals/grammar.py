@@ -131,7 +131,7 @@ def _surfaces(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
     if fastest > 0.0 and sharpest > 0.0:
         yield Family(SURFACE, "w", tuple(f"sign(w) * {v} * {w}" for v in speeds for w in turns[1:]))
         yield Family(SURFACE, "v", tuple(f"sign(v) * {v} * {w}" for v in speeds[1:] for w in turns))
-        yield Family(SURFACE, SHARE, tuple(f"{v} * {w}" for v in speeds for w in turns)[1:])
+        yield Family(SURFACE, SHARE, tuple(f"{v} * {w}" for v in speeds for w in turns))
 
 
 def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
