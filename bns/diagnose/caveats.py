@@ -18,6 +18,7 @@ from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import ties_of
+from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.model import Model
 
@@ -67,6 +68,7 @@ def notes_on(
             "more, so it is not named. It may be an artefact of the log, such as rounded time stamps."
         )
     yield from _on_effects(selection, tracks)
+    yield from _on_the_cone(selection.fit.model)
     for names in longer:
         yield f"{' with '.join(names)} would explain as much, with one more effect."
     yield from _on_rest(found.rest, tracks)
@@ -145,6 +147,15 @@ def _no_lower(with_terms: PairedErrors) -> str:
         f"With it, the error on held-out trials rises over {rose}{though}. It describes the robot, but the extended model does "
         "without it."
     )
+
+
+def _on_the_cone(model: Model) -> Iterator[str]:
+    if isinstance(model, JointedModel) and machine(model.mechanism).pyramidal:
+        yield (
+            "The model's contacts have a pyramidal friction cone, MuJoCo's default: along the diagonals they hold up to 29% less "
+            "than along the axes, as no floor does. An effect of friction may stand for that. Set <option cone=\"elliptic\"/> in "
+            "the model and ask again."
+        )
 
 
 def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:

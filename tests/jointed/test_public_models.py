@@ -5,12 +5,14 @@ import numpy as np
 import pytest
 
 import bns
+from bns.api.model import as_model
+from bns.diagnose.caveats import _on_the_cone
 from bns.errors import DataError
 from bns.physics.jointed.drives import Drive
 from bns.physics.jointed.mechanism import Mechanism, machine
 from bns.physics.jointed.model_files import load_body
 from bns.physics.jointed.simulate import Simulator, _Servos
-from tests.jointed import dog
+from tests.jointed import arm, dog
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +38,16 @@ def test_a_quadruped_has_servos_links_and_effects_by_their_own_names(body):
     for name in ("weak-joint-FR_calf_joint", "link-friction-FR_calf", "floor-friction", "marker-offset-head"):
         assert name in known
     assert "link-friction-FR_hip" not in known  # nothing of it may touch the floor
+
+
+def test_a_pyramid_of_friction_is_pointed_out_where_a_body_lies_on_a_floor(tmp_path, body):
+    default = tmp_path / "default.xml"
+    default.write_text(dog.xml().replace('cone="elliptic" ', ""))
+    (tmp_path / "arm.xml").write_text(arm.xml())
+    of_default = load_body(str(default), sites=list(dog.SITES))
+    assert 'Set <option cone="elliptic"/>' in next(_on_the_cone(of_default))
+    for model in (body, load_body(str(tmp_path / "arm.xml")), as_model("khepera")):
+        assert list(_on_the_cone(model)) == []
 
 
 def test_of_two_that_touch_the_one_with_priority_counts(body):

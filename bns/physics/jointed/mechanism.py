@@ -71,6 +71,11 @@ class Machine:
         return tuple((self.model.body(link + 1).name or f"link-{link}", link) for link in links)
 
     @property
+    def pyramidal(self) -> bool:
+        """Is friction on the floor bounded by a pyramid, MuJoCo's default, which holds 1 - 1/sqrt(2) less along its diagonals?"""
+        return self.free and self.model.npair > 0 and int(self.model.opt.cone) == int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
+
+    @property
     def pair_links(self) -> NDArray[np.int64]:
         """The moving body of every contact pair, (pairs,)."""
         bodies = self.model.geom_bodyid
