@@ -61,11 +61,14 @@ def notes_on(
             "(root mean square on the same windows). So it is not presented as an explanation."
         )
     yield from _on_slight(found.unseen, slight)
+    known = known_effects(selection) if found.negligible else {}
     for name, numbers in found.negligible.items():
+        of_log = name not in known or known[name].of_measuring
+        why = " It may be an artefact of the log, such as rounded time stamps." if of_log else ""
         said = ", ".join(f"{key} = {number['value']:.3g} {number['unit']}" for key, number in numbers.items())
         yield (
             f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "
-            "more, so it is not named. It may be an artefact of the log, such as rounded time stamps."
+            f"more, so it is not named.{why}"
         )
     yield from _on_effects(selection, tracks)
     yield from _on_the_cone(selection.fit.model)

@@ -260,7 +260,7 @@ def _diagnosed(
         found = replace(found, selection=search.competing(found.selection))
     left = found.rest.any or bool(found.terms)
     words = tuple(in_words(term, predictor) for term in found.terms)
-    hint = _hint(found.selection, len(predictor.tracks))
+    hint = _hint(found.selection, len(predictor.tracks), {*found.withdrawn, *found.imitating, *found.negligible})
     tick("longer explanations")
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
     return Diagnosis(
@@ -318,8 +318,8 @@ def _verdict(selection: SelectionResult, unexplained: bool, hint: Candidate | No
     return "insufficient-data" if hint else "none"
 
 
-def _hint(selection: SelectionResult, trials: int) -> Candidate | None:
-    """The best candidate of a search that accepted nothing, where few trials nearly sufficed."""
+def _hint(selection: SelectionResult, trials: int, judged: Collection[str] = ()) -> Candidate | None:
+    """The best candidate of a search that accepted nothing, where few trials nearly sufficed; none that was ``judged``."""
     if selection.accepted or trials >= FEW_TRIALS:
         return None
     step, least = selection.steps[0], MIN_GAIN * float(selection.nominal.losses.mean())
@@ -328,6 +328,7 @@ def _hint(selection: SelectionResult, trials: int) -> Candidate | None:
         c
         for c in step.ranking
         if not c.rejected_because
+        and c.name not in judged
         and c.paired_comparison.p_value < level
         and c.paired_comparison.z > 2
         and c.paired_comparison.elpd_diff > max(step.decoy_threshold, least)

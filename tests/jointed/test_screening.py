@@ -231,7 +231,8 @@ def test_what_numbers_of_the_base_gain_on_few_tracks_is_no_effect_s_gain():
 @pytest.mark.parametrize(("of_how_many", "hinted"), [(2, True), (55, False)])
 def test_a_sign_of_too_few_trials_is_judged_by_all_effects_that_were_screened(of_how_many, hinted):
     earned = SimpleNamespace(p_value=0.02, z=3.0, elpd_diff=1.0)
-    candidate = SimpleNamespace(rejected_because="", paired_comparison=earned)
+    candidate = SimpleNamespace(name="clock-drift", rejected_because="", paired_comparison=earned)
     step = SelectionStep((candidate, candidate), 0.1, "", of=of_how_many)
     found = SimpleNamespace(accepted=(), steps=(step,), nominal=SimpleNamespace(losses=np.ones(9)))
     assert (diagnosis._hint(found, 9) is candidate) is hinted
+    assert diagnosis._hint(found, 9, {"clock-drift"}) is None  # said to lower no error: more trials are not asked for, too

@@ -150,7 +150,9 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
         left_out = ", ".join(f"{e.left_out} at {h}" for h, e in errors.horizons.items() if e.left_out)
         yield f"  (windows excluded because the tracker jumps within them or poses were left out: {left_out})"
     if errors.noise is None:
-        yield "  (noise not known: the poses are too far apart in time)"
+        of_body = {"cycle", "stretch"} & set(errors.horizons)
+        why = "of a body only the ends of a stretch are compared" if of_body else "the poses are too far apart in time"
+        yield f"  (noise not known: {why})"
     else:
         pose_mm, basis = 1e3 * errors.noise.position_m, errors.noise.basis
         of = {"at rest": "poses at rest", "high frequency": "poses at high frequency"}.get(basis, basis)
