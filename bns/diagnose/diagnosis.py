@@ -14,7 +14,7 @@ from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
-from bns.diagnose.outcome import outcome_of, predicts_better_throughout
+from bns.diagnose.outcome import alike_in_metres, outcome_of, predicts_better_throughout
 from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
@@ -258,6 +258,8 @@ def _diagnosed(
         found = found if predicts_better_throughout(found, without) else without
     if found.fewer and not found.terms and isinstance(predictor, WheelPredictor):  # of a body it would take minutes
         found = replace(found, selection=search.competing(found.selection))
+    if isinstance(predictor, WheelPredictor):
+        found = replace(found, selection=alike_in_metres(found.selection))
     left = found.rest.any or bool(found.terms)
     words = tuple(in_words(term, predictor) for term in found.terms)
     hint = _hint(found.selection, len(predictor.tracks), {*found.withdrawn, *found.imitating, *found.negligible})

@@ -6,12 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bns.diagnose.estimate.cross_validation import Judged, judged_errors
+import numpy as np
+
+from bns.diagnose.estimate.cross_validation import Judged, held_out_steps, judged_errors
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.predict.paired_errors import PairedErrors
+from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.diagnose.residuals.established import Established, established, left_over
@@ -19,7 +21,7 @@ from bns.diagnose.residuals.floor_field import imitating_floor
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.negligible import fall_matters, negligible
+from bns.diagnose.select.negligible import LEAST_FALL, fall_matters, negligible
 from bns.diagnose.select.result import SelectionResult, certainly_lower
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of
@@ -212,6 +214,27 @@ def _beside_the_floor(
     kept = tuple(name for name in selection.accepted if name not in lost)
     other = _explained(selection.only(kept), others[0]) if others else selection.only(kept)
     return _standing(other, predictor, given, tick), lost
+
+
+def alike_in_metres(selection: SelectionResult) -> SelectionResult:
+    """The result without the explanations that fit as well and predict worse: errors add up along a path.
+
+    The accepted one has the certainly lower error on held-out trials at one horizon, by `least_fall`, and is lower by as much on
+    average over all (mean of the logarithms).
+    """
+    problem = selection.problem
+    if not selection.competing_models or selection.fit.model.per_trial_effect is not None:
+        return selection
+    accepted = held_out_steps(problem.predictor, problem.pose_filter, selection.fit.model)
+    alike = []
+    for names in selection.competing_models:
+        rest = selection.only(tuple(name for name in selection.accepted if name in names))
+        other = held_out_steps(problem.predictor, problem.pose_filter, _explained(rest, names).fit.model)
+        errors = paired_errors(problem.predictor, [("other", other), ("accepted", accepted)])
+        ratios = [at.rms_of("accepted") / at.rms_of("other") for at in errors.horizons.values() if at.windows]
+        if not fall_matters(errors, "other", "accepted") or np.log(ratios).mean() > np.log(1.0 - LEAST_FALL):
+            alike.append(names)
+    return replace(selection, competing_models=tuple(alike))
 
 
 def _explained(selection: SelectionResult, names: tuple[str, ...]) -> SelectionResult:

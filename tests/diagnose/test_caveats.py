@@ -13,11 +13,13 @@ from bns.api.diagnose import DiagnoseResult
 from bns.diagnose.caveats import _no_lower, _on_drift, _on_effects, _on_times, on_worst
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis, diagnose
-from bns.diagnose.predict.paired_errors import Change, PairedErrors
+from bns.diagnose.predict.paired_errors import Change, HorizonErrors, ModelError, PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.worst_trials import WithoutWorst
 from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, measured
+
+MODELS = (SimpleNamespace(rms_m=0.1), SimpleNamespace(rms_m=0.1))
 
 
 @pytest.mark.parametrize(
@@ -34,8 +36,29 @@ def test_a_term_with_which_an_error_rises_must_not_be_added(rose, fell, said):
 
 def test_an_error_that_may_have_changed_by_luck_neither_fell_nor_rose():
     changes = {"command": Change(-0.01, -0.02, -0.005), "1s": Change(-0.01, -0.02, 0.01), "trial": Change(0.1, 0.05, 0.2)}
-    errors = PairedErrors({h: SimpleNamespace(total=None, changes=(change,)) for h, change in changes.items()}, None, 20)
+    each = {h: SimpleNamespace(total=None, changes=(change,), models=MODELS) for h, change in changes.items()}
+    errors = PairedErrors(each, None, 20)
     assert (errors.fell_in_the_end, errors.rose_in_the_end) == (("command",), ("trial",))
+
+
+@pytest.mark.parametrize(
+    ("changes_mm", "falls"),
+    [
+        ([(-14.0, -17.0, -12.0), (0.3, 0.1, 0.5)], True),  # 0.3 of 40 mm, where the trials end at rest
+        ([(-14.0, -17.0, -12.0), (1.0, 0.5, 2.0)], False),
+        ([(-3.0, -9.0, 0.1), (-1.0, -3.0, 2.0)], False),  # undecided everywhere
+        ([(-3.0, np.nan, np.nan), (0.3, np.nan, np.nan)], True),  # too few trials for an interval
+        ([(-3.0, np.nan, np.nan), (1.0, np.nan, np.nan)], False),
+        ([(np.nan, np.nan, np.nan)], False),
+    ],
+)
+def test_an_error_falls_where_it_certainly_does_and_rises_nowhere_by_what_matters(changes_mm, falls):
+    before = ModelError("as given", 0.04, 0.03, 0.05, 0.03, 0.1)
+    horizons = {
+        str(n): HorizonErrors(str(n), 20, 0, (before, before), (), Change(*(1e-3 * v for v in change)), 0.001)
+        for n, change in enumerate(changes_mm)
+    }
+    assert PairedErrors(horizons, None, 20).falls == falls
 
 
 @pytest.mark.parametrize(("low", "high", "added"), [(0.001, 0.02, False), (-0.001, 0.02, True)])
@@ -45,7 +68,7 @@ def test_terms_with_which_an_error_rises_are_in_no_extended_model(monkeypatch, l
     monkeypatch.setattr(said_by, "numbers_of", lambda fit: {"speed-gain": 0.8 if fit is fits["with"] else 0.9})
     monkeypatch.setattr(asked_of, "documented", lambda fit, *_: fit.model)
     monkeypatch.setattr(asked_of, "Model", lambda model: model)
-    errors = PairedErrors({"trial": SimpleNamespace(total=None, changes=(Change(0.01, low, high),))}, None, 20)
+    errors = PairedErrors({"trial": SimpleNamespace(total=None, changes=(Change(0.01, low, high),), models=MODELS)}, None, 20)
     found = Diagnosis(
         "unlisted", SimpleNamespace(fit=fits["without"], accepted=("speed-gain",)), errors_with_terms=errors,
         terms=(SimpleNamespace(fit=fits["with"], name="unlisted"),),

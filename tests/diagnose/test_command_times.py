@@ -30,8 +30,17 @@ def late(table, seed=0, latest=LATEST):
     return pd.concat(parts, ignore_index=True)
 
 
-def times_in(table, model=NOMINAL):
-    predictor = WheelPredictor(tracks_of(table))
+def stopping_sooner(tracks):
+    """The tracks of a robot with friction: told to stop, it stands the sooner, the slower it was."""
+    duration_s = tracks.duration_s.copy()
+    for trial, k in np.argwhere((tracks.left_m_s[:, 1:] == 0.0) & (tracks.left_m_s[:, :-1] > 0.0)):
+        sooner_s = min(0.003 / tracks.left_m_s[trial, k], 0.1)
+        duration_s[trial, k : k + 2] += sooner_s, -sooner_s
+    return replace(tracks, duration_s=duration_s)
+
+
+def times_in(table, model=NOMINAL, as_logged=lambda tracks: tracks):
+    predictor = WheelPredictor(as_logged(tracks_of(table)))
     problem = problem_for(predictor, model)
     return command_times(problem, problem.fit(model))
 
@@ -47,6 +56,14 @@ def test_the_scatter_is_that_of_the_delays(table):
     assert found.sd_s == pytest.approx(spread_s, rel=0.12)
     assert found.high_s - found.low_s == pytest.approx(LATEST * FRAME_S, rel=0.15)
     assert f"standard deviation {1e3 * found.sd_s:.0f} ms" in found.in_words
+
+
+def test_stops_of_a_robot_with_friction_are_no_scatter(monkeypatch):
+    """Not even at a sixth of what is asked of scatter."""
+    monkeypatch.setattr("bns.diagnose.residuals.command_times.TIMES_USUAL", 1.0)
+    table = measured(NOMINAL, trials=30, seed=3, speeds=(0.02, 0.2), commands=8, pauses=True, straight=1.0)
+    assert times_in(table, as_logged=stopping_sooner) is None
+    assert times_in(late(table), hidden(command_delay={"delay_s": LATEST * FRAME_S / 2})) is not None
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,21 @@ def test_ties_keep_what_is_left_of_them():
     assert [a.effect.name for a in kept.fit.model.effects] == ["wheelbase"]
 
 
+@pytest.mark.parametrize(
+    ("truth", "rival", "stays"),
+    [
+        ({"wheel_mismatch": {"ratio": 1.03}}, ("clock-offset",), False),
+        ({"command_delay": {"delay_s": 0.1}}, ("clock-offset",), True),
+    ],
+)
+def test_an_explanation_that_predicts_worse_in_metres_is_no_tie(truth, rival, stays):
+    seen = WheelPredictor(tracks_of(measured(hidden(**truth), trials=16, seed=5)))
+    name = next(iter(truth)).replace("_", "-")
+    problem, fit, _ = fit_set(seen, NOMINAL, [listed(NOMINAL, None, seen.tracks)[name]])
+    one = SelectionResult(problem, problem.fit(NOMINAL), fit, (name,), (), (rival,))
+    assert outcome.alike_in_metres(one).competing_models == ((rival,) if stays else ())
+
+
 @pytest.mark.slow
 def test_a_diagnosis_says_what_is_negligible(monkeypatch):
     """A stand-in for the judgement: the mismatch is worth naming, and is taken for negligible here."""

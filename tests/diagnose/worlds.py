@@ -20,19 +20,30 @@ def hidden(**effects):
 
 
 def measured(
-    model, trials=16, seed=0, noise=(0.0015, 0.005), jitter=0.004, ends_only=False, commands=5, speeds=(0.02, 0.2), straight=0.0
+    model,
+    trials=16,
+    seed=0,
+    noise=(0.0015, 0.005),
+    jitter=0.004,
+    ends_only=False,
+    commands=5,
+    speeds=(0.02, 0.2),
+    straight=0.0,
+    pauses=False,
 ):
     """A table of measurements of a model's robot: random commands, motors that vary a little, a camera at 25 Hz.
 
-    ``straight``: the share of commands in which both wheels are told the same.
+    ``straight``: the share of commands in which both wheels are told the same; ``pauses``: is every other command a stop?
     """
     rng = np.random.default_rng(seed)
-    kind = (noise, jitter, ends_only, commands, speeds, straight)
+    kind = (noise, jitter, ends_only, commands, speeds, straight, pauses)
     return pd.concat([_trial(model, i, rng, *kind) for i in range(trials)], ignore_index=True)
 
 
-def _trial(model, number, rng, noise, jitter, ends_only, commands, speeds, straight):
+def _trial(model, number, rng, noise, jitter, ends_only, commands, speeds, straight, pauses):
     left, right = rng.uniform(*speeds, (2, commands))
+    if pauses:
+        left[1::2] = right[1::2] = 0.0
     if straight:
         right = np.where(rng.uniform(size=commands) < straight, left, right)
     duration = np.round(rng.uniform(0.4, 2.0, commands) / FRAME_S) * FRAME_S

@@ -25,6 +25,7 @@ from bns.diagnose.predict.horizons import Errors, errors_of
 from bns.diagnose.settings import DEFAULTS
 
 DRAWS = DEFAULTS.predict.interval_draws
+LEAST_FALL = DEFAULTS.select.least_fall
 FEWEST_TRIALS = DEFAULTS.predict.interval_fewest_trials
 _SEED = DEFAULTS.predict.interval_seed
 _LATELY = 12
@@ -74,9 +75,13 @@ class Change:
 _UNKNOWN = Change(float("nan"), float("nan"), float("nan"))
 
 
-def _falls(changes: Sequence[Change]) -> bool:
-    known = [c for c in changes if np.isfinite(c.change_m)]
-    return bool(known) and max(known, key=lambda c: c.certainty).change_m < 0 and not any(c.rose for c in known)
+def _rises(change: Change, before_m: float) -> bool:
+    """Is the error certainly higher, by as much as an effect must lower it (`least_fall`)?"""
+    return change.rose and change.change_m >= LEAST_FALL * before_m
+
+
+def _surest(changes: Sequence[Change]) -> Change:
+    return max(changes, key=lambda c: c.certainty)
 
 
 @dataclass(frozen=True)
@@ -93,6 +98,10 @@ class HorizonErrors:
     changes: tuple[Change, ...]
     total: Change | None
     noise_floor_m: float
+
+    def rms_of(self, name: str) -> float:
+        """Root mean square error of a model, m."""
+        return next(m.rms_m for m in self.models if m.name == name)
 
     def change_between(self, before: str, after: str) -> Change:
         """Of two models next to each other."""
@@ -114,11 +123,15 @@ class PairedErrors:
 
     @property
     def falls(self) -> bool:
-        """Does the error fall from the first model to the last?
+        """Does the error certainly fall from the first model to the last at one horizon, and rise at none?
 
-        The horizon at which the change is surest decides; at none may it rise for certain.
+        A rise counts from `least_fall` of the error on. Without intervals (too few trials) every change counts as certain.
         """
-        return _falls([e.total for e in self.horizons.values() if e.total is not None])
+        known = [(e.total, e.models[0].rms_m) for e in self.horizons.values() if e.total is not None]
+        known = [(change, before_m) for change, before_m in known if np.isfinite(change.change_m)]
+        if not known or any(_rises(*one) for one in known):
+            return False
+        return any(change.fell for change, _ in known)
 
     @property
     def fell_in_the_end(self) -> tuple[str, ...]:
@@ -127,12 +140,17 @@ class PairedErrors:
 
     @property
     def rose_in_the_end(self) -> tuple[str, ...]:
-        """Horizons at which it certainly rises there."""
-        return tuple(h for h, e in self.horizons.items() if e.changes and e.changes[-1].rose)
+        """Horizons at which it certainly rises there, by `least_fall` or more."""
+        return tuple(h for h, e in self.horizons.items() if e.changes and _rises(e.changes[-1], e.models[-2].rms_m))
 
     def between(self, before: str, after: str) -> bool:
-        """Does the error fall from one model to the one that follows it? As `falls`."""
-        return _falls([c for e in self.horizons.values() for c in [e.change_between(before, after)]])
+        """Does the error fall from one model to the one that follows it?
+
+        The horizon at which the change is surest decides; at none may it rise for certain, by `least_fall` or more.
+        """
+        pairs = [(e.change_between(before, after), e.rms_of(before)) for e in self.horizons.values()]
+        known = [(change, before_m) for change, before_m in pairs if np.isfinite(change.change_m)]
+        return bool(known) and _surest([c for c, _ in known]).change_m < 0 and not any(_rises(*one) for one in known)
 
     def as_json(self) -> dict[str, Any]:
         """Plain values; metres and radians."""

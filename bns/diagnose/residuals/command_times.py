@@ -2,9 +2,9 @@
 
 Each change of command is shifted a little, which shows along which direction the innovations after it answer; how far they lie
 in that direction says how late this one command was. A delay, a lag, or a limit that the model lacks makes all of them late, by
-times that depend on the change (how large it is, of which wheel, whether it is a turn or reverses, how soon it follows): that is
-taken out. What is left is compared with the same direction later in the same command, where nothing changes: errors of a tracker
-and of the model are as large there.
+times that depend on the change (how large it is, of which wheel, whether it is a turn, reverses or stops, how soon it follows):
+that is taken out. What is left is compared with the same direction later in the same command, where nothing changes: errors of
+a tracker and of the model are as large there.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import huber, weights
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.signals import CREEP_M_S
 
 SHIFT_S = DEFAULTS.residuals.command_shift_s
 WINDOW_S = DEFAULTS.residuals.command_window_s
@@ -52,7 +53,8 @@ class _Change:
     """One change of command: its trial and number, the frames after it, and those later in the command (None: too few).
 
     ``kind``: on what a fault that is the same in every change may depend: 1, its size (m/s), the left wheel's share of it, how
-    alike both wheels change (1: ahead, -1: on the spot), which wheels reverse, and how soon it follows the one before.
+    alike both wheels change (1: ahead, -1: on the spot), which wheels reverse, which stop and the inverse of their speed (s/m;
+    friction ends a slow motion sooner), and how soon it follows the one before.
     """
 
     trial: int
@@ -108,8 +110,10 @@ def _kind(speeds: Array, since_s: float) -> tuple[float, ...]:
     by = [float(v) for v in speeds[:, 1] - speeds[:, 0]]
     square = by[0] ** 2 + by[1] ** 2
     reverse = [float(v) for v in speeds[:, 0] * speeds[:, 1] < 0.0]
+    stop = [float(was != 0.0 and now == 0.0) for was, now in speeds]
+    ends = [one / max(abs(float(was)), CREEP_M_S) for one, (was, _) in zip(stop, speeds, strict=True)]
     soon = float(np.exp(-since_s / WINDOW_S))
-    return 1.0, float(np.sqrt(square)), by[0] ** 2 / square, 2 * by[0] * by[1] / square, *reverse, soon
+    return 1.0, float(np.sqrt(square)), by[0] ** 2 / square, 2 * by[0] * by[1] / square, *reverse, *stop, *ends, soon
 
 
 def _scattered(
