@@ -173,11 +173,18 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
             yield f"with {after.name}, the error on held-out trials does not fall."
 
 
-def fitted_again(before: Model, fit: Fit) -> Iterator[str]:
-    """The effects whose numbers were measured or published, with those that they have now."""
+def fitted_again(before: Model, fit: Fit, contradicted: bool = False) -> Iterator[str]:
+    """The effects whose numbers were measured or published, with those that they have now.
+
+    ``contradicted``: only those with a number outside of the interval that it has now.
+    """
+    intervals = {(f.effect, f.parameter.name): fit.interval(i) for i, f in enumerate(fit.free)}
     for active in (a for a in before.effects if a.basis in {"measured", "published"}):
         name, own = active.effect.name, fit.model.values_of(active.effect.name)
         changed = {p.name: p for p in active.effect.parameters if own.get(p.name) != active.by_name[p.name]}
+        if contradicted:
+            ends = {key: intervals.get((name, key), (-np.inf, np.inf)) for key in changed}
+            changed = {key: p for key, p in changed.items() if not ends[key][0] <= active.by_name[key] <= ends[key][1]}
         was, now = (
             ", ".join(f"{key} = {values[key]:.5g}{with_unit(p)}" for key, p in changed.items())
             for values in (active.by_name, own)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bns.diagnose.adding import fitted_again
 from bns.diagnose.caveats import notes_on, on_many_apart, on_worst
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
@@ -265,6 +266,10 @@ def _diagnosed(
     hint = _hint(found.selection, len(predictor.tracks), {*found.withdrawn, *found.imitating, *found.negligible})
     tick("longer explanations")
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
+    notes = notes_on(found, predictor.tracks, hint, pairs, words, [in_words(t, predictor) for t in found.slight])
+    rises = found.errors_with_terms is not None and found.errors_with_terms.rose_in_the_end
+    presented = found.terms[0].fit if found.terms and not rises else found.selection.fit
+    contradicted = fitted_again(model, presented, contradicted=True) if found.terms or found.selection.accepted else ()
     return Diagnosis(
         verdict=_verdict(found.selection, left, hint),
         selection=found.selection,
@@ -277,7 +282,7 @@ def _diagnosed(
         imitating=found.imitating,
         errors=found.errors,
         errors_with_terms=found.errors_with_terms,
-        notes=tuple(notes_on(found, predictor.tracks, hint, pairs, words, [in_words(t, predictor) for t in found.slight])),
+        notes=(*notes, *(f"{said} The interval does not contain the number that was given." for said in contradicted)),
         calibration=calibrated(predictor, model, barred),
     )
 

@@ -41,6 +41,18 @@ def test_an_error_that_may_have_changed_by_luck_neither_fell_nor_rose():
     assert (errors.fell_in_the_end, errors.rose_in_the_end) == (("command",), ("trial",))
 
 
+def test_a_measured_number_that_the_data_contradict_is_said_to():
+    truth = NOMINAL.with_effect("wheelbase", factor=1.06).with_effect("motor-lag", tau_s=0.2)
+    predictor = WheelPredictor(tracks_of(measured(truth, trials=14, seed=2)))
+    for tau_s, said in ((0.1, True), (0.2, False)):
+        given = NOMINAL.with_effect("motor-lag", basis="measured", reason="on the bench", tau_s=tau_s)
+        found = diagnose(predictor, given)
+        assert found.effects == ("wheelbase",)
+        about = [note for note in found.notes if note.startswith("motor-lag was measured (tau_s = 0.1 s); its param")]
+        assert bool(about) == said
+        assert not said or "The interval does not contain the number that was given." in about[0]
+
+
 @pytest.mark.parametrize(
     ("changes_mm", "falls"),
     [

@@ -164,9 +164,10 @@ def _speed(term: Formula, predictor: Predictor) -> str:
     if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0 and abs(back[0] + got[-1]) > 0.01 * fastest:
         at, got = np.append(at, -fastest), np.append(got, back)
     got = np.where(got * at < 0.0, 0.0, got)  # a knot may lie a little beyond rest: the wheel stands
-    pairs = ", ".join(f"{a:.3g} m/s gives {b:.3g} m/s" for a, b in zip(at, got, strict=True))
-    whose = {LEFT: "the left wheel", RIGHT: "the right wheel"}.get(term.on, "a wheel")
     shares = got / at
+    told = zip(at, got, shares, strict=True)
+    pairs = ", ".join(f"{a:.3g} m/s gives {b:.3g} m/s ({100 * (share - 1.0):+.1f}%)" for a, b, share in told)
+    whose = {LEFT: "the left wheel", RIGHT: "the right wheel"}.get(term.on, "a wheel")
     if np.ptp(shares) < _ALIKE:
         return f"{whose} is {_slower(1.0 - float(shares[-1]))} than its command at all speeds ({pairs})"
     return f"{whose}'s speed is not proportional to its command: {pairs}"
