@@ -278,11 +278,11 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
     """
     if not found.terms:
         return found
-    own = {term.name for term in found.terms}
+    own = tuple(term.name for term in found.terms)
     beside = replace(selection, problem=found.problem, fit=found.fit, accepted=(*found.names, *own))
-    tiny = set(negligible(beside, fewest=0))
-    if own <= tiny:
-        tiny -= own
+    tiny = negligible(beside, fewest=0)
+    if set(own) <= set(tiny):
+        tiny = tuple(name for name in tiny if name not in own)
     if not tiny:
         return found
     model = found.fit.model
