@@ -17,7 +17,7 @@ from bns.diagnose.estimate.clocks.trial_clock_test import with_trial_clocks
 from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.fit_set import Tried, fit_set
-from bns.diagnose.estimate.plausibility import implausible, with_unit
+from bns.diagnose.estimate.plausibility import fitted_again, implausible, with_unit
 from bns.diagnose.estimate.problem import given_steps, problem_for
 from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.parallel import one_thread_each
@@ -171,26 +171,6 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
     for before, after in pairwise(next(iter(errors.horizons.values())).models):
         if not errors.between(before.name, after.name):
             yield f"with {after.name}, the error on held-out trials does not fall."
-
-
-def fitted_again(before: Model, fit: Fit, contradicted: bool = False) -> Iterator[str]:
-    """The effects whose numbers were measured or published, with those that they have now.
-
-    ``contradicted``: only those with a number outside of the interval that it has now.
-    """
-    intervals = {(f.effect, f.parameter.name): fit.interval(i) for i, f in enumerate(fit.free)}
-    for active in (a for a in before.effects if a.basis in {"measured", "published"}):
-        name, own = active.effect.name, fit.model.values_of(active.effect.name)
-        changed = {p.name: p for p in active.effect.parameters if own.get(p.name) != active.by_name[p.name]}
-        if contradicted:
-            ends = {key: intervals.get((name, key), (-np.inf, np.inf)) for key in changed}
-            changed = {key: p for key, p in changed.items() if not ends[key][0] <= active.by_name[key] <= ends[key][1]}
-        was, now = (
-            ", ".join(f"{key} = {values[key]:.5g}{with_unit(p)}" for key, p in changed.items())
-            for values in (active.by_name, own)
-        )
-        if changed:
-            yield f"{name} was {active.basis} ({was}); its parameters were fitted again with the others: {now}."
 
 
 def does_nothing(fit: Fit, name: str) -> bool:

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from bns.diagnose.adding import fitted_again
 from bns.diagnose.caveats import notes_on, on_many_apart, on_worst
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
 from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.plausibility import fitted_again
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.outcome import alike_in_metres, outcome_of, predicts_better_throughout

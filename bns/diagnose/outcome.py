@@ -222,9 +222,9 @@ def alike_in_metres(selection: SelectionResult) -> SelectionResult:
     The accepted one has the certainly lower error on held-out trials at one horizon, by `least_fall`, and is lower by as much on
     average over all (mean of the logarithms).
     """
-    problem = selection.problem
-    if not selection.competing_models or selection.fit.model.per_trial_effect is not None:
+    if selection.fit.model.per_trial_effect is not None or not selection.competing_models:
         return selection
+    problem = selection.problem
     accepted = held_out_steps(problem.predictor, problem.pose_filter, selection.fit.model)
     alike = []
     for names in selection.competing_models:

@@ -67,11 +67,13 @@ def test_beside_something_left_clocks_stand_only_if_the_error_is_lower_at_every_
         pairs = {"command": 1.0, "1s": one_s} if clocks else {"command": 2.0, "1s": 2.0}
         errors = SimpleNamespace(horizons={h: SimpleNamespace(models=[SimpleNamespace(rms_m=e)]) for h, e in pairs.items()})
         model = SimpleNamespace(per_trial_effect=clocks or None)
-        selection = SimpleNamespace(fit=SimpleNamespace(model=model), nominal=SimpleNamespace(model=NOMINAL))
+        fit, nominal = SimpleNamespace(model=model), SimpleNamespace(model=NOMINAL)
+        selection = SimpleNamespace(fit=fit, nominal=nominal, accepted=(), competing_models=())
         unknown = dict.fromkeys(field.name for field in fields(Outcome))
         rest = SimpleNamespace(any=left)
-        given = {"selection": selection, "errors": errors, "rest": rest, "terms": (), "slight": (), "dependence": []}
-        return Outcome(**{**unknown, **given})
+        given = {"selection": selection, "errors": errors, "rest": rest, "dependence": [], "negligible": {}}
+        none = dict.fromkeys(("terms", "slight", "withdrawn", "imitating"), ())
+        return Outcome(**{**unknown, **given, **none})
 
     monkeypatch.setattr(diagnosis, "StepwiseSelection", Search)
     monkeypatch.setattr(diagnosis, "outcome_of", ended)

@@ -1,11 +1,14 @@
-"""Whether fitted numbers can be believed: within their bounds, and within what is plausible."""
+"""Whether fitted numbers can be believed: within their bounds, within what is plausible, and beside what was measured."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from bns.diagnose.estimate.fit import Fit
 from bns.physics.effect import Parameter
+from bns.physics.model import Model
 
 
 def at_bound(fit: Fit, name: str) -> bool:
@@ -31,6 +34,26 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
             least, most = p.plausible
             return f"{p.name} = {value:g}{with_unit(p)} is outside of the plausible range, {least:g} to {most:g}"
     return ""
+
+
+def fitted_again(before: Model, fit: Fit, contradicted: bool = False) -> Iterator[str]:
+    """The effects whose numbers were measured or published, with those that they have now.
+
+    ``contradicted``: only those with a number outside of the interval that it has now.
+    """
+    intervals = {(f.effect, f.parameter.name): fit.interval(i) for i, f in enumerate(fit.free)}
+    for active in (a for a in before.effects if a.basis in {"measured", "published"}):
+        name, own = active.effect.name, fit.model.values_of(active.effect.name)
+        changed = {p.name: p for p in active.effect.parameters if own.get(p.name) != active.by_name[p.name]}
+        if contradicted:
+            ends = {key: intervals.get((name, key), (-np.inf, np.inf)) for key in changed}
+            changed = {key: p for key, p in changed.items() if not ends[key][0] <= active.by_name[key] <= ends[key][1]}
+        was, now = (
+            ", ".join(f"{key} = {values[key]:.5g}{with_unit(p)}" for key, p in changed.items())
+            for values in (active.by_name, own)
+        )
+        if changed:
+            yield f"{name} was {active.basis} ({was}); its parameters were fitted again with the others: {now}."
 
 
 def with_unit(p: Parameter) -> str:

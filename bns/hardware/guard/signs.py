@@ -5,11 +5,20 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+_TOGETHER_S, _READINGS = 0.01, 5
+"""Two clocks are read within so many seconds of each other, at one of so many readings: a process may be stopped between."""
+
 
 def slept_s() -> float:
     """Seconds since the boot that the computer was suspended: the steady clock stands still then."""
     boot = getattr(time, "CLOCK_BOOTTIME", None)
-    return 0.0 if boot is None else time.clock_gettime(boot) - time.monotonic()
+    if boot is None:
+        return 0.0
+    for _ in range(_READINGS):
+        steady_s, since_boot_s = time.monotonic(), time.clock_gettime(boot)
+        if time.monotonic() - steady_s < _TOGETHER_S:
+            break
+    return since_boot_s - steady_s
 
 
 def frozen(process: int) -> bool:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,6 +19,7 @@ from bns.hardware.clock import RealClock
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.guard import client as guard_client
 from bns.hardware.guard import process as guard_process
+from bns.hardware.guard import signs
 from bns.hardware.guard.client import Guard, GuardedClock
 from bns.hardware.guard.recipe import bridge_recipe, bus_recipe, khepera_recipe
 from bns.hardware.link.hardware_log import HardwareLog
@@ -241,6 +243,15 @@ def test_a_guard_that_is_terminated_stops_the_robot_first(held):
     os.kill(guard.process, signal.SIGTERM)
     assert guard._process.wait(HANGS_S) == 0
     assert not robot.moves()
+
+
+@pytest.mark.parametrize(("boot", "slept"), [((101.0, 101.0), 0.0), ((701.0, 701.0), 600.0)])
+def test_a_process_that_is_stopped_between_two_clocks_takes_that_for_no_sleep(monkeypatch, boot, slept):
+    """It is for one second, at the first reading."""
+    steady, since_boot = iter([100.0, 101.0, 101.0, 101.0]), iter(boot)
+    clocks = SimpleNamespace(CLOCK_BOOTTIME=7, monotonic=lambda: next(steady), clock_gettime=lambda _: next(since_boot))
+    monkeypatch.setattr(signs, "time", clocks)
+    assert signs.slept_s() == slept
 
 
 def test_a_computer_that_slept_stops_the_robot_when_it_wakes(tmp_path, monkeypatch):
