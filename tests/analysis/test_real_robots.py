@@ -83,6 +83,7 @@ def test_optitrack_clocks_are_found_once_the_wheels_are_right():
     assert errors.of("with clocks")["1s"].rms_m < errors.of("plain")["1s"].rms_m
 
 
+@pytest.mark.slow
 @at_hand
 def test_warthog_errors_halve_and_nothing_is_claimed_of_its_clocks(tmp_path):
     answer = diagnosed(cases()["asphalt-commands"], some("asphalt-commands", 3, 50), tmp_path)

@@ -22,6 +22,7 @@ def selected(model, **how):
     return StepwiseSelection(predictor, NOMINAL).run()
 
 
+@pytest.mark.slow
 def test_turns_that_lag_less_than_straight_lines_take_the_lags_place():
     found = selected(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}))
     assert found.accepted == ("inertia-lag",)
@@ -75,6 +76,7 @@ def test_wheels_that_lag_alike_keep_the_simple_lag():
     assert extended, "the longer effect was never tried"
 
 
+@pytest.mark.slow
 def test_ramps_of_velocity_and_turn_rate_are_told_from_limits_of_each_wheel():
     """As the velocity smoothers of ROS have them, with a lag of the motors behind."""
     ramps = {"forward_m_s2": 0.3, "turn_rad_s2": 4.0}
@@ -133,7 +135,7 @@ def test_an_effect_is_a_variant_if_it_has_no_parameters_of_its_own():
 PATCH = {"x_m": 0.05, "y_m": -0.05, "radius_m": 0.25, "loss": 0.4}
 
 
-@pytest.mark.parametrize(("apart", "named"), [(1.0, "wheel-patch"), (0.0, "floor-patch")])
+@pytest.mark.parametrize(("apart", "named"), [pytest.param(1.0, "wheel-patch", marks=pytest.mark.slow), (0.0, "floor-patch")])
 def test_a_patch_that_slows_each_wheel_is_told_from_one_that_slows_the_robot(apart, named):
     table = measured(hidden(wheel_patch=PATCH | {"apart_share": apart}), trials=30, seed=11, commands=8)
     predictor = WheelPredictor(tracks_of(table))
