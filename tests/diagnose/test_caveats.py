@@ -58,13 +58,14 @@ def test_a_measured_number_that_the_data_contradict_is_said_to():
     [
         ([(-14.0, -17.0, -12.0), (0.3, 0.1, 0.5)], True),  # 0.3 of 40 mm, where the trials end at rest
         ([(-14.0, -17.0, -12.0), (1.0, 0.5, 2.0)], False),
-        ([(-3.0, -9.0, 0.1), (-1.0, -3.0, 2.0)], False),  # undecided everywhere
+        ([(-3.0, -9.0, 0.1), (1.0, -2.0, 4.0)], True),  # undecided, as where trials went wrong: the surest decides
+        ([(-1.0, -9.0, 8.0), (3.0, -1.0, 7.0)], False),
         ([(-3.0, np.nan, np.nan), (0.3, np.nan, np.nan)], True),  # too few trials for an interval
         ([(-3.0, np.nan, np.nan), (1.0, np.nan, np.nan)], False),
         ([(np.nan, np.nan, np.nan)], False),
     ],
 )
-def test_an_error_falls_where_it_certainly_does_and_rises_nowhere_by_what_matters(changes_mm, falls):
+def test_an_error_falls_where_that_is_surest_and_rises_nowhere_by_what_matters(changes_mm, falls):
     before = ModelError("as given", 0.04, 0.03, 0.05, 0.03, 0.1)
     horizons = {
         str(n): HorizonErrors(str(n), 20, 0, (before, before), (), Change(*(1e-3 * v for v in change)), 0.001)

@@ -80,8 +80,11 @@ def _rises(change: Change, before_m: float) -> bool:
     return change.rose and change.change_m >= LEAST_FALL * before_m
 
 
-def _surest(changes: Sequence[Change]) -> Change:
-    return max(changes, key=lambda c: c.certainty)
+def _falls(changes: Sequence[tuple[Change, float]]) -> bool:
+    """By changes and the errors (m) before them. Bad trials widen every interval, so a fall need not be certain."""
+    known = [(change, before_m) for change, before_m in changes if np.isfinite(change.change_m)]
+    surest = max((change for change, _ in known), key=lambda change: change.certainty, default=_UNKNOWN)
+    return surest.change_m < 0 and not any(_rises(*one) for one in known)
 
 
 @dataclass(frozen=True)
@@ -123,15 +126,8 @@ class PairedErrors:
 
     @property
     def falls(self) -> bool:
-        """Does the error certainly fall from the first model to the last at one horizon, and rise at none?
-
-        A rise counts from `least_fall` of the error on. Without intervals (too few trials) every change counts as certain.
-        """
-        known = [(e.total, e.models[0].rms_m) for e in self.horizons.values() if e.total is not None]
-        known = [(change, before_m) for change, before_m in known if np.isfinite(change.change_m)]
-        if not known or any(_rises(*one) for one in known):
-            return False
-        return any(change.fell for change, _ in known)
+        """Does the error fall from the first model to the last? As `between`."""
+        return _falls([(e.total, e.models[0].rms_m) for e in self.horizons.values() if e.total is not None])
 
     @property
     def fell_in_the_end(self) -> tuple[str, ...]:
@@ -148,9 +144,7 @@ class PairedErrors:
 
         The horizon at which the change is surest decides; at none may it rise for certain, by `least_fall` or more.
         """
-        pairs = [(e.change_between(before, after), e.rms_of(before)) for e in self.horizons.values()]
-        known = [(change, before_m) for change, before_m in pairs if np.isfinite(change.change_m)]
-        return bool(known) and _surest([c for c, _ in known]).change_m < 0 and not any(_rises(*one) for one in known)
+        return _falls([(e.change_between(before, after), e.rms_of(before)) for e in self.horizons.values()])
 
     def as_json(self) -> dict[str, Any]:
         """Plain values; metres and radians."""
