@@ -29,6 +29,29 @@ def asked(tmp_path, monkeypatch):
     return count
 
 
+@pytest.fixture(scope="module")
+def worked_out():
+    """What each question to these trials has for an answer, worked out once: by the excluded effects."""
+    return {}
+
+
+@pytest.fixture
+def answered(asked, worked_out, monkeypatch):
+    """As ``asked``, where it does not matter how the answer comes about."""
+    find = bns.api.diagnose.find
+
+    def known(*given, **named):
+        barred = tuple(named["barred"])
+        if barred in worked_out:
+            asked.append(1)
+        else:
+            worked_out[barred] = pickle.dumps(find(*given, **named))
+        return pickle.loads(worked_out[barred])
+
+    monkeypatch.setattr(bns.api.diagnose, "find", known)
+    return asked
+
+
 def answer(found):
     told = found.to_json()
     told.pop("provenance")
@@ -96,17 +119,17 @@ def test_settings_are_part_of_the_question(table):
         lambda data: b"bns 1\n" + bytes(32) + pickle.dumps("not this"),
     ],
 )
-def test_a_damaged_entry_is_none_and_is_made_again(table, asked, tmp_path, damage):
+def test_a_damaged_entry_is_none_and_is_made_again(table, answered, tmp_path, damage):
     first = bns.diagnose(table, NOMINAL)
     [entry] = entries(tmp_path)
     entry.write_bytes(damage(entry.read_bytes()))
     assert answer(bns.diagnose(table, NOMINAL)) == answer(first)
-    assert len(asked) == 2
+    assert len(answered) == 2
     bns.diagnose(table, NOMINAL)
-    assert len(asked) == 2
+    assert len(answered) == 2
 
 
-def test_entries_are_bounded_and_the_oldest_go(table, asked, tmp_path, monkeypatch):
+def test_entries_are_bounded_and_the_oldest_go(table, answered, tmp_path, monkeypatch):
     bns.diagnose(table, NOMINAL)
     [first] = entries(tmp_path)
     monkeypatch.setattr(cache, "MOST_BYTES", int(1.5 * first.stat().st_size))
