@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -94,7 +94,7 @@ class Diagnosis:
     @property
     def terms_raise_the_error(self) -> bool:
         """Does the error on held-out trials certainly rise with the terms, at any horizon? They are not added then."""
-        return bool(self.errors_with_terms and self.errors_with_terms.rose_in_the_end)
+        return _raises_the_error(self.errors_with_terms)
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""
@@ -150,7 +150,7 @@ class Diagnosis:
         if self.calibration is not None and not self.terms:
             together = numbers_of(self.calibration)
             return {name: together.get(name, values) for name, values in numbers_of(self.selection.fit).items()}
-        fit = self.terms[0].fit if self.terms and not self.terms_raise_the_error else self.selection.fit
+        fit = _presented(self.selection, self.terms, self.errors_with_terms)
         own = {term.name for term in self.terms}
         return {name: values for name, values in numbers_of(fit).items() if name not in own}
 
@@ -267,8 +267,7 @@ def _diagnosed(
     tick("longer explanations")
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
     notes = notes_on(found, predictor.tracks, hint, pairs, words, [in_words(t, predictor) for t in found.slight])
-    rises = found.errors_with_terms is not None and found.errors_with_terms.rose_in_the_end
-    presented = found.terms[0].fit if found.terms and not rises else found.selection.fit
+    presented = _presented(found.selection, found.terms, found.errors_with_terms)
     contradicted = fitted_again(model, presented, contradicted=True) if found.terms or found.selection.accepted else ()
     return Diagnosis(
         verdict=_verdict(found.selection, left, hint),
@@ -285,6 +284,15 @@ def _diagnosed(
         notes=(*notes, *(f"{said} The interval does not contain the number that was given." for said in contradicted)),
         calibration=calibrated(predictor, model, barred),
     )
+
+
+def _raises_the_error(with_terms: PairedErrors | None) -> bool:
+    return with_terms is not None and bool(with_terms.rose_in_the_end)
+
+
+def _presented(selection: SelectionResult, terms: Sequence[Formula], with_terms: PairedErrors | None) -> Fit:
+    """The fit whose numbers are shown: with the terms, where there are some that may be added."""
+    return terms[0].fit if terms and not _raises_the_error(with_terms) else selection.fit
 
 
 def _longer(selection: SelectionResult, effects: Mapping[str, Effect]) -> list[tuple[str, ...]]:
