@@ -2,6 +2,8 @@
 
 import inspect
 import pkgutil
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -189,3 +191,28 @@ def test_what_varies_within_a_step_is_late_as_it_varies_only_where_tracks_are_fo
     np.testing.assert_array_equal(late.left_m_s, delayed(ramp, steps, 0.04, tracked))
     np.testing.assert_array_equal(late.right_m_s, -late.left_m_s)
     assert (delayed(ramp, steps, 0.04, True) != delayed(ramp, steps, 0.04, False)).any()
+
+
+def test_a_users_kernels_that_are_cached_load_in_the_next_process(tmp_path):
+    """Numba imports the module that a cached kernel calls into by its name."""
+    (tmp_path / "half.py").write_text(
+        "from dataclasses import replace\n"
+        "from numba import njit\n"
+        "from bns.physics.effect import Effect, Parameter\n"
+        "@njit(cache=True)\n"
+        "def part(x, k):\n    return x * (1 - k)\n"
+        "@njit(cache=True)\n"
+        "def twice(x, k):\n    return part(part(x, k), k)\n"
+        "def apply(wheels, k):\n    return replace(wheels, left_m_s=twice(wheels.left_m_s, k))\n"
+        "EFFECT = Effect('half', 'wheel', (Parameter('k', '1', 0.0, 1.0, (0.0, 0.9), 0.0, 'share lost'),), 'x', 'y', (), apply)\n"
+    )
+    code = (
+        "from pathlib import Path; from bns.physics.effects import effect_in_file; from bns.physics.model import Model;"
+        "from bns.physics.wheels.differential_drive import simulate;"
+        "model = Model(wheelbase_m=0.1).with_active(effect_in_file(Path('half.py')), (0.5,));"
+        "print(simulate(model, [[0.1]], [[0.1]], [[1.0]])[0, -1, 0])"
+    )
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", code], check=False, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert float(done.stdout) < 0.09

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -35,10 +37,11 @@ def chain_key(effect: Effect) -> tuple[float, str]:
 
 def effect_in_file(path: Path) -> Effect:
     """The ``EFFECT`` of a user's Python file; ModelError if there is no such file, or no effect in it."""
-    spec = importlib.util.spec_from_file_location(f"bns_effect_{path.stem}", path)
+    name = f"bns_effect_{path.stem}_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:8]}"
+    spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None or not path.is_file():
         raise ModelError(f"There is no effect file {path}. Give the path of a Python file with an EFFECT in it.")
-    module = importlib.util.module_from_spec(spec)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)  # Numba finds what it has compiled by the module's name
     try:
         spec.loader.exec_module(module)
     except Exception as fault:
