@@ -210,7 +210,7 @@ def _with_interval(fit: Fit, active: ActiveEffect, reason: str) -> ActiveEffect:
     if active.trial_values:
         unit = active.effect.parameters[0].unit
         reason += f"; the mean of one value a trial, {min(active.trial_values):+.3f} to {max(active.trial_values):+.3f} {unit}"
-    return replace(active, basis="fitted", reason=reason, intervals=intervals)
+    return replace(active, basis="fitted", reason=reason, intervals=intervals, replaces=None)
 
 
 def model_yaml(model: Model) -> str:

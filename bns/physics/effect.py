@@ -144,8 +144,10 @@ class Effect:
     extends: str = ""
     """Name of a simpler effect that this one equals at neutral values of the parameters that only this one has.
 
-    A search tries it in the place of that effect, once that one is accepted.
+    A search tries it in the place of that effect, once that one is accepted or where the model has it.
     """
+    contains: tuple[str, ...] = ()
+    """Names of other effects that extend the same one, and that this one equals at neutral values of what only it has."""
 
     def __post_init__(self) -> None:
         for kind, given, valid in (

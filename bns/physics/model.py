@@ -54,6 +54,8 @@ class ActiveEffect:
     """Has every trial a value of its own? ``values`` then hold the mean, which stands for trials yet to come."""
     trial_values: tuple[float, ...] = ()
     """Each trial's value, in the order of the trials at hand; empty while none is known. A matter of data: never written down."""
+    replaces: ActiveEffect | None = field(default=None, compare=False)
+    """The simpler effect of the same model whose place it took (`Effect.extends`). `Model.without` puts that back."""
 
     def check(self) -> None:
         """ModelError for a value that is not allowed. Looked at once: a search makes ten thousand models of the same few."""
@@ -134,9 +136,16 @@ class Model:
         return {"base": self.base, "wheelbase_m": self.wheelbase_m, "dt_s": self.dt_s}
 
     def with_active(self, effect: Effect, values: tuple[float, ...]) -> Model:
-        """The model with an effect object at these values, listed or not; in its place in the chain."""
-        others = tuple(a for a in self.effects if a.effect.name != effect.name)
-        return replace(self, effects=(*others, ActiveEffect(effect, values))).arranged()
+        """The model with an effect object at these values, listed or not; in its place in the chain.
+
+        One that is new and extends an effect of the model takes the place of that one, which it contains.
+        """
+        old = next((a for a in self.effects if a.effect.name == effect.name), None)
+        parts = {effect.extends, *effect.contains} if old is None else set()
+        simpler = next((a for a in self.effects if a.effect.name in parts), None)
+        others = tuple(a for a in self.effects if a is not old and a is not simpler)
+        active = ActiveEffect(effect, values, replaces=simpler if old is None else old.replaces)
+        return replace(self, effects=(*others, active)).arranged()
 
     def with_effect(self, name: str, basis: str = "guess", reason: str = "", **values: float) -> Model:
         """The model with that effect switched on at these values; in its old place, else last."""
@@ -173,10 +182,18 @@ class Model:
         return replace(self, effects=tuple(sorted(self.effects, key=lambda a: chain_key(a.effect))))
 
     def without(self, name: str) -> Model:
-        """The model with that effect switched off."""
+        """The model with that effect switched off; with the simpler one again whose place it took."""
         if all(a.effect.name != name for a in self.effects):
             self.effect_named(name)
-        return replace(self, effects=tuple(a for a in self.effects if a.effect.name != name))
+        rest = replace(self, effects=tuple(a for a in self.effects if a.effect.name != name))
+        back = next((a.replaces for a in self.effects if a.effect.name == name), None)
+        if back is None:
+            return rest
+        name = back.effect.name
+        heir = next((a for a in rest.effects if name in (a.effect.extends, *a.effect.contains) and not a.replaces), None)
+        if heir is None:
+            return replace(rest, effects=(*rest.effects, back)).arranged()
+        return replace(rest, effects=tuple(replace(a, replaces=back) if a is heir else a for a in rest.effects))
 
     def canonical_json(self) -> str:
         """All that changes numbers, as JSON with sorted keys; neither the model's name nor the reasons."""

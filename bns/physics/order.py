@@ -23,6 +23,7 @@ ORDER = (
     "command-delay",
     "motor-lag",
     "inertia-lag",
+    "gear-friction",
     "controller-overshoot",
     "heating",  # by the work that the wheels really do
     "wheel-diameters",

@@ -20,6 +20,7 @@ from tests.hidden_effects.listed_floor import (
 from tests.hidden_effects.listed_loads import (
     ControllerOvershoot,
     ForceLimit,
+    GearFriction,
     InertiaLag,
     SlopeLoad,
     TetherLoad,
@@ -295,6 +296,7 @@ LISTED: dict[str, type[Cause]] = {
     "force-limit": ForceLimit,
     "velocity-ramp": VelocityRamp,
     "inertia-lag": InertiaLag,
+    "gear-friction": GearFriction,
     "controller-overshoot": ControllerOvershoot,
     "heating": Heating,
     "wheel-diameters": WheelDiameters,

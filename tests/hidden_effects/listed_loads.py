@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from tests.hidden_effects.cause import Body, Cause, Moment
 
@@ -71,6 +72,51 @@ class InertiaLag(Cause):
 
     def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
         return _in_small_steps(wheels, moment, lambda gap: gap, (1 / self.tau_s, 1 / self.tau_s / self.turn_ratio))
+
+
+@dataclass
+class GearFriction(Cause):
+    """Motors with a torque constant and a resistance on one body; dry friction takes what momentum it can from each in turn."""
+
+    tau_s: float
+    turn_ratio: float
+    friction_m_s: float
+    loss_m_s: float
+    constant = 0.02
+    resistance = 5.0
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        back = self.constant**2 / self.resistance  # force for each unit of speed that the voltage drives a wheel faster
+        own, shared = (self.tau_s * back * (1 + sign * self.turn_ratio) / 2 for sign in (1, -1))
+        inverse = np.linalg.inv([[own, shared], [shared, own]])
+        small_s = moment.step_s / FINE
+        volts = self.constant * (wheels + np.sign(wheels) * (self.friction_m_s - self.loss_m_s))
+        return _braked(volts, inverse, self.constant, self.resistance, self.friction_m_s * back * small_s, small_s)
+
+
+@njit
+def _braked(volts, inverse, constant, resistance, most, small_s):
+    """Impulses of friction, one wheel after the other until they agree, in each small step."""
+    out, free, braked = np.empty_like(volts), np.zeros(2), np.zeros(2)
+    for trial in range(volts.shape[0]):
+        now = np.zeros(2)
+        for i in range(volts.shape[1]):
+            way = np.zeros(2)
+            for _ in range(FINE):
+                force = constant * (volts[trial, i] - constant * now) / resistance * small_s
+                braked[:] = 0.0
+                for one in range(2):
+                    free[one] = now[one] + force[0] * inverse[0, one] + force[1] * inverse[1, one]
+                for _ in range(4):
+                    for one in range(2):
+                        others = free[one] + braked[1 - one] * inverse[one, 1 - one]
+                        braked[one] = min(max(-others / inverse[one, one], -most), most)
+                for one in range(2):
+                    after = free[one] + braked[0] * inverse[0, one] + braked[1] * inverse[1, one]
+                    way[one] += (now[one] + after) / 2 * small_s
+                    now[one] = after
+            out[trial, i] = way / (small_s * FINE)
+    return out
 
 
 @dataclass

@@ -51,6 +51,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"forward_m_s2": 0.15, "turn_rad_s2": 3.0},
     ),
     "inertia-lag": ({"tau_s": 0.12, "turn_ratio": 0.5}, {"tau_s": 0.25, "turn_ratio": 0.3}),
+    "gear-friction": (
+        {"tau_s": 0.1, "turn_ratio": 1.0, "friction_m_s": 0.03, "loss_m_s": 0.0},
+        {"tau_s": 0.2, "turn_ratio": 0.5, "friction_m_s": 0.08, "loss_m_s": 0.01},
+    ),
     "slope-load": (
         {"x_m_s": 0.003, "y_m_s": -0.002, "behind_share": 0.05, "at_rest": 0.0},
         {"x_m_s": -0.008, "y_m_s": 0.006, "behind_share": 0.15, "at_rest": 1.0},
@@ -69,7 +73,7 @@ BESIDE: dict[str, dict[str, Parameters]] = {"wheel-diameters": {"acceleration-li
 """What an effect needs beside it to differ from a simpler one: without limits, diameters are a mismatch of commands."""
 ALIKE = {"slope-load": ("tether-load",), "wheel-patch": ("floor-patch",), "wheel-diameters": ("wheel-mismatch",)}
 """What would stand in for an effect that is taken out: a slope is a cable from far away."""
-TURNING = {"backlash", "caster-drag", "caster-swing", "dead-band", "stribeck"}
+TURNING = {"backlash", "caster-drag", "caster-swing", "dead-band", "gear-friction", "stribeck"}
 """Effects that show only where wheels reverse or turn slowly."""
 
 TRIPLES: tuple[dict[str, Parameters], ...] = (

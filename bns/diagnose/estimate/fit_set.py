@@ -61,10 +61,13 @@ def fit_set(
 ) -> tuple[Problem, Fit, tuple[str, ...]]:
     """The problem, the fit, and the names in the order in which they lowered the loss.
 
-    ``known``: a model with the same effects whose numbers may be a better start; the better of both ends counts. ``tried``: what
-    earlier calls with the same predictor and model tried on the way; that of this one is added, and nothing is tried twice.
+    What another of the effects contains is left out, for that one has its place. ``known``: a model with the same effects whose
+    numbers may be a better start; the better of both ends counts. ``tried``: what earlier calls with the same predictor and model
+    tried on the way; that of this one is added, and nothing is tried twice.
     """
     tried = Tried() if tried is None else tried
+    inside = {name for effect in effects for name in (effect.extends, *effect.contains)}
+    effects = [effect for effect in effects if effect.name not in inside]
     order: tuple[Effect, ...] = ()
     problem, fit = tried.reached(predictor, model, order)
     while len(order) < len(effects):

@@ -37,23 +37,29 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
 
 
 def fitted_again(before: Model, fit: Fit, contradicted: bool = False) -> Iterator[str]:
-    """The effects whose numbers were measured or published, with those that they have now.
+    """The effects whose numbers were measured or published, with those that they have now; and those that are part of others now.
 
-    ``contradicted``: only those with a number outside of the interval that it has now.
+    ``contradicted``: of the numbers only those outside of the interval that they have now.
     """
+    parts = {a.replaces.effect.name: a.effect.name for a in fit.model.effects if a.replaces}
+    for active in (a for a in before.effects if a.effect.name in parts and a.basis not in {"measured", "published"}):
+        yield f"{active.effect.name} is part of {parts[active.effect.name]}, which takes its place."
     intervals = {(f.effect, f.parameter.name): fit.interval(i) for i, f in enumerate(fit.free)}
     for active in (a for a in before.effects if a.basis in {"measured", "published"}):
-        name, own = active.effect.name, fit.model.values_of(active.effect.name)
+        name = active.effect.name
+        longer = parts.get(name, name)
+        own = fit.model.values_of(longer)
         changed = {p.name: p for p in active.effect.parameters if own.get(p.name) != active.by_name[p.name]}
         if contradicted:
-            ends = {key: intervals.get((name, key), (-np.inf, np.inf)) for key in changed}
+            ends = {key: intervals.get((longer, key), (-np.inf, np.inf)) for key in changed}
             changed = {key: p for key, p in changed.items() if not ends[key][0] <= active.by_name[key] <= ends[key][1]}
         was, now = (
             ", ".join(f"{key} = {values[key]:.5g}{with_unit(p)}" for key, p in changed.items())
             for values in (active.by_name, own)
         )
         if changed:
-            yield f"{name} was {active.basis} ({was}); its parameters were fitted again with the others: {now}."
+            place = "" if longer == name else f" as part of {longer}, which takes its place"
+            yield f"{name} was {active.basis} ({was}); its parameters were fitted again with the others{place}: {now}."
 
 
 def with_unit(p: Parameter) -> str:

@@ -66,20 +66,21 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
     return problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter)
 
 
-def fit_extended(problem: Problem, base: Fit, effect: Effect) -> Fit:
+def fit_extended(problem: Problem, base: Fit, effect: Effect, given: bool = False) -> Fit:
     """The fit with an effect in the place of the one of ``base`` that it ``extends``, from that one's numbers.
 
-    Or in the place of one that extends the same effect in another way.
+    Or in the place of one that extends the same effect in another way. ``given``: that one comes back if this goes.
     """
     alike = {effect.extends, *(a.effect.name for a in base.model.effects if a.effect.extends == effect.extends)}
     gone = next(a.effect.name for a in base.model.effects if a.effect.name in alike)
     names = {p.name for p in effect.parameters}
-    given = {name: value for name, value in base.model.values_of(gone).items() if name in names}
-    own = [p for p in effect.parameters if p.name not in given]
+    known = {name: value for name, value in base.model.values_of(gone).items() if name in names}
+    own = [p for p in effect.parameters if p.name not in known]
     varied = {p.name for p in own if not p.is_multiple} or {p.name for p in own}  # a multiple of nothing does nothing
-    neutral = {name: [value] for name, value in {**effect.neutral, **given}.items()}
+    neutral = {name: [value] for name, value in {**effect.neutral, **known}.items()}
     starts = product(*(neutral[p.name] + (list(_grid(p)) if p.name in varied else []) for p in effect.parameters))
-    models = [base.model.without(gone).with_active(effect, values) for values in starts]
+    bare = base.model if given else base.model.without(gone)
+    models = [bare.with_active(effect, values) for values in starts]
     fit = problem.fit(min(models, key=problem.loss))
     return _from_lower_places(problem, fit) if any(p.jagged for p in own) else fit
 

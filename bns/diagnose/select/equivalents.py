@@ -48,6 +48,7 @@ def equivalent_pairs(
 def _promising(problem: Problem, fit: Fit, name: str, others: Sequence[Effect]) -> list[tuple[Effect, Effect]]:
     """Pairs whose sensitivities together span what the effect of that name does, and neither alone."""
     base = fit.model.without(name)
+    others = [effect for effect in others if effect.extends not in {active.effect.name for active in base.effects}]
     whitened, root = problem.whitened(base), np.sqrt(weights(fit.whitened))[:, None]
     done = ((fit.whitened - whitened) * root).ravel()
     base_columns = (

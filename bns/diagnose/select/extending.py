@@ -42,18 +42,21 @@ def simple(catalogue: Mapping[str, Effect], effects: Iterable[Effect], accepted:
 def to_extend(
     effects: Iterable[Effect], fit: Fit, accepted: Collection[str], exchanges: Callable[[], Iterable[Exchange]]
 ) -> dict[str, tuple[str, Fit]]:
-    """Name of an effect that extends another -> which accepted effect it would replace, and the fit that it begins from.
+    """Name of an effect that extends another -> which effect it would replace, and the fit that it begins from.
 
-    It extends an accepted effect, or one that could stand for an accepted effect nearly as well, among ``exchanges``; or an
-    accepted effect extends the same one in another way.
+    It extends an effect of the model, given or accepted, or one that could stand for an accepted effect nearly as well, among
+    ``exchanges``; or an accepted effect extends the same one in another way.
     """
     found: dict[str, tuple[str, Fit]] = {}
+    there = {active.effect.name for active in fit.model.effects}
     longer = [effect for effect in effects if effect.extends and effect.name not in accepted]
     extending = {effect.extends: effect.name for effect in effects if effect.extends and effect.name in accepted}
-    others = list(exchanges()) if any(effect.extends not in {*accepted, *extending} for effect in longer) else []
+    inside = {e.name: next((n for n in (*e.contains, e.extends) if n in there), "") for e in longer}
+    lone = any(not inside[effect.name] and effect.extends not in extending for effect in longer)
+    others = list(exchanges()) if lone else []
     for effect in longer:
-        if effect.extends in accepted:
-            found[effect.name] = effect.extends, fit
+        if inside[effect.name]:
+            found[effect.name] = inside[effect.name], fit
             continue
         if effect.extends in extending:
             found[effect.name] = extending[effect.extends], fit
@@ -63,6 +66,16 @@ def to_extend(
             _, name, tried = min(near, key=lambda n: n[0])
             found[effect.name] = name, tried
     return found
+
+
+def shorter(catalogue: Mapping[str, Effect], problem: Problem, fit: Fit, name: str) -> tuple[str, Fit] | None:
+    """The name of an effect that one of the fit contains, and the fit with it in the place of that one; None if there is none."""
+    parts = [part for part in (catalogue[name].contains if name in catalogue else ()) if part in catalogue]
+    if not parts:
+        return None
+    part, values = catalogue[parts[0]], fit.model.values_of(name)
+    model = fit.model.without(name).with_active(part, tuple(values[p.name] for p in part.parameters))
+    return part.name, problem.fit(model, nearby=fit.jacobian_by_parameter)
 
 
 def reduced(catalogue: Mapping[str, Effect], problem: Problem, fit: Fit, name: str) -> Fit:

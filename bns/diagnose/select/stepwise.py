@@ -25,7 +25,7 @@ from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.exchanges import Entry, Exchanges
-from bns.diagnose.select.extending import extended, fits_better, reduced, simple, to_extend, variant
+from bns.diagnose.select.extending import extended, fits_better, reduced, shorter, simple, to_extend, variant
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.negligible import certainly_better
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
@@ -65,6 +65,7 @@ class StepwiseSelection:
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
         self._exchanges = Exchanges(predictor, self.catalogue, self._worth, tick)
         self._all_believed = False
+        self._gone: set[str] = set()  # effects that came in and went at once
         self._least_z = MIN_Z if predictor.luck is None else MIN_Z_STRETCHES
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 
@@ -105,7 +106,9 @@ class StepwiseSelection:
     def _bare_with_clocks(fitted: Model, given: Model) -> Model:
         """The model as given and the trials' clocks, without what the first search added."""
         kept = {active.effect.name for active in given.effects} | {_per_trial_effect(fitted)}
-        return replace(fitted, effects=tuple(a for a in fitted.effects if a.effect.name in kept))
+        for active in fitted.effects:
+            fitted = fitted if active.effect.name in kept else fitted.without(active.effect.name)
+        return fitted
 
     def _clocks_earned(self, clocks: TrialClocks, before: Fit) -> bool:
         """Few trials may earn all of it, so no number of standard errors is asked for: the clocks of most may be right."""
@@ -136,7 +139,8 @@ class StepwiseSelection:
         fit = nominal
         accepted: tuple[str, ...] = ()
         steps: list[SelectionStep] = []
-        tried: set[frozenset[str]] = set()
+        tried: set[frozenset[str]] = {frozenset()}
+        self._gone.clear()
         while len(accepted) < MOST:
             before = problem, fit
             step, problem, fit = self._forward_step(problem, fit, accepted)
@@ -147,9 +151,11 @@ class StepwiseSelection:
             accepted = (*(a for a in accepted if a != step.instead_of), step.selected)
             problem, fit, accepted = self._exchange_step(problem, fit, accepted)
             problem, fit, accepted = self._backward_step(problem, fit, accepted)
-            if frozenset(accepted) in tried:
-                break
-            tried.add(frozenset(accepted))
+            if frozenset(accepted) in tried:  # what came in went again: the next best is due
+                self._gone.add(step.selected)
+            else:
+                tried.add(frozenset(accepted))
+                self._gone.clear()
         return self._ended(problem, fit, accepted, steps)
 
     def competing(self, found: SelectionResult) -> SelectionResult:
@@ -206,13 +212,15 @@ class StepwiseSelection:
 
         Where there is none, the best of those that extend an effect which does nothing by itself here.
         """
-        left = self._worth_a_fit(problem, fit, accepted)
+        left = [effect for effect in self._worth_a_fit(problem, fit, accepted) if effect.name not in self._gone]
         place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges.of(problem, fit, accepted))
+        place = {name: at for name, at in place.items() if name not in self._gone}
         tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *left, *(self._worth[name] for name in place)])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
         of = len(self.catalogue) - len(accepted) if self.predictor.screening is not None else 0
         chosen = self._chosen(problem, fit, tried[len(DECOYS) :], decoy_threshold, place, of)
-        lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in (*accepted, *place)]
+        out = {*accepted, *place, *self._gone}
+        lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in out]
         if chosen[0].selected or not lone:
             return chosen
         first, tried = chosen[0], each(partial(self._tried, problem, fit, {}), lone)
@@ -244,7 +252,7 @@ class StepwiseSelection:
                 continue
             settled = self._refit_with_noise(candidate.fit.model, problem.pose_filter.noise)
             gone = place.get(candidate.name, ("",))[0]
-            if gone and not moved and not certainly_better((problem, fit), settled):
+            if gone and not moved and not (certainly_better((problem, fit), settled) and self._needed(*settled, candidate.name)):
                 continue
             rejected_because = self._rejected(settled[1], candidate.name, bounds=False)
             if not rejected_because:
@@ -289,9 +297,14 @@ class StepwiseSelection:
     def _tried(self, problem: Problem, fit: Fit, place: Mapping[str, tuple[str, Fit]], effect: Effect) -> Candidate:
         self.tick(effect.name)
         extends = place.get(effect.name)
-        added = fit_extended(problem, extends[1], effect) if extends else fit_with(problem, fit, effect)
+        if extends:
+            given = any(active.effect.name == extends[0] for active in self.model.effects)
+            added = fit_extended(problem, extends[1], effect, given)
+        else:
+            added = fit_with(problem, fit, effect)
         found = self._candidate(problem, fit, added, effect.name)
-        if len(added.model.effects) == len(self.model.effects) + 1 and effect.name in self.catalogue:
+        given_alone = {a.effect.name for a in fit.model.effects} <= {a.effect.name for a in self.model.effects}
+        if given_alone and effect.name in self.catalogue:
             self.alone(found)
         return found
 
@@ -324,22 +337,44 @@ class StepwiseSelection:
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
     ) -> tuple[Problem, Fit, tuple[str, ...]]:
         """Drop what no longer earns its place, and what can no longer be believed beside what came in."""
+        problem, fit, accepted = self._shortened(problem, fit, accepted)
         newest = accepted[-1]
         for name in accepted:
             believed = not self._rejected(
                 fit, name, bounds=False
             )  # at a bound it may be: there it does, and earns, nothing
             parts = extended(self.catalogue, name)
+            longer = bool(parts) or any(a.replaces for a in fit.model.effects if a.effect.name == name)
             # an exchange since may have left it nothing to do; and what it extends may do as well from its numbers
-            if believed and name == newest and not at_bound(fit, name) and not parts:
+            if believed and name == newest and not at_bound(fit, name) and not longer:
                 continue
             simpler = reduced(self.catalogue, problem, fit, name)
             moved = variant(self.catalogue, name)
-            needless = bool(parts) and not moved and not certainly_better((problem, simpler), (problem, fit))
+            needless = longer and not moved and not self._needed(problem, fit, name)
             if not believed or needless or not self._stays(problem, simpler, fit, name):
                 accepted = tuple(a for a in accepted if a != name) + parts
                 problem, fit = self._refit_with_noise(simpler.model, problem.pose_filter.noise)
         return problem, fit, accepted
+
+    def _shortened(
+        self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
+    ) -> tuple[Problem, Fit, tuple[str, ...]]:
+        """Each effect that another contains takes the place of that one, unless the error is certainly higher then.
+
+        It must lower the error itself, compared with what both of them extend: else the longer one may be what does.
+        """
+        for name in accepted:
+            inside = shorter(self.catalogue, problem, fit, name)
+            if inside is None or certainly_better((problem, inside[1]), (problem, fit)):
+                continue
+            if certainly_better((problem, reduced(self.catalogue, problem, fit, name)), (problem, inside[1])):
+                accepted = tuple(inside[0] if a == name else a for a in accepted)
+                problem, fit = self._refit_with_noise(inside[1].model, problem.pose_filter.noise)
+        return problem, fit, accepted
+
+    def _needed(self, problem: Problem, fit: Fit, name: str) -> bool:
+        """Is the error certainly lower with an effect that extends another than with that other?"""
+        return certainly_better((problem, reduced(self.catalogue, problem, fit, name)), (problem, fit))
 
     def _stays(self, problem: Problem, simpler: Fit, fit: Fit, name: str) -> bool:
         """Whether an effect still earns its place; one that only acts elsewhere than the simpler one, by the better fit."""
