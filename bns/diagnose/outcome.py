@@ -102,7 +102,12 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
     slight: tuple[Formula, ...] = ()
     with_terms: PairedErrors | None = None
     unseen = stands.rest.any and not stands.rest.outliers and _within_noise(stands.errors)
-    if found := _established(stands.selection, predictor, stands.rest, True if stands.withdrawn else None):
+    response = True if stands.withdrawn else None
+    if found := _established(stands.selection, predictor, stands.rest, response):
+        if shorter := _with_parts(stands.selection, found.names):
+            again = _established(shorter, predictor, stands.rest, response)
+            if again is not None and set(again.names) - set(found.names):
+                stands, found = _standing(shorter, predictor, given, tick), again
         found = _without_negligible(found, stands.selection, predictor)
         lost = tuple(name for name in stands.selection.accepted if name not in found.names)
         next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
@@ -245,6 +250,20 @@ def _explained(selection: SelectionResult, names: tuple[str, ...]) -> SelectionR
         if name not in selection.accepted:
             fit = fit_with(problem, fit, known[name], tried.get(name))
     return replace(selection, fit=fit, accepted=names, competing_models=())
+
+
+def _with_parts(selection: SelectionResult, names: tuple[str, ...]) -> SelectionResult | None:
+    """The result with the simpler effect in the place of each one that extends it and is not among ``names``; None if none does.
+
+    What the longer one has beyond the simpler one may imitate what is left, and the simpler one be there all the same.
+    """
+    active = {a.effect.name: a for a in selection.fit.model.effects}
+    parts = {n: active[n].effect.extends for n in selection.accepted if n not in names and not active[n].replaces}
+    parts = {name: part for name, part in parts.items() if part and part not in active}
+    if not parts:
+        return None
+    rest = selection.only(tuple(name for name in selection.accepted if name not in parts))
+    return _explained(rest, tuple(dict.fromkeys(parts.get(name, name) for name in selection.accepted)))
 
 
 def _established(

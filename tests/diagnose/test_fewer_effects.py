@@ -1,6 +1,7 @@
 """What stands once a search has lost effects: its ties, its words; and what is asked of one effect beside those of a model."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -149,3 +150,28 @@ def test_a_jump_of_the_loss_in_one_trial_is_no_slope(late, monkeypatch):
 
 def _moved(fit, by):
     return fit.model.with_values({"motor-lag": {"tau_s": fit.model.values_of("motor-lag")["tau_s"] + by}})
+
+
+def test_where_an_effect_only_imitates_the_simpler_one_that_it_extends_is_asked_again(late, monkeypatch):
+    searched = standing(late, "clock-offset", "inertia-lag")
+    shorter = outcome._with_parts(searched, ("clock-offset",))
+    assert shorter.accepted == ("clock-offset", "motor-lag")
+    assert {a.effect.name for a in shorter.fit.model.effects} == {"clock-offset", "motor-lag"}
+    assert outcome._with_parts(searched, searched.accepted) is None
+    given = NOMINAL.with_effect("motor-lag", tau_s=0.1)
+    problem, fit, _ = fit_set(late, given, [effect_named("inertia-lag")])  # the model's own comes back by itself
+    assert outcome._with_parts(SelectionResult(problem, problem.fit(given), fit, ("inertia-lag",), ()), ()) is None
+
+    asked, seen = [], []
+
+    def beside_terms(stays, selection, *_):
+        asked.append(selection.accepted)
+        kept = tuple(name for name in selection.accepted if name in stays)
+        return outcome.Established(kept, (), selection.problem, selection.fit)
+
+    monkeypatch.setattr(outcome, "_without_negligible", lambda found, selection, _: seen.append(selection.accepted) or found)
+    for stays, accepted in (({"clock-offset", "motor-lag"}, shorter.accepted), ({"clock-offset"}, searched.accepted)):
+        monkeypatch.setattr(outcome, "_established", partial(beside_terms, stays))
+        outcome.outcome_of(searched, late, NOMINAL, lambda _: None)
+        assert asked[-2:] == [searched.accepted, shorter.accepted]
+        assert seen[-1] == accepted
