@@ -43,16 +43,16 @@ def braked_together(
                     break
                 end_v, end_w = a - friction * side_v, b - friction * side_w
                 if side_v != 0.0 and side_w != 0.0:
-                    t, way_v_t, way_w_t, v_t, w_t = _both(v, w, end_v, end_w, side_v, side_w, tau_s, turn_ratio, rest_s)
+                    t, mean_v, mean_w, v_t, w_t = _both(v, w, end_v, end_w, side_v, side_w, tau_s, turn_ratio, rest_s)
                 elif side_v != 0.0:
-                    t, way_v_t, v_t = _one(v, end_v, side_v, b, other_s, alone_s, friction, rest_s)
-                    way_w_t = w_t = 0.0
+                    t, mean_v, v_t = _one(v, end_v, side_v, b, other_s, alone_s, friction, rest_s)
+                    mean_w = w_t = 0.0
                 else:
-                    t, way_w_t, w_t = _one(w, end_w, side_w, a, other_s, alone_s, friction, rest_s)
-                    way_v_t = v_t = 0.0
+                    t, mean_w, w_t = _one(w, end_w, side_w, a, other_s, alone_s, friction, rest_s)
+                    mean_v = v_t = 0.0
                 if begin_s == 0.0 and t == h:
-                    mean_left[row, k], mean_right[row, k] = way_v_t, way_w_t
-                way_v, way_w = way_v + way_v_t * t, way_w + way_w_t * t
+                    mean_left[row, k], mean_right[row, k] = mean_v, mean_w
+                way_v, way_w = way_v + mean_v * t, way_w + mean_w * t
                 v, w = v_t, w_t
                 if t >= rest_s:
                     break
