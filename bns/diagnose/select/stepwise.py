@@ -212,7 +212,7 @@ class StepwiseSelection:
 
         Where there is none, the best of those that extend an effect which does nothing by itself here.
         """
-        left = [effect for effect in self._worth_a_fit(problem, fit, accepted) if effect.name not in self._gone]
+        left = self._worth_a_fit(problem, fit, accepted)
         place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges.of(problem, fit, accepted))
         place = {name: at for name, at in place.items() if name not in self._gone}
         tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *left, *(self._worth[name] for name in place)])
@@ -269,7 +269,7 @@ class StepwiseSelection:
             self.tick("screening")
             left = [effect for name, effect in self.catalogue.items() if name not in accepted]
             self._worth |= {effect.name: effect for effect in worth_a_fit(screened(problem, fit, left))}
-        return simple(self.catalogue, self._worth.values(), accepted)
+        return [effect for effect in simple(self.catalogue, self._worth.values(), accepted) if effect.name not in self._gone]
 
     def _worked_out(self, problem: Problem, fit: Fit, tried: Sequence[Candidate]) -> list[Candidate]:
         """Where models are worked out roughly: those that come near the best one worked out well, each at its own numbers.
