@@ -333,22 +333,6 @@ def test_a_lag_from_the_bench_stays_where_turns_lag_alike():
     assert {a.effect.name for a in fit.model.effects} == {"motor-lag", "wheelbase"}
 
 
-def test_where_what_came_in_goes_at_once_the_next_best_comes_in(monkeypatch):
-    look_back = StepwiseSelection._backward_step
-
-    def without_wheelbase(self, problem, fit, accepted):
-        problem, fit, accepted = look_back(self, problem, fit, accepted)
-        if "wheelbase" not in accepted:
-            return problem, fit, accepted
-        return *self._refit_with_noise(fit.model.without("wheelbase")), tuple(a for a in accepted if a != "wheelbase")
-
-    monkeypatch.setattr(StepwiseSelection, "_backward_step", without_wheelbase)
-    table = measured(hidden(wheelbase={"factor": 1.15}, floor_slope={"x_m_s": 0.004, "y_m_s": 0.0}), trials=16, seed=2)
-    found = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL).run()
-    assert found.steps[0].selected == "wheelbase"
-    assert "floor-slope" in found.accepted
-
-
 def test_an_extension_is_held_against_what_it_extends_under_the_same_noise(monkeypatch):
     """Else one came in that the look back threw out, round after round."""
     asked = []

@@ -145,7 +145,7 @@ def test_what_comes_near_the_best_is_worked_out_before_it_is_compared(monkeypatc
 def test_a_step_of_the_search_compares_what_was_worked_out(monkeypatch):
     search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
     search.predictor, search.catalogue = SimpleNamespace(screening=64), dict.fromkeys("abcde")
-    search._worth, search._gone = {}, set()
+    search._worth = {}
     gain = {"a": 100.0, "b": 90.0}
 
     def candidate(name, elpd):

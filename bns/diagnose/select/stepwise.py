@@ -65,7 +65,6 @@ class StepwiseSelection:
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
         self._exchanges = Exchanges(predictor, self.catalogue, self._worth, tick)
         self._all_believed = False
-        self._gone: set[str] = set()  # effects that came in and went at once
         self._least_z = MIN_Z if predictor.luck is None else MIN_Z_STRETCHES
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 
@@ -139,8 +138,7 @@ class StepwiseSelection:
         fit = nominal
         accepted: tuple[str, ...] = ()
         steps: list[SelectionStep] = []
-        tried: set[frozenset[str]] = {frozenset()}
-        self._gone.clear()
+        tried: set[frozenset[str]] = set()
         while len(accepted) < MOST:
             before = problem, fit
             step, problem, fit = self._forward_step(problem, fit, accepted)
@@ -151,11 +149,9 @@ class StepwiseSelection:
             accepted = (*(a for a in accepted if a != step.instead_of), step.selected)
             problem, fit, accepted = self._exchange_step(problem, fit, accepted)
             problem, fit, accepted = self._backward_step(problem, fit, accepted)
-            if frozenset(accepted) in tried:  # what came in went again: the next best is due
-                self._gone.add(step.selected)
-            else:
-                tried.add(frozenset(accepted))
-                self._gone.clear()
+            if frozenset(accepted) in tried:
+                break
+            tried.add(frozenset(accepted))
         return self._ended(problem, fit, accepted, steps)
 
     def competing(self, found: SelectionResult) -> SelectionResult:
@@ -214,13 +210,11 @@ class StepwiseSelection:
         """
         left = self._worth_a_fit(problem, fit, accepted)
         place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges.of(problem, fit, accepted))
-        place = {name: at for name, at in place.items() if name not in self._gone}
         tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *left, *(self._worth[name] for name in place)])
         decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
         of = len(self.catalogue) - len(accepted) if self.predictor.screening is not None else 0
         chosen = self._chosen(problem, fit, tried[len(DECOYS) :], decoy_threshold, place, of)
-        out = {*accepted, *place, *self._gone}
-        lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in out]
+        lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in (*accepted, *place)]
         if chosen[0].selected or not lone:
             return chosen
         first, tried = chosen[0], each(partial(self._tried, problem, fit, {}), lone)
@@ -269,7 +263,7 @@ class StepwiseSelection:
             self.tick("screening")
             left = [effect for name, effect in self.catalogue.items() if name not in accepted]
             self._worth |= {effect.name: effect for effect in worth_a_fit(screened(problem, fit, left))}
-        return [effect for effect in simple(self.catalogue, self._worth.values(), accepted) if effect.name not in self._gone]
+        return simple(self.catalogue, self._worth.values(), accepted)
 
     def _worked_out(self, problem: Problem, fit: Fit, tried: Sequence[Candidate]) -> list[Candidate]:
         """Where models are worked out roughly: those that come near the best one worked out well, each at its own numbers.
