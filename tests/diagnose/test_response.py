@@ -66,6 +66,7 @@ def overshoot():
     return np.exp(-np.pi * DAMPING / np.sqrt(1 - DAMPING**2))
 
 
+@pytest.mark.slow
 def test_a_ringing_controller_is_described():
     predictor = ringing()
     found = established(predictor, NOMINAL, {})

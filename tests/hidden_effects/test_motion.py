@@ -203,6 +203,7 @@ def test_in_turns_a_wheel_swings_with_the_inertia_that_it_moves_then():
     np.testing.assert_allclose(turned * BASE_M / 2, 0.1 * textbook_overshoot(t, 1.0, 0.2), atol=1.5e-4)
 
 
+@pytest.mark.slow
 def test_the_proportional_part_makes_a_start_lose_less_until_the_way_is_late_by_tau():
     t = np.array([0.1, 3.0])
     plain, led = (t - poses_at(t, [ControllerOvershoot(0.1, lead, 0.1)], (0.1, 0.1, 3.0))[:, 1] / 0.1 for lead in (0.0, 0.3))

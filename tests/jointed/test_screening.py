@@ -156,7 +156,7 @@ def test_a_step_of_the_search_compares_what_was_worked_out(monkeypatch):
     monkeypatch.setattr(search, "_earned", lambda *_: False, raising=False)
     well = {"a": 50.0, "b": 95.0}
     monkeypatch.setattr(search, "_worked_out", lambda _problem, _fit, tried: [candidate(c.name, well[c.name]) for c in tried])
-    step, _, _ = search._forward_step(None, None, ())
+    step, _, _ = search._forward_step(None, SimpleNamespace(model=SNAKE), ())
     assert [(c.name, c.paired_comparison.elpd_diff) for c in step.ranking] == [("b", 95.0), ("a", 50.0)]
     assert step.of == 5
 
