@@ -344,7 +344,7 @@ class StepwiseSelection:
                 continue
             simpler = reduced(self.catalogue, problem, fit, name)
             moved = variant(self.catalogue, name)
-            needless = longer and not moved and not self._needed(problem, fit, name)
+            needless = longer and not moved and not certainly_better((problem, simpler), (problem, fit))
             if not believed or needless or not self._stays(problem, simpler, fit, name):
                 accepted = tuple(a for a in accepted if a != name) + parts
                 problem, fit = self._refit_with_noise(simpler.model, problem.pose_filter.noise)
