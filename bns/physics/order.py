@@ -19,10 +19,14 @@ ORDER = (
     OTHERS,
     "acceleration-limit",  # exact for commands, which are constant in a step: so before delay and lag
     "force-limit",
+    "braking-limit",
     "velocity-ramp",
+    "braking-ramp",
     "command-delay",
     "motor-lag",
     "inertia-lag",
+    "lag-mismatch",
+    "braking-lag",
     "gear-friction",
     "controller-overshoot",
     "heating",  # by the work that the wheels really do

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from tests.hidden_effects.cause import Body, Cause, Moment
+from tests.hidden_effects.listed_braking import BrakingLag, BrakingLimit, BrakingRamp, LagMismatch
 from tests.hidden_effects.listed_floor import (
     CasterDrag,
     CasterSwing,
@@ -294,8 +295,12 @@ LISTED: dict[str, type[Cause]] = {
     "motor-lag": MotorLag,
     "acceleration-limit": AccelerationLimit,
     "force-limit": ForceLimit,
+    "braking-limit": BrakingLimit,
     "velocity-ramp": VelocityRamp,
+    "braking-ramp": BrakingRamp,
     "inertia-lag": InertiaLag,
+    "lag-mismatch": LagMismatch,
+    "braking-lag": BrakingLag,
     "gear-friction": GearFriction,
     "controller-overshoot": ControllerOvershoot,
     "heating": Heating,

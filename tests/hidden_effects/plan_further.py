@@ -51,6 +51,13 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"forward_m_s2": 0.15, "turn_rad_s2": 3.0},
     ),
     "inertia-lag": ({"tau_s": 0.12, "turn_ratio": 0.5}, {"tau_s": 0.25, "turn_ratio": 0.3}),
+    "lag-mismatch": ({"tau_s": 0.12, "ratio": 1.5}, {"tau_s": 0.2, "ratio": 0.4}),
+    "braking-lag": ({"tau_s": 0.12, "brake_ratio": 0.6}, {"tau_s": 0.2, "brake_ratio": 2.0}),
+    "braking-limit": ({"max_m_s2": 0.4, "brake_ratio": 2.0}, {"max_m_s2": 0.25, "brake_ratio": 0.5}),
+    "braking-ramp": (
+        {"forward_m_s2": 0.3, "turn_rad_s2": 8.0, "brake_ratio": 2.0},
+        {"forward_m_s2": 0.2, "turn_rad_s2": 4.0, "brake_ratio": 0.5},
+    ),
     "gear-friction": (
         {"tau_s": 0.1, "turn_ratio": 1.0, "friction_m_s": 0.03, "loss_m_s": 0.0},
         {"tau_s": 0.2, "turn_ratio": 0.5, "friction_m_s": 0.08, "loss_m_s": 0.01},
@@ -73,7 +80,7 @@ BESIDE: dict[str, dict[str, Parameters]] = {"wheel-diameters": {"acceleration-li
 """What an effect needs beside it to differ from a simpler one: without limits, diameters are a mismatch of commands."""
 ALIKE = {"slope-load": ("tether-load",), "wheel-patch": ("floor-patch",), "wheel-diameters": ("wheel-mismatch",)}
 """What would stand in for an effect that is taken out: a slope is a cable from far away."""
-TURNING = {"backlash", "caster-drag", "caster-swing", "dead-band", "gear-friction", "stribeck"}
+TURNING = {"backlash", "braking-lag", "caster-drag", "caster-swing", "dead-band", "gear-friction", "stribeck"}
 """Effects that show only where wheels reverse or turn slowly."""
 
 TRIPLES: tuple[dict[str, Parameters], ...] = (

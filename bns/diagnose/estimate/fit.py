@@ -325,6 +325,8 @@ class Problem:
             if number in nearby:
                 out[..., j] = nearby[number]
                 continue
+            if np.isinf(number.of(at.model)):  # a limit that nothing reaches: a small change does nothing
+                continue
             slopes = [self._slope(at, free, j, by) for by in increments(number, number.of(at.model), wide)]
             out[..., j] = min(slopes, key=lambda slope: float((slope**2).sum()))
         return eliminate_clocks(self, at.model, at.whitened, out)

@@ -33,7 +33,8 @@ _KEPT = 500_000
 """Steps of the grid (or frames) whose motion is remembered, over all models that were asked lately: some 50 MB."""
 _UNDONE = DEFAULTS.predict.picture_rounds
 _MOVING = ("wheel", "body")
-_DELAY, _LAGS = "command-delay", ("motor-lag", "inertia-lag", "gear-friction", "controller-overshoot")
+_DELAY = "command-delay"
+_LAGS = ("motor-lag", "inertia-lag", "lag-mismatch", "braking-lag", "gear-friction", "controller-overshoot")
 
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
 """Effects that act, their values, and those of each trial."""
