@@ -11,7 +11,6 @@ from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.braking import limited
 
-
 _FORWARD_M_S2, _TURN_RAD_S2 = (0.1, 0.3, 1.0, 3.0), (0.5, 1.5, 5.0, 15.0)
 """Where a fit begins: what small and fast robots are set to."""
 
