@@ -153,6 +153,13 @@ def test_a_trial_on_emulated_hardware(walk):
     page = (DOCS / "tutorials" / "trial.md").read_text()
     for name in re.findall(r"^\| `([\w./]+)` \|", page, flags=re.M):
         assert (folder / name).is_file(), name
+    broken, resumed = (
+        shlex.split(line)[1:] for line in "\n".join(shown("tutorials/trial.md")).splitlines() if "--seed 3" in line
+    )
+    code, _, said = walk.typist.type(broken, walk.folder)
+    assert code == 3
+    assert re.search(r"planned faults that happened: (lost-reply.*, )?hang-up at 3 s", said)
+    assert walk.typist.type(resumed, walk.folder)[0] == 0
 
 
 def test_a_robot_of_ones_own(walk):

@@ -25,6 +25,7 @@ from bns.trial.folder import (
     past_evaluations,
     stuck_before,
 )
+from bns.trial.report import count_of
 from bns.trial.session import PICTURE, TrialSetup, open_rig
 
 _START = ("start_x_m", "start_y_m", "start_heading_rad")
@@ -123,7 +124,9 @@ def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journa
         raise
     ended = f"; {len(driver.ends)} ended early" if driver.ends else ""
     rows = len(measured(journal))
-    return f"{len(trials)} trials driven{ended}; {rows} rows of measurements in {journal.with_name(MEASUREMENTS)}"
+    faults = f"\n{opened.plan.outcome()}" if opened.plan.faults else ""
+    many, kept = count_of(len(trials), "trial"), journal.with_name(MEASUREMENTS)
+    return f"{many} driven{ended}; {rows} rows of measurements in {kept}{faults}"
 
 
 def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int:

@@ -19,7 +19,8 @@ class TrialResult:
     stops_s: how long each confirmed stop took; ends: why drives ended early; waited_share: of the time, that the robot
     waited for computations; worked_share: of the time, in which training and evolution went on; rounds: of these, while it
     drove; wall_s: how long it took;
-    repeats: success of each drive of the final controller, if it was driven more than once.
+    repeats: success of each drive of the final controller, if it was driven more than once; faults: which of the faults that
+    were planned for an emulated robot have happened, in words ("" if none was planned).
     """
 
     run: RunResult
@@ -31,6 +32,7 @@ class TrialResult:
     started: datetime
     wall_s: float
     repeats: list[bool] = field(default_factory=list)
+    faults: str = ""
 
 
 def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
@@ -44,14 +46,19 @@ def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
     early = f"drives that ended early: {len(result.ends)}, the last because {result.ends[-1]}" if result.ends else ""
     return [
         f"trial {spec.run_id}: {spec.robot}, {spec.task}, seed {spec.seed}, {what}",
-        f"{len(evals['evaluation'])} evaluations, {driven_min:.1f} min of driving, {result.wall_s:.0f} s by the wall clock",
+        f"{count_of(len(numbers), 'evaluation')}, {driven_min:.1f} min of driving, {result.wall_s:.0f} s by the wall clock",
         "all goals reached: " + "; ".join(firsts),
         f"the robot waited for computations {result.waited_share:.1%} of the time; training and evolution used "
         f"{result.worked_share:.0%} of it, in {result.rounds} rounds",
         _stops(result.stops_s),
-        *([early] if early else []),
+        *filter(None, (early, result.faults)),
         *_repeats(result.repeats),
     ]
+
+
+def count_of(number: int, what: str) -> str:
+    """So many of something; the plural takes an s."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _repeats(successes: Sequence[bool]) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
@@ -77,6 +78,8 @@ class OpenedRig:
     operator: Operator
     clock: Clock
     log: HardwareLog
+    plan: FaultPlan
+    """Of an emulated robot: which planned faults have happened."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,7 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
     """Open clock, emulation, journal and platform; at the end, however it comes, the robot is stopped, seen to stand, let go."""
     with ExitStack() as stack:
         rig, hands, guard = how.rig, None, None
+        plan = replace(how.plan, happened=Counter())
         module = platform_module(rig.robot)
         clock: Clock = EmulatedClock(how.speed)
         if not how.emulated:
@@ -102,7 +106,7 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         stopping.causes.append(log.check)
         if isinstance(clock, EmulatedClock):
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bns-rig-")))
-            emulation: Emulation = module.emulate(rig, folder, clock, how.plan, seed)
+            emulation: Emulation = module.emulate(rig, folder, clock, plan, seed)
             stack.callback(emulation.close)
             rig, hands = emulation.rig, EmulatedHands(emulation, seed)
         elif guard is not None:
@@ -111,9 +115,12 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         platform = opened if guard is None else GuardedPlatform(opened, guard, stopping)
         stack.callback(platform.close)
         stack.enter_context(StopsAtTheEnd(platform.stop))
-        yield OpenedRig(
-            platform, hands or _somebody(how, stopping), clock, log
-        )
+        try:
+            yield OpenedRig(platform, hands or _somebody(how, stopping), clock, log, plan)
+        except TrialPausedError as why:
+            if not plan.faults:
+                raise
+            raise TrialPausedError(f"{why}; {plan.outcome()}") from why
 
 
 def _somebody(how: TrialSetup, stopping: Stopping) -> Operator:
@@ -173,6 +180,7 @@ def _driven(
             result = _looped(spec, how, driver, past, started, on_evaluation)
             _repeated(spec, how, driver, folder, result)
             opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
+            result = replace(result, faults=opened.plan.outcome())
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
             forget_unless(folder.journal, "trial")

@@ -11,8 +11,9 @@ faults:
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,8 @@ KINDS: Mapping[str, str] = {
     "overheat": "a servo's temperature rises beyond its limit",
 }
 """Kind of fault -> what it is."""
+_OF_TIMES = {"frozen-scene", "late-tracker"}
+"""Kinds that change which time a tracker shows."""
 _ALLOWED = {"kind", "rate", "at_s", "for_s", "id"}
 
 
@@ -57,12 +60,22 @@ class Fault:
     for_s: float = 0.0
     servo: int = 0
 
+    def __str__(self) -> str:
+        of = f" of servo {self.servo}" if self.servo else ""
+        return self.kind + of + (f" at {self.at_s:g} s" if math.isfinite(self.at_s) else "")
+
 
 class Faults:
-    """Answers whether a fault strikes now. Each emulated device has one, seeded by the plan and its own name."""
+    """Answers whether a fault strikes now. Each emulated device has one, seeded by the plan and its own name.
 
-    def __init__(self, plan: tuple[Fault, ...] = (), seed: int = 0, device: str = "") -> None:
+    ``happened`` counts how often each line of the plan has begun.
+    """
+
+    def __init__(
+        self, plan: tuple[Fault, ...] = (), seed: int = 0, device: str = "", happened: Counter[int] | None = None
+    ) -> None:
         self._plan = plan
+        self._happened: Counter[int] = Counter() if happened is None else happened
         self._draw = np.random.default_rng([seed, *device.encode()])
         self._begun: dict[int, float] = {}
 
@@ -76,6 +89,9 @@ class Faults:
 
     def filmed_s(self, t_s: float) -> float:
         """When a tracker's pose of that time was really taken."""
+        for number, fault in enumerate(self._plan):
+            if fault.kind in _OF_TIMES and t_s >= fault.at_s and number not in self._begun:
+                self._begin(number, t_s)
         frozen = [f.at_s for f in self._plan if f.kind == "frozen-scene" and f.at_s <= t_s < f.at_s + f.for_s]
         late_s = max((f.for_s for f in self._plan if f.kind == "late-tracker" and t_s >= f.at_s), default=0.0)
         return min(frozen, default=t_s) - late_s
@@ -86,9 +102,13 @@ class Faults:
             return True
         due = t_s >= fault.at_s and number not in self._begun
         if due or (fault.rate > 0.0 and self._draw.random() < fault.rate):
-            self._begun[number] = t_s
+            self._begin(number, t_s)
             return True
         return False
+
+    def _begin(self, number: int, t_s: float) -> None:
+        self._begun[number] = t_s
+        self._happened[number] += 1
 
     def byte(self, data: bytes) -> bytes:
         """`data` with one byte changed."""
@@ -101,14 +121,25 @@ class Faults:
 
 @dataclass(frozen=True)
 class FaultPlan:
-    """A whole plan."""
+    """A whole plan. ``happened``: how often each fault of it (by its place) has begun on any device."""
 
     faults: tuple[Fault, ...] = ()
     seed: int = 0
+    happened: Counter[int] = field(default_factory=Counter, compare=False, repr=False)
 
     def of(self, device: str) -> Faults:
         """The faults as one device meets them."""
-        return Faults(self.faults, self.seed, device)
+        return Faults(self.faults, self.seed, device, self.happened)
+
+    def outcome(self) -> str:
+        """Which of these faults have happened and which have not, in words; "" for an empty plan."""
+        if not self.faults:
+            return ""
+        counts = [(fault, self.happened[number]) for number, fault in enumerate(self.faults)]
+        came = [str(fault) + (f" ({count} times)" if count > 1 else "") for fault, count in counts if count]
+        missed = [str(fault) for fault, count in counts if not count]
+        parts = [f"happened: {', '.join(came)}"] * bool(came) + [f"did not happen: {', '.join(missed)}"] * bool(missed)
+        return f"planned faults that {'; that '.join(parts)}"
 
 
 def load_plan(path: Path) -> FaultPlan:

@@ -71,7 +71,9 @@ def test_a_pause_is_gone_on_with_and_nothing_is_lost(tmp_path, capsys):
     plan = faults(tmp_path, {"kind": "hang-up", "at_s": 12, "for_s": 2})
     asked = [*TRIAL, "--evaluations", 4, "--results", tmp_path]
     assert call(*asked, *plan) == 3
-    assert "the robot was lost" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "the robot was lost" in said
+    assert "planned faults that happened: hang-up at 12 s" in said
     before = past_evaluations(journal_of(tmp_path))
     assert 1 <= len(before) < 4
     assert (journal_of(tmp_path).parent / "measurements.csv").exists()
@@ -94,6 +96,23 @@ def test_a_resumed_trial_is_the_trial_that_a_replay_gives(tmp_path):
     first, again = evaluated(tmp_path, "trials-emulated"), evaluated(tmp_path, "trials-replayed")
     np.testing.assert_array_equal(first["best_fitness"], again["best_fitness"])
     assert len(first) == 3
+
+
+def test_the_summary_lists_which_planned_faults_happened(tmp_path, capsys):
+    plan = faults(
+        tmp_path,
+        {"kind": "late-tracker", "at_s": 1, "for_s": 0.01},
+        {"kind": "lost-reply", "at_s": 2},
+        {"kind": "hang-up", "at_s": 10_000, "for_s": 1},
+        {"kind": "overheat", "at_s": 1, "id": 3},
+    )
+    assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path, *plan) == 0
+    said = capsys.readouterr().out
+    assert "\n1 evaluation, " in said
+    happened = "planned faults that happened: late-tracker at 1 s, lost-reply at 2 s; "
+    assert f"{happened}that did not happen: hang-up at 10000 s, overheat of servo 3 at 1 s" in said
+    assert call(*TRIAL, "--evaluations", 1, "--seed", 9, "--results", tmp_path) == 0
+    assert "planned faults" not in capsys.readouterr().out
 
 
 def test_a_stop_that_cannot_be_confirmed_is_shouted(tmp_path, capsys):
