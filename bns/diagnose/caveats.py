@@ -147,8 +147,8 @@ def _no_lower(with_terms: PairedErrors) -> str:
     rose, fell = (" and ".join(IN_WORDS.get(h, h) for h in names) for names in both)
     though = f", though it falls over {fell}" if fell else ""
     return (
-        f"With it, the error on held-out trials rises over {rose}{though}. It describes the robot, but the extended model does "
-        "without it."
+        f"With it, the error on held-out trials rises over {rose}{though}. It may describe something else than what happens "
+        "there, and the extended model does without it."
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bns.diagnose.estimate.cross_validation import Judged, held_out_steps, judged_errors
 from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.plausibility import implausible, undetermined
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
@@ -108,7 +109,13 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
             again = _established(shorter, predictor, stands.rest, response)
             if again is not None and set(again.names) - set(found.names):
                 stands, found = _standing(shorter, predictor, given, tick), again
-        found = _without_negligible(found, stands.selection, predictor)
+        found, searched_in = _without_negligible(found, stands.selection, predictor), stands.selection
+        while absurd := _absurd(found):  # the search again without them: terms beside such numbers have none that serve alone
+            searched_in = searched_in.lacking(absurd)
+            again = _established(searched_in, predictor, stands.rest, response)
+            if again is None:
+                break
+            found = _without_negligible(again, searched_in, predictor)
         lost = tuple(name for name in stands.selection.accepted if name not in found.names)
         next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
         errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
@@ -312,6 +319,12 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
     names = tuple(name for name in found.names if name not in tiny)
     terms = tuple(replace(term, fit=fit) for term in found.terms if term.name not in tiny)
     return Established(names, terms, problem, fit)
+
+
+def _absurd(found: Established) -> tuple[str, ...]:
+    """Effects whose numbers, fitted beside the terms, cannot be believed: there they bend a curve."""
+    own = found.names if found.terms else ()
+    return tuple(name for name in own if implausible(found.fit, name) or undetermined(found.fit, name))
 
 
 def _matters(errors: PairedErrors) -> bool:

@@ -16,6 +16,7 @@ ORDER = (
     "stribeck",
     "dead-band",
     "speed-limit",
+    "speed-scaling",
     OTHERS,
     "acceleration-limit",  # exact for commands, which are constant in a step: so before delay and lag
     "force-limit",

@@ -129,6 +129,18 @@ class SpeedLimit(Cause):
 
 
 @dataclass
+class SpeedScaling(Cause):
+    """No wheel is faster than this; forward velocity and turn rate are divided by how much the faster one would exceed it."""
+
+    max_m_s: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        forward, half = wheels.sum(axis=-1) / 2, (wheels[..., 1] - wheels[..., 0]) / 2
+        exceeded = np.maximum((np.abs(forward) + np.abs(half)) / self.max_m_s, 1.0)
+        return np.stack([forward / exceeded - half / exceeded, forward / exceeded + half / exceeded], axis=-1)
+
+
+@dataclass
 class AccelerationLimit(Cause):
     """No wheel changes its speed faster than this."""
 
@@ -291,6 +303,7 @@ LISTED: dict[str, type[Cause]] = {
     "speed-gain": SpeedGain,
     "wheel-mismatch": WheelMismatch,
     "speed-limit": SpeedLimit,
+    "speed-scaling": SpeedScaling,
     "battery-sag": BatterySag,
     "motor-lag": MotorLag,
     "acceleration-limit": AccelerationLimit,

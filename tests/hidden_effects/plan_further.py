@@ -51,6 +51,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"forward_m_s2": 0.15, "turn_rad_s2": 3.0},
     ),
     "inertia-lag": ({"tau_s": 0.12, "turn_ratio": 0.5}, {"tau_s": 0.25, "turn_ratio": 0.3}),
+    "speed-scaling": ({"max_m_s": 0.16}, {"max_m_s": 0.12}),
     "lag-mismatch": ({"tau_s": 0.12, "ratio": 1.5}, {"tau_s": 0.2, "ratio": 0.4}),
     "braking-lag": ({"tau_s": 0.12, "brake_ratio": 0.6}, {"tau_s": 0.2, "brake_ratio": 2.0}),
     "braking-limit": ({"max_m_s2": 0.4, "brake_ratio": 2.0}, {"max_m_s2": 0.25, "brake_ratio": 0.5}),

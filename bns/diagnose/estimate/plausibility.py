@@ -36,6 +36,33 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
     return ""
 
 
+def undetermined(fit: Fit, name: str) -> str:
+    """Why the numbers of an effect say nothing: every interval spans all that is allowed; "" if one does not.
+
+    So it is where another effect of the model does the same: a gain beside a warm-up that outlasts every trial.
+    """
+    own = [i for i, number in enumerate(fit.free) if number.effect == name]
+    if not own or not all(_spans(fit, i) for i in own):
+        return ""
+    return f"these data do not determine {' and '.join(fit.free[i].parameter.name for i in own)}"
+
+
+def limiting(fit: Fit, name: str) -> bool:
+    """Whether an effect may be there only as a limit of itself: the interval of a number reaches one of its bounds."""
+    own = [(i, number.parameter) for i, number in enumerate(fit.free) if number.effect == name]
+    return at_bound(fit, name) or any(_reaches(p.low, p.high, fit.interval(i)) for i, p in own)
+
+
+def _reaches(low: float, high: float, interval: tuple[float, float]) -> bool:
+    return bool(np.isfinite(interval).all()) and (interval[0] <= low or interval[1] >= high)
+
+
+def _spans(fit: Fit, index: int) -> bool:
+    """Whether the interval of a number reaches from one of its bounds to the other."""
+    p, (low, high) = fit.free[index].parameter, fit.interval(index)
+    return bool(np.isfinite([p.low, p.high]).all() and low <= p.low and high >= p.high)
+
+
 def fitted_again(before: Model, fit: Fit, contradicted: bool = False) -> Iterator[str]:
     """The effects whose numbers were measured or published, with those that they have now; and those that are part of others now.
 

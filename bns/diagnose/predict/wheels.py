@@ -137,6 +137,10 @@ class WheelPredictor:
         poses.flags.writeable = sums.flags.writeable = False
         return poses, sums
 
+    def turned(self, model: Model) -> Body:
+        """The wheels, at every step of the grid, as the model's effects of the wheels turn them."""
+        return self._wheels(model.wheelbase_m, _chain(model, ("wheel",)))
+
     def starts_of(self, effect: Effect, model: Model) -> tuple[tuple[float, ...], ...]:
         """What the effect's ``starts_from`` makes of these poses, and of the wheels as the model turns them; kept.
 
@@ -145,7 +149,7 @@ class WheelPredictor:
         chain = _chain(model, ("wheel",))
         known = effect.name, model.wheelbase_m, chain
         if known not in self._starts and effect.starts_from is not None:
-            turned = self._wheels(model.wheelbase_m, chain)
+            turned = self.turned(model)
             given = Wheels(self.grid.step_s, turned.left_m_s, turned.right_m_s, model.wheelbase_m, self.conditions)
             self._starts[known] = effect.starts_from(given) or (tuple(effect.neutral.values()),)
         return self._starts[known]

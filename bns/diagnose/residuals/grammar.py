@@ -29,9 +29,12 @@ RESPONSE = "response of each wheel in time"
 SHIFTS = ("clock-offset", "command-delay")
 """Effects that shift all motion in time: beside a free response in time (`RESPONSE`) nothing tells their number from it."""
 RESPONSE_OF = {"v": "response of the forward velocity in time", "w": "response of the turning velocity in time"}
+RESPONSE_ALONE = {LEFT: "response of the left wheel in time", RIGHT: "response of the right wheel in time"}
+"""What an effect that acts alike on both wheels cannot be: beside a lag of both, the other lag of one."""
+SLOWING = "response of each wheel in time while it slows down"
 SESSION = "time of the session"
 CHANGES = "changes of speed of each wheel"
-PAST = frozenset({RESPONSE, CHANGES, *RESPONSE_OF.values()})
+PAST = frozenset({RESPONSE, SLOWING, CHANGES, *RESPONSE_OF.values(), *RESPONSE_ALONE.values()})
 """Answers to past commands."""
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 SPEED_THERE = "forward speed at a place"
@@ -137,8 +140,11 @@ def _surfaces(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
 def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
     """Families of what single motions have not: times, memories, places."""
     yield Family(CHANGES, WHEELS, ("fresh", "max(fresh, 0)", "fresh * abs(fresh)", "fresh * abs(u)"))
-    for signal, on, now in ((RESPONSE, WHEELS, "u"), *((signal, on, on) for on, signal in RESPONSE_OF.items())):
+    of_wheels = ((RESPONSE, WHEELS, "u"), *((signal, on, "u") for on, signal in RESPONSE_ALONE.items()))
+    for signal, on, now in (*of_wheels, *((signal, on, on) for on, signal in RESPONSE_OF.items())):
         yield Family(signal, on, tuple(f"(ago({a:g}, {b:g}) - {now})" for a, b in pairwise(RESPONSE_KNOTS_S)))
+    past = [f"ago({a:g}, {b:g})" for a, b in pairwise(RESPONSE_KNOTS_S)]
+    yield Family(SLOWING, WHEELS, tuple(f"({ago} - u) * max(sign(abs({ago}) - abs(u)), 0)" for ago in past))
     if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0:
         ways = [share * wheelbase_m for share in REVERSAL_KNOTS]
         yield Family("distance since each wheel reversed", WHEELS, tuple(f"u * {h}" for h in _hats("since", ways)[:-1]))

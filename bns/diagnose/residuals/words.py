@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.grammar import (
     CHANGES,
     PLACE,
     RESPONSE,
+    RESPONSE_ALONE,
     RESPONSE_KNOTS_S,
     RESPONSE_OF,
     SESSION,
+    SLOWING,
     SPEED_THERE,
     STRAIGHT,
     STRAIGHT_AT,
@@ -157,11 +161,15 @@ def _swing(term: Formula, _: Predictor) -> str:
 
 def _speed(term: Formula, predictor: Predictor) -> str:
     seen = predictor.variables()
-    fastest = float(max(np.abs(seen["left_m_s"]).max(), np.abs(seen["right_m_s"]).max()))
+    wheels = np.stack([seen["left_m_s"], seen["right_m_s"]])
+    if isinstance(predictor, WheelPredictor):  # the term begins from what the effects of the wheels leave of the commands
+        turned = predictor.turned(term.fit.model)
+        wheels = np.stack([turned.left_m_s, turned.right_m_s])
+    fastest = float(np.abs(wheels).max())
     at = fastest * np.array([0.1, 0.3, 1.0])
     got = at + _curve(term, "u", at, since=NEVER_M)
     back = -fastest + _curve(term, "u", np.array([-fastest]), since=NEVER_M)
-    if min(seen["left_m_s"].min(), seen["right_m_s"].min()) < 0.0 and abs(back[0] + got[-1]) > 0.01 * fastest:
+    if wheels.min() < 0.0 and abs(back[0] + got[-1]) > 0.01 * fastest:
         at, got = np.append(at, -fastest), np.append(got, back)
     got = np.where(got * at < 0.0, 0.0, got)  # a knot may lie a little beyond rest: the wheel stands
     shares = got / at
@@ -223,6 +231,22 @@ def _response(term: Formula, _: Predictor) -> str:
     )
 
 
+def _later(term: Formula) -> str:
+    """By how much longer a change of speed takes, from the way that it costs: each number's share of it came so long ago."""
+    middle = [(a + b) / 2.0 for a, b in pairwise(RESPONSE_KNOTS_S)]
+    late_s = sum(k * at for k, at in zip(term.values.values(), middle, strict=True))
+    return f"{abs(late_s):.2g} s {'later' if late_s > 0 else 'sooner'}"
+
+
+def _one_wheel(term: Formula, _: Predictor) -> str:
+    one, other = ("left", "right") if term.on == LEFT else ("right", "left")
+    return f"the {one} wheel follows a change of its command {_later(term)} than the {other} one"
+
+
+def _slowing(term: Formula, _: Predictor) -> str:
+    return f"a wheel that slows down follows its command {_later(term)} than one that speeds up"
+
+
 def _largest(term: Formula, predictor: Predictor) -> str:
     """The largest change of the velocity over speeds, turns, headings and places that were seen."""
     seen = predictor.variables()
@@ -260,4 +284,6 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     (CHANGES, "wheels"): _changes,
     (RESPONSE, "wheels"): _response,
     **{(signal, on): _response for on, signal in RESPONSE_OF.items()},
+    **{(signal, on): _one_wheel for on, signal in RESPONSE_ALONE.items()},
+    (SLOWING, "wheels"): _slowing,
 }

@@ -18,7 +18,7 @@ from bns.diagnose.estimate.clocks.trial_clock_test import (
     with_shared_clock,
 )
 from bns.diagnose.estimate.fit import Fit, Problem
-from bns.diagnose.estimate.plausibility import at_bound, implausible
+from bns.diagnose.estimate.plausibility import at_bound, implausible, limiting, undetermined
 from bns.diagnose.estimate.problem import settled_problem
 from bns.diagnose.estimate.significance import MIN_Z
 from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
@@ -284,9 +284,10 @@ class StepwiseSelection:
         return Candidate(name, added, problem.paired_comparison(fit, added), self._rejected(added, name))
 
     def _rejected(self, fit: Fit, name: str, bounds: bool = True) -> str:
-        """Why an effect may not be taken; where all numbers are believed, only for one at a bound."""
+        """Why an effect may not be taken; where all numbers are believed, only for one at a bound or not determined."""
         why = implausible(fit, name, bounds)
-        return "" if self._all_believed and not at_bound(fit, name) else why
+        believed = self._all_believed and not at_bound(fit, name)
+        return undetermined(fit, name) or ("" if believed else why)
 
     def _tried(self, problem: Problem, fit: Fit, place: Mapping[str, tuple[str, Fit]], effect: Effect) -> Candidate:
         self.tick(effect.name)
@@ -388,11 +389,14 @@ class StepwiseSelection:
         """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one.
 
         What comes in must have earned its place: where trials disagree, much that earns nothing certain is no worse for certain.
+        Nor may it be the limit of a longer effect that is the accepted one: a warm-up that outlasts every trial is a gain.
         """
         competing_models: list[tuple[tuple[str, ...], Fit]] = []
         lacking = cache(partial(without, problem, fit))
         for name, other, tried in self._exchanges.of(problem, fit, accepted):
-            # at a bound it may be: a tether from ever farther away is a slope
+            longer = len(tried.free) > len(fit.free)
+            if longer and limiting(tried, other):
+                continue
             may = not self._rejected(tried, other, bounds=False) and self._earned_over(
                 problem, lacking(name), tried, other
             )

@@ -1,0 +1,95 @@
+"""Wheels that answer unlike each other, or brake otherwise than they speed up: named, and described where they are not listed."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.fit import FreeParameter
+from bns.diagnose.estimate.plausibility import limiting, undetermined
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.starts import listed
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.established import established
+from bns.diagnose.residuals.grammar import RESPONSE_ALONE, RESPONSE_KNOTS_S, SLOWING
+from bns.diagnose.residuals.words import in_words
+from bns.physics.model import effect_named
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def driven(trials=20, **effects):
+    return WheelPredictor(tracks_of(measured(hidden(**effects), trials=trials, seed=4, speeds=(-0.2, 0.2))))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("lag-mismatch", {"tau_s": 0.15, "ratio": 2.0}),
+        ("braking-lag", {"tau_s": 0.2, "brake_ratio": 0.4}),
+        ("braking-limit", {"max_m_s2": 0.25, "brake_ratio": 2.5}),
+        ("braking-ramp", {"forward_m_s2": 0.25, "turn_rad_s2": 4.0, "brake_ratio": 2.5}),
+        ("speed-scaling", {"max_m_s": 0.12}),
+    ],
+)
+def test_each_is_named_with_its_numbers(name, values):
+    found = diagnose(driven(**{name.replace("-", "_"): values}), NOMINAL)
+    assert (found.verdict, found.effects) == ("effects", (name,))
+    assert {key: one["value"] for key, one in found.numbers[name].items()} == pytest.approx(values, rel=0.03)
+
+
+@pytest.mark.slow
+def test_a_lag_of_one_wheel_that_is_not_listed_is_described_beside_the_lag_of_both():
+    """Without the words for it a false ratio of the wheels' diameters stood in for it."""
+    predictor = driven(lag_mismatch={"tau_s": 0.15, "ratio": 2.0})
+    catalogue = listed(NOMINAL, None, predictor.tracks)
+    found = established(predictor, NOMINAL, {name: catalogue[name] for name in ("motor-lag", "wheel-mismatch")})
+    assert found.names == ("motor-lag",)
+    assert (found.terms[0].signal, found.terms[0].on) in {(signal, on) for on, signal in RESPONSE_ALONE.items()}
+    assert in_words(found.terms[0], predictor).startswith(("the left wheel follows", "the right wheel follows"))
+
+
+@pytest.mark.parametrize(
+    ("on", "signal", "number", "said"),
+    [
+        ("left", RESPONSE_ALONE["left"], 0.5, "the left wheel follows a change of its command 0.07 s later than the right one"),
+        ("right", RESPONSE_ALONE["right"], -0.5, "the right wheel follows a change of its command 0.07 s sooner than the left one"),
+        ("wheels", SLOWING, -0.5, "a wheel that slows down follows its command 0.07 s sooner than one that speeds up"),
+    ],
+)
+def test_a_response_is_said_by_how_much_later_it_makes_a_wheel(on, signal, number, said):
+    """Half of a step comes with the command of 0.1 to 0.18 s ago."""
+    assert RESPONSE_KNOTS_S[2:4] == (0.1, 0.18)
+    values = {f"k{i}": number * (i == 2) for i in range(len(RESPONSE_KNOTS_S) - 1)}
+    assert in_words(SimpleNamespace(on=on, signal=signal, term="", values=values), None) == said
+
+
+def made_up(intervals):
+    """A fit of warm-up's numbers, loss (-1 to 1) and time_s (0.1 to 600), with these intervals."""
+    free = tuple(FreeParameter("warm-up", p) for p in effect_named("warm-up").parameters)
+    values = [sum(ends) / 2 for ends in intervals]
+    return SimpleNamespace(free=free, values=values, interval=lambda i: intervals[i])
+
+
+def test_numbers_that_may_be_anything_are_not_determined():
+    anything, something = ((-1.0, 1.0), (0.1, 600.0)), ((-0.3, -0.1), (0.1, 600.0))
+    assert undetermined(made_up(anything), "warm-up") == "these data do not determine loss and time_s"
+    assert undetermined(made_up(something), "warm-up") == ""
+    assert limiting(made_up(something), "warm-up")  # a warm-up of any length is a gain
+    assert not limiting(made_up(((-0.3, -0.1), (2.0, 9.0))), "warm-up")
+
+
+def test_a_gain_is_no_tie_with_a_warm_up_that_outlasts_every_trial():
+    found = diagnose(driven(trials=12, speed_gain={"gain": 0.95}), NOMINAL)
+    assert (found.verdict, found.effects) == ("effects", ("speed-gain",))
+
+
+def test_a_limit_that_nothing_reaches_has_no_slope():
+    """Beside one that is finite a step of infinity made every number of the model NaN."""
+    predictor = driven(trials=4)
+    model = NOMINAL.with_effect("velocity-ramp", forward_m_s2=0.3, turn_rad_s2=np.inf)
+    fit = problem_for(predictor, model).fit(model, rounds=0)
+    assert np.isfinite(fit.jacobian).all()
+    assert not fit.jacobian[..., 1].any()
