@@ -24,12 +24,24 @@ def test_good_data_pass_as_they_are(table):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda t: {"x_m": t.x_m * 100, "y_m": t.y_m * 100}, "look like centimetres"),
+        (lambda t: {"x_m": t.x_m * 100, "y_m": t.y_m * 100}, "look like centimetres; .* unit: cm}"),
         (lambda t: {"x_m": t.x_m * 1000, "y_m": t.y_m * 1000}, "look like millimetres"),
-        (lambda t: {"heading_rad": np.degrees(t.heading_rad)}, "looks like degrees"),
-        (lambda t: {"t_s": t.t_s * 1000}, "t_s looks like milliseconds"),
+        (lambda t: {"heading_rad": np.degrees(t.heading_rad)}, "looks like degrees; .* LOG.import.yaml .* unit: deg}"),
+        (lambda t: {"t_s": t.t_s * 1000}, "t_s looks like milliseconds; .* unit: ms}"),
+        (lambda t: {"t_s": t.t_s * 1e9}, "t_s looks like nanoseconds; .* unit: ns}"),
         (lambda t: {"heading_rad": -t.heading_rad}, "counter-clockwise"),
-        (lambda t: {"x_m": t.x_m / 0.0254, "y_m": t.y_m / 0.0254}, "look like inches"),
+        (lambda t: {"left_m_s": -t.left_m_s, "right_m_s": -t.right_m_s}, "signs of both wheels are reversed"),
+        (lambda t: {"x_m": t.x_m / 0.0254, "y_m": t.y_m / 0.0254}, "look like inches; .* unit: in}"),
+        (lambda t: {"left_m_s": t.left_m_s / 0.0254, "right_m_s": t.right_m_s / 0.0254}, "in/s, or a device's .* or unit: in/s"),
+        (lambda t: {"left_m_s": np.nan}, "left_m_s is empty in all rows: no command is ever in force"),
+        (lambda t: {"left_m_s": np.nan, "right_m_s": np.nan}, "left_m_s and right_m_s are empty in all rows"),
+        (
+            lambda t: {"left_m_s": t.left_m_s.where(t.index % 2 == 0), "right_m_s": t.right_m_s.where(t.index % 2 == 1)},
+            "No row has a value in both left_m_s and right_m_s",
+        ),
+        (lambda t: {"left_m_s": 0.0, "right_m_s": 0.0}, "All values of left_m_s and right_m_s are 0, but the robot moves"),
+        (lambda t: {"heading_rad": 0.0}, "heading_rad is 0 in all poses, although the commands turn the robot"),
+        (lambda t: {"heading_rad": np.where(t.index % 2, np.pi, -np.pi)}, "in all poses, although the commands turn"),
         (lambda t: {"left_m_s": t.left_m_s * 100, "right_m_s": t.right_m_s * 100}, r"look like cm/s; .* unit: cm/s"),
         (lambda t: {"left_m_s": t.left_m_s * 50, "right_m_s": t.right_m_s * 50}, "rad/s of wheels with a radius of 20 mm"),
         (lambda t: {"left_m_s": t.left_m_s * 1000, "right_m_s": t.right_m_s * 1000}, "look like mm/s"),
@@ -157,3 +169,15 @@ def test_minutes_are_told_from_inches_and_degrees():
         other = good.assign(x_m=good.x_m * size, y_m=good.y_m * size, heading_rad=good.heading_rad * turn)
         with pytest.raises(DataError, match=text):
             checked(other)
+
+
+def test_a_robot_at_rest_that_was_told_nothing_is_listed(table):
+    rng = np.random.default_rng(5)
+    still = {name: 0.1 + 0.002 * rng.normal(size=len(table)) for name in ("x_m", "y_m", "heading_rad")}
+    _, findings = checked(table.assign(left_m_s=0.0, right_m_s=0.0, **still))
+    assert any("the robot was never told to move" in finding.text for finding in findings)
+
+
+def test_a_heading_that_stays_is_right_where_nothing_turns_the_robot(table):
+    straight = table.assign(right_m_s=table.left_m_s, heading_rad=0.0)
+    assert len(checked(straight)[0]) == len(table)

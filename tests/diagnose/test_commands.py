@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -96,13 +97,19 @@ def test_a_diagnosis_writes_terms_that_lower_the_error_where_no_effect_is_listed
     assert after < 0.6 * before
 
 
-def test_commands_that_are_all_zero_are_said_to_be(data, tmp_path, capsys):
-    table = pd.read_parquet(data).assign(left_m_s=0.0, right_m_s=0.0)
-    write_measurements(table, tmp_path / "zero.parquet")
-    assert main(["compare", str(tmp_path / "zero.parquet"), "--model", "khepera"]) == 0
-    assert "the robot was never told to move" in capsys.readouterr().err
-    assert main(["compare", str(data), "--model", "khepera"]) == 0
-    assert "never told to move" not in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("told", "message"),
+    [
+        ({"left_m_s": 0.0, "right_m_s": 0.0}, "are 0, but the robot moves"),
+        ({"left_m_s": np.nan}, "left_m_s is empty in all rows"),
+        ({"left_m_s": np.nan, "right_m_s": np.nan}, "left_m_s and right_m_s are empty in all rows"),
+    ],
+)
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_commands_that_are_never_in_force_are_refused(data, tmp_path, told, message, command, capsys):
+    write_measurements(pd.read_parquet(data).assign(**told), tmp_path / "none.parquet")
+    assert main([command, str(tmp_path / "none.parquet"), "--model", "khepera"]) == 2
+    assert message in capsys.readouterr().err
 
 
 def test_a_formula_is_added_and_comes_back(data, tmp_path):
@@ -137,7 +144,7 @@ def test_an_effect_of_ones_own_is_a_file(data, tmp_path, capsys):
     [
         (["--model", "kepera"], "Did you mean 'khepera'"),
         (["--model", "differential-drive"], "needs its wheelbase: --wheelbase METRES"),
-        (["--model", "differential-drive", "--wheelbase", "0.3"], r"A wheelbase of 0.0\d+ m would fit"),
+        (["--model", "differential-drive", "--wheelbase", "0.3"], r"A wheelbase of about 0.0\d+ m would fit"),
         (["--model", "gone.yaml"], "no model file gone.yaml"),
     ],
 )

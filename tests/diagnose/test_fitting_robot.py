@@ -8,12 +8,12 @@ import pytest
 
 from bns.diagnose.comparison import compare
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.predict.check_robot import check_same_robot
+from bns.diagnose.predict.check_robot import check_same_robot, suggested_wheelbase_m
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError
 from bns.physics.wheels.differential_drive import track
 
-from .worlds import FRAME_S, NOMINAL, hidden
+from .worlds import FRAME_S, NOMINAL, hidden, measured
 
 
 def predictor(model):
@@ -38,7 +38,7 @@ def test_motors_that_follow_late_are_no_other_robot(tau_s):
 @pytest.mark.parametrize("factor", [0.25, 4.0])
 def test_another_wheelbase_is_another_robot(factor):
     other = replace(NOMINAL, wheelbase_m=factor * NOMINAL.wheelbase_m)
-    with pytest.raises(DataError, match=r"A wheelbase of 0.088\d* m would fit: --wheelbase 0.088"):
+    with pytest.raises(DataError, match=r"A wheelbase of about 0.088\d* m would fit: --wheelbase 0.088"):
         check_same_robot(predictor(NOMINAL), other)
 
 
@@ -59,3 +59,28 @@ def test_compare_asks_only_from_a_factor_on():
     other = replace(NOMINAL, wheelbase_m=1.15 * NOMINAL.wheelbase_m)
     assert compare(predictor(NOMINAL), other).hint == ""
     assert compare(predictor(NOMINAL), replace(NOMINAL, wheelbase_m=1.35 * NOMINAL.wheelbase_m)).hint != ""
+
+
+def in_unit(table, size):
+    """The same log with wheels in another unit of speed."""
+    return WheelPredictor(tracks_of(table.assign(left_m_s=table.left_m_s / size, right_m_s=table.right_m_s / size)))
+
+
+@pytest.mark.parametrize(
+    ("size", "unit"), [(1 / 3.6, "left_m_s and right_m_s look like km/h"), (39.37, "x_m and y_m look like inches")]
+)
+def test_distances_are_judged_before_turns_and_name_the_unit(size, unit):
+    table = measured(NOMINAL, trials=12, commands=12, straight=0.5)
+    moved = table if size < 1 else table.assign(x_m=table.x_m * size, y_m=table.y_m * size)
+    with pytest.raises(DataError, match=rf"times as far as commanded\. {unit}\. In the mapping .* unit: "):
+        check_same_robot(in_unit(moved, min(size, 1.0)), NOMINAL)
+
+
+def test_no_wheelbase_is_suggested_that_no_model_may_have():
+    table = measured(NOMINAL, trials=12)
+    noise = table.assign(heading_rad=np.random.default_rng(1).normal(0, 1e-3, len(table)))
+    tracks = tracks_of(noise)
+    with pytest.raises(DataError, match=r"No wheelbase from 0\.001 to 10 m would fit: is heading_rad") as error:
+        check_same_robot(WheelPredictor(tracks), NOMINAL)
+    assert "--wheelbase" not in str(error.value)
+    assert suggested_wheelbase_m(tracks) is None

@@ -132,3 +132,34 @@ def test_what_is_no_text_is_said_to_be_none(tmp_path, content, message):
     (tmp_path / "log.csv").write_bytes(content)
     with pytest.raises(DataError, match=message):
         load_measured(tmp_path / "log.csv")
+
+
+def quaternions(order, up="z"):
+    """A log whose headings are quaternions, and the mapping that names them in some order."""
+    half = np.linspace(-3, 3, 100) / 2
+    axis = {"z": "qz", "y": "qy"}[up]
+    table = pd.DataFrame({"qx": 0.0, "qy": 0.0, "qz": 0.0, "qw": np.cos(half)}).assign(**{axis: np.sin(half)})
+    return table, {"columns": {"heading_rad": {"from": list(order), "unit": "quaternion"}}}, 2 * half
+
+
+@pytest.mark.parametrize(
+    ("order", "up", "cure"),
+    [
+        (("qw", "qx", "qy", "qz"), "z", r"w first: from: \[qx, qy, qz, qw\]"),
+        (("qx", "qy", "qz", "qw"), "y", "y axis seems to point up: up: y"),
+        (("qz", "qw", "qx", "qy"), "z", "Check the order"),
+    ],
+)
+def test_quaternions_of_a_robot_that_lies_on_its_side_are_refused(order, up, cure):
+    table, mapping, _ = quaternions(order, up)
+    with pytest.raises(DataError, match=rf"degrees off up \(median\).* The order must be x, y, z, w\. .*{cure}"):
+        applied(table, mapping)
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_quaternions_of_an_upright_robot_are_headings(up):
+    table, mapping, heading = quaternions(("qx", "qy", "qz", "qw"), up)
+    mapping["columns"]["heading_rad"]["up"] = up
+    np.testing.assert_allclose(applied(table, mapping)["heading_rad"], heading, atol=1e-12)
+    lost = applied(table.assign(qw=np.nan), mapping)
+    assert lost["heading_rad"].isna().all()

@@ -13,6 +13,7 @@ import pandas as pd
 
 from bns.diagnose.data.mapping import UNITS
 from bns.diagnose.data.merge_topics import held, merged, named_topics, of_topics, wheels_from_body
+from bns.diagnose.data.quaternions import yaw
 from bns.diagnose.data.relative_motions import relative_motions
 from bns.diagnose.data.split_trials import split
 from bns.errors import DataError, unknown_name
@@ -101,7 +102,7 @@ def _converted(name: str, values: pd.DataFrame, entry: Mapping[str, Any]) -> pd.
         return values.iloc[:, 0]
     unit = entry.get("unit")
     if unit == "quaternion":
-        numbers = _yaw(values, entry.get("up", "z"))
+        numbers = yaw(values, entry.get("up", "z"))
     else:
         numbers = (_dated if unit == "date" else _numbers)(name, values.iloc[:, 0])
     size = UNITS[unit][1] if unit else 1.0
@@ -128,17 +129,6 @@ def _dated(name: str, values: pd.Series) -> pd.Series:
         text = f"{name} is taken from {values.name}, whose dates do not read: {fault}. Write 2026-05-31T12:00:00.25."
         raise DataError(text) from fault
     return (stamps - pd.Timestamp(0, tz="UTC")).dt.total_seconds()
-
-
-def _yaw(values: pd.DataFrame, up: str) -> pd.Series:
-    """Where the body's x axis points, seen from above, by quaternions (x, y, z, w) of any length.
-
-    ``up`` y, as motion capture often has it: counter-clockwise from x in the plane of x and -z.
-    """
-    x, y, z, w = values.to_numpy(dtype=float).T
-    ahead, left = w * w + x * x - y * y - z * z, 2 * (x * y + w * z) if up == "z" else 2 * (w * y - x * z)
-    none = (ahead == 0) & (left == 0)
-    return pd.Series(np.where(none, np.nan, np.arctan2(left, ahead)), index=values.index)
 
 
 def _rate(name: str, counted: pd.Series, t_s: pd.Series | None, trial: pd.Series | None) -> pd.Series:

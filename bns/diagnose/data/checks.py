@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
-from bns.diagnose.data.odd_commands import half_told, never_told
+from bns.diagnose.data.odd_commands import half_told, never_told, refuse_untold
+from bns.diagnose.data.still_heading import refuse_still_heading
 from bns.diagnose.data.units import check_units
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
@@ -59,7 +60,10 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     usable[list(POSE)] = pose[chosen]
     if not _tracked(usable).any():
         raise DataError("There is no tracked pose in these measurements: every x_m, y_m or heading_rad is empty.")
-    check_units(usable, rows_by_trial(usable))
+    trials = rows_by_trial(usable)
+    refuse_untold(usable, trials)
+    refuse_still_heading(usable, trials)
+    check_units(usable, trials)
     told = [Finding(str(table["trial"].iloc[row]), row, text) for row, text in filter(None, (odd, never_told(usable)))]
     return usable, told + findings
 

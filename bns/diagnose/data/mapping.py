@@ -37,6 +37,7 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "cm/s": ("m/s", 1e-2),
     "mm/s": ("m/s", 1e-3),
     "km/h": ("m/s", 1 / 3.6),
+    "in/s": ("m/s", 0.0254),
     "rad/s": ("rad/s", 1.0),
     "deg/s": ("rad/s", math.pi / 180),
 }

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
+from bns.diagnose.data.spread import moved
+from bns.errors import DataError
 from bns.measurements import COMMANDS
 
 NEVER_TOLD = "all commands are 0 in all trials: the robot was never told to move. Are these the columns of the commands?"
+_WRITE = "Are these the columns of the commands? A log needs the speed of both wheels, or of the body, where it changes."
 
 
 def half_told(table: pd.DataFrame) -> tuple[int, str] | None:
@@ -27,3 +32,19 @@ def never_told(table: pd.DataFrame) -> tuple[int, str] | None:
     """The first row and what is odd, if no command moves a wheel."""
     moves = (table[list(COMMANDS)].abs() > 0).any(axis=None)
     return None if moves else (int(table.index[0]), NEVER_TOLD)
+
+
+def refuse_untold(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> None:
+    """DataError if no command is ever in force, or if all are 0 and the robot moves. ``trials``: names and row numbers."""
+    told = table[list(COMMANDS)].notna()
+    empty = [name for name in COMMANDS if not told[name].any()]
+    if empty:
+        columns = f"{' and '.join(empty)} {'is' if len(empty) == 1 else 'are'}"
+        raise DataError(f"{columns} empty in all rows: no command is ever in force. {_WRITE}")
+    if not told.all(axis=1).any():
+        raise DataError(
+            f"No row has a value in both {COMMANDS[0]} and {COMMANDS[1]}: no command is ever in force. Fill both cells where "
+            "one changes; `hold_commands_s: .inf` in the mapping of `bns import` keeps each until the next."
+        )
+    if never_told(table) and moved(table, trials):
+        raise DataError(f"All values of {COMMANDS[0]} and {COMMANDS[1]} are 0, but the robot moves. {_WRITE}")

@@ -18,7 +18,9 @@ _LONG_STEP_S = DEFAULTS.data.long_step_s
 _LONGEST_TRIAL_S = DEFAULTS.data.longest_trial_s
 _FINER = DEFAULTS.data.finer_units
 _UNTOLD_RATIO = DEFAULTS.data.untold_ratio
-_LENGTHS = [(SIZES[unit], name) for unit, name in (("in", "inches"), ("cm", "centimetres"), ("mm", "millimetres"))]
+_LENGTHS = {"in": "inches", "cm": "centimetres", "mm": "millimetres"}
+_TIMES = {"nanoseconds": "ns", "microseconds": "us", "milliseconds": "ms"}
+_WITHIN = DEFAULTS.data.unit_within
 _SLOWEST = DEFAULTS.data.slowest_ratio
 _ALIKE = DEFAULTS.data.in_proportion
 _DEGREES_AT_LEAST = DEFAULTS.data.degrees_rad_m
@@ -36,7 +38,7 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
     step = float(pauses[pauses > 0].median())
     if step > _LONG_STEP_S:  # before anything is done second by second
         unit = next(unit for least, unit in _FINER if step > least)
-        raise DataError(f"Successive rows are {step:g} s apart: t_s looks like {unit}; it must be seconds.")
+        raise DataError(_apart(step, unit))
     _check_length(table)
     ways = _driven(table, trials)
     speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
@@ -49,29 +51,39 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
             "each until the next."
         )
     if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
-        raise DataError(f"Successive rows are {step:g} s apart: t_s looks like milliseconds; it must be seconds.")
+        raise DataError(_apart(step, "milliseconds"))
     if speed > FASTEST_M_S:
-        raise DataError(f"Commands of up to {speed:g} m/s: left_m_s and right_m_s look like mm/s or a device's units.")
+        raise DataError(
+            f"Commands of up to {speed:g} m/s: left_m_s and right_m_s look like mm/s or a device's units; they must be metres "
+            f"per second. {_cure('left_m_s', 'mm/s')} For a device's units, give scale: METRES_PER_SECOND (of one unit)."
+        )
     if _turns_as_degrees(table) and _MINUTES[0] < _speed_ratio(table) < _MINUTES[1]:
         raise DataError(
             "The robot drives and turns about sixty times as fast as commanded: t_s looks like minutes; it must be seconds. In a "
             "mapping of `bns import`, give scale: 60."
         )
-    if _LENGTHS[-1][0] / _BEYOND[1] < 1 / max(ratio, 1e-9) < _LENGTHS[0][0] * _BEYOND[0]:
-        unit = min(_LENGTHS, key=lambda one: abs(np.log(one[0] * ratio)))[1]
+    if SIZES["mm"] / _BEYOND[1] < 1 / max(ratio, 1e-9) < SIZES["in"] * _BEYOND[0]:
+        unit, name = min(_LENGTHS.items(), key=lambda one: abs(np.log(SIZES[one[0]] * ratio)))
         raise DataError(
-            f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {unit}; they must be metres."
+            f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {name}; they must be metres. "
+            f"{_cure('x_m', unit)}"
         )
     if 0 < ratio < _SLOWEST and _correlation(ways[:, 0], ways[:, 1]) > _ALIKE:
         hundredths = _HUNDREDTHS[0] < ratio < _HUNDREDTHS[1]
-        looks = "cm/s" if hundredths else f"rad/s of wheels with a radius of {1e3 * ratio:.0f} mm, or a device's units"
+        inches = 1 / _WITHIN < ratio / SIZES["in/s"] < _WITHIN
+        turns = f"rad/s of wheels with a radius of {1e3 * ratio:.0f} mm,{' in/s,' if inches else ''} or a device's units"
+        looks = "cm/s" if hundredths else turns
+        cure = "unit: cm/s" if hundredths else "scale: METRES (a radius)" + (" or unit: in/s" if inches else "")
         raise DataError(
             f"The robot went {ratio:.2g} times as far as commanded, in proportion: left_m_s and right_m_s look like {looks}; "
             "they must be metres per second. In a mapping of `bns import`, give "
-            f"{'unit: cm/s' if hundredths else 'scale: METRES (a radius)'}."
+            f"{cure}."
         )
     if _turns_as_degrees(table):
-        raise DataError("Headings change far more than the wheels can turn the robot: heading_rad looks like degrees.")
+        raise DataError(
+            "Headings change far more than the wheels can turn the robot: heading_rad looks like degrees; "
+            f"it must be radians. {_cure('heading_rad', 'deg')}"
+        )
     if len(ways) and np.abs(ways[:, 2]).sum() > 0.3:
         told, seen = ways[
             np.abs(ways[:, 2]) <= np.median(np.abs(ways[ways[:, 2] != 0, 2])), 2:
@@ -79,9 +91,32 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
         same = float(told @ seen / np.sqrt((told @ told) * (seen @ seen) + 1e-300))
         if same < -0.5:
             raise DataError(
-                "The robot turns opposite to the wheels: heading_rad must run counter-clockwise, "
-                "or left_m_s and right_m_s are exchanged."
+                "The robot turns opposite to the wheels: heading_rad must run counter-clockwise (in the mapping of `bns import`, "
+                "give clockwise: true), or left_m_s and right_m_s are exchanged, or the signs of both wheels are reversed (give "
+                "both scale: -1)."
             )
+
+
+def _apart(step_s: float, unit: str) -> str:
+    """What is wrong with times of which successive ones are so far apart."""
+    return f"Successive rows are {step_s:g} s apart: t_s looks like {unit}; it must be seconds. {_cure('t_s', _TIMES[unit])}"
+
+
+def unit_by_ratio(ratio: float) -> str:
+    """Which unit a robot means that goes ``ratio`` times as far as commanded, and how a mapping says so; "" if none fits."""
+    meant = {1 / SIZES[unit]: ("x_m", unit, "x_m and y_m", name) for unit, name in _LENGTHS.items()}
+    meant |= {SIZES[unit]: ("left_m_s", unit, "left_m_s and right_m_s", unit) for unit in ("km/h", "in/s")}
+    nearest = min(meant, key=lambda size: abs(np.log(size / ratio)))
+    if not 1 / _WITHIN < nearest / ratio < _WITHIN:
+        return ""
+    column, unit, columns, name = meant[nearest]
+    return f"{columns} look like {name}. {_cure(column, unit)}"
+
+
+def _cure(column: str, unit: str) -> str:
+    """How a mapping says so."""
+    both = {"x_m": " and y_m", "left_m_s": " and right_m_s"}.get(column, "")
+    return f"In the mapping LOG.import.yaml (`bns import`), give {column}{both} `{{from: COLUMN, unit: {unit}}}`."
 
 
 def _check_length(table: pd.DataFrame) -> None:

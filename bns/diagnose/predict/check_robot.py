@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.data.units import unit_by_ratio
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import windows
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
-from bns.physics.model import Model
+from bns.physics.model import LIMITS, Model
 from bns.robots import robot_names
 
 _FACTOR = DEFAULTS.predict.robot_factor
@@ -44,11 +45,20 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
         return
     steps = predictor.steps(model).body
     predicted = _turn_predicted(steps, start, end)
+    _check_distances(tracks, steps, predicted, start, end)  # first: another unit of speeds alters the turns as well
     ratio = _turn_ratio(tracks, predicted, start, end, _EXPLAINED)
-    if ratio > _FACTOR or 0 < ratio < 1 / _FACTOR:
+    if not 1 / _FACTOR <= ratio <= _FACTOR:
         raise DataError(_on_turns(model, ratio, "Is this its model?"))
+    arcs = np.abs(predicted) < _ARC_RAD
+    _check_directions(tracks, start[arcs], end[arcs], np.cumsum(steps[:, 0]))
+
+
+def _check_distances(
+    tracks: Tracks, steps: Array, predicted: Array, start: NDArray[np.int64], end: NDArray[np.int64]
+) -> None:
+    """DataError if the robot goes much further than its model does, or less far, where both drive nearly straight ahead."""
     way = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])[1:]
-    straight = (np.abs(predicted) < 0.3) & (way[end] - way[start] > 0.02)
+    straight = (np.abs(predicted) < 0.3) & (np.abs(_turn_seen(tracks, start, end)) < 0.3) & (way[end] - way[start] > 0.02)
     if straight.sum() >= _FEWEST:
         went = np.hypot(*(tracks.pose[end, :2] - tracks.pose[start, :2]).T)[straight]
         ratio = float(np.median(went / (way[end] - way[start])[straight]))
@@ -58,11 +68,12 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
             )
         if ratio > 3 or ratio < 1 / 3:
             raise DataError(
-                f"The robot goes {ratio:.2g} times as far as commanded. Are the speeds in m/s, "
-                "the positions in m, the times in s? `bns import` turns other units into these."
+                f"The robot goes {ratio:.2g} times as far as commanded. "
+                + (
+                    unit_by_ratio(ratio)
+                    or "Are the speeds in m/s, the positions in m, the times in s? `bns import` turns other units into these."
+                )
             )
-    arcs = np.abs(predicted) < _ARC_RAD
-    _check_directions(tracks, start[arcs], end[arcs], np.cumsum(steps[:, 0]))
 
 
 def hint_on_wheelbase(predictor: Predictor, model: Model) -> str:
@@ -79,11 +90,15 @@ def hint_on_wheelbase(predictor: Predictor, model: Model) -> str:
 
 
 def _on_turns(model: Model, ratio: float, question: str) -> str:
-    fits = f"{model.wheelbase_m / ratio:.3g}"
-    return (
-        f"The robot turns {ratio:.2f} times as far as a model with a wheelbase of {model.wheelbase_m:g} m predicts. {question} "
-        f"A wheelbase of {fits} m would fit: --wheelbase {fits}."
-    )
+    fits = model.wheelbase_m / ratio if ratio else float("inf")
+    low, high = LIMITS["wheelbase_m"]
+    said = f"The robot turns {ratio:.2g} times as far as a model with a wheelbase of {model.wheelbase_m:g} m predicts."
+    if not low <= fits <= high:
+        return (
+            f"{said} No wheelbase from {low:g} to {high:g} m would fit: is heading_rad the measured heading of the robot, in "
+            "radians, and are the speeds in m/s?"
+        )
+    return f"{said} {question} A wheelbase of about {fits:.3g} m would fit: --wheelbase {fits:.3g}."
 
 
 def _turn_predicted(steps: Array, start: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
@@ -92,14 +107,19 @@ def _turn_predicted(steps: Array, start: NDArray[np.int64], end: NDArray[np.int6
     return turn[end] - turn[start]
 
 
+def _turn_seen(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
+    """Turn of windows (windows,), rad, the short way round."""
+    turned: Array = (tracks.pose[end, 2] - tracks.pose[start, 2] + np.pi) % (2 * np.pi) - np.pi
+    return turned
+
+
 def _turn_ratio(
     tracks: Tracks, predicted: Array, start: NDArray[np.int64], end: NDArray[np.int64], explained: float
 ) -> float:
     """How many times as far as predicted the robot turns; 1 where no factor leaves less than this share of the deviation."""
-    heading = tracks.pose[end, 2] - tracks.pose[start, 2]
     # where the model says that the turn is small enough, it can be told from one more round
     clear = (np.abs(predicted) < _ARC_RAD) & (np.abs(predicted) > 0.05)
-    seen = (heading + np.pi) % (2 * np.pi) - np.pi
+    seen = _turn_seen(tracks, start, end)
     if clear.sum() < _FEWEST:
         return 1.0
     ratio = _scale(seen[clear], predicted[clear])
@@ -120,7 +140,7 @@ def _check_directions(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.
     start, end, driven = start[clear], end[clear], driven[clear]
     went = (tracks.pose[end, :2] - tracks.pose[start, :2]) * np.sign(driven)[:, None]
     way = np.exp(1j * np.arctan2(went[:, 1], went[:, 0]))
-    turned = (tracks.pose[end, 2] - tracks.pose[start, 2] + np.pi) % (2 * np.pi) - np.pi
+    turned = _turn_seen(tracks, start, end)
     faces = np.exp(1j * (tracks.pose[start, 2] + turned / 2))
     beside, mirrored = complex((way / faces).mean()), complex((way * faces).mean())
     if abs(beside) > _TOGETHER and abs(np.angle(beside)) > _TURNED_RAD:
@@ -142,7 +162,8 @@ def _check_directions(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.
 def suggested_wheelbase_m(tracks: Tracks) -> float | None:
     """The wheelbase (m) with which a plain drive turns as these tracks do, over windows of a second.
 
-    None where they tell nothing. Turns of more than half a round between two poses would mislead it.
+    None where they tell nothing, or a distance that no model may have. Turns of more than half a round between two poses would
+    mislead it.
     """
     start, end = windows(tracks, "1s")
     told = np.cumsum(WheelPredictor(tracks).steps(Model(wheelbase_m=1.0)).body[:, 2])
@@ -152,7 +173,8 @@ def suggested_wheelbase_m(tracks: Tracks) -> float | None:
     if clear.sum() < _FEWEST:
         return None
     ratio = _scale(seen[clear], commanded[clear])
-    return float(1 / ratio) if ratio > 0 else None
+    low, high = LIMITS["wheelbase_m"]
+    return float(1 / ratio) if ratio > 0 and low <= 1 / ratio <= high else None
 
 
 def _scale(seen: Array, predicted: Array) -> float:

@@ -107,11 +107,40 @@ class Data:
         "A robot that goes at least as many times as far as commanded as inches in a metre, less the first factor, and at most "
         f"as many as millimetres, times the second one, has positions in such a unit; {BY_HAND}.",
     )
+    unit_within: float = setting(
+        1.3,
+        "factor",
+        "A unit is named where the robot goes as far as it would mean within this factor, which is what lag, slip and larger "
+        f"wheels leave open; {BY_HAND}.",
+    )
     minutes_ratio: tuple[float, float] = setting(
         (49.0, 77.0),
         "1",
         "A robot that drives this many times as fast as commanded, and turns as much faster, has times in minutes. The bounds "
         "are halfway, by ratio, to positions in inches (39) and centimetres (100).",
+    )
+    at_rest: tuple[float, float] = setting(
+        (0.05, 0.35),
+        "m, rad",
+        "Poses of a trial whose middle nine tenths spread by more, in position or heading, are of a robot that moves. The noise "
+        f"of a tracker and the drift of a robot at rest stay below; {BY_HAND}.",
+    )
+    same_heading_rad: float = setting(
+        1e-6,
+        "rad",
+        "Headings that differ by less are the same: the rest is rounding. The noise of any tracker is a hundred times as large.",
+    )
+    turned_for_certain_m: float = setting(
+        0.1,
+        "m",
+        "If one wheel is commanded to drive this much further than the other, the robot turns: by 0.01 rad on the largest "
+        "wheelbase that a model may have (10 m), by 1 rad on one of 0.1 m.",
+    )
+    upright_rad: float = setting(
+        math.pi / 4,
+        "rad",
+        "The z axis of a robot on a floor points up, less slopes and the tilt of its markers: both stay well below 45 degrees. "
+        "A quaternion in another order tilts it by 90 degrees on average.",
     )
     degrees_rad_m: float = setting(
         150.0,

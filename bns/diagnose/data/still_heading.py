@@ -1,0 +1,41 @@
+"""A heading that never changes although the robot is driven round: no heading was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from bns.diagnose.data.spread import moved
+from bns.diagnose.settings import DEFAULTS
+from bns.errors import DataError
+from bns.measurements import COMMANDS
+
+_SAME_RAD = DEFAULTS.data.same_heading_rad
+_TURNED_M = DEFAULTS.data.turned_for_certain_m
+
+
+def refuse_still_heading(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> None:
+    """DataError if the heading is the same in all poses of a robot that moves and is commanded to turn for certain.
+
+    ``trials``: names and row numbers.
+    """
+    headings = table["heading_rad"].dropna().to_numpy(dtype=float)
+    if len(headings) < 2 or np.abs(np.angle(np.exp(1j * (headings - headings[0])))).max() > _SAME_RAD:
+        return
+    furthest = max((_turned_m(table.iloc[rows]) for _, rows in trials), default=0.0)
+    if furthest > _TURNED_M and moved(table, trials):
+        raise DataError(
+            f"heading_rad is {headings[0]:.6g} in all poses, although the commands turn the robot (one wheel is to drive up to "
+            f"{furthest:.2g} m further than the other): it is no measured heading. It must be the direction in which the robot "
+            "faces, counter-clockwise from x. Take it from another column of the tracker; from a quaternion in the order "
+            "x, y, z, w."
+        )
+
+
+def _turned_m(rows: pd.DataFrame) -> float:
+    """By how much one wheel is commanded to drive further than the other between two times of a trial, m."""
+    apart = (rows[COMMANDS[1]] - rows[COMMANDS[0]]).fillna(0.0).to_numpy(dtype=float)
+    way = np.cumsum(np.append(0.0, apart[:-1] * np.diff(rows["t_s"].to_numpy(dtype=float))))
+    return float(np.ptp(way))
