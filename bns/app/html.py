@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -21,6 +22,8 @@ VELOCITIES = {
     "east_m_s": "velocity east (m/s)",
     "north_m_s": "velocity north (m/s)",
 }
+_NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?( [^\s]{1,5})?")
+"""A number, perhaps with a unit."""
 BADGE = '<span class="bns-badge">{}</span>'
 
 
@@ -29,7 +32,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = 
     head = "".join(f'<th scope="col">{escape(str(c))}</th>' for c in columns)
     body = "".join(
         f'<tr><th scope="row">{escape(str(row[0]))}</th>'
-        + "".join(f"<td>{escape(str(v))}</td>" for v in row[1:])
+        + "".join(_cell(str(v)) for v in row[1:])
         + "</tr>"
         for row in rows
     )
@@ -38,6 +41,12 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = 
         f'<div class="bns-scroll" tabindex="0"><table class="bns-table" id="{escape(identifier)}">{title}'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )
+
+
+def _cell(text: str) -> str:
+    """A browser breaks lines at the hyphen of 5e-05; in a number it shall not."""
+    number = ' class="bns-number"' if _NUMBER.fullmatch(text) else ""
+    return f"<td{number}>{escape(text)}</td>"
 
 
 def velocity(channel: str) -> str:

@@ -5,7 +5,9 @@ import pandas as pd
 import pytest
 
 import bns
+from bns.app.html import table as html_table
 from bns.app.log import roles
+from bns.app.log.columns import ColumnsPart
 from bns.app.log.preview import preview
 from bns.app.log.roles import BODY, COUNTED, FROM_NORTH, FROM_X, ROLES, TURNS, WHEELS, Menus
 from bns.diagnose.data.guess.mapping import guessed
@@ -78,6 +80,25 @@ def test_another_column_comes_in_the_unit_that_its_name_tells(menus):
     assert roles.with_unit(mapping, "x_m", "m")["columns"]["x_m"] == {"from": "place_cm"}
 
 
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # Panel 1.5 has only the names that 1.9 warns of
+def test_a_number_that_is_missing_is_asked_for_by_the_name_of_its_field(menus):
+    mapping = menus.guess.mapping
+    for role in ("left_m_s", "right_m_s"):
+        mapping = roles.with_unit(mapping, role, TURNS)
+    part = ColumnsPart(lambda _mapping: None)
+    part.show(menus, mapping, "log.csv", FOLDER)
+    assert "Fill in: Radius of the wheels (m)." in str(part._problem.view.object)
+    part.show(menus, roles.with_wheel_scale(mapping, 0.042), "log.csv", FOLDER)
+    assert "Fill in" not in str(part._problem.view.object)
+
+
+def test_wheels_that_were_measured_are_not_called_commanded(table):
+    renamed = table.rename(columns={"left_mm_s": "odom_left_mm_s", "right_mm_s": "odom_right_mm_s"})
+    mapping = Menus({"": renamed}).guess.mapping
+    assert roles.label(mapping, "left_m_s") == "Left wheel, measured"
+    assert roles.label(Menus({"": table}).guess.mapping, "left_m_s") == "Left wheel, commanded"
+
+
 def test_wheels_in_radians_or_counts_ask_for_the_number_that_no_log_tells(menus):
     mapping = menus.guess.mapping
     for role in ("left_m_s", "right_m_s"):
@@ -131,3 +152,9 @@ def test_a_quaternion_is_one_choice_for_the_heading():
     mapping = menus.with_column(menus.guess.mapping, "heading_rad", ("", four))
     assert mapping["columns"]["heading_rad"] == {"from": list(four), "unit": "quaternion"}
     assert roles.picked(mapping, "heading_rad").place == ("", four)
+
+
+def test_numbers_in_a_table_are_not_broken_at_their_hyphens():
+    text = html_table(["effect", "p"], [["motor-lag", "5e-05"], ["turn-slip", "falls by 2"]])
+    assert '<td class="bns-number">5e-05</td>' in text
+    assert "<td>falls by 2</td>" in text

@@ -82,14 +82,14 @@ class ColumnsPart:
             if picked is not None and picked.place not in options.values():
                 options[f"{picked.place[1]} (no such column)"] = picked.place
             menu.options, menu.value = options, picked.place if picked else None
-            menu.visible = role not in hidden
+            menu.visible, menu.name = role not in hidden, roles.label(mapping, role)
             if role in self._units:
                 self._fill_unit(role, picked, menu.visible)
         self._fill_numbers(told)
 
     def _fill_unit(self, role: str, picked: roles.Picked | None, visible: bool) -> None:
         menu = self._units[role]
-        menu.visible = visible and picked is not None
+        menu.visible, menu.name = visible and picked is not None, f"{roles.label(self._mapping, role)}: unit"
         if picked is not None:
             options = roles.units(role, picked.place[1])
             menu.options = options if picked.unit in options else [*options, picked.unit]
@@ -120,11 +120,16 @@ class ColumnsPart:
         found = preview(self._menus.tables, self._mapping, self._folder)
         paths = [(name, "", path) for name, path in zip(found.names, found.paths, strict=True)]
         self._picture.fill(paths, {"x": [], "y": [], "text": []})
-        self._problem.show(found.problem)
+        self._problem.show(self._to_fill_in() or found.problem)
         self._said.object = f"<p id='bns-preview'>{escape(found.said)}</p>" if found else ""
         name = f"{self._name}.import.yaml"
         text = roles.written(self._mapping).encode()
         self._save.object = download(f"Save {name}", name, text, "text/yaml") if found else ""
+
+    def _to_fill_in(self) -> str:
+        """Which numbers the units and commands need that are not there yet."""
+        empty = [field.name for field in (self._scale, self._wheelbase) if field.visible and not field.value]
+        return f"Fill in: {'; '.join(empty)}." if empty else ""
 
     def _pick(self, role: str) -> None:
         assert self._menus is not None

@@ -12,6 +12,7 @@ import yaml
 
 from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, unit_of_column
 from bns.diagnose.data.guess.mapping import guessed
+from bns.diagnose.data.guess.words import rank, words_of
 from bns.diagnose.data.mapping import FORWARD, SPLITS, TURN, UNITS
 from bns.measurements import COMMANDS
 
@@ -112,6 +113,14 @@ class Menus:
         time = guessed(self.tables[file]).mapping["columns"].get("t_s")
         also.append({"file": file, "columns": {"t_s": time} if time else {}})
         return dict_in(also[-1], "columns")
+
+
+def label(mapping: Mapping[str, Any], role: str) -> str:
+    """What a role is called beside the column that was chosen for it: wheels that were measured are not commanded."""
+    said, found = ROLES[role], picked(mapping, role)
+    if found is None or role not in {*COMMANDS, FORWARD, TURN} or rank(words_of(str(found.place[1])), truth=False) >= 0:
+        return said
+    return said.replace("commanded", "measured")
 
 
 def units(role: str, source: Source) -> list[str]:

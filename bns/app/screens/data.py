@@ -25,6 +25,7 @@ from bns.diagnose.data.sources.bags import ENDINGS as BAGS
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.sources.text_tables import ENDINGS as TEXTS
 from bns.examples import FOLDER
+from bns.measurements import COLUMNS
 
 SAMPLES = {"A Khepera with a hidden effect, 14 trials": FOLDER / "khepera-log.csv"}
 ENDINGS = (*TEXTS, ".gz", ".parquet", ".tuple", *BAGS)
@@ -154,6 +155,11 @@ class DataScreen:
             mapping = self._tab.mapping if self._tab.log is not None else None
             mapping = mapping or mapping_beside(paths[0])
             self._columns.show(menus, mapping, paths[0].name, paths[0].parent)
+            if mapping is None and not set(COLUMNS) <= set(menus.tables[""].columns):
+                self._problem.show(
+                    f"The columns of {paths[0].name} have other names than those of a table of measurements. Choose them below, "
+                    "then click 'Read it with this'."
+                )
 
         self._jobs.run(f"looking at the columns of {paths[0].name}", work, show, lambda _text: None)
 

@@ -46,7 +46,11 @@ class ExperimentPart:
         self._work = Working("Propose the next experiment", self._begin, lambda: tab.experiment, self._show)
         self._found = pn.Column(**WIDE)  # a picture that is hidden has no size to begin with, which Bokeh complains of
         controls = pn.Column(
-            html("<p>Commands that tell the remaining explanations apart in the least time on the robot.</p>"),
+            html(
+                "<p>Commands that tell the remaining explanations apart in the least time on the robot. "
+                "The arena begins as the area in which the robot was seen, without the outermost 0.5 % of the poses on each "
+                "side.</p>"
+            ),
             row(*self._sides, self._minutes),
             self._work.buttons,
             self._problem.view,
