@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from bns.api.common.cache import remembered
+from bns.api.common.next_command import repeated
 from bns.api.common.parameters import parameter_table
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Meter, Progress
@@ -146,9 +147,14 @@ class DiagnoseResult(Shown):
         """As `errors`, before and after adding all effects and terms (`model_with_terms`); empty if there are no terms."""
         return pd.DataFrame(self.diagnosis.as_json()["error_with_terms"]).T.rename_axis("horizon")
 
-    def summary(self) -> str:
-        """Verdict first; then numbers, errors, ranking, notes."""
-        return changes_text(self.settings) + diagnosis_text(self.diagnosis, self.rivals)
+    def summary(self, command: Mapping[str, str] | None = None) -> str:
+        """Verdict first; then numbers, errors, ranking, notes. ``command``: words (data, model) that further commands repeat."""
+        return changes_text(self.settings) + diagnosis_text(self.diagnosis, self.rivals, command or self.command)
+
+    @property
+    def command(self) -> dict[str, str]:
+        """Words (data, model) for the commands that follow."""
+        return repeated(fspath(self.ready.measured.path), self.ready.model.name)
 
     def to_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -63,9 +63,12 @@ class ProposeResult(Shown):
         """Probability that all pairs that commands can decide are decided."""
         return self.proposal.power
 
-    def summary(self, written: str = "") -> str:
-        """The explanations that are compared, and what the experiment would decide; ``written``: the file with the commands."""
-        return proposal_text(self.proposal, written)
+    def summary(self, written: str = "", command: Mapping[str, str] | None = None) -> str:
+        """The explanations that are compared, and what the experiment would decide.
+
+        ``written``: the file with the commands; ``command``: words (data, model) that further commands repeat.
+        """
+        return proposal_text(self.proposal, written, command or self.diagnosis.command)
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
         """Write the commands as a file that `bns trial --commands` drives; its path. DataError where there are none."""
@@ -170,7 +173,7 @@ def _limits(
 def checked_minutes(minutes: float) -> None:
     """DataError unless an experiment can last so long."""
     if not (math.isfinite(minutes) and 0 < minutes <= MOST_MINUTES):
-        raise DataError(f"--minutes is {minutes:g}; it must be above 0 and at most {MOST_MINUTES:g}.")
+        raise DataError(f"minutes is {minutes:g}; it must be above 0 and at most {MOST_MINUTES:g}.")
 
 
 def checked_output(path: Path, what: str, ending: str) -> Path:

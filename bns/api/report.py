@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike, fspath
@@ -107,13 +106,7 @@ def reported(
             lambda: proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=planning).proposal,
             meter,
         )
-        page = report_html(material, command or repeated(fspath(ready.measured.path), ready.model.name)).encode()
+        page = report_html(material, command or found.command).encode()
     publish(page, target.with_name(f".{target.name}.part"), target)
     meter.done()
     return ReportResult(target, found, len(page))
-
-
-def repeated(data: str, model: str, wheelbase_m: float | None = None) -> dict[str, str]:
-    """The words of a command line that the next ones repeat."""
-    base = [] if wheelbase_m is None else ["--wheelbase", f"{wheelbase_m:g}"]
-    return {"data": shlex.quote(data), "model": shlex.join(["--model", model, *base])}

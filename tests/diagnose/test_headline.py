@@ -8,7 +8,8 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.report.plain_language import headline
+from bns.diagnose.report.plain_language import further_notes, headline, with_what
+from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.effects import effect_named
 from bns.physics.model import Model
@@ -49,8 +50,27 @@ def test_effects_come_before_what_is_not_explained(monkeypatch):
     either = headline(replace(found, verdict="unlisted", selection=tied))
     cause, other = (effect_named(name).in_words for name in ("yaw-bias", "wheel-mismatch"))
     assert either.startswith(f"Missing from the model: either {cause}, or {other}; and also something that none")
+    shared = replace(found.selection, accepted=("yaw-bias", "motor-lag"), competing_models=(("wheel-mismatch", "motor-lag"),))
+    once = headline(replace(found, verdict="tie", selection=shared))
+    lag = effect_named("motor-lag").in_words
+    assert once.startswith(f"Missing from the model: {lag}; and either {cause}, or {other}. These")
+    assert with_what(replace(found, verdict="tie")) == "With the first of these explanations"
+    assert with_what(found) == "With it"
     bare = headline(replace(found, verdict="unlisted", selection=replace(found.selection, accepted=())))
     assert bare == "Something is missing from the model that none of the known effects explains."
+
+
+def test_what_is_left_is_described_once(monkeypatch):
+    predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": 0.05}), trials=14, seed=11)))
+    found = found_with(monkeypatch, predictor, "yaw-bias")
+    left = replace(
+        found,
+        verdict="unlisted",
+        terms_in_words=("one wheel rubs",),
+        notes=("What no listed effect explains behaves like this: one wheel rubs.", "Another note."),
+    )
+    assert further_notes(left) == ["Another note."]
+    assert diagnosis_text(left).count("one wheel rubs") == 1
 
 
 def test_a_set_with_which_it_falls_stays(monkeypatch):

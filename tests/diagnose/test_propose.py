@@ -186,7 +186,17 @@ def test_after_a_clear_verdict_only_the_accepted_one_is_contested():
     assert len(competing_models) > 1
     proposal = propose(d, ARENA, BOUNDS, 2.0)
     assert all(pair.already_decided for pair in proposal.model_pairs)
-    assert "No experiment is needed: these measurements tell" in proposal_text(proposal)
+    said = {"data": "'my log.csv'", "model": "--model khepera"}
+    proposal = replace(proposal, bounds=replace(BOUNDS, robot="khepera"))
+    text = proposal_text(proposal, "next one.csv", said)
+    assert "No experiment is needed: these measurements tell" in text
+    assert "What follows is optional" in text
+    assert "to drive it (optional): bns trial --robot khepera --rig RIG.yaml --commands 'next one.csv'" in text
+    driven = "--more 'results/trials/experiment-next one/measurements.csv'"
+    assert text.endswith(f"then: bns diagnose 'my log.csv' --model khepera {driven}")
+    elsewhere = replace(proposal, arena=replace(proposal.arena, start=(0.5, 0.2, 0.0)))
+    ahead = "bns propose 'my log.csv' --model khepera --start=0,0,90 -o 'next one.csv'\nwritten to next one.csv"
+    assert ahead in proposal_text(elsewhere, "next one.csv", said)
     undecided = replace(proposal, model_pairs=(replace(proposal.model_pairs[0], already_decided=False),))
     assert "No experiment is needed" not in proposal_text(undecided)
     assert model_pairs_of(d, competing_models) == tuple((0, i) for i in range(1, len(competing_models)))
@@ -318,7 +328,7 @@ def test_a_robot_that_bns_cannot_drive_gets_no_command_for_it(narrow):
     other = bounds_of(predictor.tracks, replace(load_model("khepera"), name="differential-drive"))
     fast = bounds_of(predictor.tracks, load_model("khepera"), (-0.2, 0.9))
     assert (other.robot, fast.robot) == ("", "")
-    for bounds, command in ((own, "drive it with: bns trial --robot khepera"), (other, "log them as before")):
+    for bounds, command in ((own, "to drive it: bns trial --robot khepera"), (other, "log them as before")):
         text = proposal_text(propose(d, ARENA, replace(bounds, trial_s=6.0), 0.5), "next.csv")
         assert command in text
         assert ("bns trial" in text) == (bounds is own)

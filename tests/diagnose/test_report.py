@@ -12,6 +12,7 @@ import pytest
 
 from bns.cli.main import main
 from bns.diagnose import values
+from bns.diagnose.comparison import compare
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -19,6 +20,7 @@ from bns.diagnose.report import tables
 from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.report.shown_paths import shown_paths
 from bns.diagnose.report.tables import error_table
+from bns.diagnose.report.text import comparison_text
 from bns.measurements import write_measurements
 from bns.physics.effects import effect_named
 from bns.physics.formula import formula_effect
@@ -241,3 +243,13 @@ def test_the_parameters_of_a_term_come_in_their_order_and_with_intervals(monkeyp
     found = values.numbers_of_term(SimpleNamespace(fit=None, name="t"))
     assert list(found) == ["k0", "k2", "k10"]
     assert tables.in_line(found) == "k0 500 ms (480 to 520 ms); k2 500 ms (480 to 520 ms); k10 500 ms (480 to 520 ms)"
+
+
+def test_a_comparison_of_one_trial_says_that_it_has_no_standard_error():
+    one, two = (
+        comparison_text(compare(WheelPredictor(tracks_of(measured(NOMINAL, trials=count, seed=3))), NOMINAL)) for count in (1, 2)
+    )
+    assert one.startswith("1 trial, ")
+    assert "one trial has no standard error" in one
+    assert "±" not in one
+    assert "±: standard error over trials" in two

@@ -222,6 +222,7 @@ def compare(options: argparse.Namespace) -> int:
 
 def diagnose(options: argparse.Namespace) -> int:
     """The verdict on what a model lacks."""
+    from bns.api.common.next_command import repeated
     from bns.api.model import checked_target
 
     if options.output is not None:
@@ -230,7 +231,8 @@ def diagnose(options: argparse.Namespace) -> int:
     extended = found.extended
     if options.output is not None and extended is not None:
         extended.save(options.output)
-    print(json.dumps(found.to_json()) if options.json else found.summary())
+    command = repeated(str(options.data), str(options.model), options.wheelbase, options.more)
+    print(json.dumps(found.to_json()) if options.json else found.summary(command))
     if not options.json:
         print(_where_written(options, extended), end="")
 

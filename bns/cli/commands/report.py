@@ -56,6 +56,7 @@ def add_experiment_options(parser: argparse.ArgumentParser) -> None:
 
 def propose(options: argparse.Namespace) -> int:
     """Trials that tell the rivals apart, as a file that `bns trial` drives."""
+    from bns.api.common.next_command import repeated
     from bns.api.propose import checked_minutes, checked_output
 
     checked_minutes(options.minutes)
@@ -65,8 +66,9 @@ def propose(options: argparse.Namespace) -> int:
     found = diagnosed(options)
     with ticking("planning") as tick:
         proposal = found.propose(**limits, progress=tick)
+    command = repeated(str(options.data), str(options.model), options.wheelbase, options.more)
     written = "" if out is None or proposal.commands.empty else str(proposal.to_csv(out))
-    print(json.dumps(proposal.to_json()) if options.json else proposal.summary(written))
+    print(json.dumps(proposal.to_json()) if options.json else proposal.summary(written, command))
     if out is not None and not written:
         print(f"{out} is not written: no commands would decide anything", file=sys.stderr)
     return 0
@@ -74,14 +76,14 @@ def propose(options: argparse.Namespace) -> int:
 
 def report(options: argparse.Namespace) -> int:
     """The page."""
+    from bns.api.common.next_command import repeated
     from bns.api.propose import checked_minutes, checked_output
-    from bns.api.report import repeated
 
     checked_minutes(options.minutes)
     checked_output(options.output, "The report", ".html")
     limits = _limits(options)
     found = diagnosed(options)
-    command = repeated(str(options.data), str(options.model), options.wheelbase)
+    command = repeated(str(options.data), str(options.model), options.wheelbase, options.more)
     with ticking("reporting") as tick:
         print(found.report(options.output, **limits, command=command, progress=tick).summary())
     return 0

@@ -24,7 +24,7 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.report import tables
 from bns.diagnose.report.figures import comparison_figure, diagnosis_figure, error_by_step_figure
-from bns.diagnose.report.plain_language import certainty, headline, numbers_in_words
+from bns.diagnose.report.plain_language import certainty, further_notes, headline, numbers_in_words
 from bns.diagnose.report.proposal_figure import plan_figure
 from bns.diagnose.report.proposal_text import proposal_lines
 from bns.diagnose.report.shown_paths import shown_paths
@@ -119,7 +119,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "next_lines": proposal_lines(m.proposal) if m.proposal else [m.why_none],
         "plan_picture": _planned(m.proposal),
         "commands": tables.commands_table(m.proposal) if m.proposal and len(m.proposal.plan) else None,
-        "notes": list(d.notes),
+        "notes": further_notes(d),
         "next_commands": tables.next_commands(d, m.proposal, command),
         "exact": tables.exact_table(d) if has_found and d.effects else None,
         "equations": tables.equations_table(d) if d.effects else None,

@@ -73,10 +73,13 @@ def headline(d: Diagnosis) -> str:
     """The verdict in one sentence or two."""
     said = _all_of(d, d.effects)
     if d.selection is not None and (d.verdict == "tie" or (d.verdict == "unlisted" and d.selection.competing_models)):
-        causes = [_all_of(d, names) for names in (d.selection.accepted, *d.selection.competing_models)]
+        explanations = (d.selection.accepted, *d.selection.competing_models)
+        shared = tuple(name for name in explanations[0] if all(name in names for names in explanations))
+        causes = [_all_of(d, tuple(n for n in names if n not in shared)) or "nothing else" for names in explanations]
         some = causes[:_CAUSES] + (["something else"] if len(causes) > _CAUSES else [])
+        either = f"{_all_of(d, shared)}; and either" if shared else "either"
         rest = "; and also something that none of the known effects explains" if d.verdict == "unlisted" else ""
-        return f"Missing from the model: either {', or '.join(some)}{rest}. These measurements cannot decide which."
+        return f"Missing from the model: {either} {', or '.join(some)}{rest}. These measurements cannot decide which."
     return {
         "none": "Nothing is missing from the model that these measurements could show.",
         "effects": f"Missing from the model: {said}.",
@@ -85,6 +88,19 @@ def headline(d: Diagnosis) -> str:
         else "Something is missing from the model that none of the known effects explains.",
         "insufficient-data": "These measurements do not suffice to say whether anything is missing.",
     }[d.verdict]
+
+
+def with_what(d: Diagnosis) -> str:
+    """The extended model, as the beginning of a sentence that follows the headline."""
+    if d.verdict == "tie":
+        return "With the first of these explanations"
+    return "With it" if len(d.effects) == 1 else "With them"
+
+
+def further_notes(d: Diagnosis) -> list[str]:
+    """The notes, less those that only repeat what is left over, which stands at the head of an answer."""
+    said = tuple(f"behaves like this: {words}." for words in d.behaviour)
+    return [note for note in d.notes if not note.endswith(said)]
 
 
 def _all_of(d: Diagnosis, names: tuple[str, ...]) -> str:
@@ -118,6 +134,6 @@ def certainty(d: Diagnosis) -> str:
     )
     better = int((found.problem.fit(without_last(found)).held_out > found.fit.held_out).sum())
     return (
-        f"With it, {better} of {trials} trials are predicted better, each by a fit to other trials. The probability that "
+        f"{with_what(d)}, {better} of {trials} trials are predicted better, each by a fit to other trials. The probability that "
         f"chance alone gives such a gain to any of the {tried} effects tried is at most {min(1.0, tried * chance):.1g}."
     )

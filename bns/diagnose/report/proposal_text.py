@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import shlex
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 
@@ -10,14 +12,18 @@ from bns.diagnose.design.proposal import ModelPair, Proposal
 from bns.robots.khepera import START
 
 _NEEDLESS = (
-    "No experiment is needed: these measurements tell all these explanations apart. What follows confirms that on new data."
+    "No experiment is needed: these measurements tell all these explanations apart. What follows is optional; it would confirm "
+    "that on new data."
 )
 
 
-def proposal_text(p: Proposal, written: str = "") -> str:
-    """Who stands against whom, what the experiment would decide, and what to type next."""
+def proposal_text(p: Proposal, written: str = "", command: Mapping[str, str] | None = None) -> str:
+    """Who stands against whom, what the experiment would decide, and what to type next.
+
+    ``written``: the file with the commands; ``command``: words (data, model) of the command line that the next ones repeat.
+    """
     first = f"verdict so far: {p.verdict}; explanations to tell apart: {'; '.join(r.title for r in p.competing_models)}"
-    return "\n".join([first, *proposal_lines(p), *_next(p, written)])
+    return "\n".join([first, *proposal_lines(p), *_next(p, written, command or {"data": "DATA", "model": "--model M"})])
 
 
 def model_pair_text(c: ModelPair) -> str:
@@ -36,8 +42,7 @@ def model_pair_text(c: ModelPair) -> str:
 
 def proposal_lines(p: Proposal) -> list[str]:
     """Whether an experiment is needed at all, a sentence a pair, then what the trials are."""
-    needless = bool(p.model_pairs) and all(c.already_decided for c in p.model_pairs)
-    lines = [_NEEDLESS] * needless + [model_pair_text(c) for c in p.model_pairs]
+    lines = [_NEEDLESS] * _needless(p) + [model_pair_text(c) for c in p.model_pairs]
     if not len(p.plan):
         return [*lines, "No trial is proposed: no commands would decide."]
     a = p.arena
@@ -56,16 +61,24 @@ def proposal_lines(p: Proposal) -> list[str]:
     ]
 
 
-def _next(p: Proposal, written: str) -> Iterator[str]:
-    if written and (p.bounds is None or not p.bounds.robot or p.arena is None):
-        yield f"written to {written}; drive its trials, log them as before, and then: bns diagnose DATA --more NEW.csv --model M"
-    elif written:
-        assert p.bounds is not None
-        assert p.arena is not None
-        if not np.allclose(p.arena.start, START, atol=0.02):
-            yield "note: bns trial starts every trial at x = 0, y = 0, heading 90°; --start=0,0,90 plans for that."
-        yield f"written to {written}; drive it with: bns trial --robot {p.bounds.robot} --rig RIG.yaml --commands {written}"
-        yield "then: bns diagnose DATA --more NEW.csv --model M"
+def _needless(p: Proposal) -> bool:
+    return bool(p.model_pairs) and all(c.already_decided for c in p.model_pairs)
+
+
+def _next(p: Proposal, written: str, command: Mapping[str, str]) -> Iterator[str]:
+    if not written:
+        return
+    data, model, file = command["data"], command["model"], shlex.quote(written)
+    optional = " (optional)" if _needless(p) else ""
+    if p.bounds is None or not p.bounds.robot or p.arena is None:
+        yield f"written to {written}; to go on{optional}, drive its trials and log them as before"
+        yield f"then: bns diagnose {data} {model} --more NEW-LOG.csv"
+        return
+    if not np.allclose(p.arena.start, START, atol=0.02):
+        yield f"for trials that start where those of bns trial do: bns propose {data} {model} --start=0,0,90 -o {file}"
+    yield f"written to {written}; to drive it{optional}: bns trial --robot {p.bounds.robot} --rig RIG.yaml --commands {file}"
+    driven = f"results/trials/experiment-{Path(written).stem}/measurements.csv"
+    yield f"then: bns diagnose {data} {model} --more {shlex.quote(driven)}"
 
 
 def _minutes(minutes: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,7 +15,7 @@ from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import HorizonErrors, ModelError
-from bns.diagnose.report.plain_language import figures_in_words
+from bns.diagnose.report.plain_language import figures_in_words, with_what
 from bns.diagnose.values import numbers_of
 
 Table = dict[str, list[Any]]
@@ -68,7 +69,7 @@ def improvement_text(d: Diagnosis) -> str:
         return ""
     e = shown[0]
     ahead = {"1s": "a second", "command": "a command", "cycle": "a cycle", "stretch": "a stretch"}[e.horizon]
-    known = "With it" if d.verdict != "unlisted" else "With the known effects alone"
+    known = with_what(d) if d.verdict != "unlisted" else "With the known effects alone"
     noise = f" (tracking noise alone: {_mm(e.noise_floor_m)} mm)" if np.isfinite(e.noise_floor_m) else ""
     before, after = _mm(e.models[0].rms_m), _mm(e.models[-1].rms_m)
     return f"{known}, predictions {ahead} ahead have an error of {after} mm instead of {before} mm{noise}."
@@ -177,12 +178,14 @@ def next_commands(d: Diagnosis, p: Proposal | None, command: Mapping[str, str]) 
         out.append(f"bns add {data} {' '.join(d.effects)} {model} -o extended.yaml")
     if d.formula and not d.terms:
         base = "--model extended.yaml" if out else model
-        out.append(f"bns add {data} {d.formula.name} --term '{d.formula.term}' --on {d.formula.on} {base} -o extended.yaml")
+        term = f"--term {shlex.quote(d.formula.term)} --on {d.formula.on}"
+        out.append(f"bns add {data} {d.formula.name} {term} {base} -o extended.yaml")
     if p is not None and len(p.plan):
         out.append(f"bns propose {data} {model} -o next.csv")
         if p.bounds is not None and p.bounds.robot:
             out.append(f"bns trial --robot {p.bounds.robot} --rig RIG.yaml --commands next.csv")
-        out.append(f"bns diagnose {data} {model} --more NEW-MEASUREMENTS.csv")
+        driven = "results/trials/experiment-next/measurements.csv" if p.bounds is not None and p.bounds.robot else "NEW-LOG.csv"
+        out.append(f"bns diagnose {data} {model} --more {driven}")
     return out
 
 

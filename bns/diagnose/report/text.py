@@ -16,6 +16,7 @@ from bns.diagnose.design.competing_models import Rival
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
+from bns.diagnose.report.plain_language import further_notes
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, numbers_of_term, ties_of, without_width
 from bns.physics.decoys import DECOYS
@@ -41,12 +42,15 @@ def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
     return "\n".join([f"{many} in the data (rows of the table are counted from 0):", *lines])
 
 
-def diagnosis_text(d: Diagnosis, rivals: Sequence[Rival] = ()) -> str:
-    """Verdict first; then numbers, also those of explanations that fit as well, errors, ranking, notes."""
-    return "\n".join(_diagnosis(d, rivals))
+def diagnosis_text(d: Diagnosis, rivals: Sequence[Rival] = (), command: Mapping[str, str] | None = None) -> str:
+    """Verdict first; then numbers, also those of explanations that fit as well, errors, ranking, notes.
+
+    ``command``: words (data, model) of the command line that the next ones repeat.
+    """
+    return "\n".join(_diagnosis(d, rivals, command or {"data": "LOG", "model": "--model MODEL"}))
 
 
-def _diagnosis(d: Diagnosis, rivals: Sequence[Rival]) -> Iterator[str]:
+def _diagnosis(d: Diagnosis, rivals: Sequence[Rival], command: Mapping[str, str]) -> Iterator[str]:
     yield f"verdict: {d.verdict}"
     if d.verdict == "unlisted" and d.effects:
         yield f"Missing from the model: {_named(d)}, and something that no listed effect explains."
@@ -76,9 +80,10 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival]) -> Iterator[str]:
         yield f"\n{kind} {term.name}, added to {term.on}: {term.term}"
         yield from _intervals({term.name: numbers_of_term(term)})
     for hint in hints:
-        words = f"bns add LOG {hint.name} --term {shlex.quote(hint.term)} --on {hint.on} --model MODEL -o NEW.yaml"
+        term = f"{hint.name} --term {shlex.quote(hint.term)} --on {hint.on}"
+        words = f"bns add {command['data']} {term} {command['model']} -o NEW.yaml"
         yield f"    to try it: {words}"
-    notes = [note for note in d.notes if note not in odd]
+    notes = [note for note in further_notes(d) if note not in odd]
     if notes:
         yield "\nnotes:"
         yield from (f"  - {note}" for note in notes)
@@ -188,8 +193,9 @@ def comparison_text(c: Comparison) -> str:
 
 
 def _comparison(c: Comparison) -> Iterator[str]:
-    yield f"{c.trials} trials, {c.frames} tracked poses, model {c.model}"
-    yield "\nerror of predictions from the measured pose (root mean square; ±: standard error over trials):"
+    yield f"{c.trials} trial{'' if c.trials == 1 else 's'}, {c.frames} tracked poses, model {c.model}"
+    scattered = "±: standard error over trials" if c.trials > 1 else "one trial has no standard error"
+    yield f"\nerror of predictions from the measured pose (root mean square; {scattered}):"
     yield f"  {'horizon':10}{'position mm':>14}{'forward':>10}{'left':>10}{'heading deg':>13}{'noise mm':>10}{'windows':>9}"
     for horizon, e in c.errors.items():
         if e["windows"]:
