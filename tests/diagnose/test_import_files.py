@@ -22,6 +22,7 @@ from tests.diagnose import bags
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 RADIUS_M = 0.021
+UNSAID = "No name says whether the speeds are commanded or measured: check it. Measured, they hide lag and limits."
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +135,7 @@ def test_two_files_of_a_lab_are_joined_by_time(tmp_path, table, log, capsys):
     read = read_table(first)
     assert list(read.columns) == ["Time [s]", "left wheel velocity [m/s]", "right wheel velocity [m/s]"]
     guess = guessed(read, {second.name: read_table(second)})
-    assert guess.remarks == ()
+    assert guess.remarks == (UNSAID,)
     (tmp_path / "Odometry.dat.import.yaml").write_text(guess.text)
     assert main(["import", str(first), str(second), "-o", str(tmp_path / "m.parquet")]) == 0
     said = capsys.readouterr().out
@@ -239,8 +240,49 @@ def test_commands_without_a_unit_in_their_names_are_read_from_how_far_the_robot_
     guess = guessed(foreign)
     assert guess.mapping["columns"]["left_m_s"] == {"from": left, **entry}
     assert guess.mapping["columns"]["right_m_s"] == {"from": right, **entry}
-    assert len(guess.remarks) == (remark is not None)
-    assert remark is None or remark in guess.remarks[0]
+    others = [said for said in guess.remarks if said != UNSAID]
+    assert (UNSAID in guess.remarks) == ("cmd" not in left)
+    assert len(others) == (remark is not None)
+    assert remark is None or remark in others[0]
+
+
+@pytest.mark.parametrize(
+    ("names", "taken"),
+    [
+        ("v_cmd omega_cmd measured_wheel_l measured_wheel_r x y yaw", {"forward_m_s": "v_cmd", "turn_rad_s": "omega_cmd"}),
+        (
+            "cmd_vel.linear.x cmd_vel.angular.z encoder_left_rad_s encoder_right_rad_s x_mm mocap_x_mm mocap_y_mm mocap_yaw_deg",
+            {"forward_m_s": "cmd_vel.linear.x", "turn_rad_s": "cmd_vel.angular.z", "x_m": "mocap_x_mm", "y_m": "mocap_y_mm"},
+        ),
+        ("cmd_vel_v cmd_vel_omega wheel_l_rad_s wheel_r_rad_s x y yaw", {"forward_m_s": "cmd_vel_v"}),
+        ("left_actual right_actual left_ref right_ref x y yaw", {"left_m_s": "left_ref", "right_m_s": "right_ref"}),
+        ("v omega left_meas right_meas x y yaw", {"forward_m_s": "v", "turn_rad_s": "omega"}),
+        ("left right v omega odom_x odom_y gt_x gt_y yaw", {"left_m_s": "left", "x_m": "gt_x", "y_m": "gt_y"}),
+        ("cmd_left cmd_right cmd_x y yaw", {"left_m_s": "cmd_left", "x_m": None}),
+    ],
+)
+def test_commands_come_before_measured_speeds_and_are_no_poses(names, taken):
+    columns = {name: [0.1, 0.2, 0.3, 0.4] for name in ["t", *names.split()]}
+    entries = guessed(pd.DataFrame(columns)).mapping["columns"]
+    assert {role: entries.get(role, {}).get("from") for role in taken} == taken
+    assert len({"left_m_s", "forward_m_s"} & set(entries)) == 1
+
+
+def test_speeds_of_encoders_are_no_counts():
+    log = pd.DataFrame({name: [0.1, 0.2, 0.3] for name in ("t", "encoder_left_rad_s", "encoder_right_rad_s", "x", "y", "yaw")})
+    guess = guessed(log)
+    assert guess.mapping["columns"]["left_m_s"] == {"from": "encoder_left_rad_s", "scale": "RADIUS_M"}
+    assert any("The speeds are measured, not commanded" in said for said in guess.remarks)
+    metres = guessed(log.rename(columns=lambda name: name.replace("rad_s", "mm_s"))).mapping["columns"]
+    assert metres["left_m_s"] == {"from": "encoder_left_mm_s", "unit": "mm/s"}
+
+
+def test_the_file_of_commands_is_taken_rather_than_that_of_measured_wheels():
+    names = {"odom.csv": "t left right x y yaw", "cmd_vel.csv": "t v omega"}
+    odom, told = (pd.DataFrame({name: [0.1, 0.2, 0.3] for name in said.split()}) for said in names.values())
+    guess = guessed(odom, {"cmd_vel.csv": told}, "odom.csv")
+    assert not {"left_m_s", "right_m_s"} & set(guess.mapping["columns"])
+    assert set(guess.mapping["also"][0]["columns"]) == {"t_s", "forward_m_s", "turn_rad_s"}
 
 
 def test_pauses_between_trials_are_not_driven_and_positions_far_apart_are_no_metres(table):

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.guess.numbers import heading_convention, unit_of_speeds
-from bns.diagnose.data.guess.words import QUATERNIONS, WORDS, rank, source, unit_of, words_of
+from bns.diagnose.data.guess.words import (
+    QUATERNIONS,
+    WORDS,
+    may_be_pose,
+    rank,
+    ranked_source,
+    source,
+    unit_of,
+    words_of,
+)
 from bns.diagnose.data.mapping import DURATION, FORWARD, TURN, UNITS
 from bns.diagnose.settings import DEFAULTS
-from bns.measurements import COLUMNS, COMMANDS
+from bns.measurements import COLUMNS, COMMANDS, POSE
 
 RADIUS, METRES_A_COUNT = "RADIUS_M", "METRES_A_COUNT"
 """Stand where a number is that no log tells: the wheel's radius, and the way of a wheel for one count."""
@@ -21,26 +30,20 @@ _STEPS = DEFAULTS.data.guess_units
 _LARGE_RAD = DEFAULTS.data.guess_degrees
 _KINDS = {"t_s": "s", "x_m": "m", "y_m": "m", "heading_rad": "rad", TURN: "rad/s"}
 _COUNTS = re.compile(r"\b(ticks?|counts?|encoders?|enc|steps?|pulses?)\b")
+_TURNING = {"rad/s", "deg/s"}
 _A_SECOND = re.compile(r"\b(s|sec|second|hz|rate|speed|vel|velocity)$")
 
 
 def of_columns(table: pd.DataFrame) -> dict[str, Any]:
     """Entries of a mapping, as far as names tell; a column that has the table's own name already comes first."""
     names = {str(name): words_of(str(name)) for name in table.columns}
-    entries: dict[str, Any] = {}
     quaternion = next((q for words in QUATERNIONS if len(q := list(_each(words, names))) == 4), None)
-    for column, words in WORDS.items():
-        selected = {entry["from"] for entry in entries.values()} | set(quaternion or ())
-        left = {name: said for name, said in names.items() if name not in selected}
-        fitting = {name: said for name, said in left.items() if _fits(column, said)}
-        if column in {*COMMANDS, FORWARD, TURN}:
-            fitting = dict(sorted(fitting.items(), key=lambda item: -rank(item[1], truth=False)))
-        found = column if column in COLUMNS and column in left else source(words, fitting)
-        if column == "heading_rad" and quaternion is not None:  # the last
-            entries[column] = {"from": quaternion, "unit": "quaternion"}
-        elif found is not None and not (column in {FORWARD, TURN} and "left_m_s" in entries):
-            entries[column] = {"from": found, **unit_of_column(column, found, table[found])}
-    entries = _whole(entries)
+    free = {name: said for name, said in names.items() if name not in (quaternion or ())}
+    entries = _entries(table, ("trial", "t_s"), free)
+    entries |= _commands(table, _without(free, entries))
+    entries |= _entries(table, POSE, _without(free, entries))
+    if quaternion is not None:
+        entries["heading_rad"] = {"from": quaternion, "unit": "quaternion"}
     by_numbers = unit_of_speeds(table, entries)
     counted_from = heading_convention(table, entries)
     more = {**dict.fromkeys(COMMANDS, by_numbers), "heading_rad": counted_from}
@@ -62,17 +65,41 @@ def motions_of(table: pd.DataFrame) -> dict[str, Any] | None:
     return {DURATION: {"from": lasted}, **speeds, **{name: {"from": f"{bases[0]}_{i}"} for name, i in moved}}
 
 
-def _whole(entries: dict[str, Any]) -> dict[str, Any]:
-    """Without half of a pair of commands."""
-    for pair in (COMMANDS, (FORWARD, TURN)):
-        if sum(name in entries for name in pair) == 1 and not set(COMMANDS) <= set(entries):
-            entries = {name: entry for name, entry in entries.items() if name not in pair}
+def _entries(table: pd.DataFrame, columns: Sequence[str], names: Mapping[str, str]) -> dict[str, Any]:
+    """Entries for these columns of the table of measurements, each from another one of ``names``."""
+    entries: dict[str, Any] = {}
+    for column in columns:
+        left = _without(names, entries)
+        fitting = {name: said for name, said in left.items() if _fits(column, said)}
+        found = column if column in COLUMNS and column in left else ranked_source(WORDS[column], fitting, column in POSE)
+        if found is not None:
+            entries[column] = {"from": found, **unit_of_column(column, found, table[found])}
     return entries
+
+
+def _commands(table: pd.DataFrame, names: Mapping[str, str]) -> dict[str, Any]:
+    """Entries for both wheels or for the body: for what names say was commanded rather than measured; of equals the wheels."""
+    pairs = [_entries(table, pair, names) for pair in (COMMANDS, (FORWARD, TURN))]
+    return max((pair for pair in pairs if len(pair) == 2), key=rank_of_commands, default={})
+
+
+def rank_of_commands(entries: Mapping[str, Any]) -> int:
+    """As `rank`, of the commands among entries; 2 for columns that have the table's own names."""
+    told = [(name, entries[name]["from"]) for name in (*COMMANDS, FORWARD, TURN) if name in entries]
+    return min((2 if name == of and name in COMMANDS else rank(words_of(of), truth=False) for name, of in told), default=0)
+
+
+def _without(names: Mapping[str, str], entries: Mapping[str, Any]) -> dict[str, str]:
+    """The names that no entry has taken."""
+    taken = {entry["from"] for entry in entries.values()}
+    return {name: said for name, said in names.items() if name not in taken}
 
 
 def _fits(column: str, said: str) -> bool:
     """Whether the unit that a name ends with can be one of the column's; a wheel may be told in rad/s, a heading in anything."""
     unit = unit_of(said)
+    if column in POSE and not may_be_pose(said):
+        return False
     if unit is None or column in {"trial", "heading_rad", *COMMANDS}:
         return True
     return UNITS[unit][0] == _KINDS.get(column, "m/s") or len(unit) == 1
@@ -87,9 +114,12 @@ def _each(words: tuple[str, ...], names: Mapping[str, str]) -> Iterator[str]:
 
 def _speed(said: str) -> dict[str, Any]:
     """How a wheel's column becomes m/s, where its name tells that it is none."""
-    if _COUNTS.search(said):
+    unit = unit_of(said)
+    if unit is not None and UNITS[unit][0] == "m/s":
+        return {}
+    if _COUNTS.search(said) and unit not in _TURNING:
         return {"scale": METRES_A_COUNT} if _A_SECOND.search(said) else {"scale": METRES_A_COUNT, "counts": True}
-    turning = unit_of(said) in {"rad/s", "deg/s"} or re.search(r"\b(phi|wl|wr|omega|rad s)\b", said)
+    turning = unit in _TURNING or re.search(r"\b(phi|wl|wr|omega|rad s)\b", said)
     return {"scale": RADIUS} if turning else {}
 
 

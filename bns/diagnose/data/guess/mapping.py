@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, motions_of, of_columns
+from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, motions_of, of_columns, rank_of_commands
 from bns.diagnose.data.guess.numbers import SCALE, metres_a_unit
 from bns.diagnose.data.guess.topics import of_topic_columns
 from bns.diagnose.data.guess.words import rank, unit_of, words_of
@@ -83,7 +83,23 @@ def _entries(table: pd.DataFrame) -> Entries:
 
 
 def _commands_in(found: Mapping[str, Entries]) -> tuple[str, ...]:
-    return COMMANDS if any(set(COMMANDS) <= set(entries) for entries in found.values()) else (FORWARD, TURN)
+    """Which pair of commands the files tell: that which the names of some file say was commanded; of equals the wheels."""
+
+    def merit(pair: tuple[str, ...]) -> int:
+        return max((_told_rank(file, entries, pair) for file, entries in found.items() if set(pair) <= set(entries)), default=-2)
+
+    return max((COMMANDS, (FORWARD, TURN)), key=merit)
+
+
+def _told_rank(file: str, entries: Entries, pair: tuple[str, ...]) -> int:
+    """What the names of a file and of its columns say of a pair of commands; own names of the table come first."""
+    own = rank_of_commands({name: entries[name] for name in pair})
+    return own if own > 1 else rank(f"{words_of(Path(file).name)} {_names_of(entries, pair)}", truth=False)
+
+
+def _names_of(entries: Entries, wanted: tuple[str, ...]) -> str:
+    """The words of the columns that these are taken from."""
+    return " ".join(words_of(str(entries[name]["from"])) for name in wanted if name in entries)
 
 
 def _best(found: Mapping[str, Entries], wanted: tuple[str, ...], truth: bool) -> str | None:
@@ -91,8 +107,8 @@ def _best(found: Mapping[str, Entries], wanted: tuple[str, ...], truth: bool) ->
 
     def merit(file: str) -> tuple[int, int]:
         entries = found[file]
-        names = " ".join(words_of(str(entries[name]["from"])) for name in wanted if name in entries)
-        return sum(name in entries for name in wanted), rank(f"{words_of(Path(file).name)} {names}", truth)
+        names = f"{words_of(Path(file).name)} {_names_of(entries, wanted)}"
+        return sum(name in entries for name in wanted), rank(names, truth)
 
     best = max(found, key=merit)
     return best if merit(best)[0] else None
@@ -133,10 +149,12 @@ def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[s
         )
     if {FORWARD, TURN} <= set(entries):
         yield "Fill in METRES, the wheelbase that the robot's own controller assumes."
-    told = " ".join(words_of(str(entries[n]["from"])) for n in (*COMMANDS, FORWARD, TURN) if n in entries)
-    if told and rank(told, truth=False) < 0:
+    told = _names_of(entries, (*COMMANDS, FORWARD, TURN))
+    if told and rank_of_commands(entries) < 0:
         yield "The speeds are measured, not commanded: effects of motors and controller (lag, limits) cannot show."
-    seen = " ".join(words_of(str(entries[n]["from"])) for n in POSE if n in entries)
+    if told and rank_of_commands(entries) == 0:
+        yield "No name says whether the speeds are commanded or measured: check it. Measured, they hide lag and limits."
+    seen = _names_of(entries, POSE)
     if seen and rank(seen, truth=True) < 0:
         yield "These poses are the robot's own odometry: they agree with its wheels whatever it does. Use poses of a tracker."
     if any(str(c).startswith("column_") for table in tables.values() for c in table.columns):

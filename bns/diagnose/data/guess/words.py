@@ -24,9 +24,12 @@ _TRUTH: tuple[str, ...] = (
     *("ground truth", "groundtruth", "truth", "gt", "mocap", "vrpn", "optitrack", "vicon", "qualisys", "tracker"),
     *("aruco", "apriltag", "lidar", "icp", "slam", "amcl", "map", "world"),
 )
-_TOLD = ("cmd", "command", "commanded", "cmd vel", "setpoint", "target", "desired", "reference", "control", "input")
-_MEASURED = ("odom", "odometry", "encoder", "joint states", "measured", "wheel odom")
-
+_TOLD: tuple[str, ...] = (
+    *("cmd", "command", "commands", "commanded", "set", "setpoint", "target", "desired", "ref", "reference"),
+    *("control", "input"),
+)
+_MEASURED = ("odom", "odometry", "encoders?", "joint states", "measured", "meas", "actual", "feedback")
+_RATES = ("vel", "velocity", "speed", "rate", "acc", "accel", "acceleration", "linear", "angular", "twist")
 
 _SHORT = {"mps": "m s", "mmps": "mm s", "cmps": "cm s", "mms": "mm s", "cms": "cm s", "kmh": "km h"}
 _SHORT |= {"radps": "rad s", "degps": "deg s", "dps": "deg s"}
@@ -46,6 +49,17 @@ def rank(said: str, truth: bool) -> int:
         if any(re.search(rf"\b{word}\b", said) for word in words):
             return merit
     return 0
+
+
+def may_be_pose(said: str) -> bool:
+    """Whether words can be of a measured pose: not of a command, nor of a speed."""
+    return rank(said, truth=False) <= 0 and not any(re.search(rf"\b{word}\b", said) for word in _RATES)
+
+
+def ranked_source(words: Sequence[str], names: Mapping[str, str], truth: bool) -> str | None:
+    """As `source`, but of those that speak for poses of a tracker or for commands first, of wheel odometry last (`rank`)."""
+    levels = ({name: said for name, said in names.items() if rank(said, truth) == level} for level in (1, 0, -1))
+    return next(filter(None, (source(words, level) for level in levels)), None)
 
 
 def source(words: Sequence[str], names: Mapping[str, str]) -> str | None:
