@@ -22,8 +22,8 @@ VELOCITIES = {
     "east_m_s": "velocity east (m/s)",
     "north_m_s": "velocity north (m/s)",
 }
-_NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?( [^\s]{1,5})?")
-"""A number, perhaps with a unit."""
+_SMALL = re.compile(r"[-+]?[\d.]+e-\d+")
+"""A number with a hyphen in it."""
 BADGE = '<span class="bns-badge">{}</span>'
 
 
@@ -44,8 +44,8 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = 
 
 
 def _cell(text: str) -> str:
-    """A browser breaks lines at the hyphen of 5e-05; in a number it shall not."""
-    number = ' class="bns-number"' if _NUMBER.fullmatch(text) else ""
+    """A browser breaks lines at the hyphen of 5e-05; in a number it must not."""
+    number = ' class="bns-number"' if _SMALL.fullmatch(text) else ""
     return f"<td{number}>{escape(text)}</td>"
 
 

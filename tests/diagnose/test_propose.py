@@ -195,7 +195,7 @@ def test_after_a_clear_verdict_only_the_accepted_one_is_contested():
     driven = "--more 'results/trials/experiment-next one/measurements.csv'"
     assert text.endswith(f"then: bns diagnose 'my log.csv' --model khepera {driven}")
     elsewhere = replace(proposal, arena=replace(proposal.arena, start=(0.5, 0.2, 0.0)))
-    ahead = "bns propose 'my log.csv' --model khepera --start=0,0,90 -o 'next one.csv'\nwritten to next one.csv"
+    ahead = "bns propose 'my log.csv' --model khepera --minutes 2 --start=0,0,90 -o 'next one.csv'\nwritten to next one.csv"
     assert ahead in proposal_text(elsewhere, "next one.csv", said)
     undecided = replace(proposal, model_pairs=(replace(proposal.model_pairs[0], already_decided=False),))
     assert "No experiment is needed" not in proposal_text(undecided)

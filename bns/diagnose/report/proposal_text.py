@@ -75,7 +75,8 @@ def _next(p: Proposal, written: str, command: Mapping[str, str]) -> Iterator[str
         yield f"then: bns diagnose {data} {model} --more NEW-LOG.csv"
         return
     if not np.allclose(p.arena.start, START, atol=0.02):
-        yield f"for trials that start where those of bns trial do: bns propose {data} {model} --start=0,0,90 -o {file}"
+        limits = f"--minutes {p.minutes:g} --start=0,0,90"
+        yield f"for trials that start where those of bns trial do: bns propose {data} {model} {limits} -o {file}"
     yield f"written to {written}; to drive it{optional}: bns trial --robot {p.bounds.robot} --rig RIG.yaml --commands {file}"
     driven = f"results/trials/experiment-{Path(written).stem}/measurements.csv"
     yield f"then: bns diagnose {data} {model} --more {shlex.quote(driven)}"
