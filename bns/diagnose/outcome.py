@@ -109,13 +109,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
             again = _established(shorter, predictor, stands.rest, response)
             if again is not None and set(again.names) - set(found.names):
                 stands, found = _standing(shorter, predictor, given, tick), again
-        found, searched_in = _without_negligible(found, stands.selection, predictor), stands.selection
-        while absurd := _absurd(found):  # the search again without them: terms beside such numbers have none that serve alone
-            searched_in = searched_in.lacking(absurd)
-            again = _established(searched_in, predictor, stands.rest, response)
-            if again is None:
-                break
-            found = _without_negligible(again, searched_in, predictor)
+        found = _believable(found, stands, predictor, response)
         lost = tuple(name for name in stands.selection.accepted if name not in found.names)
         next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
         errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
@@ -319,6 +313,19 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
     names = tuple(name for name in found.names if name not in tiny)
     terms = tuple(replace(term, fit=fit) for term in found.terms if term.name not in tiny)
     return Established(names, terms, problem, fit)
+
+
+def _believable(found: Established, stands: Standing, predictor: Predictor, response: bool | None) -> Established:
+    """Without what lowers no error; searched again without effects that are `_absurd`, since their terms serve only beside them."""
+    selection = stands.selection
+    found = _without_negligible(found, selection, predictor)
+    while absurd := _absurd(found):
+        selection = selection.lacking(absurd)
+        again = _established(selection, predictor, stands.rest, response)
+        if again is None:
+            break
+        found = _without_negligible(again, selection, predictor)
+    return found
 
 
 def _absurd(found: Established) -> tuple[str, ...]:

@@ -181,3 +181,13 @@ def test_a_robot_at_rest_that_was_told_nothing_is_listed(table):
 def test_a_heading_that_stays_is_right_where_nothing_turns_the_robot(table):
     straight = table.assign(right_m_s=table.left_m_s, heading_rad=0.0)
     assert len(checked(straight)[0]) == len(table)
+
+
+def test_rows_that_were_written_twice_are_one_finding_of_a_trial_and_no_slow_tracker(table):
+    twice = pd.concat([table, table]).sort_values(["trial", "t_s"], kind="stable", ignore_index=True)
+    usable, findings = checked(twice)
+    assert len(usable) == len(table)
+    assert [finding.trial for finding in findings] == ["0", "1", "2"]
+    rows = int((table.trial == 0).sum())
+    assert findings[0].text == f"in {rows} rows, the first here (time 0 s), the time repeats an earlier one; they are excluded"
+    assert findings[0].row == 1

@@ -27,8 +27,10 @@ from bns.diagnose.residuals.established import (
 from bns.diagnose.residuals.grammar import (
     CHANGES,
     RESPONSE,
+    RESPONSE_ALONE,
     RESPONSE_OF,
     SESSION,
+    SLOWING,
     STRAIGHT,
     SURFACE,
     families,
@@ -320,7 +322,8 @@ def test_a_term_that_is_idle_beside_later_ones_goes(monkeypatch):
     [("-0.05 * u", "a wheel is slower by 5.00% than its command at all speeds"), ("-0.5 * u * abs(u)", "not proportional")],
 )
 def test_a_wheel_that_is_slower_by_one_share_is_not_called_out_of_proportion(term, said):
-    stand_in = SimpleNamespace(on="wheels", term=term, values={}, signal="speed of each wheel")
+    fit = SimpleNamespace(model=NOMINAL)
+    stand_in = SimpleNamespace(on="wheels", term=term, values={}, signal="speed of each wheel", fit=fit)
     assert said in in_words(stand_in, predictor_of(NOMINAL))
 
 
@@ -379,8 +382,8 @@ def test_a_model_that_was_extended_before_keeps_its_term():
 def test_of_answers_to_past_commands_only_one_is_a_term():
     predictor = predictor_of(NOMINAL)
     every = families(predictor, NOMINAL.wheelbase_m)
-    past = [f for f in every if f.signal in {RESPONSE, CHANGES, *RESPONSE_OF.values()}]
-    assert len(past) == 4
+    past = [f for f in every if f.signal in {RESPONSE, SLOWING, CHANGES, *RESPONSE_OF.values(), *RESPONSE_ALONE.values()}]
+    assert len(past) == 7
     assert all(may_join([(f.signal, f.on)], past) == [] for f in past)
     assert len(may_join([], every)) == len(every)
     assert len(may_join([(CHANGES, "wheels")], every)) == len(every) - len(past)

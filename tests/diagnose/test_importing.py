@@ -69,6 +69,8 @@ def test_the_mapping_is_kept_beside_the_data_and_used(log):
     [
         ("unit: cm", "unit: rad", "x_m cannot be in rad; it may be in m, cm, mm, in"),
         ("unit: cm", "unit: furlong", "unknown unit 'furlong'"),
+        ("unit: ms", "unit: milliseconds", "unknown unit 'milliseconds'. Did you mean 'ms'?"),
+        ("unit: deg", "unit: Degree", "unknown unit 'Degree'. Did you mean 'deg'?"),
         ("from: X", "form: X", "x_m is .*; write {from: COLUMN"),
         ("clockwise", "clokwise", "Did you mean 'clockwise'"),
         ("from: X,", "from: x,", "asks for an unknown column 'x'"),

@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from bns.diagnose import outcome
@@ -94,7 +95,7 @@ def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named)
     found = Established(("wheelbase",), ("a term",), searched.problem, searched.fit)
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
     monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
-    monkeypatch.setattr(outcome, "_without_negligible", lambda found, *_: found)
+    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: matters)
     monkeypatch.setattr(outcome, "unexplained", lambda *_: NOTHING)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
@@ -111,7 +112,7 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
     left = replace(NOTHING, residual_dependence=("something",))
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
     monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
-    monkeypatch.setattr(outcome, "_without_negligible", lambda found, *_: found)
+    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: matters)
     monkeypatch.setattr(outcome, "residual_dependence", lambda *_: [])
     monkeypatch.setattr(outcome, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
@@ -123,6 +124,22 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
     if not matters:
         said = notes_on(replace(ended, terms=()), predictor().tracks, None, slight=["slower for two seconds"])
         assert next(said).startswith("What is left is certain but slight: slower for two seconds.")
+
+
+def test_beside_terms_an_effect_at_its_bound_is_left_out_and_the_terms_are_searched_again(monkeypatch):
+    """Terms and a wheelbase that run away from each other serve together, and neither says anything."""
+    searched = selected("wheelbase", "wheel-mismatch")
+    numbers = [(number.parameter, number.effect) for number in searched.fit.free]
+    at_bound = np.array([p.high if effect == "wheelbase" else p.neutral for p, effect in numbers])
+    first = Established(("wheelbase", "wheel-mismatch"), ("a term",), searched.problem, replace(searched.fit, values=at_bound))
+    second = Established(("wheel-mismatch",), ("another",), searched.problem, searched.fit)
+    asked = []
+    monkeypatch.setattr(outcome, "_established", lambda selection, *_: (asked.append(selection.accepted), second)[1])
+    monkeypatch.setattr(outcome, "_without_negligible", lambda found, *_: found)
+    stands = SimpleNamespace(selection=searched, rest=NOTHING)
+    assert outcome._believable(first, stands, predictor(), None) is second
+    assert asked == [("wheel-mismatch",)]
+    assert outcome._believable(second, stands, predictor(), None) is second
 
 
 def test_with_a_term_in_the_model_an_effect_that_lowers_no_error_is_not_named():
