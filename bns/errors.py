@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 
 
@@ -75,9 +75,13 @@ class SweepWarning(UserWarning):
     """A sweep goes on, but most likely not as it is meant."""
 
 
-def unknown_name(kind: str, given: object, valid: Iterable[str]) -> str:
-    """Say that ``given`` is no ``kind``, which one was probably meant, and list the valid names."""
-    names = sorted(valid)
-    near = get_close_matches(str(given), names, n=1, cutoff=0.5)
+def unknown_name(kind: str, given: object, valid: Iterable[str], also: Mapping[str, str] | None = None) -> str:
+    """Say that ``given`` is no ``kind``, which one was probably meant, and list the valid names.
+
+    ``also``: other words for valid names, by which somebody may have called them.
+    """
+    names, words = sorted(valid), dict(also or {})
+    near = [words.get(one, one) for one in get_close_matches(str(given).lower(), [*words, *names], n=1, cutoff=0.5)]
+    near = near or get_close_matches(str(given), names, n=1, cutoff=0.5)
     hint = f" Did you mean {near[0]!r}?" if near else ""
     return f"unknown {kind} {given!r}.{hint} Valid: {', '.join(names)}."

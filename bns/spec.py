@@ -33,6 +33,8 @@ APPROACH_VERSIONS: Mapping[str, int] = {
 2: physics models are integrated in graded steps (`bns.bootstrap.simulators.GROWTH`).
 """
 
+MOST_COMMANDS = 20_000_000
+"""Commands that all controllers of a population may have together: 40 bytes each, so that a run takes less than a gigabyte."""
 RADII_CM = (7, 10, 14, 20)
 """Radii of the goals, cm, at which success is recorded."""
 
@@ -86,7 +88,7 @@ class RunSpec:
     )
     seed: int = _field(0, "seed of this run", low=0, high=2**32 - 1)
     root_seed: int = _field(0, "seed of the whole study", low=0, high=2**32 - 1)
-    population_size: int = _field(400, "number of controllers in the population", low=1, high=1_000_000)
+    population_size: int = _field(400, "number of controllers in the population", low=1, high=100_000)
     tournament_size: float = _field(0.5, "tournament size for parents, as a fraction of the population", low=0.0, high=1.0)
     mutation_rate: float = _field(0.1, "probability that a component of a command mutates", low=0.0, high=1.0)
     real_world_selection_size: float = _field(
@@ -123,6 +125,11 @@ class RunSpec:
             raise SpecError(
                 f"min_commands is {self.min_commands} and max_commands {self.max_commands}; "
                 "the shortest list must not be longer than the longest: set both."
+            )
+        if self.population_size * self.max_commands > MOST_COMMANDS:
+            raise SpecError(
+                f"population_size is {self.population_size} and max_commands {self.max_commands}; together a population may have "
+                f"{MOST_COMMANDS} commands, which take {40 * MOST_COMMANDS / 1e9:.1f} GB of memory: lower one of them."
             )
         if (change := change_of(self.world)) and change.at > self.evaluations:
             raise SpecError(

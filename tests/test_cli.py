@@ -135,7 +135,7 @@ def test_one_and_two_jobs_and_a_resumed_sweep_give_the_same_rows(tmp_path, sweep
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["run", "--task", "cirle"], r"unknown task of robot khepera 'cirle'\. Did you mean 'circle'\?"),
+        (["run", "--task", "cirle"], r"robot khepera: unknown task 'cirle'\. Did you mean 'circle'\?"),
         (["run", "--robot", "kepera"], r"unknown robot 'kepera'\. Did you mean 'khepera'\?"),
         (["sweep", "nowhere.yaml"], r"nowhere\.yaml"),
         (["status", "--results", "nowhere"], r"bns sweep khepera-small"),

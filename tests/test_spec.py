@@ -46,6 +46,7 @@ def test_whole_numbers_and_shares_are_taken_as_their_own_type():
     ("name", "value", "message"),
     [
         ("population_size", 0, r"population_size is 0; it must be a whole number from 1 to"),
+        ("population_size", 1_000_000, r"population_size is 1000000; it must be a whole number from 1 to 100000\."),
         ("population_size", 1.5, r"population_size is 1.5; it must be a whole number"),
         ("population_size", True, r"population_size is True"),
         ("mutation_rate", 30, r"from 0 to 1\. For 30 percent write 0\.3"),
@@ -63,6 +64,12 @@ def test_bad_values_are_named_with_what_is_allowed(name, value, message):
     if name in FIELDS:
         with pytest.raises(SpecError, match=message):
             RunSpec(**{name: value})
+
+
+def test_a_population_fits_into_memory():
+    with pytest.raises(SpecError, match=r"population_size is 100000 and max_commands 1000; .* 20000000 commands, .* 0\.8 GB"):
+        RunSpec(population_size=100_000, max_commands=1000)
+    assert RunSpec(population_size=100_000, max_commands=200).max_commands == 200
 
 
 def test_shortest_list_must_not_exceed_the_longest():

@@ -95,7 +95,7 @@ def default_task(robot: str) -> str:
 def load_task(robot: str, name: str) -> Task:
     """Read a task; SpecError for an unknown one lists those there are."""
     if name not in task_names(robot):
-        raise SpecError(unknown_name(f"task of robot {robot}", name, task_names(robot)))
+        raise SpecError(f"robot {robot}: " + unknown_name("task", name, task_names(robot)))
     task: Task = TASKS.load(f"{robot_and_options(robot)[0]}.{name}")
     return task
 

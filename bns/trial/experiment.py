@@ -38,9 +38,13 @@ def read_commands(path: Path, robot: Robot) -> list[tuple[np.ndarray, np.ndarray
     columns = ("trial", *limits)
     try:
         table = pd.read_csv(path)
-    except (OSError, ValueError) as error:
+    except OSError as error:
         raise HardwareError(
-            f"cannot read the commands {path}: {error}. It is a CSV file with {', '.join(columns)}."
+            f"cannot read the commands {path}: {error.strerror or error}. Give a CSV file with {', '.join(columns)}."
+        ) from error
+    except ValueError as error:  # the reader's own words may be of several lines, and about its insides
+        raise HardwareError(
+            f"{path} is no table of comma-separated values. Commands of a {robot.name} are a CSV file with {', '.join(columns)}."
         ) from error
     missing = [name for name in columns if name not in table.columns]
     if missing:

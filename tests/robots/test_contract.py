@@ -78,7 +78,7 @@ def test_defaults_name_a_robot_and_its_task():
 def test_unknown_names_list_the_known_ones():
     with pytest.raises(SpecError, match=r"unknown robot 'kheperra'.*Did you mean 'khepera'.*Valid: .*khepera"):
         load_robot("kheperra")
-    with pytest.raises(SpecError, match=r"unknown task of robot khepera 'cirle'.*'circle'.*Valid: "):
+    with pytest.raises(SpecError, match=r"robot khepera: unknown task 'cirle'.*'circle'.*Valid: "):
         load_task("khepera", "cirle")
 
 

@@ -12,7 +12,9 @@ import pytest
 
 from bns.errors import StoreError
 from bns.store import Writer, compact, finished, load
+from bns.store.disk.files import publish
 from bns.store.disk.journal import journals
+from bns.store.read.snapshot import full_snapshot
 
 from .synthetic import records
 
@@ -150,3 +152,20 @@ with Writer(sys.argv[1], "s") as writer:
     assert "free some space" in message
     assert len(finished(tmp_path, "s")) == int(stored) > 0
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
+
+
+def test_a_file_that_cannot_be_made_is_named_and_so_is_its_folder(tmp_path, monkeypatch):
+    place = tmp_path / "report.html"
+    disk = Disk(monkeypatch, errno.ENOENT)
+    monkeypatch.setattr(os, "open", disk._open)
+    with pytest.raises(StoreError, match=rf"write {place}: .* Nothing can be made in the folder {tmp_path}\. .*another folder"):
+        publish(b"page", place.with_name(f".{place.name}.part"), place)
+
+
+def test_a_folder_with_nothing_to_read_is_not_called_empty(tmp_path):
+    (tmp_path / "evals").mkdir()
+    with pytest.raises(StoreError, match="nothing in the folder can be read as results"):
+        full_snapshot(tmp_path)
+    (tmp_path / "evals").rmdir()
+    with pytest.raises(StoreError, match="the folder is empty"):
+        full_snapshot(tmp_path)

@@ -123,7 +123,7 @@ ERRORS = {
     "syntax": ("fixed: {evaluations: 1\ngrid: 2\n", 4, "not valid YAML"),
     "tab": ("fixed:\n\tevaluations: 1\n", 4, "not valid YAML"),
     "tag": ("fixed:\n  evaluations: !!python/object:os.system x\n", 4, "cannot be understood"),
-    "task": ("grid:\n  task:\n  - circel\n", 5, "unknown task of robot 'khepera' 'circel'. Did you mean 'circle'?"),
+    "task": ("grid:\n  task:\n  - circel\n", 5, "robot khepera: unknown task 'circel'. Did you mean 'circle'?"),
     "exclude nothing": ("grid: {evaluations: [1, 2]}\nexclude:\n  - {evaluations: 3}\n", 5, "matches no combination"),
     "exclude all": ("fixed: {evaluations: 1}\nexclude:\n  - {evaluations: 1}\n", 1, "leaves no combination"),
     "exclude empty": ("exclude:\n  - {}\n", 4, "would leave everything out"),

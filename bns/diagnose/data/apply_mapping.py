@@ -67,6 +67,8 @@ def repeated(table: pd.DataFrame) -> pd.Series:
     if not {"trial", *POSE, *COMMANDS} <= set(table.columns):
         return pd.Series(False, index=table.index)
     same = table[[*POSE]].eq(table[[*POSE]].shift()).all(axis=1) & table["trial"].eq(table["trial"].shift())
+    if "t_s" in table.columns:  # a row that was written twice says nothing of the tracker
+        same &= table["t_s"].ne(table["t_s"].shift())
     told = (table[list(COMMANDS)].abs().max(axis=1) > 0).shift(fill_value=False)
     return same & told
 

@@ -186,9 +186,14 @@ def forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> 
     latest = np.maximum.accumulate(t)
     good = np.ones(len(t), dtype=bool)
     good[1:] = t[1:] > latest[:-1]
-    for i in map(int, np.flatnonzero(~good)):
-        what = "repeats" if t[i] == latest[i - 1] else "lies before"
-        findings.append(Finding(trial, int(rows.index[i]), f"time {t[i]:g} s {what} an earlier one; the row is excluded"))
+    same = np.append(False, t[1:] == latest[:-1])
+    for what, whose in (("repeats", ~good & same), ("lies before", ~good & ~same)):
+        found = np.flatnonzero(whose)
+        if len(found):
+            row, at_s = int(rows.index[found[0]]), f"{t[found[0]]:g} s"
+            one = f"time {at_s} {what} an earlier one; the row is excluded"
+            many = f"in {len(found)} rows, the first here (time {at_s}), the time {what} an earlier one; they are excluded"
+            findings.append(Finding(trial, row, one if len(found) == 1 else many))
     if (~good).mean() > 0.5 and len(t) > 4:
         raise DataError(
             f"Trial {trial}: time runs backwards or repeats in {(~good).sum()} of {len(t)} rows. Sort the rows by time; "

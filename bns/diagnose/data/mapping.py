@@ -42,6 +42,14 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "deg/s": ("rad/s", math.pi / 180),
 }
 """Unit -> what it measures in SI units, and its size."""
+WORDS: Mapping[str, str] = {
+    **{"seconds": "s", "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns", "datetime": "date", "iso8601": "date"},
+    **{"metres": "m", "meters": "m", "centimetres": "cm", "centimeters": "cm", "millimetres": "mm", "millimeters": "mm"},
+    **{"inches": "in", "radians": "rad", "degrees": "deg"},
+    **{"metres per second": "m/s", "meters per second": "m/s", "mps": "m/s", "kmh": "km/h", "kph": "km/h"},
+    **{"radians per second": "rad/s", "degrees per second": "deg/s", "dps": "deg/s"},
+}
+"""What units are called elsewhere -> the unit."""
 SIZES = {unit: size for unit, (_, size) in UNITS.items()}
 """Unit -> its size in SI units."""
 FORWARD, TURN = "forward_m_s", "turn_rad_s"
@@ -185,7 +193,7 @@ def _check_unit(path: Path, name: str, entry: Mapping[str, Any]) -> None:
     if unit is None:
         return
     if not isinstance(unit, str) or unit not in UNITS:
-        raise DataError(f"{path}: {name}: " + unknown_name("unit", unit, UNITS))
+        raise DataError(f"{path}: {name}: " + unknown_name("unit", unit, UNITS, WORDS))
     wanted = "m" if entry.get("counts") and _SI.get(name) == "m/s" else _SI.get(name)
     if wanted is not None and UNITS[unit][0] != wanted:
         fitting = ", ".join(u for u, (kind, _) in UNITS.items() if kind == wanted)

@@ -66,6 +66,8 @@ def explained(action: str, path: Path) -> Iterator[None]:
                 "The folder is read-only for this user.",
                 "make it writable, or choose another folder with --results DIR.",
             )
+        elif error.errno == errno.ENOENT and path.parent.is_dir():
+            reason, remedy = f"Nothing can be made in the folder {path.parent}.", "choose another folder."
         else:
             reason, remedy = "", "look after the disk and repeat the command."
         raise StoreError(
@@ -74,11 +76,13 @@ def explained(action: str, path: Path) -> Iterator[None]:
 
 
 def what_is_there(results: Path) -> str:
-    """Why nothing can be read from ``results``, to follow its name: "is a file", "does not exist", "is empty"."""
+    """Why nothing can be read from ``results``, to follow its name: it is a file, does not exist, is empty, ..."""
     obstacle = _obstacle(results)
     if obstacle is not None:
         return f"{obstacle} is a file, not a folder"
-    return "the folder is empty" if results.is_dir() else "the folder does not exist"
+    if not results.is_dir():
+        return "the folder does not exist"
+    return "nothing in the folder can be read as results" if any(results.iterdir()) else "the folder is empty"
 
 
 def is_same(path: Path, known: os.stat_result) -> bool:
@@ -119,7 +123,7 @@ def publish(data: bytes, staged: Path, place: Path) -> None:
     make_folder(staged.parent)
     make_folder(place.parent)
     try:
-        with explained("write", staged):
+        with explained("write", place if staged.parent == place.parent else staged):
             _write_synced(staged, data)
         with explained("publish", place):
             _replace(staged, place)

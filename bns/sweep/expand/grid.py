@@ -270,7 +270,7 @@ def _check_tasks(parts: Parts) -> None:
     valid = task_names(parts.robot)
     for place, task in parts.tasks:
         if task not in valid:
-            place.fail(unknown_name(f"task of robot {parts.robot!r}", task, valid))
+            place.fail(f"robot {parts.robot}: " + unknown_name("task", task, valid))
 
 
 def _check_default_task(root: Located, parts: Parts, combos: Iterable[RunSpec]) -> None:

@@ -84,7 +84,8 @@ def test_a_filmed_robot_is_seen_where_it_is_at_any_speed(tmp_path):
         ("trial,left_m_s,right_m_s\n1,0.1,0.1\n", "lacks the column duration_s"),
         ("trial,left_m_s,right_m_s,duration_s\n1,0.1,0.1,1\n1,9,0.1,1\n", "line 3 of"),
         ("trial,left_m_s,right_m_s,duration_s\n1,0.1,x,1\n", "line 2 of"),
-        ("", "cannot read the commands"),
+        ("", "is no table of comma-separated values. Commands of a khepera are a CSV file with trial"),
+        ("a: 1\nb: 2\nc, d, e\n", "is no table of comma-separated values. Commands of a khepera are a CSV file with trial"),
     ],
 )
 def test_bad_commands_are_named_before_anything_moves(tmp_path, capsys, text, message):
