@@ -316,7 +316,7 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
 
 
 def _believable(found: Established, stands: Standing, predictor: Predictor, response: bool | None) -> Established:
-    """Without what lowers no error; searched again without effects that are `_absurd`, since their terms serve only beside them."""
+    """Without what lowers no error; searched again without effects that are `_absurd`: their terms serve only beside them."""
     selection = stands.selection
     found = _without_negligible(found, selection, predictor)
     while absurd := _absurd(found):

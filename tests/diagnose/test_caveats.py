@@ -27,7 +27,7 @@ MODELS = (SimpleNamespace(rms_m=0.1), SimpleNamespace(rms_m=0.1))
     [
         ((), (), "is not needed in the model"),
         (("trial",), ("command", "1s"), "rises over the whole trial, though it falls over one command and 1 second"),
-        (("5s", "trial"), (), "5 seconds and the whole trial. It may describe something else than what happens there, and the extended model does without"),
+        (("5s", "trial"), (), "5 seconds and the whole trial. It may describe something else than what happens there, and the"),
     ],
 )
 def test_a_term_with_which_an_error_rises_must_not_be_added(rose, fell, said):
