@@ -46,6 +46,8 @@ class Parameter:
     """The plausible range and the start values grow with this power of the wheelbase: 1 for lengths and speeds."""
     floor_share: float = 0.0
     """Upper bound of a length, as a fraction of the diagonal of the area where the robot was seen; 0: no such bound."""
+    trial_share: float = 0.0
+    """Upper bound of a time, as a fraction of the longest trial; 0: no such bound."""
     reached: tuple[float, ...] = ()
     """Bounds at which a fit may end, because real robots reach them: the strength of a servo without torque."""
     resolution: float = 0.0
@@ -91,6 +93,14 @@ class Parameter:
         high = max(self.floor_share * diagonal_m, 4.0 * self.low)
         neutral = min(self.neutral, high) if np.isfinite(self.neutral) else self.neutral
         return replace(self, high=high, plausible=(min(self.plausible[0], high / 2.0), high), neutral=neutral)
+
+    def lasting(self, longest_s: float) -> Parameter:
+        """The parameter, bounded to its `trial_share` of trials of which the longest takes so long."""
+        if not self.trial_share:
+            return self
+        high = min(self.high, max(self.trial_share * longest_s, 4.0 * self.low))
+        low, most = (min(end, high) for end in self.plausible)
+        return replace(self, high=high, plausible=(low, most), neutral=min(self.neutral, high))
 
     def scaled(self, ratio: float) -> Parameter:
         """The parameter for a robot whose wheelbase is ``ratio`` times that of the reference; its bounds stay."""
@@ -175,6 +185,14 @@ class Effect:
         if not any(p.floor_share for p in self.parameters):
             return self
         return replace(self, parameters=tuple(p.within(diagonal_m) for p in self.parameters))
+
+    def lasting(self, longest_s: float) -> Effect:
+        """The effect with ranges and start values for trials of which the longest takes so long, s."""
+        if not any(p.trial_share for p in self.parameters):
+            return self
+        bounded = tuple(p.lasting(longest_s) for p in self.parameters)
+        starts = tuple(tuple(min(v, p.high) for v, p in zip(start, bounded, strict=True)) for start in self.starts)
+        return replace(self, parameters=bounded, starts=starts)
 
     @property
     def in_words(self) -> str:

@@ -78,7 +78,17 @@ def test_numbers_that_may_be_anything_are_not_determined():
     assert undetermined(made_up(anything), "warm-up") == "these data do not determine loss and time_s"
     assert undetermined(made_up(something), "warm-up") == ""
     assert limiting(made_up(something), "warm-up")  # a warm-up of any length is a gain
+    assert not limiting(made_up(((-0.3, -0.1), (90.0, 600.0))), "warm-up")
     assert not limiting(made_up(((-0.3, -0.1), (2.0, 9.0))), "warm-up")
+
+
+def test_a_warm_up_takes_no_longer_than_the_longest_trial():
+    predictor = driven(trials=4)
+    longest_s = float(predictor.tracks.own_s.max())
+    loss, time = listed(NOMINAL, None, predictor.tracks)["warm-up"].parameters
+    assert (time.high, time.plausible[1]) == (longest_s, longest_s)
+    assert loss == effect_named("warm-up").parameters[0]
+    assert effect_named("warm-up").lasting(1e4) == effect_named("warm-up")
 
 
 def test_a_gain_is_no_tie_with_a_warm_up_that_outlasts_every_trial():

@@ -48,13 +48,8 @@ def undetermined(fit: Fit, name: str) -> str:
 
 
 def limiting(fit: Fit, name: str) -> bool:
-    """Whether an effect may be there only as a limit of itself: the interval of a number reaches one of its bounds."""
-    own = [(i, number.parameter) for i, number in enumerate(fit.free) if number.effect == name]
-    return at_bound(fit, name) or any(_reaches(p.low, p.high, fit.interval(i)) for i, p in own)
-
-
-def _reaches(low: float, high: float, interval: tuple[float, float]) -> bool:
-    return bool(np.isfinite(interval).all()) and (interval[0] <= low or interval[1] >= high)
+    """Whether a number of an effect may be anything, so that the effect does the work of a shorter one."""
+    return any(_spans(fit, i) for i, number in enumerate(fit.free) if number.effect == name)
 
 
 def _spans(fit: Fit, index: int) -> bool:

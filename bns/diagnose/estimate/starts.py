@@ -47,12 +47,13 @@ def listed(
 
 
 def fitting(effect: Effect, model: Model, tracks: Tracks | None) -> Effect:
-    """The effect with ranges and starts for the model's size and the floor on which the robot was seen."""
+    """The effect with ranges and starts for the model's size, the floor on which the robot was seen, and the longest trial."""
     scaled = effect.scaled(model.wheelbase_m)
     if tracks is None or not len(tracks.pose):
         return scaled
     low, high = np.quantile(tracks.pose[:, :2], [0.02, 0.98], axis=0)
-    return scaled.within(float(np.hypot(*(high - low))))
+    within = scaled.within(float(np.hypot(*(high - low))))
+    return within if tracks.relative else within.lasting(float(tracks.own_s.max()))
 
 
 def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = None) -> Fit:

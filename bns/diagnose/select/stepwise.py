@@ -389,14 +389,14 @@ class StepwiseSelection:
         """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one.
 
         What comes in must have earned its place: where trials disagree, much that earns nothing certain is no worse for certain.
-        Nor may it be the limit of a longer effect that is the accepted one: a warm-up that outlasts every trial is a gain.
+        Nor may one with more numbers have one that may be anything: a warm-up of any length at all is a gain.
         """
         competing_models: list[tuple[tuple[str, ...], Fit]] = []
         lacking = cache(partial(without, problem, fit))
         for name, other, tried in self._exchanges.of(problem, fit, accepted):
-            longer = len(tried.free) > len(fit.free)
-            if longer and limiting(tried, other):
+            if len(tried.free) > len(fit.free) and limiting(tried, other):
                 continue
+            # at a bound it may be: a tether from ever farther away is a slope
             may = not self._rejected(tried, other, bounds=False) and self._earned_over(
                 problem, lacking(name), tried, other
             )

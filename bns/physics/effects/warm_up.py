@@ -21,7 +21,11 @@ EFFECT = Effect(
         Parameter(
             "loss", "1", -1.0, 1.0, (-0.9, 0.9), 0.0, "fraction of speed lost at the start of a trial (negative: gained)"
         ),
-        Parameter("time_s", "s", 0.1, 600.0, (0.3, 120.0), 3.0, "time constant with which the loss decays", resolution=0.01),
+        Parameter(  # longer than every trial, it would be a gain
+            *("time_s", "s", 0.1, 600.0, (0.3, 120.0), 3.0, "time constant with which the loss decays"),
+            resolution=0.01,
+            trial_share=1.0,
+        ),
     ),
     equation="u' = u·(1 - k·exp(-t/T)) for each wheel, t since the trial began",
     residuals="All motion is too slow early in a trial and right later, in every trial again.",
