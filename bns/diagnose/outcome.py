@@ -329,7 +329,7 @@ def _believable(found: Established, stands: Standing, predictor: Predictor, resp
 
 
 def _absurd(found: Established) -> tuple[str, ...]:
-    """Effects whose numbers, fitted beside the terms, cannot be believed: there they bend a curve."""
+    """Effects whose numbers, fitted beside the terms, cannot be believed: they only compensate for a part of a term."""
     own = found.names if found.terms else ()
     return tuple(name for name in own if implausible(found.fit, name) or undetermined(found.fit, name))
 

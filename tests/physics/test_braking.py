@@ -90,6 +90,16 @@ def test_the_second_implementation_agrees(name, values):
     assert heading[-1] == pytest.approx((way[1] - way[0]) / 0.0884, abs=1e-3)
 
 
+def test_speeds_are_scaled_as_forward_velocity_and_turn_rate_are_divided_by_how_much_the_faster_wheel_exceeds_the_limit():
+    told = RNG.uniform(-0.3, 0.3, (1, 40, 2))
+    driven = cause("speed-scaling", {"max_m_s": 0.12}).command(told)[0]
+    assert 0.2 < (driven != told[0]).any(axis=1).mean() < 1.0
+    model = Model(wheelbase_m=0.0884).with_effect("speed-scaling", max_m_s=0.12)
+    heading = simulate(model, told[..., 0], told[..., 1], np.full((1, 40), 0.2))[0, :, 2]
+    turned = np.cumsum(driven[:, 1] - driven[:, 0]) * 0.2 / 0.0884
+    np.testing.assert_allclose(heading[1:] if len(heading) == 41 else heading, turned, atol=1e-9)
+
+
 def test_with_different_lags_one_step_of_speed_turns_the_robot_by_the_difference_of_the_ways():
     model = Model(wheelbase_m=0.2).with_effect("lag-mismatch", tau_s=0.15, ratio=2.0)
     heading = simulate(model, [[0.2]], [[0.2]], [[5.0]])[0, -1, 2]
