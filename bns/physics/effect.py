@@ -191,8 +191,8 @@ class Effect:
         if not any(p.trial_share for p in self.parameters):
             return self
         bounded = tuple(p.lasting(longest_s) for p in self.parameters)
-        starts = tuple(tuple(min(v, p.high) for v, p in zip(start, bounded, strict=True)) for start in self.starts)
-        return replace(self, parameters=bounded, starts=starts)
+        starts = [tuple(min(v, p.high) for v, p in zip(start, bounded, strict=True)) for start in self.starts]
+        return replace(self, parameters=bounded, starts=tuple(dict.fromkeys(starts)))
 
     @property
     def in_words(self) -> str:

@@ -103,3 +103,14 @@ def test_a_limit_that_nothing_reaches_has_no_slope():
     fit = problem_for(predictor, model).fit(model, rounds=0)
     assert np.isfinite(fit.jacobian).all()
     assert not fit.jacobian[..., 1].any()
+
+
+def test_a_number_at_neutral_on_its_upper_bound_is_compared():
+    """Its step for differences goes down: taken for a distance it divided 0 by 0."""
+    predictor = driven(warm_up={"loss": 0.3, "time_s": 2.0})
+    bounded = effect_named("warm-up").lasting(2.0)
+    assert bounded.parameters[1].high == bounded.parameters[1].neutral == 2.0
+    problem = problem_for(predictor, NOMINAL)
+    base = problem.fit(NOMINAL)
+    added = problem.fit(NOMINAL.with_active(bounded, (0.3, 2.0)), rounds=0)
+    assert problem.paired_comparison(base, added).p_value < 1e-4

@@ -298,7 +298,7 @@ class Problem:
             changed = added.values[j] - number.parameter.neutral
             if not np.isfinite(changed):
                 changed, lacking = 1.0, self.whitened(added.model.without(number.effect))
-            elif abs(changed) < increment(number, added.values[j]):
+            elif abs(changed) < abs(increment(number, added.values[j])):
                 out.append(added.jacobian[..., j])
                 continue
             else:
