@@ -114,6 +114,7 @@ def formula_effect(
     if not unknown:
         raise ModelError(f"formula {name}: {term!r} has no number to fit; multiply it by one, as in k * ({term}).")
     linear = _is_linear(code, unknown)
+    placed = bool(code.names & _PLACE) or on in {"east", "north"}
     return Effect(
         name=name,
         stage="body",
@@ -127,7 +128,8 @@ def formula_effect(
         lookalikes=(),
         apply=partial(_apply, name, code, on, logged),
         after=FORMULAS,
-        needs_place=bool(code.names & _PLACE) or on in {"east", "north"},
+        needs_place=placed,
+        revision=2 if placed else 1,
     )
 
 

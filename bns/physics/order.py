@@ -7,6 +7,7 @@ OTHERS, DECOYS, FORMULAS = "others", "decoys", "formulas"
 
 ORDER = (
     "command-quantisation",
+    "command-truncation",
     "command-rate",
     "speed-gain",
     "wheel-mismatch",
@@ -17,6 +18,7 @@ ORDER = (
     "dead-band",
     "speed-limit",
     "speed-scaling",
+    "reversal-pause",
     OTHERS,
     "acceleration-limit",  # exact for commands, which are constant in a step: so before delay and lag
     "force-limit",
@@ -35,6 +37,7 @@ ORDER = (
     "wheel-eccentricity",
     "backlash",
     "wheelbase",
+    "turn-dead-zone",
     "turn-slip",
     "turn-slip-quadratic",
     "understeer",
@@ -43,6 +46,7 @@ ORDER = (
     "caster-drag",
     "floor-patch",
     "wheel-patch",
+    "uneven-patch",
     "slope-load",
     "tether-load",
     DECOYS,

@@ -54,7 +54,7 @@ def true_model(world: World, predictor: Predictor) -> Model:
     model = Model(wheelbase_m=world.nominal.wheelbase_m)
     there = listed(model, None, predictor.tracks)
     for name, given in world.hidden.items():
-        values = there[name].neutral | ({"share": 1.0} if name == "command-quantisation" else {}) | given
+        values = there[name].neutral | ({"share": 1.0} if name in {"command-quantisation", "command-truncation"} else {}) | given
         model = model.with_active(there[name], tuple(values[p.name] for p in there[name].parameters))
     return model
 

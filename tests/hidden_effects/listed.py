@@ -16,6 +16,7 @@ from tests.hidden_effects.listed_floor import (
     LensDistortion,
     QuadraticTurnSlip,
     TiltedCamera,
+    UnevenPatch,
     WheelPatch,
 )
 from tests.hidden_effects.listed_loads import (
@@ -31,7 +32,9 @@ from tests.hidden_effects.listed_motors import (
     Backlash,
     CommandQuantisation,
     CommandRate,
+    CommandTruncation,
     Heating,
+    ReversalPause,
     Stribeck,
     WarmUp,
     WheelEccentricity,
@@ -154,6 +157,16 @@ class AccelerationLimit(Cause):
             out[:, i] = (now + then) / 2
             now = then
         return out
+
+
+@dataclass
+class TurnDeadZone(Cause):
+    """Scrubbing takes the same turn rate from every turn: what is left of a slower one is nothing."""
+
+    width_rad_s: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        return body._replace(turn=body.turn - np.clip(body.turn, -self.width_rad_s, self.width_rad_s))
 
 
 @dataclass
@@ -294,6 +307,7 @@ class CameraRotation(Cause):
 
 LISTED: dict[str, type[Cause]] = {
     "command-quantisation": CommandQuantisation,
+    "command-truncation": CommandTruncation,
     "command-rate": CommandRate,
     "command-delay": CommandDelay,
     "dead-zone": DeadZone,
@@ -304,6 +318,7 @@ LISTED: dict[str, type[Cause]] = {
     "wheel-mismatch": WheelMismatch,
     "speed-limit": SpeedLimit,
     "speed-scaling": SpeedScaling,
+    "reversal-pause": ReversalPause,
     "battery-sag": BatterySag,
     "motor-lag": MotorLag,
     "acceleration-limit": AccelerationLimit,
@@ -324,11 +339,13 @@ LISTED: dict[str, type[Cause]] = {
     "caster-drag": CasterDrag,
     "wheelbase": Wheelbase,
     "yaw-bias": YawBias,
+    "turn-dead-zone": TurnDeadZone,
     "turn-slip": TurnSlip,
     "turn-slip-quadratic": QuadraticTurnSlip,
     "side-slip": SideSlip,
     "floor-patch": FloorPatch,
     "wheel-patch": WheelPatch,
+    "uneven-patch": UnevenPatch,
     "slope-load": SlopeLoad,
     "tether-load": TetherLoad,
     "floor-slope": FloorSlope,

@@ -38,10 +38,26 @@ class WheelPatch(FloorPatch):
     apart_share: float = 1.0
 
     def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        return self.slowed(body, x, y, heading, (self.loss, self.loss))
+
+    def slowed(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray, losses: tuple[float, float]) -> Body:
+        """With a loss for each wheel."""
         here, to_left = x + 1j * y - (self.x_m + 1j * self.y_m), 0.5j * BASE_M * np.exp(1j * heading)
-        left, right = (1 - self.loss * (np.abs(here + s * self.apart_share * to_left) < self.radius_m) for s in (1, -1))
+        within = [np.abs(here + s * self.apart_share * to_left) < self.radius_m for s in (1, -1)]
+        left, right = (1 - loss * inside for loss, inside in zip(losses, within, strict=True))
         rolled = left * (body.forward - body.turn * BASE_M / 2), right * (body.forward + body.turn * BASE_M / 2)
         return body._replace(forward=sum(rolled) / 2, turn=(rolled[1] - rolled[0]) / BASE_M)
+
+
+@dataclass
+class UnevenPatch(WheelPatch):
+    """The same; one wheel loses more than the other, and the mean of both losses is given."""
+
+    left_share: float = 1.0
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        left = self.loss * self.left_share
+        return self.slowed(body, x, y, heading, (left, 2 * self.loss - left))
 
 
 @dataclass

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from tests.hidden_effects.cause import Cause, Moment
+from tests.hidden_effects.listed_loads import FINE
 
 
 @dataclass
@@ -20,6 +21,41 @@ class CommandQuantisation(Cause):
     def command(self, wheels: np.ndarray) -> np.ndarray:
         known = np.floor(wheels / self.step_m_s + 0.5) * self.step_m_s
         return (1 - self.share) * wheels + self.share * known
+
+
+@dataclass
+class CommandTruncation(Cause):
+    """The controller stores whole steps and forgets what is left, as C does."""
+
+    step_m_s: float
+    share: float = 1.0
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        forgotten = np.fmod(wheels, self.step_m_s)
+        return wheels - self.share * forgotten
+
+
+@dataclass
+class ReversalPause(Cause):
+    """A wheel may turn one way when it has not been told to turn the other way for a while: looked at in small steps."""
+
+    pause_s: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        out, small_s = np.empty_like(wheels), moment.step_s / FINE
+        last_s = np.full((2, *wheels[:, 0].shape), -np.inf)  # when each wheel last turned forwards and backwards
+        now_s = 0.0
+        for i in range(wheels.shape[1]):
+            told, turned = wheels[:, i], np.zeros_like(wheels[:, i])
+            for _ in range(FINE):
+                now_s += small_s
+                other = np.where(told > 0, last_s[1], last_s[0])
+                free = now_s - other > self.pause_s + small_s / 2
+                turned += np.where(free, told, 0.0) / FINE
+                for sign, seen in zip((1, -1), last_s, strict=True):
+                    seen[free & (np.sign(told) == sign)] = now_s
+            out[:, i] = turned
+        return out
 
 
 @dataclass

@@ -38,8 +38,15 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"x_m": 0.8, "y_m": 0.5, "radius_m": 0.2, "loss": 0.35, "apart_share": 1.0},
         {"x_m": 0.6, "y_m": 0.6, "radius_m": 0.3, "loss": 0.5, "apart_share": 1.0},
     ),
+    "uneven-patch": (
+        {"x_m": 0.8, "y_m": 0.5, "radius_m": 0.25, "loss": 0.15, "apart_share": 1.0, "left_share": 2.0},
+        {"x_m": 0.6, "y_m": 0.6, "radius_m": 0.3, "loss": 0.3, "apart_share": 1.0, "left_share": 0.4},
+    ),
     "command-rate": ({"period_s": 0.2}, {"period_s": 0.5}),
     "command-quantisation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
+    "command-truncation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
+    "reversal-pause": ({"pause_s": 0.1}, {"pause_s": 0.3}),
+    "turn-dead-zone": ({"width_rad_s": 0.1}, {"width_rad_s": 0.25}),
     "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06}),
     "lens-distortion": (
         {"per_m2": -0.04, "x_m": 0.8, "y_m": 0.5},
@@ -79,9 +86,14 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
 """Medium and strong, of the Khepera."""
 BESIDE: dict[str, dict[str, Parameters]] = {"wheel-diameters": {"acceleration-limit": {"max_m_s2": 0.25}}}
 """What an effect needs beside it to differ from a simpler one: without limits, diameters are a mismatch of commands."""
-ALIKE = {"slope-load": ("tether-load",), "wheel-patch": ("floor-patch",), "wheel-diameters": ("wheel-mismatch",)}
+ALIKE = {
+    "slope-load": ("tether-load",),
+    "wheel-patch": ("floor-patch", "uneven-patch"),
+    "uneven-patch": ("floor-patch", "wheel-patch"),
+    "wheel-diameters": ("wheel-mismatch",),
+}
 """What would stand in for an effect that is taken out: a slope is a cable from far away."""
-TURNING = {"backlash", "braking-lag", "caster-drag", "caster-swing", "dead-band", "gear-friction", "stribeck"}
+TURNING = {"backlash", "braking-lag", "caster-drag", "caster-swing", "dead-band", "gear-friction", "reversal-pause", "stribeck"}
 """Effects that show only where wheels reverse or turn slowly."""
 
 TRIPLES: tuple[dict[str, Parameters], ...] = (

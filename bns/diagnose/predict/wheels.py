@@ -19,6 +19,7 @@ from bns.diagnose.predict.pictures import pictured, undone
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
 from bns.physics.effect import Effect
+from bns.physics.effects import chain_key
 from bns.physics.model import ActiveEffect, Model
 from bns.physics.signals import Body, Conditions, Logged, View, Wheels
 from bns.physics.wheels.differential_drive import taken_at
@@ -144,12 +145,14 @@ class WheelPredictor:
     def starts_of(self, effect: Effect, model: Model) -> tuple[tuple[float, ...], ...]:
         """What the effect's ``starts_from`` makes of these poses, and of the wheels as the model turns them; kept.
 
-        Its neutral values if nothing.
+        One that acts on the wheels gets them as those before it turn them. Its neutral values if nothing.
         """
         chain = _chain(model, ("wheel",))
+        if effect.stage == "wheel":
+            chain = tuple(one for one in chain if chain_key(one[0]) < chain_key(effect))
         known = effect.name, model.wheelbase_m, chain
         if known not in self._starts and effect.starts_from is not None:
-            turned = self.turned(model)
+            turned = self._wheels(model.wheelbase_m, chain)
             given = Wheels(self.grid.step_s, turned.left_m_s, turned.right_m_s, model.wheelbase_m, self.conditions)
             self._starts[known] = effect.starts_from(given) or (tuple(effect.neutral.values()),)
         return self._starts[known]

@@ -49,6 +49,7 @@ EFFECT = Effect(
     sentence="the robot is faster downhill and slower uphill, on wheels that do not slip sideways",
     measurement="lay a spirit level on the floor, in two directions",
     apply=apply,
+    revision=2,
     needs="track",
     needs_place=True,
     starts_from=starts_from,

@@ -70,6 +70,7 @@ EFFECT = Effect(
     measurement="repeat some trials with the cable unplugged or held up",
     beside={"slope-load": "A slope is a cable from far away: to tell them apart, drive on both sides of the assumed anchor."},
     apply=apply,
+    revision=2,
     needs="track",
     needs_place=True,
     starts_from=starts_from,

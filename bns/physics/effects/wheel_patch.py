@@ -18,6 +18,11 @@ from bns.physics.signals import Body, Wheels
 
 def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float, apart_share: float) -> Body:
     """Each side's speed times 1 - ``loss`` while the point ``apart_share`` half wheelbases to that side is on the patch."""
+    return slowed(body, (x_m, y_m), radius_m, (loss, loss), apart_share)
+
+
+def slowed(body: Body, centre_m: tuple[float, float], radius_m: float, losses: tuple[float, float], apart_share: float) -> Body:
+    """The same with a loss for the left side and one for the right."""
     if body.place is None:
         return body
     heading, half = body.place[..., 2], body.wheelbase_m / 2.0
@@ -27,13 +32,13 @@ def apply(body: Body, x_m: float, y_m: float, radius_m: float, loss: float, apar
             body,
             body.place[..., :2] + side * aside,
             body.forward_m_s - side * apart_share * half * body.yaw_rad_s,
-            (x_m, y_m),
+            centre_m,
             radius_m,
             loss,
         )
-        for side in (1.0, -1.0)
+        for side, loss in zip((1.0, -1.0), losses, strict=True)
     ]
-    left, right = (1.0 - loss * share for share in inside)
+    left, right = (1.0 - loss * share for loss, share in zip(losses, inside, strict=True))
     left_m_s, right_m_s = left * (body.forward_m_s - half * body.yaw_rad_s), right * (body.forward_m_s + half * body.yaw_rad_s)
     return replace(
         body,
@@ -47,24 +52,23 @@ def _starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     return tuple((*start, 1.0) for start in starts_from(wheels))
 
 
+APART = Parameter(
+    "apart_share",
+    "1",
+    0.0,
+    2.0,
+    (0.0, 1.5),
+    0.0,
+    "half the distance between the two points that are slowed, divided by half the wheelbase (1: the wheels)",
+    resolution=0.02,
+    jagged=True,
+    reached=(0.0,),
+)
+
 EFFECT = Effect(
     name="wheel-patch",
     stage="body",
-    parameters=(
-        *WHOLE.parameters,
-        Parameter(
-            "apart_share",
-            "1",
-            0.0,
-            2.0,
-            (0.0, 1.5),
-            0.0,
-            "half the distance between the two points that are slowed, divided by half the wheelbase (1: the wheels)",
-            resolution=0.02,
-            jagged=True,
-            reached=(0.0,),
-        ),
-    ),
+    parameters=(*WHOLE.parameters, APART),
     equation="l, r times 1 - k while the left, the right point is where (x - px)^2 + (y - py)^2 < p^2; the points are a·b/2 to "
     "either side",
     residuals="As with a patch of floor, and where the patch is entered at its side, the robot turns towards it.",
@@ -72,6 +76,7 @@ EFFECT = Effect(
     sentence="each wheel is slower on one patch of the floor",
     measurement="inspect the floor there, or drive straight over its edge with one wheel outside",
     apply=apply,
+    revision=2,
     needs="track",
     needs_place=True,
     starts_from=_starts_from,

@@ -37,6 +37,25 @@ def first_order(target: Array, step_s: Array, tau_s: float) -> Array:
 
 
 @exact
+def paused(target: Array, step_s: Array, pause_s: float) -> Array:
+    """Mean over each step of a speed that is 0 within ``pause_s`` after the last step of the other direction."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        direction, since_s = 0.0, 0.0
+        for k in range(target.shape[1]):
+            h, u = step_s[row, k], target[row, k]
+            if h == 0.0:
+                continue
+            stands_s = min(max(pause_s - since_s, 0.0), h) if u * direction < 0.0 else 0.0
+            if u != 0.0 and stands_s < h:
+                direction, since_s = np.sign(u), 0.0
+            else:
+                since_s += h
+            mean[row, k] = u * (1.0 - stands_s / h)
+    return mean
+
+
+@exact
 def second_order(target: Array, step_s: Array, tau_s: float, lead_s: float, swing_s: float) -> Array:
     """Mean over each step of w = y + lead·y', where swing²·y'' + (tau + lead)·y' + y = target and y = y' = 0 at the start; exact.
 

@@ -1,0 +1,41 @@
+"""What firmware and drives do to commands, and scrubbing to turns: each is named with its numbers."""
+
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.starts import fit_with, listed
+from bns.diagnose.predict.wheels import WheelPredictor
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def driven(trials=20, **effects):
+    """Without scatter of the motors: it would act before the commands are rounded."""
+    return WheelPredictor(tracks_of(measured(hidden(**effects), trials=trials, seed=4, speeds=(-0.2, 0.2), jitter=0.0)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("command-truncation", {"step_m_s": 0.013, "share": 1.0}),
+        ("command-quantisation", {"step_m_s": 0.027, "share": 1.0}),
+        ("reversal-pause", {"pause_s": 0.15}),
+        ("turn-dead-zone", {"width_rad_s": 0.2}),
+    ],
+)
+def test_each_is_named_with_its_numbers(name, values):
+    found = diagnose(driven(**{name.replace("-", "_"): values}), NOMINAL)
+    assert (found.verdict, found.effects) == ("effects", (name,))
+    assert {key: one["value"] for key, one in found.numbers[name].items()} == pytest.approx(values, rel=0.03)
+
+
+@pytest.mark.parametrize("step_m_s", [0.0113, 0.027, 0.045])
+@pytest.mark.parametrize("name", ["command-truncation", "command-quantisation"])
+def test_a_step_is_found_that_is_no_round_number(name, step_m_s):
+    """The loss has a valley for each number of steps below the fastest speed."""
+    predictor = driven(trials=8, **{name.replace("-", "_"): {"step_m_s": step_m_s, "share": 1.0}})
+    problem = problem_for(predictor, NOMINAL)
+    found = fit_with(problem, problem.fit(NOMINAL), listed(NOMINAL, None, predictor.tracks)[name])
+    assert found.values == pytest.approx([step_m_s, 1.0], rel=0.05)
