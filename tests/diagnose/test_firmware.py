@@ -1,4 +1,4 @@
-"""What firmware and drives do to commands, and scrubbing to turns: each is named with its numbers."""
+"""What firmware, drives and bearings do to commands, and scrubbing to turns: each is named with its numbers."""
 
 import pytest
 
@@ -23,6 +23,9 @@ def driven(trials=20, **effects):
         ("command-quantisation", {"step_m_s": 0.027, "share": 1.0}),
         ("reversal-pause", {"pause_s": 0.15}),
         ("turn-dead-zone", {"width_rad_s": 0.2}),
+        ("reverse-gain", {"gain": 0.9}),
+        ("dead-zone-mismatch", {"width_m_s": 0.01, "left_share": 1.8}),
+        ("speed-limit-mismatch", {"max_m_s": 0.12, "left_spare": 0.25}),
     ],
 )
 def test_each_is_named_with_its_numbers(name, values):

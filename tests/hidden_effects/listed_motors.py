@@ -59,6 +59,44 @@ class ReversalPause(Cause):
 
 
 @dataclass
+class ReverseGain(Cause):
+    """Half the sum of a speed and its size is what is forwards of it, the rest is backwards."""
+
+    gain: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        forwards = (wheels + np.abs(wheels)) / 2
+        return forwards + self.gain * (wheels - forwards)
+
+
+@dataclass
+class DeadZoneMismatch(Cause):
+    """Each wheel loses what it is held back by: the two losses have this mean."""
+
+    width_m_s: float
+    left_share: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        left = self.left_share * self.width_m_s
+        held = np.array([left, 2 * self.width_m_s - left])
+        return wheels - np.clip(wheels, -held, held)
+
+
+@dataclass
+class SpeedLimitMismatch(Cause):
+    """The wheel with the lower limit has this one."""
+
+    max_m_s: float
+    left_spare: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        with np.errstate(divide="ignore"):
+            other = self.max_m_s / np.float64(1 - abs(self.left_spare))
+        limits = np.array([other, self.max_m_s] if self.left_spare > 0 else [self.max_m_s, other])
+        return np.sign(wheels) * np.minimum(np.abs(wheels), limits)
+
+
+@dataclass
 class CommandRate(Cause):
     """A command waits for the next tick of a clock that starts with the trial."""
 

@@ -46,6 +46,9 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "command-quantisation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
     "command-truncation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
     "reversal-pause": ({"pause_s": 0.1}, {"pause_s": 0.3}),
+    "reverse-gain": ({"gain": 0.95}, {"gain": 1.12}),
+    "dead-zone-mismatch": ({"width_m_s": 0.006, "left_share": 1.8}, {"width_m_s": 0.015, "left_share": 0.4}),
+    "speed-limit-mismatch": ({"max_m_s": 0.16, "left_spare": 0.2}, {"max_m_s": 0.12, "left_spare": -1.0}),
     "turn-dead-zone": ({"width_rad_s": 0.1}, {"width_rad_s": 0.25}),
     "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06}),
     "lens-distortion": (
@@ -93,7 +96,17 @@ ALIKE = {
     "wheel-diameters": ("wheel-mismatch",),
 }
 """What would stand in for an effect that is taken out: a slope is a cable from far away."""
-TURNING = {"backlash", "braking-lag", "caster-drag", "caster-swing", "dead-band", "gear-friction", "reversal-pause", "stribeck"}
+TURNING = {
+    "backlash",
+    "braking-lag",
+    "caster-drag",
+    "caster-swing",
+    "dead-band",
+    "gear-friction",
+    "reversal-pause",
+    "reverse-gain",
+    "stribeck",
+}
 """Effects that show only where wheels reverse or turn slowly."""
 
 TRIPLES: tuple[dict[str, Parameters], ...] = (

@@ -12,10 +12,11 @@ from bns.physics.signals import Array, Wheels
 
 def apply(wheels: Wheels, width_m_s: float) -> Wheels:
     """Each wheel's speed reduced towards zero by ``width_m_s``, and not beyond zero."""
-    return replace(wheels, left_m_s=_shrunk(wheels.left_m_s, width_m_s), right_m_s=_shrunk(wheels.right_m_s, width_m_s))
+    return replace(wheels, left_m_s=shrunk(wheels.left_m_s, width_m_s), right_m_s=shrunk(wheels.right_m_s, width_m_s))
 
 
-def _shrunk(speed: Array, width: float) -> Array:
+def shrunk(speed: Array, width: float) -> Array:
+    """A speed reduced towards zero by ``width``, and not beyond zero."""
     return np.sign(speed) * np.maximum(np.abs(speed) - width, 0.0)
 
 
