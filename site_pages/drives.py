@@ -40,6 +40,7 @@ VALUES: dict[str, dict[str, float]] = {
     "command-quantisation": {"step_m_s": 0.03, "share": 1.0},
     "command-truncation": {"step_m_s": 0.06, "share": 1.0},
     "command-rate": {"period_s": 0.7},
+    "compass-deviation": {"cosine_share": 0.3, "sine_share": 0.2},
     "controller-overshoot": {"tau_s": 0.15, "lead_s": 0.1, "swing_s": 0.3, "turn_ratio": 1.0},
     "dead-zone": {"width_m_s": 0.02},
     "floor-patch": {"x_m": 0.35, "y_m": 0.0, "radius_m": 0.12, "loss": 0.3},

@@ -65,6 +65,7 @@ ORDER = (
     "lens-distortion",
     "camera-scale",
     "camera-rotation",
+    "compass-deviation",
 )
 """Stages come first (wheel, body, world, clock, measure); this is the order of effects that are put together by the machine."""
 

@@ -23,6 +23,7 @@ def driven(trials=20, **effects):
         ("command-quantisation", {"step_m_s": 0.027, "share": 1.0}),
         ("reversal-pause", {"pause_s": 0.15}),
         ("turn-dead-zone", {"width_rad_s": 0.2}),
+        ("compass-deviation", {"cosine_share": 0.1, "sine_share": -0.06}),
         ("reverse-gain", {"gain": 0.9}),
         ("dead-zone-mismatch", {"width_m_s": 0.01, "left_share": 1.8}),
         ("speed-limit-mismatch", {"max_m_s": 0.12, "left_spare": 0.25}),

@@ -308,6 +308,19 @@ class CameraRotation(Cause):
         return np.stack([x * cos - y * sin, x * sin + y * cos, heading], -1)
 
 
+@dataclass
+class CompassDeviation(Cause):
+    """The needle follows the sum of two fields; headings go on where they were, whole turns included."""
+
+    cosine_share: float
+    sine_share: float
+
+    def seen(self, poses: np.ndarray) -> np.ndarray:
+        really = np.exp(1j * poses[..., 2])
+        needle = really + complex(self.cosine_share, self.sine_share)
+        return np.concatenate([poses[..., :2], (poses[..., 2] + np.angle(needle / really))[..., None]], axis=-1)
+
+
 LISTED: dict[str, type[Cause]] = {
     "command-quantisation": CommandQuantisation,
     "command-truncation": CommandTruncation,
@@ -361,6 +374,7 @@ LISTED: dict[str, type[Cause]] = {
     "lens-distortion": LensDistortion,
     "camera-scale": CameraScale,
     "camera-rotation": CameraRotation,
+    "compass-deviation": CompassDeviation,
     "clock-offset": ClockOffset,
 }
 """In the order in which they act when two of them act on the same thing."""

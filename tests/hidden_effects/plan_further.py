@@ -51,6 +51,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "speed-limit-mismatch": ({"max_m_s": 0.16, "left_spare": 0.2}, {"max_m_s": 0.12, "left_spare": -1.0}),
     "turn-dead-zone": ({"width_rad_s": 0.1}, {"width_rad_s": 0.25}),
     "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06}),
+    "compass-deviation": ({"cosine_share": 0.05, "sine_share": -0.03}, {"cosine_share": -0.12, "sine_share": 0.15}),
     "lens-distortion": (
         {"per_m2": -0.04, "x_m": 0.8, "y_m": 0.5},
         {"per_m2": 0.08, "x_m": 0.7, "y_m": 0.4},

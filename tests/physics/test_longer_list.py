@@ -277,3 +277,11 @@ def test_a_path_does_not_depend_on_those_beside_it():
     together = simulate(model, np.repeat(LEFT, 3, 0), np.repeat(RIGHT, 3, 0), np.repeat(LASTS, 3, 0), start=starts)
     for start, path in zip(starts, together, strict=True):
         np.testing.assert_array_equal(simulate(model, LEFT, RIGHT, LASTS, start=start)[0], path)
+
+
+def test_a_compass_is_turned_by_the_field_of_the_robot_and_right_along_it():
+    model = IDEAL.with_effect("compass-deviation", cosine_share=0.0, sine_share=0.2)
+    most = np.arctan(0.2)
+    for heading, off in ((np.pi / 2, 0.0), (-np.pi / 2, 0.0), (0.0, most), (np.pi, -most), (6 * np.pi, most)):
+        seen = observe([[0.3, 0.1, heading]], None, model)[0]
+        np.testing.assert_allclose(seen, [0.3, 0.1, heading + off], atol=1e-12)
