@@ -198,7 +198,8 @@ def test_a_log_of_scan_matches_is_seen_for_what_it_is(tmp_path):
         pytest.skip(f"no {path}")
     guess = guessed(read_table(path))
     assert guess.mapping["relative"]
-    assert guess.remarks == ("Fill in RADIUS_M, the radius of the wheels: their speeds are in rad/s.",)
+    where = "scale in the entries left_m_s and right_m_s"
+    assert guess.remarks == (f"Fill in RADIUS_M ({where}): the radius of the wheels in metres; their speeds are in rad/s.",)
     assert import_log([path], filled(guess)).trials > 100
 
 

@@ -16,6 +16,7 @@ from bns.app.log.preview import preview
 from bns.app.log.roles import BY_COLUMN, COMMANDED, CUTS, ROLES, RUNNING, WHOLE, Mapped, Menus
 from bns.app.parts import WIDE, Problem, beside, button, download, drawn, heading, html, on_change, row
 from bns.app.tab import mapping_of
+from bns.diagnose.data.guess.mapping import METRES, blanks_of
 from bns.errors import DataError
 
 NONE = "(none)"
@@ -53,7 +54,7 @@ class ColumnsPart:
     def show(self, menus: Menus, mapping: Mapping[str, Any] | None, name: str, folder: Path) -> None:
         """Open for files that were read; ``mapping``: how they are read now, None: as guessed."""
         self._menus, self._name, self._folder = menus, name, folder
-        remarks = menus.guess.remarks if mapping is None else ()
+        remarks = menus.guess.said if mapping is None else ()  # blanks are asked for beside their fields
         self._remarks.object = "".join(f"<p>{escape(remark)}</p>" for remark in remarks)
         self._take_over(dict(menus.guess.mapping if mapping is None else mapping))
         self.view.visible = True
@@ -100,7 +101,7 @@ class ColumnsPart:
         units = {menu.value for role, menu in self._units.items() if menu.visible}
         counted = roles.COUNTED in units
         self._scale.visible = counted or roles.TURNS in units
-        self._scale.name = "Distance per encoder count (m)" if counted else "Radius of the wheels (m)"
+        self._scale.name = "Distance per encoder count (m)" if counted else roles.name_of_scale(mapping)
         self._scale.value = roles.wheel_scale(mapping)
         self._wheelbase.visible = told == roles.BODY
         base = mapping.get("wheelbase_m")
@@ -127,9 +128,12 @@ class ColumnsPart:
         self._save.object = download(f"Save {name}", name, text, "text/yaml") if found else ""
 
     def _to_fill_in(self) -> str:
-        """Which numbers the units and commands need that are not there yet."""
-        empty = [field.name for field in (self._scale, self._wheelbase) if field.visible and not field.value]
-        return f"Fill in: {'; '.join(empty)}." if empty else ""
+        """Which numbers the units and commands need that are not there yet: in which field, in which line, what to measure."""
+        blanks = {b.where.split()[0]: b for b in blanks_of(self._mapping, self._menus.tables if self._menus else {})}
+        fields = {"scale": self._scale, "wheelbase_m": self._wheelbase}
+        empty = [(field.name, blanks.get(key)) for key, field in fields.items() if field.visible and not field.value]
+        said = [name if b is None else f"{name} ({b.where} of the mapping): {b.what}" for name, b in empty]
+        return f"Fill in the field {'; and the field '.join(said)}." if said else ""
 
     def _pick(self, role: str) -> None:
         assert self._menus is not None
@@ -158,7 +162,7 @@ class ColumnsPart:
         if roles.commanded(mapping) != roles.BODY:
             first = next(iter(self._menus.columns(roles.FORWARD).values()))
             mapping["columns"][roles.FORWARD] = {"from": first[1]}
-        mapping.setdefault("wheelbase_m", "METRES")
+        mapping.setdefault("wheelbase_m", METRES)
 
     def _cut(self) -> None:
         assert self._menus is not None
