@@ -296,6 +296,6 @@ def _mapped(table: pd.DataFrame, mapping: Rules | None, folder: Path) -> pd.Data
     if mapping is None:
         return table
     rules = (
-        checked_mapping(dict(mapping), Path("mapping")) if isinstance(mapping, Mapping) else load_mapping(Path(mapping))
+        checked_mapping(dict(mapping)) if isinstance(mapping, Mapping) else load_mapping(Path(mapping))
     )
     return applied(table, rules, folder, read_table)

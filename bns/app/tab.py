@@ -12,8 +12,6 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from bns.api.common.prepared import are_networks
 from bns.api.compare import CompareResult, compare
 from bns.api.diagnose import DiagnoseResult, diagnose
@@ -25,8 +23,10 @@ from bns.app.background import Background
 from bns.app.log.part import ALL, Part
 from bns.app.switches import History, Switches
 from bns.app.workbench import Workbench
+from bns.diagnose.data.located import BEGINS
 from bns.diagnose.data.sources.read import read_table
 from bns.errors import DataError, ModelError
+from bns.safe_yaml import read_yaml, shown
 
 FIRST_MODEL = "khepera"
 _LONGEST_S = 600.0
@@ -214,12 +214,9 @@ def files_of(log: Log | Any) -> tuple[Path, ...]:
 
 def mapping_of(text: str) -> dict[str, Any]:
     """A mapping as the user wrote it; DataError if it is no YAML."""
-    try:
-        rules = yaml.safe_load(text)
-    except yaml.YAMLError as fault:
-        raise DataError(f"The mapping is not valid YAML: {fault}. Correct the place it names.") from fault
+    rules, _ = read_yaml(text, BEGINS, DataError)
     if not isinstance(rules, dict):
-        raise DataError("The mapping must have keys such as columns; docs/logs.md has all that may stand in it.")
+        raise DataError(f"{BEGINS}: it is {shown(rules)}; it must have keys such as columns (docs/logs.md has them all).")
     return rules
 
 

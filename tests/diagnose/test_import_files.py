@@ -148,7 +148,7 @@ def test_two_files_of_a_lab_are_joined_by_time(tmp_path, table, log, capsys):
 def test_a_file_that_the_mapping_does_not_know_is_refused(tmp_path, log):
     first, second = lab_files(tmp_path, log)
     (tmp_path / "Odometry.dat.import.yaml").write_text(guessed(read_table(first)).text)
-    with pytest.raises(DataError, match=r"uses nothing from .*groundtruth.txt; add it under also"):
+    with pytest.raises(DataError, match=r"Odometry.dat.import.yaml, line \d: nothing is taken from .*groundtruth.txt; add"):
         import_log([first, second])
 
 

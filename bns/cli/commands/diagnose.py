@@ -189,7 +189,7 @@ def import_(options: argparse.Namespace) -> int:
     if options.map:
         beside = first.with_name(first.name + ".import.yaml")
         if not beside.exists():
-            beside.write_text(yaml.safe_dump(found.mapping, sort_keys=False), encoding="utf-8")
+            beside.write_text(yaml.safe_dump(dict(found.mapping or {}), sort_keys=False), encoding="utf-8")
     print(found.summary(str(options.output)))
     print(findings_text(found.findings))
     return 0

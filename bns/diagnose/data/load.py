@@ -16,6 +16,7 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.bodies.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.data.bodies.joints import are_joints, joint_tracks
 from bns.diagnose.data.checks import Finding, checked
+from bns.diagnose.data.located import BEGINS
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.tracker_faults import jumps, without_faults
@@ -165,7 +166,7 @@ def naming(path: Path) -> Iterator[None]:
     try:
         yield
     except DataError as error:
-        if str(path) in str(error):
+        if str(path) in str(error) or str(error).startswith(BEGINS):
             raise
         raise DataError(f"{path}: {error}") from error
 
