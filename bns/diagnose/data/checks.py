@@ -63,8 +63,9 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     trials = rows_by_trial(usable)
     refuse_untold(usable, trials)
     refuse_still_heading(usable, trials)
-    check_units(usable, trials)
-    told = [Finding(str(table["trial"].iloc[row]), row, text) for row, text in filter(None, (odd, never_told(usable)))]
+    note = check_units(usable, trials)
+    unit = (int(usable.index[0]), note) if note else None
+    told = [Finding(str(table["trial"].iloc[row]), row, text) for row, text in filter(None, (unit, odd, never_told(usable)))]
     return usable, told + findings
 
 
