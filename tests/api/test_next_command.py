@@ -1,16 +1,22 @@
-"""Commands that are printed for the next step ask the same again: they hold all that was given."""
+"""Commands that are printed for the next step ask the same again: they hold all that was given. What is said in a message
+of an option is said for Python, too."""
 
+import ast
+import re
 import shlex
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 import bns
 from bns.api.common.next_command import model_words, repeated
+from bns.api.common.prepared import prepared
 from bns.cli.commands.diagnose import words_of
 from bns.cli.main import _parser
 from bns.diagnose.report.proposal_text import proposal_text
 from bns.diagnose.report.tables import next_commands
+from bns.errors import DataError
 from bns.measurements import write_measurements
 from tests.diagnose.worlds import NOMINAL, measured
 
@@ -132,3 +138,34 @@ def test_a_wheelbase_is_written_where_the_name_means_another():
     assert model_words(bns.Model("khepera"))["wheelbase_m"] is None
     assert model_words(bns.Model("khepera", wheelbase_m=0.2)) == {"model": "khepera", "wheelbase_m": 0.2}
     assert repeated("a.csv", **model_words(bns.Model(wheelbase_m=0.2)))["model"] == "--model differential-drive --wheelbase 0.2"
+
+
+def flags_outside(tree):
+    """Texts of raised errors with an option of the command line that is not beside its name in Python."""
+    within = {id(one) for call in ast.walk(tree) if getattr(getattr(call, "func", None), "id", "") == "in_both"
+              for one in ast.walk(call)}  # fmt: skip
+    texts = (one for fault in ast.walk(tree) if isinstance(fault, ast.Raise) for one in ast.walk(fault))
+    return [one.value for one in texts if isinstance(one, ast.Constant) and id(one) not in within and FLAG.search(str(one.value))]
+
+
+FLAG = re.compile(r"(^|[\s(])--[a-z]")
+ON_THE_COMMAND_LINE_ALONE = {"import_log.py", "network_errors.py", "trial.py", "run.py"}
+"""Messages of `bns import`, of writing networks, and of runs and trials."""
+
+
+def test_errors_that_python_meets_name_its_arguments_beside_the_options():
+    folder = Path(bns.__file__).parent
+    modules = [path for room in ("api", "diagnose") for path in (folder / room).rglob("*.py")]
+    found = {path.name: flags_outside(ast.parse(path.read_text())) for path in modules}
+    assert {name: texts for name, texts in found.items() if texts and name not in ON_THE_COMMAND_LINE_ALONE} == {}
+    assert flags_outside(ast.parse("raise DataError(f'{x}; give --model snake')")) == ["; give --model snake"]
+    assert flags_outside(ast.parse("raise DataError(f\"give {in_both('--model snake', 'x')}\")")) == []
+
+
+def test_a_model_of_another_robot_is_refused_with_both_ways_to_give_one(tmp_path):
+    write_measurements(measured(NOMINAL, trials=4), tmp_path / "log.csv")
+    said = r"--model khepera, or --model differential-drive --wheelbase METRES \(in Python: the model \"khepera\", or bns\.Model"
+    with pytest.raises(DataError, match=said):
+        prepared(tmp_path / "log.csv", "snake")
+    with pytest.raises(DataError, match=r"--wheelbase 0\.08\d* \(in Python: bns\.Model\(NAME, wheelbase_m=0\.08\d*\)\)"):
+        prepared(tmp_path / "log.csv", bns.Model(wheelbase_m=0.35))

@@ -14,7 +14,7 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import windows
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
-from bns.errors import DataError
+from bns.errors import DataError, in_both
 from bns.physics.model import LIMITS, Model
 from bns.robots import robot_names
 
@@ -116,7 +116,8 @@ def _on_turns(model: Model, ratio: float, question: str) -> str:
             f"{said} No wheelbase from {low:g} to {high:g} m would fit: is heading_rad the measured heading of the robot, in "
             "radians, and are the speeds in m/s?"
         )
-    return f"{said} {question} A wheelbase of about {fits:.3g} m would fit: --wheelbase {fits:.3g}."
+    given = in_both(f"--wheelbase {fits:.3g}", f"bns.Model(NAME, wheelbase_m={fits:.3g})")
+    return f"{said} {question} A wheelbase of about {fits:.3g} m would fit: {given}."
 
 
 def _turn_predicted(steps: Array, start: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
