@@ -20,8 +20,8 @@ _TRIAL_S = DEFAULTS.design.trial_s
 _HEADING_RAD = DEFAULTS.design.heading_rad
 _LARGEST_M = DEFAULTS.design.largest_m
 _ARENA = in_both("--arena 1.8x1.3, in metres", "arena=(1.8, 1.3)")
-START = in_both("--start 0,0,90, in metres and degrees", "start=(x_m, y_m, heading_rad)")
-_SPEEDS = in_both("--speeds=-0.2,0.2", "speeds=(-0.2, 0.2)")
+START = in_both("--start X,Y,DEGREES, such as --start 0,0,90", "start=(x_m, y_m, heading_rad)")
+_SPEEDS = in_both("--speeds=LOW,HIGH, such as --speeds=-0.2,0.2", "speeds=(-0.2, 0.2)")
 
 
 def arena_of(
