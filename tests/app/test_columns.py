@@ -81,7 +81,6 @@ def test_another_column_comes_in_the_unit_that_its_name_tells(menus):
     assert roles.with_unit(mapping, "x_m", "m")["columns"]["x_m"] == {"from": "place_cm"}
 
 
-@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # Panel 1.5 has only the names that 1.9 warns of
 def test_a_number_that_is_missing_is_asked_for_by_the_name_of_its_field(menus):
     mapping = menus.guess.mapping
     for role in ("left_m_s", "right_m_s"):
@@ -94,7 +93,6 @@ def test_a_number_that_is_missing_is_asked_for_by_the_name_of_its_field(menus):
     assert "Fill in" not in str(part._problem.view.object)
 
 
-@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # as above
 def test_placeholders_are_named_by_their_fields_and_say_what_to_measure(table):
     speeds = {"left_mm_s": "linear_velocity", "right_mm_s": "angular_velocity"}
     menus = Menus({"": table.rename(columns=speeds)})
@@ -110,7 +108,6 @@ def test_placeholders_are_named_by_their_fields_and_say_what_to_measure(table):
     assert "Fill in" not in str(part._problem.view.object)
 
 
-@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # as above
 def test_a_device_unit_asks_for_its_speed_and_says_how_far_the_robot_went(table):
     menus = Menus({"": table.assign(left_mm_s=table.left_mm_s * 37.0, right_mm_s=table.right_mm_s * 37.0)})
     menus = Menus({"": menus.tables[""].rename(columns={"left_mm_s": "left", "right_mm_s": "right"})})
