@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
-from bns.diagnose.data.odd_commands import half_told, never_told, refuse_untold
+from bns.diagnose.data.odd_commands import half_told, never_told, refuse_untold, untold_trials
 from bns.diagnose.data.still_heading import refuse_still_heading
 from bns.diagnose.data.units import check_units
 from bns.diagnose.settings import DEFAULTS
@@ -64,8 +64,9 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     refuse_untold(usable, trials)
     refuse_still_heading(usable, trials)
     note = check_units(usable, trials)
-    unit = (int(usable.index[0]), note) if note else None
-    told = [Finding(str(table["trial"].iloc[row]), row, text) for row, text in filter(None, (unit, odd, never_told(usable)))]
+    unit: tuple[int, str] | None = (int(usable.index[0]), note) if note else None
+    oddities = (unit, odd, untold_trials(usable, trials), never_told(usable))
+    told = [Finding(str(table["trial"].iloc[row]), row, text) for row, text in filter(None, oddities)]
     return usable, told + findings
 
 
