@@ -75,6 +75,11 @@ class SweepWarning(UserWarning):
     """A sweep goes on, but most likely not as it is meant."""
 
 
+def in_both(typed: str, python: str) -> str:
+    """How a user says something on the command line, and in Python: a message does not know from where it was asked for."""
+    return f"{typed} (in Python: {python})"
+
+
 def unknown_name(kind: str, given: object, valid: Iterable[str], also: Mapping[str, str] | None = None) -> str:
     """Say that ``given`` is no ``kind``, which one was probably meant, and list the valid names.
 

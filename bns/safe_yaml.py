@@ -55,6 +55,10 @@ class Lines:
             line = mark.start_mark.line
         return int(line) + 1
 
+    def line(self, *path: str | int) -> int | None:
+        """The same; None where there is no file, or none of the piece in it."""
+        return None if self._root is None or not path else self.of(*path)
+
     @contextmanager
     def at(self, *path: str | int) -> Iterator[None]:
         """Name the line of the piece in the error that is met with it."""

@@ -22,12 +22,13 @@ from bns.diagnose.report.text import extension_text
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.settings.chosen import in_force
 from bns.diagnose.values import numbers_of
-from bns.errors import ModelError
+from bns.errors import ModelError, in_both
 from bns.physics.effect import Effect
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_FORMULA = in_both("bns add LOG NAME --term … --on …", 'bns.add(log, "NAME", model, term=…, on=…)')
 Wanted = str | PathLike[str] | Effect
 
 
@@ -126,7 +127,7 @@ def add(
         raise ModelError("No effect is given; give at least one name of bns.effects().")
     if term is not None and len(wanted) != 1:
         names = ", ".join(map(_name, wanted))
-        raise ModelError(f"A formula needs one name, not {names}: bns add NAME --term … --on …")
+        raise ModelError(f"A formula needs one name, not {names}: {_FORMULA}.")
     robot = with_effects(model)
     ready = prepared(log, robot)
     columns = getattr(ready.predictor.tracks, "extra", ())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike, fspath
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from bns.api.common.cache import remembered
-from bns.api.common.next_command import repeated
+from bns.api.common.next_command import model_words, own_files, repeated
 from bns.api.common.parameters import parameter_table
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Meter, Progress
@@ -24,6 +24,8 @@ from bns.diagnose.adding import documented
 from bns.diagnose.design.competing_models import Rival, rivals_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.diagnosis import diagnose as find
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.settings import DEFAULTS, Settings
 from bns.diagnose.settings.chosen import Chosen, changes_text, in_force, settings_of
@@ -55,6 +57,8 @@ class DiagnoseResult(Shown):
     ready: Prepared
     diagnosis: Diagnosis
     settings: Settings = DEFAULTS
+    asked: Mapping[str, Any] = field(default_factory=dict)
+    """What a command line would repeat of the arguments, beside data and model."""
 
     @property
     def verdict(self) -> str:
@@ -76,7 +80,7 @@ class DiagnoseResult(Shown):
         selection = self.diagnosis.selection
         if selection is None:
             return self.ready.model
-        return Model(documented(selection.fit, self.ready.model, self.ready.measured, self.diagnosis.errors))
+        return self._documented(selection.fit, self.diagnosis.errors)
 
     @property
     def model_with_terms(self) -> Model | None:
@@ -84,7 +88,7 @@ class DiagnoseResult(Shown):
         terms = self.diagnosis.terms
         if not terms:
             return None
-        return Model(documented(terms[0].fit, self.ready.model, self.ready.measured, self.diagnosis.errors_with_terms))
+        return self._documented(terms[0].fit, self.diagnosis.errors_with_terms)
 
     @property
     def extended(self) -> Model | None:
@@ -153,8 +157,8 @@ class DiagnoseResult(Shown):
 
     @property
     def command(self) -> dict[str, str]:
-        """Words (data, model) for the commands that follow."""
-        return repeated(fspath(self.ready.measured.path), self.ready.model.name)
+        """Words (data, model and what else was given) for the commands that follow."""
+        return repeated(**{**self.ready.log.given, **model_words(self.ready.model), **self.asked})
 
     def to_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""
@@ -191,6 +195,13 @@ class DiagnoseResult(Shown):
 
         return bns.explore(self, **options)
 
+    def _documented(self, fit: Fit, errors: PairedErrors | None) -> Model:
+        """The fitted model; effects of the user's own with their files, without which nobody could read them back."""
+        model = documented(fit, self.ready.model, self.ready.measured, errors)
+        files = {n: {"file": str(Path(file).resolve())} for n, file in own_files(self.asked.get("also", ())).items()}
+        known = tuple(replace(a, written=files.get(a.effect.name, a.written)) for a in model.effects)
+        return Model(replace(model, effects=known))
+
     def _line(self) -> str:
         lacks = f" ({', '.join(self.effects)})" if self.effects else ""
         return f"{self.verdict}{lacks}; {self.ready.model.name} on {self.ready.log.name}, {len(self.ready.log)} trials"
@@ -225,16 +236,29 @@ def diagnose(
         DataError: measurements that cannot be used, or of another robot.
         ModelError: there is no such model, or the file of an effect cannot be used.
     """
-    chosen = settings_of(settings)
+    chosen, also, without_effects = settings_of(settings), tuple(also), tuple(without_effects)
     with in_force(chosen):
-        return _found(_checked_again(log, chosen), model, also, without_effects, chosen, fresh, progress, alone)
+        found = _found(_checked_again(log, chosen), model, also, without_effects, chosen, fresh, progress, alone)
+    return replace(found, asked=_asked(model, also, without_effects, settings))
+
+
+def _asked(
+    model: Given, also: Iterable[Effect | str | PathLike[str]], without_effects: Iterable[str], settings: Chosen | None
+) -> dict[str, Any]:
+    """Those arguments that are names or files: a command line has no others."""
+    return {
+        **({"model": fspath(model)} if isinstance(model, str | PathLike) else {}),
+        "also": tuple(fspath(file) for file in also if not isinstance(file, Effect)),
+        "without_effects": tuple(without_effects),
+        "settings": fspath(settings) if isinstance(settings, str | PathLike) else None,
+    }
 
 
 def _checked_again(log: Log, settings: Settings) -> Log:
     """Measurements that were read under the default settings, checked under these."""
     if settings.data == DEFAULTS.data or not isinstance(log, Measurements):
         return log
-    return Measurements(log.measured.table)
+    return log.checked_again()
 
 
 def _found(

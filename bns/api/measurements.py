@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
@@ -58,6 +58,7 @@ class Measurements(Shown):
         self, log: Log, *more: str | PathLike[str], robot: str | None = None, mapping: Rules | None = None
     ) -> None:
         self._measured = _read(log, more, robot, mapping)
+        self._given = log.given if isinstance(log, Measurements) else _words_given(self._measured.path, log, more, robot)
 
     @property
     def frame(self) -> pd.DataFrame:
@@ -91,13 +92,19 @@ class Measurements(Shown):
         return self._measured.path.name
 
     @property
+    def given(self) -> dict[str, Any]:
+        """What a command line repeats to read the same: data and more (files), robot (or None), without (names of trials)."""
+        return dict(self._given)
+
+    @property
     def measured(self) -> Measured:
         """The same for the library's own functions: tracks as arrays, findings, digest."""
         return self._measured
 
     def without(self, trials: Iterable[str]) -> Measurements:
         """The same measurements without some trials, by their names. DataError if there is no such trial, or none is left."""
-        left_out, there = set(map(str, trials)), self._rows_of_trials
+        trials = tuple(map(str, trials))
+        left_out, there = set(trials), self._rows_of_trials
         unknown = sorted(left_out - set(there))
         if unknown:
             raise DataError(f"There is no trial {', '.join(unknown)}; there are {', '.join(there)}.")
@@ -107,9 +114,13 @@ class Measurements(Shown):
             raise DataError("All trials are left out; keep at least one.")
         kept = np.ones(len(self._measured.table), dtype=bool)
         kept[np.concatenate([there[name] for name in left_out])] = False
-        fewer = copy(self)
-        fewer.__dict__ = {"_measured": measured_table(self._measured.table[kept], self._measured.path)}
+        fewer = self._of(self._measured.table[kept])
+        fewer._given = {**self._given, "without": (*self._given["without"], *dict.fromkeys(trials))}
         return fewer
+
+    def checked_again(self) -> Measurements:
+        """The same rows, checked under the settings that are in force."""
+        return self._of(self._measured.table)
 
     def without_rows(self, rows: Iterable[int]) -> Measurements:
         """The same measurements without the poses of some rows (of `frame`, from 0, as `findings` counts them).
@@ -185,9 +196,12 @@ class Measurements(Shown):
         if not out.any():
             return self
         table = self._measured.table
-        marked = table.assign(**{LEFT_OUT: (out | left_out_rows(table)).astype(int)})
+        return self._of(table.assign(**{LEFT_OUT: (out | left_out_rows(table)).astype(int)}))
+
+    def _of(self, table: pd.DataFrame) -> Measurements:
+        """Some of the same rows, or the same with other marks."""
         fewer = copy(self)
-        fewer.__dict__ = {"_measured": measured_table(marked, self._measured.path)}
+        fewer.__dict__ = {"_measured": measured_table(table, self._measured.path), "_given": self._given}
         return fewer
 
     @cached_property
@@ -238,6 +252,12 @@ def _seen(table: pd.DataFrame) -> NDArray[np.bool_]:
     return np.asarray(table[places].notna().all(axis=1), dtype=bool)
 
 
+def _words_given(path: Path, log: Log, more: Iterable[str | PathLike[str]], robot: str | None) -> dict[str, Any]:
+    """As `Measurements.given` has it."""
+    further = [*(log[1:] if isinstance(log, list | tuple) else ()), *more]
+    return {"data": fspath(path), "more": tuple(map(fspath, further)), "robot": robot, "without": ()}
+
+
 def as_measurements(log: Log) -> Measurements:
     """Measurements as they are, or read."""
     return log if isinstance(log, Measurements) else Measurements(log)
@@ -276,6 +296,6 @@ def _mapped(table: pd.DataFrame, mapping: Rules | None, folder: Path) -> pd.Data
     if mapping is None:
         return table
     rules = (
-        checked_mapping(dict(mapping), Path("mapping")) if isinstance(mapping, Mapping) else load_mapping(Path(mapping))
+        checked_mapping(dict(mapping)) if isinstance(mapping, Mapping) else load_mapping(Path(mapping))
     )
     return applied(table, rules, folder, read_table)

@@ -10,7 +10,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from bns.errors import ModelError, unknown_name
+from bns.errors import ModelError, in_both, unknown_name
 from bns.physics import model as physics
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
@@ -161,7 +161,8 @@ def _fields(given: Given | None, fields: dict[str, Any]) -> dict[str, Any]:
     if given is None or (isinstance(given, str) and given in BASES):
         if "wheelbase_m" not in fields:
             raise ModelError(
-                f"The model {given or BASES[0]} needs its wheelbase: --wheelbase METRES; in Python bns.Model(wheelbase_m=0.2)."
+                f"The model {given or BASES[0]} needs its wheelbase: "
+                f"{in_both('--wheelbase METRES', 'bns.Model(wheelbase_m=0.2)')}."
             )
         return {} if given is None else {"name": given}
     model = given if isinstance(given, physics.Model) else load_model(fspath(given))

@@ -25,7 +25,7 @@ from bns.diagnose.design.search import GENERATIONS
 from bns.diagnose.design.sequences import Arena, Bounds
 from bns.diagnose.report.proposal_text import proposal_text
 from bns.diagnose.settings.chosen import in_force
-from bns.errors import DataError
+from bns.errors import DataError, in_both
 from bns.physics.effect import Effect
 from bns.physics.jointed.model import JointedModel
 from bns.store.disk.files import publish
@@ -165,7 +165,7 @@ def _limits(
     if (arena, start, speeds) != (None, None, None):
         raise DataError(
             f"arena, start and speeds are for wheels, and {model.name} is a body on joints: its experiment repeats cycles "
-            "that were driven. Leave out --arena, --start and --speeds."
+            f"that were driven. Leave out {in_both('--arena, --start and --speeds', 'arena, start, speeds')}."
         )
     return None, None
 

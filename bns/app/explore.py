@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -74,7 +75,7 @@ def explore(
 
 
 def shown_of(
-    log: Log | DiagnoseResult | None, model: Given, data_words: str = "", model_words: tuple[str, ...] = ()
+    log: Log | DiagnoseResult | None, model: Given, data_words: Sequence[str] = (), model_words: tuple[str, ...] = ()
 ) -> Tabs | Study:
     """A store's runs, or what every tab begins with."""
     if isinstance(log, str | PathLike) and is_store(Path(log)):
@@ -83,7 +84,7 @@ def shown_of(
 
 
 def tabs_of(
-    log: Log | DiagnoseResult | None, model: Given, data_words: str = "", model_words: tuple[str, ...] = ()
+    log: Log | DiagnoseResult | None, model: Given, data_words: Sequence[str] = (), model_words: tuple[str, ...] = ()
 ) -> Tabs:
     """What every tab begins with."""
     if isinstance(log, str | PathLike) and is_session(Path(log)):
@@ -94,7 +95,7 @@ def tabs_of(
     first.take(model, model_words or (_words(model),))
     files = files_of(log)
     if files:
-        first.ask([Path(file) for file in files], data_words or " ".join(map(str, files)))
+        first.ask([Path(file) for file in files], data_words or tuple(map(str, files)))
     elif log is not None:
         first.open(log, data_words or _words(log))
     if kept is not None:

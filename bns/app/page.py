@@ -10,6 +10,7 @@ import panel as pn
 
 from bns.app.design import template
 from bns.app.jobs import Jobs
+from bns.app.names import call, called, looking
 from bns.app.parts import WIDE, button, html, on_change, row
 from bns.app.screens.data import DataScreen
 from bns.app.screens.effects import EffectsScreen
@@ -48,11 +49,10 @@ class Screens:
         self._tab, self._screens = tab, dict[str, Any]()
         names = list(SCREENS)
         self._chosen = pn.widgets.RadioButtonGroup(
-            name="Screen",
+            **called("Screen"),
             options=names,
             value=tab.screen or ("Effects" if tab.bench else names[0]),
-            button_type="primary",
-            button_style="outline",
+            **looking("primary", "outline"),
             **WIDE,
         )
         on_change(self._chosen, lambda: self._enter(self._chosen.value))
@@ -84,7 +84,7 @@ class Screens:
         """What comes next, for somebody who sees the page for the first time."""
         following = [name for before, name in pairwise(SCREENS) if before == self._chosen.value]
         self._on.visible = bool(following)
-        self._on.name = f"Continue: {following[0]}" if following else ""
+        call(self._on, f"Continue: {following[0]}" if following else "")
 
     def _go_on(self) -> None:
         self._chosen.value = next(name for before, name in pairwise(SCREENS) if before == self._chosen.value)

@@ -12,6 +12,7 @@ from typing import Any
 import panel as pn
 
 from bns.app.html import message
+from bns.app.names import called, looking
 
 CSS = (resources.files("bns.app") / "style.css").read_text(encoding="utf-8")
 NO_WIDER = {"max-width": "calc(100vw - 28px)"}
@@ -58,7 +59,7 @@ def on_change(widget: Any, act: Callable[[], object], what: str = "value") -> No
 
 def button(name: str, clicked: Callable[[], object], kind: str = "default", **more: Any) -> Any:
     """A button that does something."""
-    made = pn.widgets.Button(name=name, button_type=kind, width=None, **more)
+    made = pn.widgets.Button(**called(name), **looking(kind), width=None, **more)
     on_change(made, clicked, "clicks")
     return made
 

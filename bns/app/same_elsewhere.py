@@ -11,9 +11,10 @@ from bns.app.log.part import ALL, Part
 from bns.app.switches import Switches
 
 
-def commands(data: str, model: Sequence[str], switches: Switches, networks: bool = False) -> list[str]:
+def commands(files: Sequence[str], model: Sequence[str], switches: Switches, networks: bool = False) -> list[str]:
     """What to type for the same: one `bns add` for listed effects, and one more for every formula; networks are compared only."""
-    data, base = shlex.quote(data), shlex.join(["--model", *model])
+    data, more = shlex.quote(files[0]), [word for file in files[1:] for word in ("--more", file)]
+    base, new = shlex.join(["--model", *model, *more]), shlex.join(["--model", "extended.yaml", *more])
     if networks:
         return [f"bns compare {data} {base}"]
     given = base
@@ -22,16 +23,16 @@ def commands(data: str, model: Sequence[str], switches: Switches, networks: bool
     out = [f"bns compare {data} {base}", f"bns diagnose {data} {base}"]
     if names:
         out.append(f"bns add {data} {' '.join(names)} {base} -o extended.yaml")
-        base = "--model extended.yaml"
+        base = new
     for name in (n for n in switches.on if n in terms):
         t = terms[name]
         out.append(f"bns add {data} {shlex.join([name, '--term', t.term, '--on', t.on])} {base} -o extended.yaml")
-        base = "--model extended.yaml"
+        base = new
     return [*out, f"bns report {data} {given} -o report.html"]
 
 
 def python(
-    data: str, model: Sequence[str], switches: Switches, part: Part = ALL, mapping: Mapping[str, Any] | None = None,
+    files: Sequence[str], model: Sequence[str], switches: Switches, part: Part = ALL, mapping: Mapping[str, Any] | None = None,
     networks: bool = False,
 ) -> str:
     """The same in Python; ``mapping``: how the columns were read, where the user said that."""
@@ -39,7 +40,7 @@ def python(
     names = [n for n in switches.on if n not in terms]
     given = f"bns.Model({model[0]!r}" + (f", wheelbase_m={model[2]})" if len(model) > 2 else ")")
     read = "" if mapping is None else f", mapping={_literal(mapping)}"
-    lines = ["import bns", "", f"log = bns.Measurements({data!r}{read})", *part.python()]
+    lines = ["import bns", "", f"log = bns.Measurements({', '.join(map(repr, files))}{read})", *part.python()]
     if networks:
         return "\n".join([*lines, f"print(bns.compare(log, {model[0]!r}).summary())"])
     lines += [f"model = {given}", "print(bns.compare(log, model).summary())"]

@@ -72,7 +72,7 @@ def opened(path: Path) -> Tab:
         )
     given = _model(model, path, tab)
     tab.take(given, tuple(str(word) for word in model.get("words") or (_name(given),)))
-    tab.open(measured, " ".join(files), mapping, files=files)
+    tab.open(measured, files if mapping is None else files[:1], mapping, files=files)
     tab.take_part(read_part(log, str(path)))
     snapshots = tree.get("snapshots") or {}
     tab.history.to(_switches(tree["switches"], path))

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import panel as pn
 
+from bns.app.names import called
 from bns.app.parts import WIDE, on_change
 
 _UNTITLED = ".bk-slider-title { display: none; }"
@@ -62,11 +63,11 @@ class NumberSlider:
         step = (end - start) / steps
         self._moved, self._quiet = moved, False
         self._box = pn.widgets.FloatInput(
-            name=name, value=value, step=step, start=bounds[0], end=bounds[1], format=_DIGITS, width=300, margin=0,
+            **called(name), value=value, step=step, start=bounds[0], end=bounds[1], format=_DIGITS, width=300, margin=0,
             stylesheets=[_IN_A_LINE],
         )  # fmt: skip
         self._slider = Slider(
-            name=short, value=value, start=start, end=end, step=step, show_value=False, format=_DIGITS, margin=(0, 0, 5, 0),
+            **called(short), value=value, start=start, end=end, step=step, show_value=False, format=_DIGITS, margin=(0, 0, 5, 0),
             stylesheets=[_UNTITLED], **WIDE,
         )  # fmt: skip
         for widget in (self._box, self._slider):

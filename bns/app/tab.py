@@ -12,8 +12,6 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from bns.api.common.prepared import are_networks
 from bns.api.compare import CompareResult, compare
 from bns.api.diagnose import DiagnoseResult, diagnose
@@ -25,8 +23,10 @@ from bns.app.background import Background
 from bns.app.log.part import ALL, Part
 from bns.app.switches import History, Switches
 from bns.app.workbench import Workbench
+from bns.diagnose.data.located import BEGINS
 from bns.diagnose.data.sources.read import read_table
 from bns.errors import DataError, ModelError
+from bns.safe_yaml import read_yaml, shown
 
 FIRST_MODEL = "khepera"
 _LONGEST_S = 600.0
@@ -46,7 +46,7 @@ class Tab:
     """
 
     log: Measurements | None = None
-    data_words: str = ""
+    data_words: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     mapping: Mapping[str, Any] | None = None
     part: Part = ALL
@@ -76,15 +76,21 @@ class Tab:
             weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         return self._folder
 
-    def open(self, log: Log, words: str, mapping: Mapping[str, Any] | None = None, files: Sequence[str] = ()) -> None:
-        """Another log, which lies in ``files`` if it is read already. DataError: it cannot be used, and all stays as it was."""
+    def open(
+        self, log: Log, words: str | Sequence[str], mapping: Mapping[str, Any] | None = None, files: Sequence[str] = ()
+    ) -> None:
+        """Another log; ``words``: what its files are called, ``files``: where they lie, if it is read already.
+
+        DataError: it cannot be used, and all stays as it was.
+        """
         self.log = self._used = log if isinstance(log, Measurements) else Measurements(log, mapping=mapping)
-        self.data_words, self.part, self.mapping = words, ALL, mapping
+        self.data_words = (words,) if isinstance(words, str) else tuple(words)
+        self.part, self.mapping = ALL, mapping
         self.files = tuple(files) or tuple(str(path.absolute()) for path in files_of(log))
         self.asked, self.why_no_log = tuple(map(Path, self.files)), ""
         self._lay_on()
 
-    def ask(self, paths: Sequence[Path], words: str) -> None:
+    def ask(self, paths: Sequence[Path], words: Sequence[str]) -> None:
         """Open files; where their columns say nothing, keep the question for the page, which has menus for that.
 
         DataError: they cannot be read at all.
@@ -108,7 +114,7 @@ class Tab:
         logs = [path for path in files if path.suffix not in {".yaml", ".yml"}]
         if not logs:
             raise DataError("There is no log among these files; give a .csv or .parquet file of measurements.")
-        self.open(list(map(str, logs)), logs[0].name)
+        self.open(list(map(str, logs)), [path.name for path in logs])
 
     def become(self, other: Tab) -> None:
         """All that another tab is about; its own folder stays."""
@@ -208,12 +214,9 @@ def files_of(log: Log | Any) -> tuple[Path, ...]:
 
 def mapping_of(text: str) -> dict[str, Any]:
     """A mapping as the user wrote it; DataError if it is no YAML."""
-    try:
-        rules = yaml.safe_load(text)
-    except yaml.YAMLError as fault:
-        raise DataError(f"The mapping is not valid YAML: {fault}. Correct the place it names.") from fault
+    rules, _ = read_yaml(text, BEGINS, DataError)
     if not isinstance(rules, dict):
-        raise DataError("The mapping must have keys such as columns; docs/logs.md has all that may stand in it.")
+        raise DataError(f"{BEGINS}: it is {shown(rules)}; it must have keys such as columns (docs/logs.md has them all).")
     return rules
 
 

@@ -23,7 +23,7 @@ from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.paired_errors import PairedErrors, PairedWindows
-from bns.errors import ModelError
+from bns.errors import ModelError, in_both
 from bns.physics.effect import Effect
 from bns.physics.effects import effect_in_file
 from bns.physics.formula import formula_effect
@@ -94,8 +94,8 @@ def add_effects(
     """
     if per_trial and not any(effect.per_trial_allowed for effect, _ in effects):
         able = ", ".join(e.name for e in model.catalogue().values() if e.per_trial_allowed) or "none of this robot"
-        given = ", ".join(e.name for e, _ in effects)
-        raise ModelError(f"None of {given} may differ from trial to trial; --per-trial goes with {able}.")
+        given, way = ", ".join(e.name for e, _ in effects), in_both("--per-trial", "per_trial=True")
+        raise ModelError(f"None of {given} may differ from trial to trial; {way} goes with {able}.")
     for effect, _ in effects:
         if any(a.effect.name == effect.name for a in model.effects):
             raise ModelError(

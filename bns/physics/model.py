@@ -13,7 +13,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, ClassVar
 
-from bns.errors import ModelError, unknown_name
+from bns.errors import ModelError, in_both, unknown_name
 from bns.physics.effect import Effect, number
 from bns.physics.effects import all_effects, chain_key, effect_named, effect_names
 from bns.physics.formula import formula_effect
@@ -239,7 +239,8 @@ def load_model(name_or_path: str | Path) -> Model:
             )
         known = unknown_name("robot model", str(name_or_path), _names())
         raise ModelError(
-            f"{known} Or give the path of a YAML file, with .yaml at its end. {BASES[0]} also needs --wheelbase METRES."
+            f"{known} Or give the path of a YAML file, with .yaml at its end. {BASES[0]} also needs "
+            f"{in_both('--wheelbase METRES', 'bns.Model(wheelbase_m=METRES)')}."
         )
     text = (resources.files("bns.physics") / f"{name_or_path}.yaml").read_text(encoding="utf-8")
     return parse_model(text, str(name_or_path))

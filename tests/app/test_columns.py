@@ -11,6 +11,7 @@ from bns.app.log.columns import ColumnsPart
 from bns.app.log.preview import preview
 from bns.app.log.roles import BODY, COUNTED, FROM_NORTH, FROM_X, ROLES, TURNS, WHEELS, Menus
 from bns.diagnose.data.guess.mapping import guessed
+from bns.diagnose.data.guess.numbers import metres_a_unit
 from bns.diagnose.data.mapping import FORWARD, TURN
 from bns.diagnose.data.sources.read import read_table
 from bns.examples import FOLDER
@@ -80,16 +81,43 @@ def test_another_column_comes_in_the_unit_that_its_name_tells(menus):
     assert roles.with_unit(mapping, "x_m", "m")["columns"]["x_m"] == {"from": "place_cm"}
 
 
-@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # Panel 1.5 has only the names that 1.9 warns of
 def test_a_number_that_is_missing_is_asked_for_by_the_name_of_its_field(menus):
     mapping = menus.guess.mapping
     for role in ("left_m_s", "right_m_s"):
         mapping = roles.with_unit(mapping, role, TURNS)
     part = ColumnsPart(lambda _mapping: None)
     part.show(menus, mapping, "log.csv", FOLDER)
-    assert "Fill in: Radius of the wheels (m)." in str(part._problem.view.object)
+    said = "Fill in the field Radius of the wheels (m) (scale in the entries left_m_s and right_m_s of the mapping): the radius "
+    assert f"{said}of the wheels in metres; their speeds are in rad/s." in str(part._problem.view.object)
     part.show(menus, roles.with_wheel_scale(mapping, 0.042), "log.csv", FOLDER)
     assert "Fill in" not in str(part._problem.view.object)
+
+
+def test_placeholders_are_named_by_their_fields_and_say_what_to_measure(table):
+    speeds = {"left_mm_s": "linear_velocity", "right_mm_s": "angular_velocity"}
+    menus = Menus({"": table.rename(columns=speeds)})
+    mapping = {**menus.guess.mapping, "columns": dict(menus.guess.mapping["columns"])}
+    mapping["columns"] |= {FORWARD: {"from": "linear_velocity"}, TURN: {"from": "angular_velocity"}}
+    part = ColumnsPart(lambda _mapping: None)
+    part.show(menus, None, "log.csv", FOLDER)
+    assert "METRES" not in str(part._remarks.object)  # a word of the mapping file, which the page hides
+    part.show(menus, {**mapping, "wheelbase_m": "METRES"}, "log.csv", FOLDER)
+    said = str(part._problem.view.object)
+    assert "Fill in the field Wheelbase of the controller (m) (wheelbase_m of the mapping): the distance in metres" in said
+    part.show(menus, {**mapping, "wheelbase_m": 0.1}, "log.csv", FOLDER)
+    assert "Fill in" not in str(part._problem.view.object)
+
+
+def test_a_device_unit_asks_for_its_speed_and_says_how_far_the_robot_went(table):
+    menus = Menus({"": table.assign(left_mm_s=table.left_mm_s * 37.0, right_mm_s=table.right_mm_s * 37.0)})
+    menus = Menus({"": menus.tables[""].rename(columns={"left_mm_s": "left", "right_mm_s": "right"})})
+    part = ColumnsPart(lambda _mapping: None)
+    part.show(menus, None, "log.csv", FOLDER)
+    said = str(part._problem.view.object)
+    went = metres_a_unit(menus.tables[""], menus.guess.mapping["columns"])
+    assert went < 1e-4
+    assert "Fill in the field Speed of one unit of the commands (m/s) (scale in the entries left_m_s and right_m_s of" in said
+    assert f"the robot went about {went:.2g} m per unit and second" in said
 
 
 def test_wheels_that_were_measured_are_not_called_commanded(table):

@@ -23,8 +23,6 @@ from bns.app.screens.where import WhereScreen
 from bns.app.tab import Tab
 from bns.app.workbench import Workbench
 
-pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
-
 DRAWN = 70_000
 """More points of all paths together make a browser slow."""
 

@@ -28,9 +28,6 @@ from bns.app.screens.where import WhereScreen
 from bns.app.session import opened, session_yaml
 from bns.app.tab import Tab
 
-pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
-
-
 LOG = FOLDER / "khepera-log.csv"
 
 

@@ -38,7 +38,6 @@ def test_the_page_is_served_on_loopback_under_a_token(page):
     assert answer(page.address) == 200
 
 
-@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # Panel 1.9 on a name that 1.5 has alone
 def test_a_phone_is_told_to_use_its_own_width(page):
     with urllib.request.urlopen(page.address, timeout=30) as got:
         head = got.read().decode().partition("<body")[0]

@@ -9,6 +9,7 @@ import pytest
 import bns
 from bns.api.compare import compare
 from bns.app.background import Background
+from bns.app.explore import tabs_of
 from bns.app.log.part import Part
 from bns.app.same_elsewhere import commands, python
 from bns.app.session import opened, session_yaml
@@ -20,6 +21,7 @@ from bns.diagnose.data.mapping import load_mapping
 from bns.diagnose.predict.paired_errors import paired_errors
 from bns.errors import DataError
 from bns.examples import FOLDER
+from bns.measurements import write_measurements
 from tests.app.numbers import rows_of
 
 LOG = FOLDER / "khepera-log.csv"
@@ -193,13 +195,25 @@ def test_a_diagnosis_in_the_background_can_be_stopped_and_begun_again():
 
 def test_what_to_type_gives_the_same(tmp_path, monkeypatch, capsys, bench):
     monkeypatch.chdir(tmp_path)
-    typed = commands(str(LOG), ("khepera",), BOTH.with_term(Term("mine", "k * v", "v")))
+    typed = commands([str(LOG)], ("khepera",), BOTH.with_term(Term("mine", "k * v", "v")))
     assert typed[2] == f"bns add {LOG} motor-lag turn-slip --model khepera -o extended.yaml"
     assert typed[3] == f"bns add {LOG} mine --term 'k * v' --on v --model extended.yaml -o extended.yaml"
-    exec(python(str(LOG), ("khepera",), BOTH.moved("motor-lag", "tau_s", 0.1)), {})
+    exec(python([str(LOG)], ("khepera",), BOTH.moved("motor-lag", "tau_s", 0.1)), {})
     capsys.readouterr()
     saved = bns.Model("extended.yaml")
     assert rows_of(saved) == rows_of(bench.shown(BOTH.moved("motor-lag", "tau_s", 0.1)).model)
+
+
+def test_several_files_are_written_one_by_one(tmp_path):
+    other = tmp_path / "the other.csv"
+    table = bns.Measurements(LOG).frame
+    write_measurements(table.assign(x_m=table.x_m + 0.1), other)
+    tabs = tabs_of([str(LOG), str(other)], bns.Model("khepera"), [str(LOG), str(other)])
+    typed = commands(tabs.first.data_words, ("khepera",), BOTH.with_term(Term("mine", "k * v", "v")))
+    assert typed[0] == f"bns compare {LOG} --model khepera --more '{other}'"
+    assert typed[3].endswith(f"--model extended.yaml --more '{other}' -o extended.yaml")
+    lines = python(tabs.first.data_words, ("khepera",), Switches())
+    assert f"log = bns.Measurements({str(LOG)!r}, {str(other)!r})" in lines
 
 
 def test_what_was_left_out_is_saved_and_read_again(tmp_path):
@@ -222,7 +236,7 @@ def test_what_was_left_out_is_saved_and_read_again(tmp_path):
 
 def test_python_reads_columns_as_the_menus_had_them(tmp_path):
     mapping = {**load_mapping(LOG.with_name(LOG.name + ".import.yaml")), "hold_commands_s": float("inf")}
-    text = python(str(LOG), ("khepera",), Switches(), mapping=mapping)
+    text = python([str(LOG)], ("khepera",), Switches(), mapping=mapping)
     names = {}
     exec(text.split("model =")[0], names)
     assert names["log"].sha256 == bns.Measurements(LOG, mapping=mapping).sha256

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bns.api.measurements import Measurements
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
 from bns.errors import DataError
@@ -71,6 +72,34 @@ def test_a_command_for_one_wheel_only_is_listed(table, column, told):
     assert any("a command for one wheel only" in f.text and f"({column} is empty)" in f.text for f in checked(half)[1])
     both = table.assign(left_m_s=half[column], right_m_s=half[column])
     assert not any("one wheel only" in f.text for f in checked(both)[1])
+
+
+def without_commands_in(table, *names):
+    empty = table.trial.isin(names)
+    return table.assign(**{name: table[name].mask(empty) for name in ("left_m_s", "right_m_s")})
+
+
+def test_trials_without_a_command_say_what_is_done_with_them_and_how_to_leave_them_out(table):
+    odd = without_commands_in(table, 1)
+    (found,) = checked(odd)[1]
+    assert (found.trial, found.row) == ("1", int(table.index[table.trial == 1][0]))
+    assert "this trial holds no command from beginning to end, and the robot counts as told to stand" in found.text
+    assert "it moves, which counts as an error of every model and in every fit" in found.text
+    assert found.text.endswith("leave it out: --without 1 (in Python: log.without(['1']))")
+    assert tracks_of(checked(odd)[0]).left_m_s[1].tolist() == [0.0] * tracks_of(odd).left_m_s.shape[1]  # as the words say
+    (found,) = checked(without_commands_in(measured(NOMINAL, trials=9), *range(7)))[1]
+    assert "7 trials hold no command" in found.text
+    assert "In 7 of them it moves" in found.text
+    assert found.text.endswith("'4'])), and so on for 2 more")
+    left = Measurements(without_commands_in(table, 1)).without(["1"])
+    assert left.findings.empty
+
+
+def test_a_robot_that_stands_without_a_command_tells_the_noise(table):
+    odd = without_commands_in(table, 1)
+    odd.loc[odd.trial == 1, ["x_m", "y_m", "heading_rad"]] = [0.1, 0.2, 0.3]
+    (found,) = checked(odd)[1]
+    assert "It does stand: the poses are used for the noise of the tracker" in found.text
 
 
 def test_missing_columns_are_named(table):

@@ -137,6 +137,9 @@ def test_an_effect_of_ones_own_is_a_file(data, tmp_path, capsys):
     answer = json.loads(capsys.readouterr().out)
     assert {"my-drag", "turn-slip"} <= {entry["name"] for entry in answer["ranking"]}
     assert answer["ties"] == [["my-drag", "turn-slip"]]
+    alone = ["diagnose", str(data), "--model", "khepera", "--also", str(mine), "--without-effect", "turn-slip"]
+    assert main([*alone, "-o", str(tmp_path / "found.yaml")]) == 0
+    assert load_model(tmp_path / "found.yaml").values_of("my-drag")["k"] == pytest.approx(0.12, abs=0.03)
 
 
 @pytest.mark.parametrize(

@@ -148,7 +148,7 @@ def test_two_files_of_a_lab_are_joined_by_time(tmp_path, table, log, capsys):
 def test_a_file_that_the_mapping_does_not_know_is_refused(tmp_path, log):
     first, second = lab_files(tmp_path, log)
     (tmp_path / "Odometry.dat.import.yaml").write_text(guessed(read_table(first)).text)
-    with pytest.raises(DataError, match=r"uses nothing from .*groundtruth.txt; add it under also"):
+    with pytest.raises(DataError, match=r"Odometry.dat.import.yaml, line \d: nothing is taken from .*groundtruth.txt; add"):
         import_log([first, second])
 
 
@@ -198,7 +198,8 @@ def test_a_log_of_scan_matches_is_seen_for_what_it_is(tmp_path):
         pytest.skip(f"no {path}")
     guess = guessed(read_table(path))
     assert guess.mapping["relative"]
-    assert guess.remarks == ("Fill in RADIUS_M, the radius of the wheels: their speeds are in rad/s.",)
+    where = "scale in the entries left_m_s and right_m_s"
+    assert guess.remarks == (f"Fill in RADIUS_M ({where}): the radius of the wheels in metres; their speeds are in rad/s.",)
     assert import_log([path], filled(guess)).trials > 100
 
 

@@ -85,6 +85,35 @@ def test_mappings_that_are_wrong_say_where(log, old, new, message):
         applied(pd.read_csv(folder / "log.csv"), load_mapping(path))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        ("clockwise", "clokwise", 8, r"heading_rad: unknown key 'clokwise'\. Did you mean 'clockwise'\? Valid: clockwise, "),
+        ("unit: cm", "unit: rad", 6, "x_m cannot be in rad; it may be in m, cm, mm, in"),
+        ("from: X,", "from: x,", 6, "x_m asks for an unknown column 'x'"),
+        ("unit: ms", "unit: date", 3, "t_s is taken from time, which holds numbers, no dates; give their unit: s, ms"),
+        ("columns:", "holds: 1\ncolumns:", 1, "unknown key 'holds'.* Valid: also, columns"),
+        ("columns:", "trials: {gap_s: 0}\ncolumns:", 1, "trials is {'gap_s': 0}; write one of"),
+        ("columns:", "also:\n- {file: no.csv, columns: {t_s: {from: t, unit: h}}}\ncolumns:", 2, "t_s: unknown unit 'h'"),
+        ("left_m_s: ", "forward_m_s: ", 1, "there is forward_m_s but not turn_rad_s; the wheel speeds need both"),
+        ("x_m: {", "x_m: [", 6, "no valid YAML"),
+    ],
+)
+def test_every_message_about_a_mapping_begins_with_its_file_and_line(log, old, new, line, said):
+    folder, _ = log
+    path = folder / "log.csv.import.yaml"
+    path.write_text(MAPPING.lstrip("\n").replace(old, new))
+    with pytest.raises(DataError, match=rf"^the mapping {path}, line {line}: {said}"):
+        load_measured(folder / "log.csv")
+
+
+def test_a_mapping_in_memory_has_no_line():
+    with pytest.raises(DataError, match=r"^the mapping: x_m cannot be in rad"):
+        Measurements(pd.DataFrame({"X": [1.0]}), mapping={"columns": {"x_m": {"from": "X", "unit": "rad"}}})
+    with pytest.raises(DataError, match=r"^the mapping: it is \{'cols': \{\}\}; it must have the key columns"):
+        Measurements(pd.DataFrame({"X": [1.0]}), mapping={"cols": {}})
+
+
 def test_no_mapping_lists_the_columns(log, capsys):
     folder, _ = log
     assert main(["import", str(folder / "log.csv"), "-o", str(folder / "m.csv")]) == 2

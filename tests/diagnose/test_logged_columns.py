@@ -1,5 +1,8 @@
 """Any column of a log is a signal for formulas and Python effects; a name that nobody knows is an error."""
 
+import re
+import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +12,12 @@ import pytest
 import bns
 from bns.cli.main import main
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.text import diagnosis_text
+from bns.diagnose.residuals.symbolic import Formula
 from bns.errors import ModelError
+from bns.measurements import write_measurements
 from bns.physics.effects import effect_in_file
 from bns.physics.formula import FUNCTIONS, ON, PAST, VARIABLES, formula_effect
 from bns.physics.model import parse_model
@@ -98,6 +105,24 @@ def test_columns_of_rows_without_poses_are_read_between_them(table):
     np.testing.assert_allclose(tracks.extra["hot"][inner], tracks.t_s[inner], atol=1e-9)
     grid = WheelPredictor(tracks).conditions.logged["hot"]
     assert np.isfinite(grid).all()
+
+
+@pytest.mark.slow
+def test_what_an_unlisted_verdict_says_of_a_column_holds_its_name_and_its_command_works(table, tmp_path):
+    data = tmp_path / "my log.csv"
+    write_measurements(table, data)
+    found = bns.diagnose(data, "khepera")
+    assert found.verdict == "unlisted"
+    assert re.search(r"Left unexplained by listed effects: forward_m_s along load, [0-9.]+% of the loss", found.summary())
+    problem, term = problem_for(found.ready.predictor, found.ready.model), "k * load * v"
+    before = problem.fit(found.ready.model)
+    after = problem.fit(before.model.with_active(formula_effect("loss", term, "v", ("load",)), (0.0,)))
+    hint = Formula("v", term, after, problem.paired_comparison(before, after), "loss", "")
+    lines = diagnosis_text(replace(found.diagnosis, formula=hint), command=found.command).split("\n")
+    (typed,) = (line.partition("to try it: ")[2] for line in lines if "to try it" in line)
+    assert typed == f"bns add '{data}' loss --term 'k * load * v' --on v --model khepera -o NEW.yaml"
+    assert main([*shlex.split(typed)[1:-1], str(tmp_path / "NEW.yaml")]) == 0
+    assert bns.Model(tmp_path / "NEW.yaml").values_of("loss")["k"] == pytest.approx(-LOSS, abs=0.03)
 
 
 def test_the_names_are_documented():

@@ -1,16 +1,77 @@
-"""Words of a command line that the commands which follow it repeat."""
+"""Words of a command line that the commands which follow it repeat: what was given, so that they ask the same."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from bns.physics.effects import effect_in_file
+from bns.physics.model import BASES, Model, load_model, model_names
+
+_Path = str | PathLike[str]
 
 
 def repeated(
-    data: str, model: str, wheelbase_m: float | None = None, more: Iterable[str | PathLike[str]] = ()
+    data: _Path,
+    model: _Path,
+    wheelbase_m: float | None = None,
+    more: Iterable[_Path] = (),
+    *,
+    robot: str | None = None,
+    without: Iterable[str] = (),
+    also: Iterable[_Path] = (),
+    without_effects: Iterable[str] = (),
+    settings: _Path | None = None,
+    trust: bool = False,
+    minutes: float | None = None,
+    arena: str | None = None,
+    start: str | None = None,
+    speeds: str | None = None,
 ) -> dict[str, str]:
-    """Data (with ``more`` of them) and model, quoted for a shell."""
-    base = [] if wheelbase_m is None else ["--wheelbase", f"{wheelbase_m:g}"]
-    joined = [word for path in more for word in ("--more", fspath(path))]
-    return {"data": shlex.quote(data), "model": shlex.join(["--model", model, *base, *joined])}
+    """What further commands repeat, quoted for a shell, by what it is for:
+
+    ``data``; ``model``: the model with all that every command takes; ``shared``: the same without the model;
+    ``search``: as ``model``, with what only diagnose, propose and report take; ``area``, ``limits``: what propose takes in
+    addition, ``limits`` with the time and the start; ``effect NAME``: the file of an effect of the user's own.
+    """
+    own, further = [fspath(file) for file in also], [fspath(file) for file in more]
+    shared = [*_options("--more", further), *_options("--robot", [robot]), *_options("--without", [*without])]
+    shared += [*_options("--also", own), *(["--trust"] if trust else [])]
+    thresholds = [None if settings is None else fspath(settings)]
+    tried = [*_options("--without-effect", [*without_effects]), *_options("--settings", thresholds)]
+    base = ["--model", fspath(model), *([] if wheelbase_m is None else ["--wheelbase", f"{wheelbase_m:g}"]), *shared]
+    area = _options("--arena", [arena]) + _options("--speeds", [speeds])
+    time = _options("--minutes", [None if minutes is None else f"{minutes:g}"])
+    words = {
+        "model": base,
+        "shared": shared,
+        "search": [*base, *tried],
+        "area": area,
+        "limits": [*time, *area, *_options("--start", [start])],
+    }
+    files = {f"effect {name}": shlex.quote(file) for name, file in own_files(own).items()}
+    return {"data": shlex.quote(fspath(data)), **{key: shlex.join(given) for key, given in words.items()}, **files}
+
+
+def model_words(model: Model) -> dict[str, Any]:
+    """The arguments ``model`` and, where the name alone would give another one, ``wheelbase_m``."""
+    if model.name in model_names():
+        other = model.wheelbase_m != load_model(model.name).wheelbase_m
+        return {"model": model.name, "wheelbase_m": model.wheelbase_m if other else None}
+    if model.name in {*BASES, Model.name}:
+        return {"model": model.base, "wheelbase_m": model.wheelbase_m}
+    return {"model": model.name, "wheelbase_m": None}
+
+
+def own_files(also: Iterable[_Path]) -> dict[str, str]:
+    """The files of a user's own effects by the names of these."""
+    return {effect_in_file(Path(file)).name: fspath(file) for file in also}
+
+
+def _options(name: str, values: Sequence[str | None]) -> list[str]:
+    """An option once for each value; one that begins with a hyphen is joined to it, so that it is not taken for an option."""
+    given = [value for value in values if value is not None]
+    return [word for value in given for word in ([f"{name}={value}"] if value.startswith("-") else [name, value])]

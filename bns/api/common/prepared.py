@@ -18,12 +18,17 @@ from bns.diagnose.predict.check_robot import check_named_robot, check_same_robot
 from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.predict.saved_networks import network_predictor, networks_file
 from bns.diagnose.predict.wheels import predictor_for_search
-from bns.errors import DataError, ModelError
+from bns.errors import DataError, ModelError, in_both
 from bns.physics import model as physics
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.jointed.model_files import SNAKE
 from bns.physics.model import model_names
+
+_SNAKE = in_both("--model snake", 'the model "snake"')
+_DRIVE = in_both(
+    "--model khepera, or --model differential-drive --wheelbase METRES", 'the model "khepera", or bns.Model(wheelbase_m=METRES)'
+)
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ def prepared(log: Log, model: Given) -> Prepared:
     if isinstance(measured.tracks, CycleTracks):
         raise DataError(
             f"{measured.path} holds cycles and markers, and the model {robot.name} drives wheels; give the model of the robot "
-            "that was driven in cycles: --model snake."
+            f"that was driven in cycles: {_SNAKE}."
         )
     predictor = predictor_for_search(measured.tracks)
     if len(predictor.tracks.t_s) < len(measured.tracks.t_s):
@@ -93,12 +98,12 @@ def _prepared_body(read: Measurements, model: Model) -> Prepared:
     if not isinstance(tracks, CycleTracks | JointTracks):
         raise DataError(
             f"{measured.path} holds wheel speeds and poses, and the model {model.name} is a body on joints; give the model of a "
-            "drive: --model khepera, or --model differential-drive --wheelbase METRES."
+            f"drive: {_DRIVE}."
         )
     body = machine(model.mechanism)
     if isinstance(tracks, CycleTracks):
         if model.name != SNAKE and model.written.get("body") != SNAKE:
-            raise DataError(f"{measured.path} holds cycles of the snake, and {model.name} is another body; give --model snake.")
+            raise DataError(f"{measured.path} holds cycles of the snake, and {model.name} is another body; give {_SNAKE}.")
         if not tracks.stable.any():
             raise DataError(f"{measured.path}: no cycle is stable, and only stable ones are compared with a simulated body.")
         stretches = stretches_of_cycles(tracks, model.mechanism, len(body.joints))

@@ -14,8 +14,10 @@ from bns.app.figures.paths import LogFigure
 from bns.app.log import roles
 from bns.app.log.preview import preview
 from bns.app.log.roles import BY_COLUMN, COMMANDED, CUTS, ROLES, RUNNING, WHOLE, Mapped, Menus
+from bns.app.names import call, called, text_on
 from bns.app.parts import WIDE, Problem, beside, button, download, drawn, heading, html, on_change, row
 from bns.app.tab import mapping_of
+from bns.diagnose.data.guess.mapping import METRES, blanks_of
 from bns.errors import DataError
 
 NONE = "(none)"
@@ -31,20 +33,20 @@ class ColumnsPart:
         self._quiet, self._name, self._folder = False, "log", Path()
         self._problem, self._said, self._remarks, self._save = Problem(), html(), html(), html()
         self._picture = LogFigure("The first paths, as this mapping reads them", height=300)
-        self._commanded = pn.widgets.Select(name="Commanded are", options=list(COMMANDED), width=230)
-        self._columns = {role: pn.widgets.Select(name=said, options={}, width=230) for role, said in ROLES.items()}
+        self._commanded = pn.widgets.Select(**called("Commanded are"), options=list(COMMANDED), width=230)
+        self._columns = {role: pn.widgets.Select(**called(said), options={}, width=230) for role, said in ROLES.items()}
         self._units = {
-            role: pn.widgets.Select(name=f"{said}: unit", options=[], width=200)
+            role: pn.widgets.Select(**called(f"{said}: unit"), options=[], width=200)
             for role, said in ROLES.items()
             if role != "trial"
         }
-        self._running = pn.widgets.Select(name="The heading runs", options=list(RUNNING), width=230)
-        self._scale = pn.widgets.FloatInput(name="Radius of the wheels (m)", value=None, width=180)
-        self._wheelbase = pn.widgets.FloatInput(name="Wheelbase of the controller (m)", value=None, width=210)
-        self._trials = pn.widgets.Select(name="Trials", options=[BY_COLUMN, *CUTS.values(), WHOLE], width=230)
-        self._seconds = pn.widgets.FloatInput(name="Seconds", value=_SECONDS, start=0.001, step=1, width=110)
-        self._text = pn.widgets.TextAreaInput(name="The mapping (FILE.import.yaml)", height=230, **WIDE)
-        self._advanced = pn.widgets.Toggle(name="Advanced: the mapping as YAML", value=False)
+        self._running = pn.widgets.Select(**called("The heading runs"), options=list(RUNNING), width=230)
+        self._scale = pn.widgets.FloatInput(**called("Radius of the wheels (m)"), value=None, width=180)
+        self._wheelbase = pn.widgets.FloatInput(**called("Wheelbase of the controller (m)"), value=None, width=210)
+        self._trials = pn.widgets.Select(**called("Trials"), options=[BY_COLUMN, *CUTS.values(), WHOLE], width=230)
+        self._seconds = pn.widgets.FloatInput(**called("Seconds"), value=_SECONDS, start=0.001, step=1, width=110)
+        self._text = pn.widgets.TextAreaInput(**called("The mapping (FILE.import.yaml)"), height=230, **WIDE)
+        self._advanced = pn.widgets.Toggle(**called("Advanced: the mapping as YAML"), value=False)
         self._take = button("Read it with this", lambda: taken(self._mapping), "primary")
         self._watch()
         self.view = self._laid_out()
@@ -53,7 +55,7 @@ class ColumnsPart:
     def show(self, menus: Menus, mapping: Mapping[str, Any] | None, name: str, folder: Path) -> None:
         """Open for files that were read; ``mapping``: how they are read now, None: as guessed."""
         self._menus, self._name, self._folder = menus, name, folder
-        remarks = menus.guess.remarks if mapping is None else ()
+        remarks = menus.guess.said if mapping is None else ()  # blanks are asked for beside their fields
         self._remarks.object = "".join(f"<p>{escape(remark)}</p>" for remark in remarks)
         self._take_over(dict(menus.guess.mapping if mapping is None else mapping))
         self.view.visible = True
@@ -82,14 +84,16 @@ class ColumnsPart:
             if picked is not None and picked.place not in options.values():
                 options[f"{picked.place[1]} (no such column)"] = picked.place
             menu.options, menu.value = options, picked.place if picked else None
-            menu.visible, menu.name = role not in hidden, roles.label(mapping, role)
+            menu.visible = role not in hidden
+            call(menu, roles.label(mapping, role))
             if role in self._units:
                 self._fill_unit(role, picked, menu.visible)
         self._fill_numbers(told)
 
     def _fill_unit(self, role: str, picked: roles.Picked | None, visible: bool) -> None:
         menu = self._units[role]
-        menu.visible, menu.name = visible and picked is not None, f"{roles.label(self._mapping, role)}: unit"
+        menu.visible = visible and picked is not None
+        call(menu, f"{roles.label(self._mapping, role)}: unit")
         if picked is not None:
             options = roles.units(role, picked.place[1])
             menu.options = options if picked.unit in options else [*options, picked.unit]
@@ -100,7 +104,7 @@ class ColumnsPart:
         units = {menu.value for role, menu in self._units.items() if menu.visible}
         counted = roles.COUNTED in units
         self._scale.visible = counted or roles.TURNS in units
-        self._scale.name = "Distance per encoder count (m)" if counted else "Radius of the wheels (m)"
+        call(self._scale, "Distance per encoder count (m)" if counted else roles.name_of_scale(mapping))
         self._scale.value = roles.wheel_scale(mapping)
         self._wheelbase.visible = told == roles.BODY
         base = mapping.get("wheelbase_m")
@@ -127,9 +131,12 @@ class ColumnsPart:
         self._save.object = download(f"Save {name}", name, text, "text/yaml") if found else ""
 
     def _to_fill_in(self) -> str:
-        """Which numbers the units and commands need that are not there yet."""
-        empty = [field.name for field in (self._scale, self._wheelbase) if field.visible and not field.value]
-        return f"Fill in: {'; '.join(empty)}." if empty else ""
+        """Which numbers the units and commands need that are not there yet: in which field, in which line, what to measure."""
+        blanks = {b.where.split()[0]: b for b in blanks_of(self._mapping, self._menus.tables if self._menus else {})}
+        fields = {"scale": self._scale, "wheelbase_m": self._wheelbase}
+        empty = [(text_on(field), blanks.get(key)) for key, field in fields.items() if field.visible and not field.value]
+        said = [name if b is None else f"{name} ({b.where} of the mapping): {b.what}" for name, b in empty]
+        return f"Fill in the field {'; and the field '.join(said)}." if said else ""
 
     def _pick(self, role: str) -> None:
         assert self._menus is not None
@@ -158,7 +165,7 @@ class ColumnsPart:
         if roles.commanded(mapping) != roles.BODY:
             first = next(iter(self._menus.columns(roles.FORWARD).values()))
             mapping["columns"][roles.FORWARD] = {"from": first[1]}
-        mapping.setdefault("wheelbase_m", "METRES")
+        mapping.setdefault("wheelbase_m", METRES)
 
     def _cut(self) -> None:
         assert self._menus is not None

@@ -10,6 +10,7 @@ import panel as pn
 
 from bns.app.figures.time_axis import Stretch, TimeAxisFigure
 from bns.app.log.part import Part
+from bns.app.names import called
 from bns.app.parts import WIDE, button, drawn, heading, offer, on_change, row
 from bns.app.tab import Tab
 
@@ -20,9 +21,9 @@ class CutPart:
     def __init__(self, tab: Tab, changed: Callable[[Part], None]) -> None:
         self._tab, self._changed = tab, changed
         self._picture = TimeAxisFigure(self._brushed)
-        self._trial = pn.widgets.Select(name="Trial to cut", options=[], width=160)
-        self._from = pn.widgets.FloatInput(name="keep from (s)", value=0.0, step=0.1, width=110)
-        self._to = pn.widgets.FloatInput(name="to (s)", value=0.0, step=0.1, width=110)
+        self._trial = pn.widgets.Select(**called("Trial to cut"), options=[], width=160)
+        self._from = pn.widgets.FloatInput(**called("keep from (s)"), value=0.0, step=0.1, width=110)
+        self._to = pn.widgets.FloatInput(**called("to (s)"), value=0.0, step=0.1, width=110)
         self._keep = button("Keep only this stretch", self._cut)
         self._whole = button("Keep the whole trial", lambda: self._to_part(None))
         self._place = pn.Column(**WIDE)

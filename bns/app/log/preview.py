@@ -49,7 +49,7 @@ def preview(tables: Mapping[str, pd.DataFrame], mapping: Mapped, folder: Path = 
         return tables[path.name] if path.name in tables else read_table(path)
 
     try:
-        rules = checked_mapping(mapping, Path("the mapping"))
+        rules = checked_mapping(mapping)
         table = applied(whole.iloc[:MOST_ROWS], rules, folder, read)
     except DataError as fault:
         if "trials" in mapping:  # what cannot be cut can be drawn in one

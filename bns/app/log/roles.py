@@ -12,6 +12,7 @@ import yaml
 
 from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, unit_of_column
 from bns.diagnose.data.guess.mapping import guessed
+from bns.diagnose.data.guess.numbers import SCALE
 from bns.diagnose.data.guess.words import rank, words_of
 from bns.diagnose.data.mapping import FORWARD, SPLITS, TURN, UNITS
 from bns.measurements import COMMANDS
@@ -167,6 +168,12 @@ def wheel_scale(mapping: Mapping[str, Any]) -> float | None:
             if isinstance(value, int | float):
                 return float(value)
     return None
+
+
+def name_of_scale(mapping: Mapping[str, Any]) -> str:
+    """What the field for that number is called where it is no distance of a count."""
+    unknown = any(entries.get(role, {}).get("scale") == SCALE for role in COMMANDS for _, entries in _files(mapping))
+    return "Speed of one unit of the commands (m/s)" if unknown else "Radius of the wheels (m)"
 
 
 def with_wheel_scale(mapping: Mapped, value: float) -> Mapped:

@@ -9,6 +9,7 @@ import panel as pn
 
 from bns.app.design import template
 from bns.app.figures.runs import CurveFigure, ParallelFigure, RunsFigure
+from bns.app.names import called
 from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, on_change, row, together
 from bns.app.results.hovered import HoveredRun
 from bns.app.results.one_run import OneRun
@@ -36,11 +37,11 @@ class ResultsScreen:
     def __init__(self, study: Study) -> None:
         self._study, self._problem, self._count = study, Problem(), html()
         self._filters = {name: _menu(name) for name in ("sweep", "robot", "task", *PARAMETERS)}
-        self._x = pn.widgets.Select(name="Across", options=_options(OUTCOMES), value="diversity", width=220)
-        self._y = pn.widgets.Select(name="Up", options=_options(OUTCOMES), value="fitness_error", width=220)
-        self._curve = pn.widgets.Select(name="Curve", options=_options(CURVES), width=220)
-        self._names = [pn.widgets.Select(name=f"Run {letter}", options=[], width=300) for letter in "AB"]
-        self._live = pn.widgets.Checkbox(name="Look for new runs every 10 s", value=False)
+        self._x = pn.widgets.Select(**called("Across"), options=_options(OUTCOMES), value="diversity", width=220)
+        self._y = pn.widgets.Select(**called("Up"), options=_options(OUTCOMES), value="fitness_error", width=220)
+        self._curve = pn.widgets.Select(**called("Curve"), options=_options(CURVES), width=220)
+        self._names = [pn.widgets.Select(**called(f"Run {letter}"), options=[], width=300) for letter in "AB"]
+        self._live = pn.widgets.Checkbox(**called("Look for new runs every 10 s"), value=False)
         self._clock: Any = None
         self._next = 0
         self._dots, self._parallel, self._curves = RunsFigure(self._pick, self._hover), ParallelFigure(), CurveFigure()
@@ -153,7 +154,7 @@ class ResultsScreen:
 
 
 def _menu(name: str) -> Any:
-    return pn.widgets.MultiSelect(name=f"Only {name.replace('_', ' ')} (none: all)", options=[], size=4, **WIDE)
+    return pn.widgets.MultiSelect(**called(f"Only {name.replace('_', ' ')} (none: all)"), options=[], size=4, **WIDE)
 
 
 def _options(words: dict[str, str]) -> dict[str, str]:

@@ -17,6 +17,7 @@ from bns.app.log.cutting import CutPart
 from bns.app.log.findings import MOST, FindingsPart, in_words
 from bns.app.log.part import Part
 from bns.app.log.roles import Mapped, Menus
+from bns.app.names import called
 from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, on_change, row
 from bns.app.session import is_session, opened
 from bns.app.tab import Tab
@@ -37,16 +38,16 @@ class DataScreen:
     def __init__(self, tab: Tab, jobs: Jobs) -> None:
         self._tab, self._jobs = tab, jobs
         self._problem, self._bench_problem, self._part_problem = Problem(), Problem(), Problem()
-        self._sample = pn.widgets.Select(name="A sample log", options=list(SAMPLES), **WIDE)
-        self._path = pn.widgets.TextInput(name="Or a file of this machine", placeholder="/path/to/log.csv", **WIDE)
+        self._sample = pn.widgets.Select(**called("A sample log"), options=list(SAMPLES), **WIDE)
+        self._path = pn.widgets.TextInput(**called("Or a file of this machine"), placeholder="/path/to/log.csv", **WIDE)
         self._file = pn.widgets.FileInput(
-            name="Or choose files", accept=",".join((*ENDINGS, ".yaml", ".yml")), multiple=True
+            **called("Or choose files"), accept=",".join((*ENDINGS, ".yaml", ".yml")), multiple=True
         )
         self._columns = ColumnsPart(self._read_mapped)
         self._other = button("Columns and units", self._ask_columns, visible=False)
         self._said, self._picture = html(), LogFigure()
         self._findings, self._cut = FindingsPart(tab, self._to_part), CutPart(tab, self._to_part)
-        self._left_out = pn.widgets.MultiSelect(name="Trials excluded", options=[], size=8, width=200)
+        self._left_out = pn.widgets.MultiSelect(**called("Trials excluded"), options=[], size=8, width=200)
         self._leave = button("Exclude these", self._leave_out)
         self._brushed = button("Exclude the selection in the picture", self._leave_selected)
         on_change(self._file, self._read_uploaded)

@@ -11,6 +11,7 @@ import panel as pn
 
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.app.jobs import Jobs
+from bns.app.names import call
 from bns.app.parts import WIDE, button, heading, row
 from bns.app.screens.verdict import verdict_html
 from bns.app.screens.working import Working
@@ -112,7 +113,7 @@ class DiagnosisPart:
         self._offers = offers
         for n, each in enumerate(self._buttons):
             each.visible = n < len(offers)
-            each.name = offers[n][0] if n < len(offers) else ""
+            call(each, offers[n][0] if n < len(offers) else "")
 
     def _take(self, number: int) -> None:
         if number < len(self._offers):

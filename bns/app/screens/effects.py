@@ -10,6 +10,7 @@ from bns.app.figures.errors import LadderFigure
 from bns.app.figures.paths import PathFigure
 from bns.app.html import error_list, message, note
 from bns.app.jobs import Jobs
+from bns.app.names import called
 from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, offer, on_change, row
 from bns.app.screens.diagnosis import DiagnosisPart
 from bns.app.screens.one_effect import OneEffect
@@ -47,14 +48,14 @@ class EffectsScreen:
         self._ladder = LadderFigure()
         self._before = PathFigure("as given")
         self._after = PathFigure("now", self._before)
-        self._horizon = pn.widgets.Select(name="Error how far ahead", options={ahead("1s"): "1s"}, width=160)
-        self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
-        self._time = Slider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
+        self._horizon = pn.widgets.Select(**called("Error how far ahead"), options={ahead("1s"): "1s"}, width=160)
+        self._trial = pn.widgets.Select(**called("Trial"), options=[], width=160)
+        self._time = Slider(**called("Time in the trial (s)"), start=0, end=1, step=0.02, **WIDE)
         self._diagnosis = DiagnosisPart(tab, jobs, self._learned, self._switch_to)
         self._snapshots = SnapshotsPart(tab, jobs, self._go_to, lambda: str(self._horizon.value))
-        self._name = pn.widgets.TextInput(name="Name", value="mine", width=110)
-        self._term = pn.widgets.TextInput(name="Formula", placeholder="k * v * abs(w)", width=220)
-        self._on = pn.widgets.Select(name="Added to", options=list(ON), width=90)
+        self._name = pn.widgets.TextInput(**called("Name"), value="mine", width=110)
+        self._term = pn.widgets.TextInput(**called("Formula"), placeholder="k * v * abs(w)", width=220)
+        self._on = pn.widgets.Select(**called("Added to"), options=list(ON), width=90)
         self._add_term = button("Add the formula", self._take_term)
         self._undo, self._redo = button("Undo", self._go_back), button("Redo", self._go_forward)
         self._fit = button("Fit all numbers", self._fit_all)

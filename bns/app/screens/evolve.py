@@ -7,6 +7,7 @@ import panel as pn
 from bns.api.run import RunResult, run
 from bns.app.figures.floor import GoalFigure
 from bns.app.html import table
+from bns.app.names import called
 from bns.app.parts import WIDE, Problem, drawn, heading, html, row
 from bns.app.screens.working import Working
 from bns.app.tab import Tab
@@ -24,9 +25,9 @@ class EvolvePart:
 
     def __init__(self, tab: Tab) -> None:
         self._tab, self._problem = tab, Problem()
-        self._task = pn.widgets.Select(name="Task", options=list(task_names(ROBOT)), width=140)
-        self._evaluations = pn.widgets.IntInput(name="Evaluations", value=30, start=1, end=MOST_EVALUATIONS, width=110)
-        self._seed = pn.widgets.IntInput(name="Seed", value=0, start=0, width=90)
+        self._task = pn.widgets.Select(**called("Task"), options=list(task_names(ROBOT)), width=140)
+        self._evaluations = pn.widgets.IntInput(**called("Evaluations"), value=30, start=1, end=MOST_EVALUATIONS, width=110)
+        self._seed = pn.widgets.IntInput(**called("Seed"), value=0, start=0, width=90)
         self._said, self._picture = html(), GoalFigure()
         self._work = Working("Evolve in this model", self._begin, lambda: tab.evolution, self._show)
         self._canvas = pn.Column(**WIDE)  # a picture that is hidden has no size to begin with, which Bokeh complains of

@@ -12,6 +12,7 @@ from bns.api.propose import ProposeResult, checked_minutes, proposed
 from bns.app.background import Tell
 from bns.app.figures.floor import ArenaFigure, PowerFigure, Sides
 from bns.app.html import table
+from bns.app.names import called
 from bns.app.parts import WIDE, Problem, beside, download, drawn, heading, html, offer, on_change, row
 from bns.app.screens.working import Working
 from bns.app.tab import Tab
@@ -31,14 +32,14 @@ class ExperimentPart:
         self._frame_s = 0.04
         self._picture, self._power = ArenaFigure(self._draw), PowerFigure()
         self._minutes = pn.widgets.FloatInput(
-            name="Minutes of driving", value=5.0, start=0.1, end=600, step=1, width=130
+            **called("Minutes of driving"), value=5.0, start=0.1, end=600, step=1, width=130
         )
-        self._sides = [pn.widgets.FloatInput(name=name, value=0.0, step=0.1, width=95) for name in _SIDES]
+        self._sides = [pn.widgets.FloatInput(**called(name), value=0.0, step=0.1, width=95) for name in _SIDES]
         for side in self._sides:
             on_change(side, lambda: self._picture.arena(self._arena()))
-        self._trial = pn.widgets.Select(name="Proposed trial", options=[], width=140)
+        self._trial = pn.widgets.Select(**called("Proposed trial"), options=[], width=140)
         self._time = pn.widgets.Player(
-            name="Time", start=0, end=1, value=0, interval=40, loop_policy="loop", show_loop_controls=False, width=260
+            **called("Time"), start=0, end=1, value=0, interval=40, loop_policy="loop", show_loop_controls=False, width=260
         )
         on_change(self._trial, self._show_trial)
         on_change(self._time, lambda: self._picture.at(self._frame_s * self._time.value))

@@ -11,6 +11,7 @@ import panel as pn
 
 from bns.api.model import Model
 from bns.app.jobs import Jobs
+from bns.app.names import called
 from bns.app.parts import WIDE, Problem, beside, button, heading, html, on_change
 from bns.app.tab import Tab
 from bns.diagnose.predict.saved_networks import OF_ROBOT
@@ -27,13 +28,13 @@ class ModelScreen:
     def __init__(self, tab: Tab, jobs: Jobs) -> None:
         self._tab, self._jobs = tab, jobs
         self._problem, self._bench_problem, self._said = Problem(), Problem(), html()
-        self._name = pn.widgets.Select(name="A robot of the catalogue", options=ROBOTS, **WIDE)
-        self._path = pn.widgets.TextInput(name="Or a model file of this machine", placeholder="mine.yaml", **WIDE)
+        self._name = pn.widgets.Select(**called("A robot of the catalogue"), options=ROBOTS, **WIDE)
+        self._path = pn.widgets.TextInput(**called("Or a model file of this machine"), placeholder="mine.yaml", **WIDE)
         self._file = pn.widgets.FileInput(
-            name="Or choose a model file, or drop it on this screen", accept=".yaml,.yml,.xml,.safetensors"
+            **called("Or choose a model file, or drop it on this screen"), accept=".yaml,.yml,.xml,.safetensors"
         )
         self._wheelbase = pn.widgets.FloatInput(
-            name="Or a differential drive: wheelbase (m)", value=0.1, start=0.001, end=10, step=0.001, **WIDE
+            **called("Or a differential drive: wheelbase (m)"), value=0.1, start=0.001, end=10, step=0.001, **WIDE
         )
         self._suggestion = html()
         on_change(self._file, self._take_uploaded)

@@ -73,7 +73,7 @@ class NextScreen:
         tab = self._tab
         notes = [f"# {USED}: the measurements that were used, saved here"] if not tab.as_it_lies else []
         notes += ["# parameters set by hand are only in the saved model"] if tab.now.by_hand else []
-        return [*notes, *commands(tab.data_words if tab.as_it_lies else USED, tab.model_words, tab.now, bool(tab.networks))]
+        return [*notes, *commands(tab.data_words if tab.as_it_lies else [USED], tab.model_words, tab.now, bool(tab.networks))]
 
     def _fitted(self, shown: Shown) -> None:
         if self._tab.networks:

@@ -9,6 +9,7 @@ import panel as pn
 
 from bns.app.html import change_text, mm, table
 from bns.app.jobs import Jobs
+from bns.app.names import called
 from bns.app.parts import WIDE, Problem, button, heading, html, offer, row
 from bns.app.switches import Switches
 from bns.app.tab import Tab
@@ -24,8 +25,8 @@ class SnapshotsPart:
 
     def __init__(self, tab: Tab, jobs: Jobs, go_to: Callable[[Switches], None], horizon: Callable[[], str]) -> None:
         self._tab, self._jobs, self._go_to, self._horizon = tab, jobs, go_to, horizon
-        self._name = pn.widgets.TextInput(name="Name of the snapshot", placeholder="with lag", width=180)
-        self._chosen = pn.widgets.Select(name="Snapshot", options=[], width=180)
+        self._name = pn.widgets.TextInput(**called("Name of the snapshot"), placeholder="with lag", width=180)
+        self._chosen = pn.widgets.Select(**called("Snapshot"), options=[], width=180)
         self._table, self._problem = html(), Problem()
         self._there = row(
             self._chosen, button("Go back to it", self._back), button("Forget it", self._forget), align_items="end"

@@ -12,6 +12,7 @@ from bns.app.figures.errors import WindowFigures, noise_in_words
 from bns.app.figures.paths import PathFigure
 from bns.app.html import mm, note, table, velocity
 from bns.app.jobs import Jobs
+from bns.app.names import called
 from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, offer, on_change, row
 from bns.app.sliders import Slider
 from bns.app.tab import Tab
@@ -28,12 +29,12 @@ class WhereScreen:
     def __init__(self, tab: Tab, jobs: Jobs) -> None:
         self._tab, self._jobs = tab, jobs
         self._problem, self._pictures, self._path = Problem(), WindowFigures(), PathFigure("path")
-        self._which = pn.widgets.RadioButtonGroup(name="Model", options=[GIVEN, NOW], value=GIVEN)
-        self._horizon = pn.widgets.Select(name="Error how far ahead", options={ahead("1s"): "1s"}, width=160)
-        self._variable = pn.widgets.Select(name="Along", options={label("time_in_trial_s"): "time_in_trial_s"}, width=260)
-        self._worst = pn.widgets.Select(name="Worst moments", options=[], size=6, width=320)
-        self._trial = pn.widgets.Select(name="Trial", options=[], width=160)
-        self._time = Slider(name="Time in the trial (s)", start=0, end=1, step=0.02, **WIDE)
+        self._which = pn.widgets.RadioButtonGroup(**called("Model"), options=[GIVEN, NOW], value=GIVEN)
+        self._horizon = pn.widgets.Select(**called("Error how far ahead"), options={ahead("1s"): "1s"}, width=160)
+        self._variable = pn.widgets.Select(**called("Along"), options={label("time_in_trial_s"): "time_in_trial_s"}, width=260)
+        self._worst = pn.widgets.Select(**called("Worst moments"), options=[], size=6, width=320)
+        self._trial = pn.widgets.Select(**called("Trial"), options=[], width=160)
+        self._time = Slider(**called("Time in the trial (s)"), start=0, end=1, step=0.02, **WIDE)
         self._errors, self._explained, self._brushed = html(), html(), html()
         self._shown: Shown | None = None
         self._windows, self._rows = pd.DataFrame(), list[int]()

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 SAYS_LITTLE = 0.03
 """A share so small says nothing yet of how long the whole takes."""
+MINUTES = 10.0
+"""Of driving, which an experiment takes where nothing else is asked for."""
 Adder = Callable[[str, Callable[[argparse.Namespace], int], str], Parser]
 
 
@@ -187,7 +189,7 @@ def import_(options: argparse.Namespace) -> int:
     if options.map:
         beside = first.with_name(first.name + ".import.yaml")
         if not beside.exists():
-            beside.write_text(yaml.safe_dump(found.mapping, sort_keys=False), encoding="utf-8")
+            beside.write_text(yaml.safe_dump(dict(found.mapping or {}), sort_keys=False), encoding="utf-8")
     print(found.summary(str(options.output)))
     print(findings_text(found.findings))
     return 0
@@ -222,7 +224,6 @@ def compare(options: argparse.Namespace) -> int:
 
 def diagnose(options: argparse.Namespace) -> int:
     """The verdict on what a model lacks."""
-    from bns.api.common.next_command import repeated
     from bns.api.model import checked_target
 
     if options.output is not None:
@@ -231,8 +232,7 @@ def diagnose(options: argparse.Namespace) -> int:
     extended = found.extended
     if options.output is not None and extended is not None:
         extended.save(options.output)
-    command = repeated(str(options.data), str(options.model), options.wheelbase, options.more)
-    print(json.dumps(found.to_json()) if options.json else found.summary(command))
+    print(json.dumps(found.to_json()) if options.json else found.summary(words_of(options)))
     if not options.json:
         print(_where_written(options, extended), end="")
 
@@ -327,6 +327,26 @@ def log_of(options: argparse.Namespace) -> Measurements:
         most = len(findings) if getattr(options, "findings", False) else 5
         print(findings_text(findings, most), file=sys.stderr)
     return log
+
+
+def words_of(options: argparse.Namespace) -> dict[str, str]:
+    """What the commands that follow one of diagnose, propose or report repeat of it."""
+    from bns.api.common.next_command import repeated
+
+    limits = {name: getattr(options, name, None) for name in ("minutes", "arena", "start", "speeds")}
+    return repeated(
+        options.data,
+        options.model,
+        options.wheelbase,
+        options.more,
+        robot=options.robot,
+        without=options.without,
+        also=options.also,
+        without_effects=options.without_effect,
+        settings=options.settings,
+        trust=options.trust,
+        **{name: value for name, value in limits.items() if (name, value) != ("minutes", MINUTES)},
+    )
 
 
 def model_of(options: argparse.Namespace) -> Given:

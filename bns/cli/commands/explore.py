@@ -51,7 +51,7 @@ def explore(options: argparse.Namespace) -> int:
     files = [str(file) for file in options.data]
     log = files[0] if len(files) == 1 else files or None
     model = options.model if are_networks(options.model) else Model(options.model, **given)
-    explorer = Explorer(shown_of(log, model, " ".join(files), words), options.port)
+    explorer = Explorer(shown_of(log, model, files, words), options.port)
     print(explorer.address, flush=True)
     print("open this address in a browser on this machine; Ctrl-C ends the page", flush=True)
     explorer.serve(browser=not options.no_browser)

@@ -8,7 +8,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from bns.cli.commands.diagnose import Adder, add_effect_options, add_model_options, diagnosed, ticking
+from bns.cli.commands.diagnose import (
+    MINUTES,
+    Adder,
+    add_effect_options,
+    add_model_options,
+    diagnosed,
+    ticking,
+    words_of,
+)
 
 
 def add_commands(command: Adder) -> None:
@@ -40,7 +48,7 @@ def add_commands(command: Adder) -> None:
 
 def add_experiment_options(parser: argparse.ArgumentParser) -> None:
     """How long, where and how fast."""
-    parser.add_argument("--minutes", type=float, default=10.0, metavar="N", help="minutes of driving to plan (default: 10)")
+    parser.add_argument("--minutes", type=float, default=MINUTES, metavar="N", help="minutes of driving to plan (default: 10)")
     parser.add_argument("--arena", metavar="WxH", help="size of the arena in metres (default: where the robot was seen)")
     parser.add_argument(
         "--start",
@@ -56,7 +64,6 @@ def add_experiment_options(parser: argparse.ArgumentParser) -> None:
 
 def propose(options: argparse.Namespace) -> int:
     """Trials that tell the rivals apart, as a file that `bns trial` drives."""
-    from bns.api.common.next_command import repeated
     from bns.api.propose import checked_minutes, checked_output
 
     checked_minutes(options.minutes)
@@ -66,9 +73,8 @@ def propose(options: argparse.Namespace) -> int:
     found = diagnosed(options)
     with ticking("planning") as tick:
         proposal = found.propose(**limits, progress=tick)
-    command = repeated(str(options.data), str(options.model), options.wheelbase, options.more)
     written = "" if out is None or proposal.commands.empty else str(proposal.to_csv(out))
-    print(json.dumps(proposal.to_json()) if options.json else proposal.summary(written, command))
+    print(json.dumps(proposal.to_json()) if options.json else proposal.summary(written, words_of(options)))
     if out is not None and not written:
         print(f"{out} is not written: no commands would decide anything", file=sys.stderr)
     return 0
@@ -76,16 +82,14 @@ def propose(options: argparse.Namespace) -> int:
 
 def report(options: argparse.Namespace) -> int:
     """The page."""
-    from bns.api.common.next_command import repeated
     from bns.api.propose import checked_minutes, checked_output
 
     checked_minutes(options.minutes)
     checked_output(options.output, "The report", ".html")
     limits = _limits(options)
     found = diagnosed(options)
-    command = repeated(str(options.data), str(options.model), options.wheelbase, options.more)
     with ticking("reporting") as tick:
-        print(found.report(options.output, **limits, command=command, progress=tick).summary())
+        print(found.report(options.output, **limits, command=words_of(options), progress=tick).summary())
     return 0
 
 

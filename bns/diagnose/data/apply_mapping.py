@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from bns.diagnose.data.located import LocatedMapping, located
 from bns.diagnose.data.mapping import UNITS
 from bns.diagnose.data.merge_topics import held, merged, named_topics, of_topics, wheels_from_body
 from bns.diagnose.data.quaternions import yaw
@@ -29,24 +30,31 @@ def applied(
 
     ``folder`` and ``read``: where the files of ``also`` are, and how they are read. DataError where the mapping does not fit.
     """
-    out = _renamed(table, mapping["columns"])
+    rules = located(mapping)
+    out = _renamed(table, rules["columns"], rules, ("columns",))
     if of_topics(table):
         out = named_topics(out)
-    for other in mapping.get("also", []):
-        if folder is None or read is None:
-            raise DataError(f"The mapping takes columns from {other['file']}, too; give the log as a file in the same folder.")
-        with _of_file(other["file"]):
-            out = merged(out, _renamed(read(folder / other["file"]), other["columns"], others=False))
-    if mapping.get("relative"):
-        out = relative_motions(out)
-    out = wheels_from_body(out, mapping.get("wheelbase_m"))
-    if "hold_commands_s" in mapping:
-        out = held(out, float(mapping["hold_commands_s"]))
-    if "trials" in mapping:
-        out = split(out, *next(iter(mapping["trials"].items())))
+    for number, other in enumerate(rules.get("also", [])):
+        with rules.at("also", number):
+            if folder is None or read is None:
+                raise DataError(f"columns come from {other['file']}, too; give the log as a file in the same folder.")
+            with _of_file(other["file"]):
+                entries = read(folder / other["file"])
+            within = ("also", number, "columns")
+            out = merged(out, _renamed(entries, other["columns"], rules, within, others=False))
+    if rules.get("relative"):
+        with rules.at("relative"):
+            out = relative_motions(out)
+    with rules.at("wheelbase_m" if "wheelbase_m" in rules else "columns"):
+        out = wheels_from_body(out, rules.get("wheelbase_m"))
+    if "hold_commands_s" in rules:
+        out = held(out, float(rules["hold_commands_s"]))
+    if "trials" in rules:
+        with rules.at("trials"):
+            out = split(out, *next(iter(rules["trials"].items())))
     if "trial" not in out.columns:
         out.insert(0, "trial", 0)
-    if mapping.get("repeated_poses") == "lost":
+    if rules.get("repeated_poses") == "lost":
         out.loc[repeated(out), list(POSE)] = np.nan
     return out[[*(c for c in COLUMNS if c in out.columns), *(c for c in out.columns if c not in COLUMNS)]]
 
@@ -73,14 +81,20 @@ def repeated(table: pd.DataFrame) -> pd.Series:
     return same & told
 
 
-def _renamed(table: pd.DataFrame, columns: Mapping[str, Any], others: bool = True) -> pd.DataFrame:
-    """Columns by the entries; ``others``: those that no entry names stay. Counters are last: they need time and trial."""
+def _renamed(
+    table: pd.DataFrame, columns: Mapping[str, Any], rules: LocatedMapping, within: tuple[str | int, ...], others: bool = True
+) -> pd.DataFrame:
+    """Columns by the entries, which lie ``within`` the mapping. Counters are last: they need time and trial.
+
+    ``others``: columns that no entry names stay.
+    """
     new: dict[str, pd.Series] = {}
     for name, entry in sorted(columns.items(), key=lambda item: bool(item[1].get("counts"))):
-        values = _converted(name, _source(table, entry), entry)
-        if entry.get("counts"):
-            by = {"t_s": table.get("t_s"), "trial": table.get("trial"), **new}
-            values = _rate(name, values, by["t_s"], by["trial"])
+        with rules.at(*within, name):
+            values = _converted(name, _source(table, name, entry), entry)
+            if entry.get("counts"):
+                by = {"t_s": table.get("t_s"), "trial": table.get("trial"), **new}
+                values = _rate(name, values, by["t_s"], by["trial"])
         new[name] = values
     if not others:
         return pd.DataFrame(new)
@@ -92,10 +106,10 @@ def _named(entry: Mapping[str, Any]) -> list[Any]:
     return entry["from"] if isinstance(entry["from"], list) else [entry["from"]]
 
 
-def _source(table: pd.DataFrame, entry: Mapping[str, Any]) -> pd.DataFrame:
-    for name in _named(entry):
-        if name not in table.columns:
-            raise DataError("The mapping asks for an " + unknown_name("column", name, map(str, table.columns)))
+def _source(table: pd.DataFrame, name: str, entry: Mapping[str, Any]) -> pd.DataFrame:
+    for source in _named(entry):
+        if source not in table.columns:
+            raise DataError(f"{name} asks for an " + unknown_name("column", source, map(str, table.columns)))
     return table[_named(entry)]
 
 
@@ -125,6 +139,8 @@ def _numbers(name: str, values: pd.Series) -> pd.Series:
 
 def _dated(name: str, values: pd.Series) -> pd.Series:
     """Seconds since the first date."""
+    if pd.api.types.is_numeric_dtype(values):
+        raise DataError(f"{name} is taken from {values.name}, which holds numbers, no dates; give their unit: s, ms, us or ns.")
     try:
         stamps = pd.to_datetime(values, utc=True, format="ISO8601")
     except (ValueError, TypeError) as fault:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
-from bns.diagnose.data.odd_commands import half_told, never_told, refuse_untold
+from bns.diagnose.data.odd_commands import half_told, never_told, refuse_untold, untold_trials
 from bns.diagnose.data.still_heading import refuse_still_heading
 from bns.diagnose.data.units import check_units
 from bns.diagnose.settings import DEFAULTS
@@ -63,8 +63,10 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     trials = rows_by_trial(usable)
     refuse_untold(usable, trials)
     refuse_still_heading(usable, trials)
-    check_units(usable, trials)
-    told = [Finding(str(table["trial"].iloc[row]), row, text) for row, text in filter(None, (odd, never_told(usable)))]
+    note = check_units(usable, trials)
+    unit: tuple[int, str] | None = (int(usable.index[0]), note) if note else None
+    oddities = (unit, odd, untold_trials(usable, trials), never_told(usable))
+    told = [Finding(str(table["trial"].iloc[row]), row, text) for row, text in filter(None, oddities)]
     return usable, told + findings
 
 

@@ -14,6 +14,7 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import Finding, checked, own_rows
 from bns.diagnose.data.guess.mapping import guessed, lacking
 from bns.diagnose.data.load import naming
+from bns.diagnose.data.located import located
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
 from bns.errors import DataError
@@ -74,19 +75,19 @@ def import_log(files: Sequence[Path], mapping: Mapping[str, Any] | None = None) 
         return _checked(first, table, None)
     if mapping is None:
         raise DataError(_proposed(first, table, others))
-    named = {one["file"] for one in mapping.get("also", ())}
+    rules = located(mapping)
+    named = {one["file"] for one in rules.get("also", ())}
     missing = [path for path in others if path.name not in named and str(path) not in named]
-    if missing:
-        raise DataError(
-            f"The mapping of {first} uses nothing from {missing[0]}; add it under also:, or leave the file out."
-        )
-    with naming(first):
+    with rules.at("also" if named else "columns"):
+        if missing:
+            raise DataError(f"nothing is taken from {missing[0]}; add it under also:, or leave the file out.")
+    with naming(first), rules.at("columns"):
         try:
-            out = applied(table, mapping, first.parent, read_table)
+            out = applied(table, rules, first.parent, read_table)
         except DataError as error:
-            more = lacking(mapping)
+            more = lacking(rules)
             raise DataError(" ".join([str(error), *more])) from error
-        gone = lacking(mapping) if not set(COLUMNS) <= set(out.columns) else ()
+        gone = lacking(rules) if not set(COLUMNS) <= set(out.columns) else ()
         if gone:
             raise DataError(" ".join(gone))
     return _checked(first, out, mapping)

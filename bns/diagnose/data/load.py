@@ -16,11 +16,12 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.bodies.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.data.bodies.joints import are_joints, joint_tracks
 from bns.diagnose.data.checks import Finding, checked
+from bns.diagnose.data.located import BEGINS
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracks import Tracks, tracks_of
-from bns.errors import DataError
+from bns.errors import DataError, in_both
 from bns.measurements import DISCARDED, POSE
 
 
@@ -165,7 +166,7 @@ def naming(path: Path) -> Iterator[None]:
     try:
         yield
     except DataError as error:
-        if str(path) in str(error):
+        if str(path) in str(error) or str(error).startswith(BEGINS):
             raise
         raise DataError(f"{path}: {error}") from error
 
@@ -184,13 +185,15 @@ def _of_one_robot(table: pd.DataFrame, robot: str | None) -> pd.DataFrame:
     if "robot" not in table.columns:
         if robot is not None:
             raise DataError(
-                f"There is no column robot, so {robot!r} cannot be chosen; leave out --robot, or add the column."
+                f"There is no column robot, so {robot!r} cannot be chosen; leave out {in_both('--robot', 'robot=')}, or add the "
+                "column."
             )
         return table
     names = sorted(str(name) for name in table["robot"].dropna().unique())
     if robot is None and len(names) > 1:
         raise DataError(
-            f"The measurements are of {len(names)} robots: {', '.join(names)}. Choose one with --robot {names[0]}."
+            f"The measurements are of {len(names)} robots: {', '.join(names)}. Choose one with "
+            f"{in_both(f'--robot {names[0]}', f'robot={names[0]!r}')}."
         )
     if robot is None:
         return table

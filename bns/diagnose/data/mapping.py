@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bns.diagnose.data.located import LocatedMapping
 from bns.errors import DataError, unknown_name
 from bns.safe_yaml import Lines, read_yaml_file, shown
 
@@ -82,55 +83,65 @@ _NUMBERS, _FLAGS = ("scale", "offset", "zero_deg"), ("clockwise", "counts")
 _UP = ("z", "y")
 
 
-def mapping_beside(data: Path) -> dict[str, Any] | None:
+def mapping_beside(data: Path) -> LocatedMapping | None:
     """The mapping kept beside a data file; None if there is none."""
     path = data.with_name(data.name + ".import.yaml")
     return load_mapping(path) if path.is_file() else None
 
 
-def load_mapping(path: Path) -> dict[str, Any]:
-    """A mapping file, checked; DataError with the key that is wrong."""
+def load_mapping(path: Path) -> LocatedMapping:
+    """A mapping file, checked; DataError with its line and the key that is wrong."""
     tree, lines = read_yaml_file(path, "the mapping", DataError)
     return checked_mapping(tree, path, lines)
 
 
-def checked_mapping(tree: Any, path: Path, lines: Lines | None = None) -> dict[str, Any]:
-    """A mapping that was read already, checked; ``path`` names it. DataError with the key that is wrong, and its line."""
-    lines = lines or Lines()
-    if not isinstance(tree, dict) or not isinstance(tree.get("columns"), dict):
-        raise DataError(f"The mapping {path} must have the key columns, with an entry for each column of the table.")
-    _check_keys(f"{path}", tree, _TABLE_KEYS)
-    with lines.at("repeated_poses"):
-        if tree.get("repeated_poses", "kept") not in REPEATED:
-            raise DataError(f"{path}: " + unknown_name("word for repeated_poses", tree["repeated_poses"], REPEATED))
-    for name in (name for name in _LENGTHS if name in tree):
-        with lines.at(name):
-            if not _positive(tree[name]):
-                raise DataError(f"{path}: {name} is {shown(tree[name])}; it must be a number above 0.")
-    with lines.at("relative"):
-        if not isinstance(tree.get("relative", False), bool):
-            raise DataError(f"{path}: relative is {shown(tree['relative'])}; it must be true or false.")
-    with lines.at("trials"):
-        _check_trials(path, tree)
-    for name in tree["columns"]:
-        with lines.at("columns", name):
-            _check_columns(path, {name: tree["columns"][name]})
-    with lines.at("also"):
-        _check_also(path, tree.get("also", []))
-    return tree
+def checked_mapping(tree: Any, path: Path | None = None, lines: Lines | None = None) -> LocatedMapping:
+    """A mapping that was read already, checked. DataError with the file, the line and the key that is wrong.
+
+    ``path``: of its file; None for one in memory.
+    """
+    rules = LocatedMapping(tree if isinstance(tree, dict) else {}, path, lines)
+    with rules.at():
+        if not isinstance(rules.get("columns"), dict):
+            raise DataError(f"it is {shown(tree)}; it must have the key columns, with an entry for each column of the table.")
+    for key in rules:
+        with rules.at(key):
+            _check_keys("", {key: None}, _TABLE_KEYS)
+    with rules.at("repeated_poses"):
+        if rules.get("repeated_poses", "kept") not in REPEATED:
+            raise DataError(unknown_name("word for repeated_poses", rules["repeated_poses"], REPEATED))
+    for name in (name for name in _LENGTHS if name in rules):
+        with rules.at(name):
+            if not _positive(rules[name]):
+                raise DataError(f"{name} is {shown(rules[name])}; it must be a number above 0.")
+    with rules.at("relative"):
+        if not isinstance(rules.get("relative", False), bool):
+            raise DataError(f"relative is {shown(rules['relative'])}; it must be true or false.")
+    with rules.at("trials"):
+        _check_trials(rules)
+    for name in rules["columns"]:
+        with rules.at("columns", name):
+            _check_columns({name: rules["columns"][name]})
+    with rules.at("also"):
+        if not isinstance(rules.get("also", []), list):
+            raise DataError(f"also is {shown(rules['also'])}; it must be a list of {{file: NAME, columns: ...}}.")
+    for number, other in enumerate(rules.get("also", [])):
+        with rules.at("also", number):
+            _check_also(rules, number, other)
+    return rules
 
 
 def _check_keys(where: str, given: Mapping[str, Any], valid: tuple[str, ...]) -> None:
     for key in given:
         if key not in valid:
-            raise DataError(f"{where}: " + unknown_name("key", key, valid))
+            raise DataError((f"{where}: " if where else "") + unknown_name("key", key, valid))
 
 
 def _positive(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and value > 0
 
 
-def _check_trials(path: Path, tree: Mapping[str, Any]) -> None:
+def _check_trials(tree: Mapping[str, Any]) -> None:
     if "trials" not in tree:
         return
     split = tree["trials"]
@@ -141,73 +152,68 @@ def _check_trials(path: Path, tree: Mapping[str, Any]) -> None:
         or not _positive(*split.values())
     ):
         raise DataError(
-            f"{path}: trials is {shown(split)}; write one of {{standing_s: 1}}, {{lasting_s: 20}}, {{gap_s: 2}}."
+            f"trials is {shown(split)}; write one of {{standing_s: 1}}, {{lasting_s: 20}}, {{gap_s: 2}}."
         )
     if "trial" in tree["columns"]:
         raise DataError(
-            f"{path}: trials are cut by {next(iter(split))} and named by a column; leave out one of the two."
+            f"trials are cut by {next(iter(split))} and named by a column; leave out one of the two."
         )
 
 
-def _check_also(path: Path, others: Any) -> None:
-    if not isinstance(others, list):
-        raise DataError(f"{path}: also is {shown(others)}; it must be a list of {{file: NAME, columns: ...}}.")
-    for other in others:
-        if (
-            not isinstance(other, dict)
-            or not isinstance(other.get("file"), str)
-            or not isinstance(other.get("columns"), dict)
-        ):
-            raise DataError(f"{path}: also has {shown(other)}; write {{file: NAME, columns: ...}}.")
-        _check_keys(f"{path}: also", other, _ALSO_KEYS)
-        _check_columns(path, other["columns"])
-        if "t_s" not in other["columns"]:
-            raise DataError(f"{path}: also: {other['file']} needs an entry t_s, by the same clock as the log's.")
+def _check_also(rules: LocatedMapping, number: int, other: Any) -> None:
+    if not isinstance(other, dict) or not isinstance(other.get("file"), str) or not isinstance(other.get("columns"), dict):
+        raise DataError(f"also has {shown(other)}; write {{file: NAME, columns: ...}}.")
+    _check_keys("also", other, _ALSO_KEYS)
+    for name in other["columns"]:
+        with rules.at("also", number, "columns", name):
+            _check_columns({name: other["columns"][name]})
+    if "t_s" not in other["columns"]:
+        raise DataError(f"also: {other['file']} needs an entry t_s, by the same clock as the log's.")
 
 
-def _check_columns(path: Path, columns: Mapping[str, Any]) -> None:
+def _check_columns(columns: Mapping[str, Any]) -> None:
     for name, entry in columns.items():
         if not isinstance(entry, dict) or "from" not in entry:
-            raise DataError(f"{path}: {name} is {shown(entry)}; write {{from: COLUMN, unit: UNIT}}.")
-        _check_keys(f"{path}: {name}", entry, _KEYS)
-        _check_entry(path, name, entry)
-        _check_unit(path, name, entry)
-        _check_quaternion(path, name, entry)
+            raise DataError(f"{name} is {shown(entry)}; write {{from: COLUMN, unit: UNIT}}.")
+        _check_keys(f"{name}", entry, _KEYS)
+        _check_entry(name, entry)
+        _check_unit(name, entry)
+        _check_quaternion(name, entry)
 
 
-def _check_entry(path: Path, name: str, entry: Mapping[str, Any]) -> None:
+def _check_entry(name: str, entry: Mapping[str, Any]) -> None:
     sources = entry["from"] if isinstance(entry["from"], list) else [entry["from"]]
     if not isinstance(name, str) or not all(isinstance(source, str) for source in sources):
-        raise DataError(f"{path}: {name!r} is taken from {shown(entry['from'])}; both are names of columns: put them in quotes.")
+        raise DataError(f"{name!r} is taken from {shown(entry['from'])}; both are names of columns: put them in quotes.")
     for key in (key for key in _NUMBERS if key in entry):
         value = entry[key]
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < math.inf:
-            raise DataError(f"{path}: {name}: {key} is {shown(value)}; it must be a number.")
+            raise DataError(f"{name}: {key} is {shown(value)}; it must be a number.")
     for key in (key for key in _FLAGS if key in entry):
         if not isinstance(entry[key], bool):
-            raise DataError(f"{path}: {name}: {key} is {shown(entry[key])}; it must be true or false.")
+            raise DataError(f"{name}: {key} is {shown(entry[key])}; it must be true or false.")
 
 
-def _check_unit(path: Path, name: str, entry: Mapping[str, Any]) -> None:
+def _check_unit(name: str, entry: Mapping[str, Any]) -> None:
     unit = entry.get("unit")
     if unit is None:
         return
     if not isinstance(unit, str) or unit not in UNITS:
-        raise DataError(f"{path}: {name}: " + unknown_name("unit", unit, UNITS, WORDS))
+        raise DataError(f"{name}: " + unknown_name("unit", unit, UNITS, WORDS))
     wanted = "m" if entry.get("counts") and _SI.get(name) == "m/s" else _SI.get(name)
     if wanted is not None and UNITS[unit][0] != wanted:
         fitting = ", ".join(u for u, (kind, _) in UNITS.items() if kind == wanted)
         more = (
             "; of turns of a wheel, give no unit but scale: its radius in metres" if unit in {"rad/s", "deg/s"} else ""
         )
-        raise DataError(f"{path}: {name} cannot be in {unit}; it may be in {fitting}{more}.")
+        raise DataError(f"{name} cannot be in {unit}; it may be in {fitting}{more}.")
 
 
-def _check_quaternion(path: Path, name: str, entry: Mapping[str, Any]) -> None:
+def _check_quaternion(name: str, entry: Mapping[str, Any]) -> None:
     source, quaternion = entry["from"], entry.get("unit") == "quaternion"
     if quaternion != isinstance(source, list) or (quaternion and len(source) != 4):
         raise DataError(
-            f"{path}: {name}: a quaternion is {{from: [QX, QY, QZ, QW], unit: quaternion}}; given: {shown(source)}."
+            f"{name}: a quaternion is {{from: [QX, QY, QZ, QW], unit: quaternion}}; given: {shown(source)}."
         )
     if "up" in entry and (not quaternion or entry["up"] not in _UP):
-        raise DataError(f"{path}: {name}: up is {shown(entry['up'])}; it is for quaternions, and z or y.")
+        raise DataError(f"{name}: up is {shown(entry['up'])}; it is for quaternions, and z or y.")

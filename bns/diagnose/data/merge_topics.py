@@ -18,10 +18,10 @@ def merged(table: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
     """
     keys = ["trial", "t_s"] if "trial" in table.columns else ["t_s"]
     if ("trial" in other.columns) != ("trial" in table.columns):
-        raise DataError("Only some of the tables that the mapping joins have trials; give all of them an entry trial, or none.")
+        raise DataError("only some of the tables that are joined have trials; give all of them an entry trial, or none.")
     both = sorted((set(table.columns) & set(other.columns)) - set(keys))
     if both:
-        raise DataError(f"The mapping takes {', '.join(both)} from two tables; leave all but one of them out.")
+        raise DataError(f"two tables give {', '.join(both)}; leave all but one of them out.")
     rows = pd.concat([table, other], ignore_index=True)
     if rows["t_s"].isna().any():
         raise DataError("Tables can be joined only if every row has a time; t_s is empty in some.")
@@ -66,15 +66,15 @@ def wheels_from_body(table: pd.DataFrame, wheelbase_m: float | None) -> pd.DataF
         return table
     if len(there) == 1:
         other = FORWARD if there[0] == TURN else TURN
-        raise DataError(f"The mapping has {there[0]} but not {other}; the wheel speeds need both.")
+        raise DataError(f"there is {there[0]} but not {other}; the wheel speeds need both.")
     twice = [name for name in COMMANDS if name in table.columns]
     if twice:
         raise DataError(
-            f"The mapping gives {' and '.join(twice)} and speeds of the body; leave out the ones that were not commanded."
+            f"there are {' and '.join(twice)} and speeds of the body; leave out the ones that were not commanded."
         )
     if wheelbase_m is None:
         raise DataError(
-            f"Wheel speeds follow from {FORWARD} and {TURN} with the wheelbase that the robot's own controller assumes: "
+            f"wheel speeds follow from {FORWARD} and {TURN} with the wheelbase that the robot's own controller assumes: "
             "add wheelbase_m: METRES to the mapping."
         )
     apart = table[TURN] * float(wheelbase_m) / 2

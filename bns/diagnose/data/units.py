@@ -9,6 +9,7 @@ import pandas as pd
 
 from bns.diagnose.data.mapping import SIZES
 from bns.diagnose.data.merge_topics import without_commands
+from bns.diagnose.data.speed_units import Ways, mistake_of, speed_note
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import COMMANDS, POSE
@@ -27,12 +28,13 @@ _DEGREES_AT_LEAST = DEFAULTS.data.degrees_rad_m
 _MINUTES = DEFAULTS.data.minutes_ratio
 _HUNDREDTHS = DEFAULTS.data.hundredths_ratio
 _BEYOND = DEFAULTS.data.lengths_beyond
+_DEGREES_BEYOND = DEFAULTS.data.degrees_beyond
 
 
-def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> None:
+def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> str:
     """Compare what was commanded with what was seen: units show as factors. DataError names the column and the unit.
 
-    ``trials``: names and row numbers.
+    ``trials``: names and row numbers. A note on speeds that look like another unit, though the robot may have such a gain.
     """
     pauses = table["t_s"].diff()
     step = float(pauses[pauses > 0].median())
@@ -40,7 +42,7 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
         unit = next(unit for least, unit in _FINER if step > least)
         raise DataError(_apart(step, unit))
     _check_length(table)
-    ways = _driven(table, trials)
+    ways, driven = _driven(table, trials)
     speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
     ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
     untold = without_commands(table)
@@ -60,10 +62,13 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
     if _turns_as_degrees(table) and _MINUTES[0] < _speed_ratio(table) < _MINUTES[1]:
         raise DataError(
             "The robot drives and turns about sixty times as fast as commanded: t_s looks like minutes; it must be seconds. In a "
-            "mapping of `bns import`, give scale: 60."
+            "mapping of `bns import`, give scale: 60 (or the same for the speeds, if they were divided by 60)."
         )
     if SIZES["mm"] / _BEYOND[1] < 1 / max(ratio, 1e-9) < SIZES["in"] * _BEYOND[0]:
         unit, name = min(_LENGTHS.items(), key=lambda one: abs(np.log(SIZES[one[0]] * ratio)))
+        slow = mistake_of(1 / SIZES[unit], _WITHIN)
+        if slow is not None and _turns_as_degrees(table) and table["heading_rad"].abs().max() < _DEGREES_BEYOND:
+            raise DataError(f"The robot went {ratio:.0f} times as far as commanded, and turns as much further: {slow}")
         raise DataError(
             f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {name}; they must be metres. "
             f"{_cure('x_m', unit)}"
@@ -72,8 +77,11 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
         hundredths = _HUNDREDTHS[0] < ratio < _HUNDREDTHS[1]
         inches = 1 / _WITHIN < ratio / SIZES["in/s"] < _WITHIN
         turns = f"rad/s of wheels with a radius of {1e3 * ratio:.0f} mm,{' in/s,' if inches else ''} or a device's units"
+        other = mistake_of(driven.ratio)
         looks = "cm/s" if hundredths else turns
         cure = "unit: cm/s" if hundredths else "scale: METRES (a radius)" + (" or unit: in/s" if inches else "")
+        if other is not None and not (hundredths or inches):
+            looks, cure = f"{other.looks}, {looks}", f"{cure}, or {other.cure}"
         raise DataError(
             f"The robot went {ratio:.2g} times as far as commanded, in proportion: left_m_s and right_m_s look like {looks}; "
             "they must be metres per second. In a mapping of `bns import`, give "
@@ -95,6 +103,7 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
                 "give clockwise: true), or left_m_s and right_m_s are exchanged, or the signs of both wheels are reversed (give "
                 "both scale: -1)."
             )
+    return speed_note(driven)
 
 
 def _apart(step_s: float, unit: str) -> str:
@@ -103,14 +112,16 @@ def _apart(step_s: float, unit: str) -> str:
 
 
 def unit_by_ratio(ratio: float) -> str:
-    """Which unit a robot means that goes ``ratio`` times as far as commanded, and how a mapping says so; "" if none fits."""
-    meant = {1 / SIZES[unit]: ("x_m", unit, "x_m and y_m", name) for unit, name in _LENGTHS.items()}
-    meant |= {SIZES[unit]: ("left_m_s", unit, "left_m_s and right_m_s", unit) for unit in ("km/h", "in/s")}
-    nearest = min(meant, key=lambda size: abs(np.log(size / ratio)))
-    if not 1 / _WITHIN < nearest / ratio < _WITHIN:
-        return ""
-    column, unit, columns, name = meant[nearest]
-    return f"{columns} look like {name}. {_cure(column, unit)}"
+    """Which unit a robot means that goes ``ratio`` times as far as commanded, and how a mapping says so; "" if none fits.
+
+    Ways that are too long look like lengths in another unit, not like speeds, unless they are by a factor of speeds alone.
+    """
+    lengths = {1 / SIZES[unit]: (unit, name) for unit, name in _LENGTHS.items()}
+    nearest = min(lengths, key=lambda size: abs(np.log(size / ratio)))
+    if 1 / _WITHIN < nearest / ratio < _WITHIN:
+        unit, name = lengths[nearest]
+        return f"x_m and y_m look like {name}. {_cure('x_m', unit)}"
+    return str(mistake_of(ratio, _WITHIN) or "")
 
 
 def _cure(column: str, unit: str) -> str:
@@ -161,17 +172,18 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.corrcoef(one, other)[0, 1]) if one.std() > 0 and other.std() > 0 else 0.0
 
 
-def _driven(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> np.ndarray:
-    """For windows of about a second (windows, 4): way and turn commanded (base of 1 m), way and turn seen.
+def _driven(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> tuple[np.ndarray, Ways]:
+    """For windows of about a second (windows, 4): way and turn commanded (base of 1 m), way and turn seen; and the same as ways.
 
     A trial that is shorter than that, such as a single motion of a sensor, is a window.
     """
     times, commands, poses = table["t_s"].to_numpy(), table[list(COMMANDS)].to_numpy(), table[list(POSE)].to_numpy()
-    found = [np.zeros((0, 4))]
-    for _, at in trials:
+    found = [np.zeros((0, 6))]
+    for number, (_, at) in enumerate(trials):
         t, pose = times[at], poses[at]
         left, right = np.nan_to_num(commands[at]).T
         span = np.append(np.diff(t), 0.0)
+        forward = np.concatenate([[0], np.cumsum(((left + right) / 2 * span)[:-1])])
         way = np.concatenate([[0], np.cumsum((np.abs(left + right) / 2 * span)[:-1])])
         turn = np.concatenate([[0], np.cumsum(((right - left) * span)[:-1])])
         seen = np.flatnonzero(np.isfinite(pose).all(axis=1))
@@ -183,5 +195,8 @@ def _driven(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> np
         heading[seen] = np.unwrap(pose[seen, 2])
         a, b = marks[:-1], marks[1:]
         went = np.hypot(*(pose[b, :2] - pose[a, :2]).T)
-        found.append(np.column_stack([way[b] - way[a], went, turn[b] - turn[a], heading[b] - heading[a]]))
-    return np.concatenate(found)
+        told = [way[b] - way[a], went, turn[b] - turn[a], heading[b] - heading[a], forward[b] - forward[a]]
+        found.append(np.column_stack([*told, np.full(len(a), number)]))
+    windows = np.concatenate(found)
+    way, went, _, turned, forward, trial = windows.T
+    return windows[:, :4], Ways(forward, way, went, turned, trial.astype(np.int64))

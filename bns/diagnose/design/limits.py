@@ -10,7 +10,7 @@ from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.units import FASTEST_M_S
 from bns.diagnose.design.sequences import MARGIN_M, Arena, Bounds
 from bns.diagnose.settings import DEFAULTS
-from bns.errors import DataError
+from bns.errors import DataError, in_both
 from bns.physics.model import Model
 from bns.robots import load_robot, robot_names
 from bns.robots.base import TwoWheeled
@@ -19,6 +19,9 @@ _TOGETHER_M = DEFAULTS.design.together_m
 _TRIAL_S = DEFAULTS.design.trial_s
 _HEADING_RAD = DEFAULTS.design.heading_rad
 _LARGEST_M = DEFAULTS.design.largest_m
+_ARENA = in_both("--arena 1.8x1.3, in metres", "arena=(1.8, 1.3)")
+START = in_both("--start X,Y,DEGREES, such as --start 0,0,90", "start=(x_m, y_m, heading_rad)")
+_SPEEDS = in_both("--speeds=LOW,HIGH, such as --speeds=-0.2,0.2", "speeds=(-0.2, 0.2)")
 
 
 def arena_of(
@@ -52,7 +55,7 @@ def arena_of(
     if not bool(arena.holds(np.array(begin[0]), np.array(begin[1]))):
         raise DataError(
             f"The start x = {begin[0]:.2f}, y = {begin[1]:.2f} m lies outside of the arena, x {low[0]:.2f} to {high[0]:.2f} m, "
-            f"y {low[1]:.2f} to {high[1]:.2f} m less {100 * MARGIN_M:.0f} cm. Give --arena WxH (metres) around the start."
+            f"y {low[1]:.2f} to {high[1]:.2f} m less {100 * MARGIN_M:.0f} cm. Give {_ARENA} around the start."
         )
     return arena
 
@@ -90,7 +93,7 @@ def _checked_size(size: tuple[float, ...]) -> Array:
     if sides is None or not (sides > 2 * MARGIN_M).all() or not (sides < _LARGEST_M).all():
         raise DataError(
             f"The arena's size is {size!r}; it must be width and height in metres, each above {2 * MARGIN_M:g} and below "
-            f"{_LARGEST_M:g}: --arena 1.8x1.3; in Python arena=(1.8, 1.3)."
+            f"{_LARGEST_M:g}: {_ARENA}."
         )
     return sides
 
@@ -101,7 +104,7 @@ def _checked_sides(sides: tuple[float, ...]) -> tuple[Array, Array]:
     if ends is None or not ends[0] < ends[1] or not ends[2] < ends[3]:
         raise DataError(
             f"The arena's sides are {sides!r}; they must be lowest x, highest x, lowest y, highest y in metres: "
-            "--arena=-0.5,1.2,0,0.9; in Python arena=(-0.5, 1.2, 0.0, 0.9)."
+            f"{in_both('--arena=-0.5,1.2,0,0.9', 'arena=(-0.5, 1.2, 0.0, 0.9)')}."
         )
     _checked_size((float(ends[1] - ends[0]), float(ends[3] - ends[2])))
     return ends[[0, 2]], ends[[1, 3]]
@@ -111,7 +114,7 @@ def _checked_start(start: tuple[float, float, float]) -> tuple[float, float, flo
     pose = _numbers(start, 3)
     if pose is None:
         raise DataError(
-            f"The start is {start!r}; it must be three numbers: --start X,Y,DEGREES; in Python start=(x_m, y_m, heading_rad)."
+            f"The start is {start!r}; it must be three numbers: {START}."
         )
     return float(pose[0]), float(pose[1]), float(pose[2])
 
@@ -120,13 +123,12 @@ def _checked_speeds(speeds: tuple[float, float]) -> tuple[float, float]:
     pair = _numbers(speeds, 2)
     if pair is None or not pair[0] < pair[1]:
         raise DataError(
-            f"The wheels' speeds are {speeds!r}; they must be the lowest and the highest in m/s: --speeds=LOW,HIGH such as "
-            "--speeds=-0.2,0.2; in Python speeds=(-0.2, 0.2)."
+            f"The wheels' speeds are {speeds!r}; they must be the lowest and the highest in m/s: {_SPEEDS}."
         )
     if np.abs(pair).max() > FASTEST_M_S:
         raise DataError(
-            f"The wheels' speeds are {speeds!r}; speeds above {FASTEST_M_S:g} m/s look like mm/s or a device's units: "
-            "--speeds=LOW,HIGH in m/s."
+            f"The wheels' speeds are {speeds!r}; speeds above {FASTEST_M_S:g} m/s look like mm/s or a device's units; give "
+            f"m/s: {_SPEEDS}."
         )
     return float(pair[0]), float(pair[1])
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from bns.diagnose.design.competing_models import CompetingModel
 from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, Pair, discriminations
+from bns.diagnose.design.limits import START
 from bns.diagnose.design.power import PastTrials
 from bns.diagnose.design.search import Pool, design_trials, random_pool
 from bns.diagnose.design.sequences import Bounds
-from bns.errors import DataError
+from bns.errors import DataError, in_both
 
 Both = tuple[Discrimination, Discrimination]
 
@@ -61,7 +62,7 @@ class WheelPlanner:
             start = self.setup.arena.start
             raise DataError(
                 f"No trial of {self.bounds.trial_s:g} s stays inside the arena from its start at x = {start[0]:.2f}, y = "
-                f"{start[1]:.2f} m. Give a larger one (--arena 2x1.5) or another start (--start 0,0,90)."
+                f"{start[1]:.2f} m. Give a larger one, {in_both('--arena 2x1.5', 'arena=(2, 1.5)')}, or another start, {START}."
             )
         return best
 

@@ -7,13 +7,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from bns.diagnose.data.speed_units import Ways
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.units import unit_by_ratio
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import windows
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
-from bns.errors import DataError
+from bns.errors import DataError, in_both
 from bns.physics.model import LIMITS, Model
 from bns.robots import robot_names
 
@@ -26,6 +27,7 @@ _CLEAR_M = DEFAULTS.predict.robot_clear_m
 _ARC_RAD = DEFAULTS.predict.robot_arc_rad
 _TOGETHER = DEFAULTS.predict.robot_together
 _TURNED_RAD = DEFAULTS.predict.robot_turned_rad
+_AS_FAR = DEFAULTS.predict.robot_as_far
 
 
 def check_named_robot(robot: str, model: Model) -> None:
@@ -48,6 +50,7 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
     _check_distances(tracks, steps, predicted, start, end)  # first: another unit of speeds alters the turns as well
     ratio = _turn_ratio(tracks, predicted, start, end, _EXPLAINED)
     if not 1 / _FACTOR <= ratio <= _FACTOR:
+        _check_speeds(tracks, steps, start, end, ratio)
         raise DataError(_on_turns(model, ratio, "Is this its model?"))
     arcs = np.abs(predicted) < _ARC_RAD
     _check_directions(tracks, start[arcs], end[arcs], np.cumsum(steps[:, 0]))
@@ -76,6 +79,21 @@ def _check_distances(
             )
 
 
+def _check_speeds(tracks: Tracks, steps: Array, start: NDArray[np.int64], end: NDArray[np.int64], turns: float) -> None:
+    """DataError if the robot goes as many times as far as its model as it turns: a unit of speeds does that, no wheelbase.
+
+    ``steps`` (frames, 3): of the model; ``turns``: how many times as far it turns.
+    """
+    forward, way = np.cumsum(steps[:, 0]), np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))
+    heading = _unwrapped(tracks)
+    went = np.hypot(*(tracks.pose[end, :2] - tracks.pose[start, :2]).T)
+    trial = np.asarray(tracks.trial[start], dtype=np.int64)
+    ways = Ways(forward[end] - forward[start], way[end] - way[start], went, heading[end] - heading[start], trial)
+    if 1 / _AS_FAR < ways.ratio / turns < _AS_FAR:
+        unit = unit_by_ratio(ways.ratio) or "Are the speeds in m/s, the positions in m, the times in s?"
+        raise DataError(f"The robot goes and turns {ways.ratio:.2g} times as far as commanded. {unit}")
+
+
 def hint_on_wheelbase(predictor: Predictor, model: Model) -> str:
     """What to say of a wheelbase that is probably too large, if not so much that the data must be another robot's; else "".
 
@@ -98,7 +116,8 @@ def _on_turns(model: Model, ratio: float, question: str) -> str:
             f"{said} No wheelbase from {low:g} to {high:g} m would fit: is heading_rad the measured heading of the robot, in "
             "radians, and are the speeds in m/s?"
         )
-    return f"{said} {question} A wheelbase of about {fits:.3g} m would fit: --wheelbase {fits:.3g}."
+    given = in_both(f"--wheelbase {fits:.3g}", f"bns.Model(NAME, wheelbase_m={fits:.3g})")
+    return f"{said} {question} A wheelbase of about {fits:.3g} m would fit: {given}."
 
 
 def _turn_predicted(steps: Array, start: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
@@ -167,7 +186,7 @@ def suggested_wheelbase_m(tracks: Tracks) -> float | None:
     """
     start, end = windows(tracks, "1s")
     told = np.cumsum(WheelPredictor(tracks).steps(Model(wheelbase_m=1.0)).body[:, 2])
-    heading = np.concatenate([np.unwrap(tracks.pose[a:b, 2]) for a, b in pairwise(tracks.first)])
+    heading = _unwrapped(tracks)
     commanded, seen = told[end] - told[start], heading[end] - heading[start]
     clear = np.abs(commanded) > _CLEAR_M
     if clear.sum() < _FEWEST:
@@ -175,6 +194,12 @@ def suggested_wheelbase_m(tracks: Tracks) -> float | None:
     ratio = _scale(seen[clear], commanded[clear])
     low, high = LIMITS["wheelbase_m"]
     return float(1 / ratio) if ratio > 0 and low <= 1 / ratio <= high else None
+
+
+def _unwrapped(tracks: Tracks) -> Array:
+    """Headings (frames,), rad, of each trial without jumps by a round."""
+    headings: Array = np.concatenate([np.unwrap(tracks.pose[a:b, 2]) for a, b in pairwise(tracks.first)])
+    return headings
 
 
 def _scale(seen: Array, predicted: Array) -> float:

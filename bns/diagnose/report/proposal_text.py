@@ -68,14 +68,14 @@ def _needless(p: Proposal) -> bool:
 def _next(p: Proposal, written: str, command: Mapping[str, str]) -> Iterator[str]:
     if not written:
         return
-    data, model, file = command["data"], command["model"], shlex.quote(written)
+    data, model, file = command["data"], command.get("search", command["model"]), shlex.quote(written)
     optional = " (optional)" if _needless(p) else ""
     if p.bounds is None or not p.bounds.robot or p.arena is None:
         yield f"written to {written}; to go on{optional}, drive its trials and log them as before"
         yield f"then: bns diagnose {data} {model} --more NEW-LOG.csv"
         return
     if not np.allclose(p.arena.start, START, atol=0.02):
-        limits = f"--minutes {p.minutes:g} --start=0,0,90"
+        limits = " ".join(filter(None, (f"--minutes {p.minutes:g}", command.get("area", ""), "--start=0,0,90")))
         yield f"for trials that start where those of bns trial do: bns propose {data} {model} {limits} -o {file}"
     yield f"written to {written}; to drive it{optional}: bns trial --robot {p.bounds.robot} --rig RIG.yaml --commands {file}"
     driven = f"results/trials/experiment-{Path(written).stem}/measurements.csv"

@@ -169,23 +169,25 @@ def findings_table(measured: Measured, most: int = 100) -> Table:
 
 
 def next_commands(d: Diagnosis, p: Proposal | None, command: Mapping[str, str]) -> list[str]:
-    """What to type next."""
+    """What to type next. ``command``: words of `bns.api.common.next_command.repeated`; data and model suffice."""
     data, model = command["data"], command["model"]
+    search = command.get("search", model)
     out = []
     if d.terms:  # fitted together with the effects: one after the other they would be others
-        out.append(f"bns diagnose {data} {model} -o extended.yaml")
+        out.append(f"bns diagnose {data} {search} -o extended.yaml")
     elif d.effects:
-        out.append(f"bns add {data} {' '.join(d.effects)} {model} -o extended.yaml")
+        names = " ".join(command.get(f"effect {name}", name) for name in d.effects)
+        out.append(f"bns add {data} {names} {model} -o extended.yaml")
     if d.formula and not d.terms:
-        base = "--model extended.yaml" if out else model
+        base = f"--model extended.yaml {command.get('shared', '')}".rstrip() if out else model
         term = f"--term {shlex.quote(d.formula.term)} --on {d.formula.on}"
         out.append(f"bns add {data} {d.formula.name} {term} {base} -o extended.yaml")
     if p is not None and len(p.plan):
-        out.append(f"bns propose {data} {model} -o next.csv")
+        out.append(f"bns propose {data} {search} {command.get('limits', '')}".rstrip() + " -o next.csv")
         if p.bounds is not None and p.bounds.robot:
             out.append(f"bns trial --robot {p.bounds.robot} --rig RIG.yaml --commands next.csv")
         driven = "results/trials/experiment-next/measurements.csv" if p.bounds is not None and p.bounds.robot else "NEW-LOG.csv"
-        out.append(f"bns diagnose {data} {model} --more {driven}")
+        out.append(f"bns diagnose {data} {search} --more {driven}")
     return out
 
 

@@ -147,6 +147,29 @@ class Data:
         "rad/m",
         "More radians per metre of wheel difference mean a wheelbase of less than a centimetre, or degrees.",
     )
+    degrees_beyond: float = setting(
+        60.0, "rad", f"If no heading of a log is larger, they are radians: in degrees, a robot leaves this quickly; {BY_HAND}."
+    )
+    speed_unit_band: float = setting(
+        1.05,
+        "factor",
+        "Speeds look like another unit where the median way is within this factor of what the unit would mean. Robots' own gains "
+        f"(0.3 to 2) lie outside the band of every unit; {BY_HAND}.",
+    )
+    speed_unit_trials: tuple[float, float] = setting(
+        (1.2, 0.75),
+        "factor, 1",
+        f"They do so only if in this fraction of the trials the median way is within this factor of it, too; {BY_HAND}.",
+    )
+    speed_one_way: float = setting(
+        0.99,
+        "1",
+        "Windows in which less than this fraction of the commanded way is in one direction say nothing of the unit: the robot "
+        "comes back.",
+    )
+    speed_turn_rad: float = setting(
+        2.0, "rad", f"Nor do windows in which the robot turns by more: the noise of its chord grows with the arc; {BY_HAND}."
+    )
     guess_units: tuple[tuple[float, str], ...] = setting(
         ((1e6, "ns"), (3e3, "us"), (3.0, "ms")),
         "number, unit",

@@ -155,6 +155,12 @@ class Predict:
         "Skid-steered robots turn as if their wheelbase were up to twice as large; beyond this factor, the model is "
         "of another robot or the units are wrong.",
     )
+    robot_as_far: float = setting(
+        1.25,
+        "factor",
+        "If a robot turns beyond that factor, and goes as far as it turns within this one, its speeds are in another unit: a "
+        f"wheelbase alters turns alone; {BY_HAND}.",
+    )
     robot_hint: float = setting(
         1.25,
         "1",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,12 @@ from bns.diagnose.data.merge_topics import of_topics
 from bns.measurements import COMMANDS, POSE
 
 Entries = dict[str, Any]
+METRES = "METRES"
+"""Stands where the wheelbase of the robot's own controller is."""
+CONTROLLERS_BASE = (
+    "the distance in metres between the middles of the two wheels that the robot's own controller reckons with (often called "
+    "wheel_separation, wheelbase or track); if nobody knows it, measure it on the robot"
+)
 _SERVE_COMMANDS = (
     "speeds of both wheels (m/s; rad/s with the wheel's radius), counters of encoders, or forward and turning speed of the body "
     "(a topic of geometry_msgs/Twist or TwistStamped such as /cmd_vel, sensor_msgs/JointState of the wheels)"
@@ -30,11 +36,33 @@ _SERVE_POSE = (
 
 
 @dataclass(frozen=True)
+class Blank:
+    """A number that no log tells, for which a word stands in the mapping.
+
+    ``word``: stands in its place; ``where``: in which line, or in which key of which entries; ``what``: what to measure or to
+    look up.
+    """
+
+    word: str
+    where: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"Fill in {self.word} ({self.where}): {self.what}."
+
+
+@dataclass(frozen=True)
 class Guess:
-    """A mapping as a tree, and what to know of it: what lacks, and what may not be what it seems."""
+    """A mapping as a tree, and what to know of it: what may not be what it seems, and numbers that nobody has filled in."""
 
     mapping: dict[str, Any]
-    remarks: tuple[str, ...] = field(default=())
+    said: tuple[str, ...] = ()
+    blanks: tuple[Blank, ...] = ()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """All that is to be known, in sentences."""
+        return *self.said, *map(str, self.blanks)
 
     @property
     def text(self) -> str:
@@ -52,7 +80,7 @@ def guessed(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = Non
     """The guess for one file, or for several of which the first is the one beside which the mapping lies."""
     motions = motions_of(table)
     if motions is not None and not others:
-        return Guess({"relative": True, "columns": motions}, tuple(_placeholders(motions)))
+        return Guess({"relative": True, "columns": motions}, blanks=tuple(_blanks(motions)))
     tables = {name: table, **(others or {})}
     found = {file: _entries(one) for file, one in tables.items()}
     poses = _best(found, POSE, truth=True)
@@ -62,20 +90,29 @@ def guessed(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = Non
     also = [{"file": file, "columns": entries} for file, entries in kept.items() if set(entries) > {"t_s"}]
     if also:
         tree["also"] = also
-    everything = {k: v for entries in (tree["columns"], *(one["columns"] for one in also)) for k, v in entries.items()}
+    everything = _everything(tree)
     if {FORWARD, TURN} <= set(everything):
-        tree["wheelbase_m"] = "METRES"
+        tree["wheelbase_m"] = METRES
     if also or of_topics(table) or _apart(table, everything):
         tree["hold_commands_s"] = float("inf")
     if "trial" not in everything:
         tree["trials"] = {"standing_s": 1}
-    return Guess(tree, tuple(_remarks(everything, tables)))
+    return Guess(tree, tuple(_remarks(everything, tables)), tuple(_blanks(everything, tables)))
 
 
 def lacking(mapping: Mapping[str, Any]) -> tuple[str, ...]:
     """What measurements need and a mapping's columns do not give (times, commands, poses), each with what would serve."""
-    entries = {**mapping["columns"], **{k: v for one in mapping.get("also", ()) for k, v in one["columns"].items()}}
-    return tuple(_lacks(entries))
+    return tuple(_lacks(_everything(mapping)))
+
+
+def blanks_of(mapping: Mapping[str, Any], tables: Mapping[str, pd.DataFrame]) -> tuple[Blank, ...]:
+    """The numbers for which words stand in a mapping of these files, by name."""
+    return tuple(_blanks(_everything(mapping), tables))
+
+
+def _everything(mapping: Mapping[str, Any]) -> Entries:
+    """The entries of all files."""
+    return {**mapping["columns"], **{k: v for one in mapping.get("also", ()) for k, v in one["columns"].items()}}
 
 
 def _entries(table: pd.DataFrame) -> Entries:
@@ -134,21 +171,12 @@ def _apart(table: pd.DataFrame, entries: Entries) -> bool:
 
 def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
     yield from _lacks(entries)
-    yield from _placeholders(entries)
     heading = entries.get("heading_rad", {})
     if {"clockwise", "zero_deg"} & set(heading):
         yield "How the heading is counted is guessed from where the robot drove: check it."
     left = entries.get(COMMANDS[0], {})
     if "unit" in left and unit_of(words_of(str(left["from"]))) is None:
         yield f"That the commands are in {left['unit']} is guessed from how far the robot went: check it."
-    if SCALE in {entry.get("scale") for entry in entries.values()}:
-        ratio = next(filter(None, (metres_a_unit(table, entries) for table in tables.values() if _has_all(table, entries))), 0.0)
-        yield (
-            f"Fill in {SCALE}, the speed in m/s that one unit of the commands stands for: the robot went about {ratio:.2g} m per "
-            "unit and second (of rad/s it is the radius of the wheels in metres, of rpm 0.105 times the radius)."
-        )
-    if {FORWARD, TURN} <= set(entries):
-        yield "Fill in METRES, the wheelbase that the robot's own controller assumes."
     told = _names_of(entries, (*COMMANDS, FORWARD, TURN))
     if told and rank_of_commands(entries) < 0:
         yield "The speeds are measured, not commanded: effects of motors and controller (lag, limits) cannot show."
@@ -175,9 +203,28 @@ def _lacks(entries: Mapping[str, Any]) -> Iterator[str]:
         yield f"No column holds {', '.join(gone)}. Suitable are {_SERVE_POSE}."
 
 
-def _placeholders(entries: Entries) -> Iterator[str]:
-    scales = {entry.get("scale") for entry in entries.values()}
-    if RADIUS in scales:
-        yield f"Fill in {RADIUS}, the radius of the wheels: their speeds are in rad/s."
-    if METRES_A_COUNT in scales:
-        yield f"Fill in {METRES_A_COUNT}, the distance in metres that a wheel drives for one count of its encoder (motor step)."
+def _blanks(entries: Entries, tables: Mapping[str, pd.DataFrame] | None = None) -> Iterator[Blank]:
+    """Numbers that no log tells."""
+    scaled = {name: entry.get("scale") for name, entry in entries.items()}
+    where = {word: f"scale in the entr{'y' if len(n) == 1 else 'ies'} {' and '.join(n)}" for word, n in _by_value(scaled).items()}
+    if RADIUS in where:
+        yield Blank(RADIUS, where[RADIUS], "the radius of the wheels in metres; their speeds are in rad/s")
+    if METRES_A_COUNT in where:
+        counted = "the distance in metres that a wheel drives for one count of its encoder (motor step)"
+        yield Blank(METRES_A_COUNT, where[METRES_A_COUNT], counted)
+    if SCALE in where:
+        ratios = (metres_a_unit(table, entries) for table in (tables or {}).values() if _has_all(table, entries))
+        ratio = next(filter(None, ratios), 0.0)
+        speed = (
+            f"the speed in m/s that one unit of the commands stands for; the robot went about {ratio:.2g} m per unit and second "
+            "(of rad/s it is the radius of the wheels in metres, of rpm 0.105 times the radius)"
+        )
+        yield Blank(SCALE, where[SCALE], speed)
+    if {FORWARD, TURN} <= set(entries):
+        yield Blank(METRES, "wheelbase_m", CONTROLLERS_BASE)
+
+
+def _by_value(scaled: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Names of entries by the word that stands for their scale."""
+    words = dict.fromkeys(value for value in scaled.values() if isinstance(value, str))
+    return {word: [name for name, value in scaled.items() if value == word] for word in words}
