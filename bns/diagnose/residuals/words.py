@@ -232,9 +232,11 @@ def _response(term: Formula, _: Predictor) -> str:
 
 
 def _later(term: Formula) -> str:
-    """By how much longer a change of speed takes, from the way that it costs: each number's share of it came so long ago."""
-    middle = [(a + b) / 2.0 for a, b in pairwise(RESPONSE_KNOTS_S)]
-    late_s = sum(k * at for k, at in zip(term.values.values(), middle, strict=True))
+    """By how much longer a change of speed takes, from the way that it costs: each number's share of it came so long ago.
+
+    By the numbers' names: a model lists them as texts, k10 before k2.
+    """
+    late_s = sum(term.values[f"k{i}"] * (a + b) / 2.0 for i, (a, b) in enumerate(pairwise(RESPONSE_KNOTS_S)))
     return f"{abs(late_s):.2g} s {'later' if late_s > 0 else 'sooner'}"
 
 
