@@ -349,6 +349,32 @@ def test_where_a_slope_helps_and_where_it_brakes_is_said(on, term, said):
     assert in_words(stand_in, predictor_of(NOMINAL)).endswith(said)
 
 
+def surface(term, on):
+    stand_in = SimpleNamespace(on=on, term=term, values={}, signal=SURFACE, fit=SimpleNamespace(model=NOMINAL))
+    return in_words(stand_in, predictor_of(NOMINAL))
+
+
+def test_a_loss_of_turning_that_is_alike_everywhere_is_said_in_one_number():
+    assert surface("-0.12 * sign(w)", "w") == "the robot turns slower by 6.9 °/s, at nearly all speeds and turn rates alike"
+    assert surface("-0.12 * sign(w)", "w") != surface("-0.06 * sign(w)", "w")
+    assert surface("0.02 * sign(v)", "v") == "the robot drives faster by 20 mm/s, at nearly all speeds and turn rates alike"
+    assert surface("-0.1 + 0 * v", "share").startswith("the robot is slower by 10.00%, at nearly all")
+
+
+def test_of_a_loss_that_grows_its_ends_are_said():
+    at = r" °/s at \S+ m/s with -?\d+ °/s"
+    said = re.fullmatch(rf"the robot turns slower by ([\d.]+){at}, slower by ([\d.]+){at}", surface("-0.3 * w", "w"))
+    most, least = (float(text) for text in said.groups())
+    assert most > 2 * least > 0
+
+
+def test_a_formula_without_a_signal_says_what_it_is_a_function_of():
+    fit = SimpleNamespace(model=NOMINAL)
+    stand_in = SimpleNamespace(on="w", term="k0 * v * x + k1 * v * y", values={"k0": 2.0, "k1": 1.0}, signal="", fit=fit)
+    words = in_words(stand_in, predictor_of(NOMINAL))
+    assert re.fullmatch(r"turning velocity depends on forward velocity and place \(by up to [\d.]+ rad/s\)", words)
+
+
 def test_a_formula_that_is_no_part_of_the_model_is_called_a_hint():
     predictor = predictor_of(NOMINAL)
     found, problem = diagnose(predictor, NOMINAL), problem_for(predictor, NOMINAL)
