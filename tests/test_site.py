@@ -178,8 +178,8 @@ PRIVATE = re.compile(BANNED.pattern + r"|\b(beside|told|share of|ways? (driven|o
 def test_effects_are_described_in_plain_english():
     jointed = [getattr(part, "effect", part) for part in map(JOINT_EFFECTS.load, JOINT_EFFECTS.names())]
     for effect in (*all_effects().values(), *jointed):
-        said = (effect.sentence, effect.residuals, effect.measurement, effect.caveat, effect.equation, *effect.beside.values())
-        for text in (*said, *(p.text for p in effect.parameters)):
+        said = (effect.sentence, effect.sized, effect.residuals, effect.measurement, effect.caveat, effect.equation)
+        for text in (*said, *effect.beside.values(), *(p.text for p in effect.parameters)):
             assert not PRIVATE.search(text), f"{effect.name}: {text}"
         assert all(p.text.strip() and p.unit for p in effect.parameters), effect.name
 

@@ -384,6 +384,18 @@ def test_a_formula_that_is_no_part_of_the_model_is_called_a_hint():
     assert "bns add LOG drag --term 'k * v' --on v --model MODEL -o NEW.yaml" in text
 
 
+@pytest.mark.parametrize(("waves", "shown"), [(1, True), (9, False)])
+def test_a_long_formula_is_said_where_it_is_and_not_shown(waves, shown):
+    predictor = predictor_of(NOMINAL)
+    found, problem = diagnose(predictor, NOMINAL), problem_for(predictor, NOMINAL)
+    term = " + ".join(f"k{i} * sin({i} * heading)" for i in range(1, waves + 1))
+    waving = fitted(problem, problem.fit(NOMINAL), "w", term, "unlisted", "heading")
+    text = diagnosis_text(replace(found, verdict="unlisted", terms=(waving,), terms_in_words=("it waves",)))
+    assert "It behaves like this: it waves." in text
+    assert (term in text) == ("unlisted: k1 = " in text) == shown
+    assert shown or "unlisted (heading), added to w: 9 numbers; the formula is in the output of --json and in" in text
+
+
 def test_a_family_earns_the_same_beside_a_term_of_any_name():
     """A term of the model had the name of the additions that are tried, and went while they were."""
     predictor = predictor_of(warming(-0.2, wheelbase={"factor": 1.1}))
