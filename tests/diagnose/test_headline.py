@@ -82,6 +82,9 @@ def test_what_is_left_is_described_once(monkeypatch):
         notes=("What no listed effect explains behaves like this: one wheel rubs.", "Another note."),
     )
     assert further_notes(left) == ["Another note."]
+    with_formula = replace(left, notes=("A candidate term: v + k * v with k = 0.1.", *left.notes))
+    assert further_notes(with_formula) == ["Another note."]
+    assert further_notes(with_formula, formula=True) == ["A candidate term: v + k * v with k = 0.1.", "Another note."]
     assert diagnosis_text(left).count("one wheel rubs") == 1
 
 

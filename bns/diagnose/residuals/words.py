@@ -44,7 +44,7 @@ def in_words(term: Formula, predictor: Predictor) -> str:
         v = term.values
         there = f"within {abs(v['c']):.3g} m of ({v['a']:.3g}, {v['b']:.3g}) m"
         if term.on in {"east", "north"}:
-            return f"{_VELOCITIES[term.on]} differs by {1e3 * v['k']:+.2g} mm/s {there}"
+            return f"{_VELOCITIES[term.on]} differs by {1e3 * v['k']:+.3g} mm/s {there}"
         if term.on == "s":
             return f"the robot slides to the {'right' if v['k'] >= 0 else 'left'} by {abs(v['k']):.2%} of its speed {there}"
         motion = {"v": " in forward motion", "w": " in its turns"}.get(term.on, "")
@@ -268,7 +268,7 @@ def _steps(term: Formula, _: Predictor) -> str:
     speeds = np.linspace(0.0, 1.0, 100 * _POINTS)
     jumps = np.flatnonzero(np.diff(_curve(term, "u", speeds)) > 0)
     step = float(np.median(np.diff(speeds[jumps]))) if len(jumps) > 1 else float("nan")
-    return f"wheel speeds come in steps of {step:.3g} m/s"
+    return f"wheel speeds come in steps of {1e3 * step:.3g} mm/s"
 
 
 def _changes(term: Formula, _: Predictor) -> str:
@@ -346,7 +346,9 @@ def _largest(term: Formula, predictor: Predictor) -> str:
     places = {name: seen[variable].ravel() for name, variable in of.items() if variable in seen}
     change = np.abs(np.broadcast_to(value_of(term.term, {**term.values, **names, **places}), left.shape))
     size = float(np.quantile(change[np.isfinite(change)], 0.95))
-    return f"by up to {size:.2%}" if term.on == SHARE else f"by up to {size:.3g} {'rad/s' if term.on == 'w' else 'm/s'}"
+    if term.on == SHARE:
+        return f"by up to {size:.2%}"
+    return f"by up to {np.degrees(size):.3g} °/s" if term.on == "w" else f"by up to {1e3 * size:.3g} mm/s"
 
 
 _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
