@@ -108,6 +108,7 @@ def page(effect: Effect, shown: Demonstration) -> str:
             "## Look-alikes\n",
             f"These effects leave nearly the same traces: {names}.",
             *(f"\n**Compared with {other}.** {text}" for other, text in effect.beside.items()),
+            *_of_robot(effect),
             "\n## Confirm it on the bench\n",
             _bench(effect),
             "\n## Use it\n",
@@ -116,6 +117,11 @@ def page(effect: Effect, shown: Demonstration) -> str:
             "```\n",
         ]
     )
+
+
+def _of_robot(effect: Effect) -> list[str]:
+    said = _sentence(effect.or_of_robot, begin=False)
+    return [f"\n**Or the robot itself.** The same log results if {said}"] if said else []
 
 
 def _drawn_with(effect: Effect, shown: Demonstration) -> str:
@@ -146,5 +152,7 @@ def _bench(effect: Effect) -> str:
     return text + (f"\n\nLog the column {columns}. {_sentence(effect.caveat)}" if columns else "")
 
 
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith('.') else '.'}" if text else ""
+def _sentence(text: str, begin: bool = True) -> str:
+    """With its full stop; ``begin``: and a capital letter."""
+    first = text[:1].upper() if begin else text[:1]
+    return f"{first}{text[1:]}{'' if text.endswith('.') else '.'}" if text else ""

@@ -14,8 +14,9 @@ from bns.cli.main import _parser
 from bns.physics.effects import all_effects
 from bns.registry import JOINT_EFFECTS
 from site_pages.command_pages import page as command_page
-from site_pages.drives import VALUES, demonstrate, visible_values
+from site_pages.drives import VALUES, Demonstration, demonstrate, visible_values
 from site_pages.effect_pages import joints
+from site_pages.effect_pages import page as effect_page
 
 ROOT = Path(__file__).resolve().parent.parent
 FETCHED = {
@@ -178,10 +179,17 @@ PRIVATE = re.compile(BANNED.pattern + r"|\b(beside|told|share of|ways? (driven|o
 def test_effects_are_described_in_plain_english():
     jointed = [getattr(part, "effect", part) for part in map(JOINT_EFFECTS.load, JOINT_EFFECTS.names())]
     for effect in (*all_effects().values(), *jointed):
-        said = (effect.sentence, effect.residuals, effect.measurement, effect.caveat, effect.equation, *effect.beside.values())
-        for text in (*said, *(p.text for p in effect.parameters)):
+        said = (effect.sentence, effect.sized, effect.residuals, effect.measurement, effect.caveat, effect.equation)
+        for text in (*said, effect.or_of_robot, *effect.beside.values(), *(p.text for p in effect.parameters)):
             assert not PRIVATE.search(text), f"{effect.name}: {text}"
         assert all(p.text.strip() and p.unit for p in effect.parameters), effect.name
+
+
+def test_the_page_of_an_effect_says_what_of_the_robot_leaves_the_same_log():
+    drawn = Demonstration({}, None, None, None)
+    marker, scale = (effect_page(all_effects()[name], drawn) for name in ("marker-offset", "camera-scale"))
+    assert "**Or the robot itself.** The same log results if the robot turns about another point than the midpoint" in marker
+    assert "Or the robot itself" not in scale
 
 
 def test_choices_name_files_that_exist():

@@ -14,14 +14,6 @@ from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.report.tables import ahead
 from bns.physics.effect import Effect
 
-VELOCITIES = {
-    "forward_m_s": "forward velocity (m/s)",
-    "sideways_m_s": "velocity to the left (m/s)",
-    "yaw_rad_s": "turn rate (rad/s)",
-    "share_of_motion": "the whole motion (fraction)",
-    "east_m_s": "velocity east (m/s)",
-    "north_m_s": "velocity north (m/s)",
-}
 _SMALL = re.compile(r"[-+]?[\d.]+e-\d+")
 """A number with a hyphen in it."""
 BADGE = '<span class="bns-badge">{}</span>'
@@ -47,11 +39,6 @@ def _cell(text: str) -> str:
     """A browser breaks lines at the hyphen of 5e-05; in a number it must not."""
     number = ' class="bns-number"' if _SMALL.fullmatch(text) else ""
     return f"<td{number}>{escape(text)}</td>"
-
-
-def velocity(channel: str) -> str:
-    """What a curve is added to, in words, with the unit."""
-    return VELOCITIES.get(channel, channel)
 
 
 def error_list(e: HorizonErrors) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import stdtr
 
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.data.variables import bare, label, velocity
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import PairedErrors
@@ -28,6 +29,7 @@ NOTABLE = DEFAULTS.verdict.notable
 CHANCE = DEFAULTS.residuals.chance
 WORST_SHARE = DEFAULTS.residuals.worst_share
 SHOWN = DEFAULTS.report.moments
+OFTEN = DEFAULTS.verdict.often
 FEWEST_CLOCKS = DEFAULTS.verdict.fewest_clocks
 
 
@@ -38,11 +40,12 @@ def notes_on(
     longer: Sequence[tuple[str, ...]] = (),
     terms: Sequence[str] = (),
     slight: Sequence[str] = (),
+    formula_in_words: str = "",
 ) -> Iterator[str]:
     """All notes, one sentence or two each.
 
     ``hint``: an effect that more trials might confirm; ``longer``: explanations with one effect more that fit as well;
-    ``terms``, ``slight``: the terms in words.
+    ``terms``, ``slight``, ``formula_in_words``: the terms and the formula in words.
     """
     selection = found.selection
     yield from (implausible_text(selection, name) for name in selection.implausible)
@@ -78,7 +81,8 @@ def notes_on(
     formula, with_terms = found.formula, found.errors_with_terms
     if formula is not None and not formula.signal and formula.paired_comparison.p_value < CHANCE:
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
-        yield f"A candidate term: {formula.on} + {formula.term} with {values}."
+        said = f"{formula_in_words}: " if formula_in_words else ""
+        yield f"A candidate term: {said}{formula.on} + {formula.term} with {values}."
     yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
     if terms and with_terms is not None and (with_terms.rose_in_the_end or not with_terms.falls):
         yield _no_lower(with_terms)
@@ -116,16 +120,37 @@ def _on_slight(unseen: bool, slight: Sequence[str]) -> Iterator[str]:
 
 
 def on_worst(both: WithoutWorst) -> str:
-    """What becomes of a verdict with and without trials that are unlike the rest."""
+    """What becomes of a verdict with and without trials that are unlike the rest, how they are unlike, and what would say why."""
     one = len(both.trials) == 1
     counts, them = ("It does not count in the fits, but is", "it") if one else ("They do not count in the fits, but are", "them")
-    those = f"{'trial' if one else 'trials'} {', '.join(both.trials)}"
-    begun = f"Unlike all others as a whole: {those}. {counts} part of the errors shown"
-    if both.same:
-        return f"{begun}; the verdict is the same with {them}. Check what happened there; `--without` excludes {them}."
+    known = {a.trial: f" ({a.in_words})" for a in both.apart[:SHOWN]}
+    each = [f"{name}{known.get(name, '')}" for name in both.trials]
+    those = f"trial {each[0]}" if one else f"trials {'; '.join(each) if known else ', '.join(each)}"
     verdict, effects = both.with_them
-    said = f"{verdict} ({', '.join(effects)})" if effects else verdict
-    return f"{begun}; with {them} the verdict would be {said}. Check what happened there; `--without` excludes {them}."
+    other = f"{verdict} ({', '.join(effects)})" if effects else verdict
+    said = f"the verdict is the same with {them}" if both.same else f"with {them} the verdict would be {other}"
+    return (
+        f"Unlike all others as a whole: {those}. {counts} part of the errors shown; {said}. {_causes(both)}`--without` excludes "
+        f"{them}."
+    )
+
+
+def _causes(both: WithoutWorst) -> str:
+    """Which causes are left of trials that are unlike the rest, and what tells them apart."""
+    said = ""
+    if any(a.once and not a.jumped for a in both.apart):
+        said += (
+            "One moment is a push, a slip, a cable that caught, a tracker that lost the robot, or a command that the log has at "
+            "a wrong time: a film, or the logged commands of that moment, tells which. "
+        )
+    if any(not a.once for a in both.apart):
+        said += (
+            "The model lacks something, so a trial that differs throughout may be one in which this matters most. "
+            if both.without[0] == "unlisted"
+            else "A trial that differs throughout had another load, floor or start, or its commands are logged at wrong times: "
+            "repeat it with the same commands. "
+        )
+    return said
 
 
 def on_many_apart(trials: Sequence[str]) -> str:
@@ -167,7 +192,9 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
     tied = {name for group in ties_of(selection) for name in group if not all(known[one].of_measuring for one in group)}
     for name in sorted(names):
         if known[name].of_measuring:
-            yield f"{name} {'would be' if name in tied else 'is'} an error of the measurement, not of the robot."
+            begun = f"{name} {'would be' if name in tied else 'is'} an error of the measurement"
+            also = known[name].or_of_robot
+            yield f"{begun}, or else one of the model of the robot: {also}." if also else f"{begun}, not of the robot."
     chain = sorted((known[name] for name in names), key=lambda effect: (effect.place, effect.name))
     logged = {*tracks.extra, *(("session_s",) if tracks.start_known else ())}
     yield from (effect.caveat for effect in chain if effect.caveat and not logged.intersection(effect.explained_by))
@@ -218,10 +245,12 @@ def _on_times(selection: SelectionResult, tracks: Tracks, names: Collection[str]
 
 
 def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
-    for p in rest.residual_dependence[:4]:
+    if left := rest.residual_dependence[:SHOWN]:
+        along = ", ".join(f"{bare(velocity(p.channel))} along {bare(label(p.variable))} ({p.share:.2%})" for p in left)
+        chance = max(p.paired_comparison.p_value for p in left)
         yield (
-            f"Left unexplained by listed effects: {p.channel} along {p.variable}, {p.share:.2%} of the loss on held-out trials "
-            f"(p {'<' if p.paired_comparison.p_value < 1e-4 else '='} {max(p.paired_comparison.p_value, 1e-4):.2g})."
+            "Left unexplained by listed effects, with the fraction of the loss on held-out trials that a free curve along a "
+            f"variable removes: {along}; p {'<' if chance < 1e-4 else '<='} {max(chance, 1e-4):.2g}."
         )
     if rest.command_times is not None:
         yield (
@@ -239,7 +268,12 @@ def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
     if rest.outliers:
         worst = "; ".join(o.in_words for o in rest.outliers[:SHOWN])
         more = ", and so on" if len(rest.outliers) > SHOWN else ""
-        yield (
-            f"{len(rest.outliers)} of {len(tracks)} trials have moments with more than {FAR:g} times the usual error: check what "
-            f"happened there ({worst}{more})."
-        )
+        some = f"{len(rest.outliers)} of {len(tracks)} trials"
+        begun = f"{some} have moments with more than {FAR:g} times the usual error ({worst}{more})"
+        if len(rest.outliers) >= OFTEN * len(tracks):
+            yield f"{begun}. That is too often for accidents: look for what they share, such as a place or a change of command."
+        else:
+            yield (
+                f"{begun}. If they share a place, a direction or a change of command, the robot or the floor does this, and it "
+                "comes back when that is driven again; else something happened once, such as a push or a cable that caught."
+            )

@@ -24,7 +24,7 @@ from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.residuals.words import in_words
-from bns.diagnose.residuals.worst_trials import WithoutWorst, far_off, most_left_out, standing_out
+from bns.diagnose.residuals.worst_trials import WithoutWorst, apart, far_off, most_left_out, standing_out
 from bns.diagnose.select.equivalents import equivalent_pairs
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
@@ -52,6 +52,8 @@ class Diagnosis:
     terms: tuple[Formula, ...] = ()
     """What no effect explains, as terms that can be added one after the other; their fit has the effects and all of them."""
     terms_in_words: tuple[str, ...] = ()
+    formula_in_words: str = ""
+    """Of the formula, where there are no terms."""
     negligible: Mapping[str, dict[str, dict[str, Any]]] = field(default_factory=dict)
     """Effects that are certain but change no error by as much as `least_fall`, with their numbers; not among the accepted."""
     imitating: tuple[str, ...] = ()
@@ -159,7 +161,9 @@ class Diagnosis:
             return None
         one = self.without_worst
         said = {"with_them": one.with_them, "without": one.without}
-        return {"trials": list(one.trials), **{k: {"verdict": v, "effects": list(e)} for k, (v, e) in said.items()}}
+        seen = [{"trial": a.trial, "times": plain(a.times), "share_of_moment": plain(a.share)} for a in one.apart]
+        both = {k: {"verdict": v, "effects": list(e)} for k, (v, e) in said.items()}
+        return {"trials": list(one.trials), "apart": seen, **both}
 
     def _terms(self) -> list[dict[str, Any]]:
         return [
@@ -183,6 +187,7 @@ class Diagnosis:
         return {
             "on": self.formula.on,
             "term": self.formula.term,
+            "in_words": self.formula_in_words,
             "values": {k: plain(v) for k, v in self.formula.values.items()},
             "elpd_diff": plain(comparison.elpd_diff),
             "dse": plain(comparison.dse),
@@ -226,7 +231,8 @@ def diagnose(
             every = [predictor.tracks.names[i] for i in (*wild, *hidden)]
             return replace(found, notes=(on_many_apart(every), *found.notes))
     names = tuple(predictor.tracks.names[i] for i in wild)
-    both = WithoutWorst(names, (found.verdict, found.effects), (without.verdict, without.effects))
+    seen = tuple(apart(found.selection.problem, found.selection.fit, wild.tolist()))
+    both = WithoutWorst(names, (found.verdict, found.effects), (without.verdict, without.effects), seen)
     return replace(without, without_worst=both, notes=(on_worst(both), *without.notes))
 
 
@@ -263,10 +269,11 @@ def _diagnosed(
         found = replace(found, selection=alike_in_metres(found.selection))
     left = found.rest.any or bool(found.terms)
     words = tuple(in_words(term, predictor) for term in found.terms)
+    formula = _formula_in_words(found.formula, predictor) if not found.terms else ""
     hint = _hint(found.selection, len(predictor.tracks), {*found.withdrawn, *found.imitating, *found.negligible})
     tick("longer explanations")
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
-    notes = notes_on(found, predictor.tracks, hint, pairs, words, [in_words(t, predictor) for t in found.slight])
+    notes = notes_on(found, predictor.tracks, hint, pairs, words, [in_words(t, predictor) for t in found.slight], formula)
     presented = _presented(found.selection, found.terms, found.errors_with_terms)
     contradicted = fitted_again(model, presented, contradicted=True) if found.terms or found.selection.accepted else ()
     return Diagnosis(
@@ -277,6 +284,7 @@ def _diagnosed(
         formula=found.formula,
         terms=found.terms,
         terms_in_words=words,
+        formula_in_words=formula,
         negligible=found.negligible,
         imitating=found.imitating,
         errors=found.errors,
@@ -284,6 +292,12 @@ def _diagnosed(
         notes=(*notes, *(f"{said} The interval does not contain the number that was given." for said in contradicted)),
         calibration=calibrated(predictor, model, barred),
     )
+
+
+def _formula_in_words(formula: Formula | None, predictor: Predictor) -> str:
+    """"" where there is none, or of a body that has no wheels."""
+    known = formula is not None and "left_m_s" in predictor.variables()
+    return in_words(formula, predictor) if formula is not None and known else ""
 
 
 def _raises_the_error(with_terms: PairedErrors | None) -> bool:

@@ -129,8 +129,13 @@ class Effect:
     apply: Callable[..., Any] = field(repr=False)
     sentence: str = ""
     """What happens, as a clause after "Missing from the model:"; may be empty, like all fields below."""
+    sized: str = ""
+    """The sentence with fitted numbers, a format string: ``{tau_s}`` is a number with its unit, ``{gain:faster|slower}`` how far
+    it is from neutral and the word for above or below ("7 % slower"), ``{gain:faster|slower|}`` that word alone."""
     measurement: str = ""
     """A measurement on the bench that shows this effect alone."""
+    or_of_robot: str = ""
+    """Of a fault of the measuring: what the robot itself may do to leave the same log, as a clause."""
     beside: Mapping[str, str] = field(default_factory=dict, hash=False)
     """Name of another effect -> how to tell the two apart, if a verdict names both."""
     explained_by: tuple[str, ...] = ()

@@ -162,6 +162,11 @@ def value_of(term: str, names: Mapping[str, Any]) -> Array:
     return np.asarray(value, dtype=np.float64)
 
 
+def names_in(term: str) -> set[str]:
+    """All names in a term, of variables, columns and numbers alike; ModelError if it is no formula."""
+    return set(_parsed("term", term).names)
+
+
 def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | None) -> tuple[list[str], list[str]]:
     """Columns of the log and numbers to fit among the names that are no variables, in order."""
     logged, unknown = [], []

@@ -262,7 +262,7 @@ def test_the_other_explanations_of_a_tie_have_numbers(found):
             assert name in rival.names
             for parameter, number in numbers.items():
                 assert number["low"] < number["value"] < number["high"]
-                assert f"  {name}: {parameter} = {number['value']:.5g}" in text
+                assert f"    {parameter} = {number['value']:.5g}" in text
 
 
 def test_what_is_added_lowers_the_error_step_by_step(log):

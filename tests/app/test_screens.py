@@ -7,7 +7,7 @@ import pytest
 
 import bns
 from bns.cli.main import main
-from bns.diagnose.report.variables import LABELS
+from bns.diagnose.data.variables import LABELS
 from bns.diagnose.residuals.along_variables import CHANNELS, WORLD
 from bns.examples import FOLDER
 from tests.diagnose.test_established import warming

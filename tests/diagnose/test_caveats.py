@@ -10,13 +10,15 @@ import pytest
 import bns.api.diagnose as asked_of
 import bns.diagnose.diagnosis as said_by
 from bns.api.diagnose import DiagnoseResult
-from bns.diagnose.caveats import _no_lower, _on_drift, _on_effects, _on_times, on_worst
+from bns.diagnose.caveats import _no_lower, _on_drift, _on_effects, _on_rest, _on_times, on_worst
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis, diagnose
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, ModelError, PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals.worst_trials import WithoutWorst
-from bns.physics.effects import effect_named
+from bns.diagnose.residuals.along_variables import ResidualDependence
+from bns.diagnose.residuals.unexplained import Unexplained
+from bns.diagnose.residuals.worst_trials import Apart, WithoutWorst
+from bns.physics.effects import all_effects, effect_named
 from tests.diagnose.worlds import NOMINAL, measured
 
 MODELS = (SimpleNamespace(rms_m=0.1), SimpleNamespace(rms_m=0.1))
@@ -102,6 +104,55 @@ def test_terms_with_which_an_error_rises_are_in_no_extended_model(monkeypatch, l
 def test_trials_that_are_left_out_are_one_or_several(trials, same, said):
     effects = ("clock-offset",)
     assert said in on_worst(WithoutWorst(trials, ("tie", effects), ("tie" if same else "effects", effects)))
+
+
+MOMENT = SimpleNamespace(when="at 3.10 s, near (0.20, 0.10) m: moved 60 mm, predicted 0 mm")
+
+
+@pytest.mark.parametrize(
+    ("share", "jumped", "verdict", "said", "unsaid"),
+    [
+        (0.97, False, "effects", ["97% of the excess from one moment: at 3.10 s", "a command that the log has at"], "throughout"),
+        (0.97, True, "effects", ["from one moment, where the tracker jumps: at 3.10 s"], "a push"),
+        (0.1, False, "effects", ["spread over the trial", "repeat it with the same commands"], "a push"),
+        (0.1, False, "unlisted", ["may be one in which this matters most"], "repeat it"),
+    ],
+)
+def test_a_trial_unlike_the_rest_is_described_and_no_cause_is_named_that_the_data_exclude(share, jumped, verdict, said, unsaid):
+    one = Apart("7", 2.2, share, MOMENT, jumped)
+    note = on_worst(WithoutWorst(("7",), (verdict, ()), (verdict, ()), (one,)))
+    assert note.startswith("Unlike all others as a whole: trial 7 (2.2 times the loss per pose of the median trial, ")
+    assert all(text in note for text in said)
+    assert unsaid not in note
+    assert note.endswith("`--without` excludes it.")
+
+
+@pytest.mark.parametrize(("moments", "said"), [(9, "too often for accidents: look for what they share"), (2, "else something")])
+def test_moments_are_accidents_only_where_they_are_few(moments, said):
+    outlier = SimpleNamespace(in_words="trial 7 at 3.10 s")
+    rest = SimpleNamespace(residual_dependence=(), command_times=None, autocorrelation=None, outliers=[outlier] * moments)
+    (note,) = _on_rest(rest, range(20))
+    assert f"{moments} of 20 trials have moments" in note
+    assert said in note
+
+
+def test_what_is_left_is_said_in_words():
+    chance = SimpleNamespace(p_value=5e-5)
+    left = [ResidualDependence("wheel_difference_m_s", "yaw_rad_s", chance, 0.083)]
+    left.append(ResidualDependence("place", "share_of_motion", chance, 0.02))
+    (note,) = _on_rest(Unexplained(tuple(left), None, ()), range(20))
+    assert "turn rate along commanded difference, right − left (8.30%), the whole motion along place (2.00%); p < 0.0001" in note
+
+
+def test_an_offset_of_the_marker_may_be_the_robots():
+    model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
+    selection = SimpleNamespace(
+        accepted=("camera-scale", "marker-offset"), competing_models=(), steps=(), fit=SimpleNamespace(model=model)
+    )
+    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
+    camera, marker = list(_on_effects(selection, tracks))[:2]
+    assert camera == "camera-scale is an error of the measurement, not of the robot."
+    assert marker.startswith("marker-offset is an error of the measurement, or else one of the model of the robot: ")
 
 
 @pytest.mark.parametrize(("rate", "scatter_s", "said"), [(1e-4, 5e-3, True), (0.0, 5e-3, False), (1e-4, 0.5, False)])

@@ -1,5 +1,6 @@
 """What a verdict presents lowers the error, and what fits best is shown, however hard it is to believe."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -60,6 +61,17 @@ def test_effects_come_before_what_is_not_explained(monkeypatch):
     assert bare == "Something is missing from the model that none of the known effects explains."
 
 
+def test_a_verdict_says_how_much_and_to_which_side(monkeypatch):
+    predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": -0.05}), trials=14, seed=11)))
+    found = found_with(monkeypatch, predictor, "yaw-bias")
+    turns = r"the robot turns (2\.\d|3)°/s to the right whenever it moves"
+    said = re.fullmatch(rf"Missing from the model: ({turns})\.", headline(found))
+    lines = diagnosis_text(found).splitlines()
+    at = lines.index(f"  yaw-bias: {said[1]}")
+    assert lines[at + 1].startswith("    rate_rad_s = -0.0")
+    assert lines[at + 2] == f"    {effect_named('yaw-bias').equation}"
+
+
 def test_what_is_left_is_described_once(monkeypatch):
     predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": 0.05}), trials=14, seed=11)))
     found = found_with(monkeypatch, predictor, "yaw-bias")
@@ -70,6 +82,9 @@ def test_what_is_left_is_described_once(monkeypatch):
         notes=("What no listed effect explains behaves like this: one wheel rubs.", "Another note."),
     )
     assert further_notes(left) == ["Another note."]
+    with_formula = replace(left, notes=("A candidate term: v + k * v with k = 0.1.", *left.notes))
+    assert further_notes(with_formula) == ["Another note."]
+    assert further_notes(with_formula, formula=True) == ["A candidate term: v + k * v with k = 0.1.", "Another note."]
     assert diagnosis_text(left).count("one wheel rubs") == 1
 
 
@@ -91,7 +106,8 @@ def test_a_skid_steer_that_turns_as_if_it_were_wider_is_shown_so(factor, plausib
     said = found.as_json()
     number = said["parameters"]["wheelbase"]["factor"]
     assert number["low"] < factor < number["high"]
-    assert "the effective wheelbase differs from that of the model" in headline(found)
+    side = "longer" if factor > 1.0 else "shorter"
+    assert re.search(rf"the effective wheelbase is .*{side} .*than that of the model", headline(found))
     assert set(said["implausible"]) == (set() if plausible else {"wheelbase"})
     assert any(note.startswith("wheelbase fits best, but with an implausible") for note in found.notes) is not plausible
     for error in said["error"].values():

@@ -93,6 +93,21 @@ def test_what_is_no_response_to_a_step_is_not_described_as_one(term):
     assert in_words(term, None).endswith("not as the response of a drive to a step does")
 
 
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [
+        (NOMINAL, "after a change of its command a wheel has half of the new speed within 0.04 s, and"),
+        (
+            NOMINAL.with_effect("motor-lag", tau_s=0.2),
+            "after a change of its command, as the effects of the wheels leave it, a wheel has half of the new speed within 0",
+        ),
+    ],
+)
+def test_a_response_says_from_what_it_begins_and_no_time_that_its_knots_do_not_resolve(model, said):
+    term = SimpleNamespace(signal=RESPONSE, on="wheels", term="k * (ago(0.4, 0.55) - u)", values={"k": 0.3})
+    assert in_words(SimpleNamespace(**vars(term), fit=SimpleNamespace(model=model)), None).startswith(said)
+
+
 def test_a_free_response_is_tried_only_where_no_effect_was_accepted(monkeypatch):
     """It can imitate lag, delay and limits; these have names, and numbers that can be measured."""
     asked = []

@@ -1,5 +1,6 @@
 """Wheels that answer unlike each other, or brake otherwise than they speed up: named, and described where they are not listed."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,8 @@ from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.established import established
-from bns.diagnose.residuals.grammar import RESPONSE_ALONE, RESPONSE_KNOTS_S, SLOWING
+from bns.diagnose.residuals.grammar import RESPONSE_ALONE, RESPONSE_KNOTS_S, SLOWING, families
+from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.words import in_words
 from bns.physics.model import effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -64,6 +66,24 @@ def test_a_response_is_said_by_how_much_later_it_makes_a_wheel(on, signal, numbe
     assert RESPONSE_KNOTS_S[2:4] == (0.1, 0.18)
     values = {f"k{i}": number * (i == 2) for i in range(len(RESPONSE_KNOTS_S) - 1)}
     assert in_words(SimpleNamespace(on=on, signal=signal, term="", values=values), None).startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("effects", "given_s", "on", "signal", "said", "within_s"),
+    [
+        ({"lag_mismatch": {"tau_s": 0.15, "ratio": 2.0}}, 0.2, "left", RESPONSE_ALONE["left"], "sooner than the right", 0.005),
+        ({"lag_mismatch": {"tau_s": 0.15, "ratio": 2.0}}, 0.1, "right", RESPONSE_ALONE["right"], "later than the left", 0.005),
+        ({"braking_lag": {"tau_s": 0.2, "brake_ratio": 0.5}}, 0.2, "wheels", SLOWING, "sooner than one that speeds", 0.02),
+    ],
+)
+def test_a_response_that_is_fitted_says_the_delay_of_the_robot(effects, given_s, on, signal, said, within_s):
+    """By 0.1 s. A fit has its numbers in the order of texts, k10 before k2: 0.14 and 0.13 s were said of one wheel."""
+    predictor, given = driven(**effects), NOMINAL.with_effect("motor-lag", tau_s=given_s)
+    family = next(f for f in families(predictor, NOMINAL.wheelbase_m) if (f.signal, f.on) == (signal, on))
+    problem = problem_for(predictor, given)
+    term = fitted(problem, problem.fit(given), on, family.term, "unlisted", signal)
+    late = re.search(rf"([0-9.]+) s {said}", in_words(term, predictor))
+    assert float(late[1]) == pytest.approx(0.1, abs=within_s)
 
 
 def made_up(intervals):

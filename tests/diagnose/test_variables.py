@@ -5,8 +5,8 @@ import pytest
 
 from bns.diagnose.comparison import BINS, _binned
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.data.variables import LABELS, label
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.report.variables import LABELS, label
 from bns.robots.snake.table import GAIT
 from tests.diagnose.worlds import NOMINAL, measured
 

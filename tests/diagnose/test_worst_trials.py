@@ -9,7 +9,7 @@ from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import diagnosis_text
-from bns.diagnose.residuals.worst_trials import most_left_out, standing_out
+from bns.diagnose.residuals.worst_trials import apart, most_left_out, standing_out
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
@@ -51,6 +51,36 @@ def test_more_than_the_worst_few_are_a_phenomenon():
     bad = hidden(wheelbase={"factor": 0.6})
     assert wild_of(with_bad(NOMINAL, bad, trials=30, of_them=1)) == ["100"]
     assert wild_of(with_bad(NOMINAL, bad, trials=30, of_them=4)) == []
+
+
+def apart_in(table, trial):
+    predictor = WheelPredictor(tracks_of(table))
+    problem = problem_for(predictor, NOMINAL)
+    return next(iter(apart(problem, problem.fit(NOMINAL), [predictor.tracks.names.index(trial)])))
+
+
+def test_a_trial_that_a_push_makes_unlike_the_rest_is_told_from_one_that_differs_throughout():
+    table = measured(NOMINAL, trials=20, seed=2)
+    pushed = table.index[table.trial == 7]
+    at = len(pushed) // 2
+    shift = np.clip((np.arange(len(pushed)) - at) / 4.0, 0.0, 1.0)  # 60 mm within four frames
+    table.loc[pushed, "x_m"] += 0.06 * shift
+    one = apart_in(table, "7")
+    assert one.once
+    assert one.share > 0.9
+    assert one.times > 1.5
+    assert abs(one.moment.t_s - table.loc[pushed[at], "t_s"]) < 0.5
+    assert f"of the excess from one moment: at {one.moment.t_s:.2f} s, near (" in one.in_words
+    other = apart_in(with_bad(NOMINAL, hidden(wheelbase={"factor": 0.6}), trials=20, of_them=1), "100")
+    assert not other.once
+    assert other.in_words.endswith("times the loss per pose of the median trial, spread over the trial")
+
+
+def test_a_trial_that_is_too_short_for_a_moment_has_none():
+    table = measured(NOMINAL, trials=12, seed=2)
+    few = table.index[table.trial == 3]
+    one = apart_in(table.drop(few[8:]), "3")
+    assert (one.once, one.moment) == (False, None)
 
 
 def held_from(table, shares):

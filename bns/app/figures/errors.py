@@ -9,8 +9,8 @@ from bokeh.models import ColumnDataSource, FactorRange, HoverTool, Span, Whisker
 
 from bns.app.figures.bands import band
 from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank
+from bns.diagnose.data.variables import label
 from bns.diagnose.predict.paired_errors import HorizonErrors
-from bns.diagnose.report.variables import label
 from bns.plotting.style import BLUE, GREY, OKABE_ITO, RED
 
 

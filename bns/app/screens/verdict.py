@@ -8,7 +8,7 @@ from html import escape
 from bns.api.diagnose import DiagnoseResult
 from bns.app.html import found_errors, found_numbers, mm
 from bns.diagnose.design.competing_models import Rival
-from bns.diagnose.report.plain_language import certainty, headline
+from bns.diagnose.report.plain_language import certainty, further_notes, headline
 from bns.diagnose.report.tables import ahead
 
 _SWITCH_ON = "Switch it on, see the error fall in the table, then save the extended model on the Next screen."
@@ -30,7 +30,7 @@ def verdict_html(result: DiagnoseResult, others: Sequence[Rival]) -> str:
     either = "".join(f"<br>or{found_numbers(other.numbers)}" for other in others)
     then = _then(result)
     said = f"<b>{escape(headline(d))}</b> {escape(sure)}{sizes}{either}{words}" + (f"<br>{then}" if then else "")
-    notes = "".join(f"<li>{escape(note)}</li>" for note in d.notes if note not in sure)
+    notes = "".join(f"<li>{escape(note)}</li>" for note in further_notes(d, formula=True) if note not in sure)
     listed = f"<ul id='bns-notes'>{notes}</ul>" if notes else ""
     return f"<p id='bns-verdict'>{said}</p>{listed}{found_errors(d.errors_with_terms or d.errors)}"
 

@@ -10,15 +10,15 @@ import panel as pn
 from bns.api.compare import CompareResult
 from bns.app.figures.errors import WindowFigures, noise_in_words
 from bns.app.figures.paths import PathFigure
-from bns.app.html import mm, note, table, velocity
+from bns.app.html import mm, note, table
 from bns.app.jobs import Jobs
 from bns.app.names import called
 from bns.app.parts import WIDE, Problem, beside, drawn, heading, html, offer, on_change, row
 from bns.app.sliders import Slider
 from bns.app.tab import Tab
 from bns.app.workbench import Shown, Workbench
+from bns.diagnose.data.variables import label, velocity
 from bns.diagnose.report.tables import ahead
-from bns.diagnose.report.variables import label
 
 GIVEN, NOW = "as given", "as it is now"
 

@@ -13,10 +13,10 @@ from matplotlib.ticker import FuncFormatter
 
 from bns.diagnose.adding import ExtendedModel
 from bns.diagnose.comparison import Comparison, Curve
+from bns.diagnose.data.variables import label as in_words
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.report.text import ahead
-from bns.diagnose.report.variables import label as in_words
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, save, style
 
 

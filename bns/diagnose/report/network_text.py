@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from bns.diagnose.report.variables import LABELS
+from bns.diagnose.data.variables import LABELS
 from bns.diagnose.residuals.network_errors import FEWEST, FEWEST_TRIALS, MEMORY_S, NetworkErrors
 
 _CAUSES = {

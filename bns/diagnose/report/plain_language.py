@@ -10,21 +10,18 @@ import numpy as np
 from bns.diagnose.design.competing_models import without_last
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.report.people import unit_for_people
+from bns.diagnose.report.sized import sized_sentence
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, without_width
 
-_UNITS = {"s": (1e3, "ms"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "rad": (57.29578, "°"), "rad/s": (57.29578, "°/s")}
-"""SI unit -> factor and unit for people."""
-_LARGE = DEFAULTS.report.large
 _CAUSES = DEFAULTS.report.causes
 
 
 def figures_in_words(value: float, low: float | None, high: float | None, unit: str) -> tuple[str, str]:
     """A number with its unit, and its 95 % interval ("" where there is none), rounded to what is known of it."""
-    factor, shown = _UNITS.get(unit, (1.0, "" if unit == "1" else unit))
-    if unit in {"s", "m"} and abs(value) >= _LARGE:
-        factor, shown = 1.0, unit
+    factor, shown = unit_for_people(value, unit)
     ends = () if low is None or high is None or without_width(low, high) else (low, high)
     numbers = [factor * v for v in (value, *ends) if v is not None and np.isfinite(v)]
     if not numbers:
@@ -71,13 +68,14 @@ def numbers_in_words(
 
 def headline(d: Diagnosis) -> str:
     """The verdict in one sentence or two."""
-    said = _all_of(d, d.effects)
+    numbers = d.numbers
+    said = _all_of(d, d.effects, numbers)
     if d.selection is not None and (d.verdict == "tie" or (d.verdict == "unlisted" and d.selection.competing_models)):
         explanations = (d.selection.accepted, *d.selection.competing_models)
         shared = tuple(name for name in explanations[0] if all(name in names for names in explanations))
         causes = [_all_of(d, tuple(n for n in names if n not in shared)) or "nothing else" for names in explanations]
         some = causes[:_CAUSES] + (["something else"] if len(causes) > _CAUSES else [])
-        either = f"{_all_of(d, shared)}; and either" if shared else "either"
+        either = f"{_all_of(d, shared, numbers)}; and either" if shared else "either"
         rest = "; and also something that none of the known effects explains" if d.verdict == "unlisted" else ""
         return f"Missing from the model: {either} {', or '.join(some)}{rest}. These measurements cannot decide which."
     return {
@@ -97,16 +95,19 @@ def with_what(d: Diagnosis) -> str:
     return "With it" if len(d.effects) == 1 else "With them"
 
 
-def further_notes(d: Diagnosis) -> list[str]:
-    """The notes, less those that only repeat what is left over, which stands at the head of an answer."""
+def further_notes(d: Diagnosis, formula: bool = False) -> list[str]:
+    """The notes, less those that only repeat what is shown at the head of an answer: what is left over.
+
+    ``formula``: is the note wanted that has a formula? Not where the formula is shown as well.
+    """
     said = tuple(f"behaves like this: {words}." for words in d.behaviour)
-    return [note for note in d.notes if not note.endswith(said)]
+    return [note for note in d.notes if not note.endswith(said) and (formula or not note.startswith("A candidate term: "))]
 
 
-def _all_of(d: Diagnosis, names: tuple[str, ...]) -> str:
-    """What happens where these effects are at work, in everyday words."""
+def _all_of(d: Diagnosis, names: tuple[str, ...], numbers: Mapping[str, Mapping[str, Mapping[str, Any]]] | None = None) -> str:
+    """What happens where these effects are at work, in everyday words; how much, where ``numbers`` has it."""
     known = known_effects(d.selection) if d.selection else {}
-    return " and ".join(known[name].in_words for name in names)
+    return " and ".join(sized_sentence(known[name], (numbers or {}).get(name, {})) for name in names)
 
 
 def certainty(d: Diagnosis) -> str:

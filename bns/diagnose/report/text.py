@@ -17,9 +17,13 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.report.plain_language import further_notes
+from bns.diagnose.report.sized import sized_sentence
+from bns.diagnose.residuals.symbolic import Formula
+from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, numbers_of_term, ties_of, without_width
 from bns.physics.decoys import DECOYS
+from bns.physics.effect import Effect
 
 _VERDICTS = {
     "none": "Nothing is missing that these measurements could show.",
@@ -29,6 +33,7 @@ _VERDICTS = {
     "insufficient-data": "These measurements do not suffice for a verdict.",
 }
 _SHOWN = DEFAULTS.report.rows
+_WIDTH = DEFAULTS.report.formula_width
 
 
 def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
@@ -59,12 +64,12 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival], command: Mapping[str, str]
     odd = [implausible_text(d.selection, name) for name in d.selection.implausible] if d.selection is not None else []
     yield from odd
     if d.selection is not None:
-        begun = "Beyond these effects, the robot behaves like this" if d.effects else "It behaves like this"
-        yield from (f"{begun}: {words}." for words in d.behaviour)
-        yield from _numbers(d)
+        known = known_effects(d.selection)
+        yield from _effects(d.numbers, known)
+        yield from _behaviour(d)
         for rival in rivals:
             yield f"or {' and '.join(rival.names)}:"
-            yield from _intervals(rival.numbers, d.selection.fit.model.catalogue())
+            yield from _effects(rival.numbers, known)
         for group in ties_of(d.selection):
             yield "cannot be told apart: " + ", ".join(group)
         yield from _errors(d.errors_with_terms or d.errors)
@@ -74,15 +79,9 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival], command: Mapping[str, str]
         yield from _intervals(numbers_of(d.calibration))
         for side, (value, low, high) in wheel_sizes(d.calibration).items():
             yield f"  {side} wheel: {value:.5g} of the drawing's size (95 %: {low:.5g} to {high:.5g})"
-    hints = (d.formula,) if d.formula and not d.terms else ()
-    for term in (*d.terms, *hints):
-        kind = "hint, not part of the extended model: candidate term" if hints else "candidate term"
-        yield f"\n{kind} {term.name}, added to {term.on}: {term.term}"
-        yield from _intervals({term.name: numbers_of_term(term)})
-    for hint in hints:
-        term = f"{hint.name} --term {shlex.quote(hint.term)} --on {hint.on}"
-        words = f"bns add {command['data']} {term} {command['model']} -o NEW.yaml"
-        yield f"    to try it: {words}"
+    yield from _terms(d)
+    if d.formula is not None and not d.terms:
+        yield from _hint(d.formula, d.formula_in_words, command)
     notes = [note for note in further_notes(d) if note not in odd]
     if notes:
         yield "\nnotes:"
@@ -101,24 +100,63 @@ def _named(d: Diagnosis) -> str:
     return enumerated([f"{name} (or {' or '.join(others[name])})" if others.get(name) else name for name in d.effects])
 
 
-def _numbers(d: Diagnosis) -> Iterator[str]:
-    assert d.selection is not None
-    yield from _intervals(d.numbers, d.selection.fit.model.catalogue())
+def _effects(values: Mapping[str, Mapping[str, Mapping[str, Any]]], known: Mapping[str, Effect]) -> Iterator[str]:
+    """Each effect: what happens, and how much; its numbers with their intervals; its equation."""
+    for name, numbers in values.items():
+        yield f"  {name}: {sized_sentence(known[name], numbers)}" if name in known else f"  {name}"
+        shown = {key: n for key, n in numbers.items() if n["low"] is not None and n["high"] is not None}
+        yield from (f"    {_number(key, n)}" for key, n in shown.items())
+        if name in known:
+            yield f"    {known[name].equation}"
 
 
-def _intervals(
-    values: Mapping[str, Mapping[str, Mapping[str, Any]]], catalogue: Mapping[str, Any] | None = None
-) -> Iterator[str]:
+def _behaviour(d: Diagnosis) -> Iterator[str]:
+    """What no effect explains: in a line, or a list where it is several things."""
+    begun = "Beyond these effects, the robot behaves like this:" if d.effects else "It behaves like this:"
+    if len(d.behaviour) == 1:
+        yield f"{begun} {d.behaviour[0]}."
+    elif d.behaviour:
+        yield begun
+        yield from (f"  - {words}." for words in d.behaviour)
+
+
+def _terms(d: Diagnosis) -> Iterator[str]:
+    """The terms as formulas; of a long one, where it is written."""
+    for term in d.terms:
+        numbers = numbers_of_term(term)
+        if len(term.term) <= _WIDTH:
+            yield f"\ncandidate term {term.name}, added to {term.on}: {term.term}"
+            yield from _intervals({term.name: numbers})
+            continue
+        written = "" if d.terms_raise_the_error else " and in the model that -o FILE writes"
+        yield (
+            f"\ncandidate term {term.name} ({term.signal}), added to {term.on}: {len(numbers)} numbers; the formula is in the "
+            f"output of --json{written}"
+        )
+
+
+def _hint(formula: Formula, words: str, command: Mapping[str, str]) -> Iterator[str]:
+    """A formula that is no part of the extended model: what it says, and the command that adds it."""
+    said = f"{words};\n  " if words else ""
+    yield f"\nhint, not part of the extended model: {said}candidate term {formula.name}, added to {formula.on}: {formula.term}"
+    yield from _intervals({formula.name: numbers_of_term(formula)})
+    term = f"{formula.name} --term {shlex.quote(formula.term)} --on {formula.on}"
+    yield f"    to try it: bns add {command['data']} {term} {command['model']} -o NEW.yaml"
+
+
+def _intervals(values: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iterator[str]:
     for effect, numbers in values.items():
         for name, n in numbers.items():
             if n["low"] is not None and n["high"] is not None:
                 yield _with_interval(effect, name, n)
-        if catalogue and effect in catalogue:
-            yield f"    {catalogue[effect].equation}"
 
 
 def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
-    said = f"  {effect}: {name} = {n['value']:.5g}{_unit(n)}"
+    return f"  {effect}: {_number(name, n)}"
+
+
+def _number(name: str, n: Mapping[str, Any]) -> str:
+    said = f"{name} = {n['value']:.5g}{_unit(n)}"
     if without_width(n["low"], n["high"]):
         return f"{said} (no interval: it is at a bound, or no small change of it changes the loss)"
     return f"{said} (95 %: {n['low']:.5g} to {n['high']:.5g})"

@@ -55,9 +55,14 @@ class Outlier:
     @property
     def in_words(self) -> str:
         """All of it in a clause."""
+        return f"trial {self.trial} {self.when}"
+
+    @property
+    def when(self) -> str:
+        """The same, without the trial."""
         turned, predicted = (round(np.degrees(angle)) for angle in (self.turned_rad, self.predicted_rad))
         return (
-            f"trial {self.trial} at {self.t_s:.2f} s, near ({self.x_m:.2f}, {self.y_m:.2f}) m: moved {1e3 * self.moved_m:.0f} mm "
+            f"at {self.t_s:.2f} s, near ({self.x_m:.2f}, {self.y_m:.2f}) m: moved {1e3 * self.moved_m:.0f} mm "
             f"and turned {turned}° in {self.lasted_s:.2f} s, predicted {1e3 * self.predicted_m:.0f} mm and {predicted}°"
         )
 
@@ -78,11 +83,12 @@ def outliers(problem: Problem, fit: Fit) -> list[Outlier]:
     worst = {int(tracks.trial[start[i]]): i for i in reversed(order)}
     if len(worst) < TRIALS:
         return []
-    found = [_outlier(problem, fit, int(start[i]), float(size[i])) for i in worst.values()]
+    found = [moment_at(problem, fit, int(start[i]), float(size[i])) for i in worst.values()]
     return sorted(found, key=lambda o: -o.size)
 
 
-def _outlier(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
+def moment_at(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
+    """The window that begins with this frame."""
     tracks, begin, end = problem.predictor.tracks, start - 1, start + WIDTH - 1
     driven, off = (way[0] for way in ways(problem, fit, np.array([begin]), np.array([end])))
     way, turned = np.hypot(*(driven + off)[:2]), driven[2] + off[2]

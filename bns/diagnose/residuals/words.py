@@ -22,14 +22,18 @@ from bns.diagnose.residuals.grammar import (
     SPEED_THERE,
     STRAIGHT,
     STRAIGHT_AT,
+    SURFACE,
+    SURFACE_KNOTS,
     TRAVEL,
 )
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.settings import DEFAULTS
-from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, value_of
+from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, names_in, value_of
 
 _POINTS = 400
 _ALIKE = DEFAULTS.report.same_share
+_FLAT = DEFAULTS.report.flat_share
+_ENDS = DEFAULTS.report.surface_ends
 _WAYS = ({"lately10": 1.0, "lately100": 1.0}, {"lately10": 0.0, "lately100": 1.0})
 """Of a wheel that drove a metre just now; and of one that did so more than 10 s ago."""
 
@@ -38,13 +42,18 @@ def in_words(term: Formula, predictor: Predictor) -> str:
     """One sentence without its full stop."""
     if term.signal == "place" and "c" in term.values:
         v = term.values
-        forward = " in forward motion" if term.on == "v" else ""
-        return f"{_slower(-v['k'])}{forward} within {abs(v['c']):.3g} m of ({v['a']:.3g}, {v['b']:.3g}) m"
+        there = f"within {abs(v['c']):.3g} m of ({v['a']:.3g}, {v['b']:.3g}) m"
+        if term.on in {"east", "north"}:
+            return f"{_VELOCITIES[term.on]} differs by {1e3 * v['k']:+.3g} mm/s {there}"
+        if term.on == "s":
+            return f"the robot slides to the {'right' if v['k'] >= 0 else 'left'} by {abs(v['k']):.2%} of its speed {there}"
+        motion = {"v": " in forward motion", "w": " in its turns"}.get(term.on, "")
+        return f"{_slower(-v['k'])}{motion} {there}"
     said = _SAID.get((term.signal, term.on))
     return (
         said(term, predictor)
         if said
-        else f"{_VELOCITIES[term.on]} depends on {term.signal} ({_largest(term, predictor)})"
+        else f"{_VELOCITIES[term.on]} depends on {term.signal or _variables(term)} ({_largest(term, predictor)})"
     )
 
 
@@ -59,6 +68,28 @@ _VELOCITIES = {
     "left": "the speed of the left wheel",
     "right": "the speed of the right wheel",
 }
+
+
+_NAMES = {
+    "v": "forward velocity",
+    "w": "turn rate",
+    "l": "the left wheel's speed",
+    "r": "the right wheel's speed",
+    "t": "time of the session",
+    "tau": "time in the trial",
+    "d": "distance driven in the trial",
+    "x": "place",
+    "y": "place",
+    "heading": "heading",
+    "u": "its speed",
+}
+
+
+def _variables(term: Formula) -> str:
+    """What a formula without a signal is a function of."""
+    used = names_in(term.term)
+    found = list(dict.fromkeys(text for name, text in _NAMES.items() if name in used)) or ["whether a wheel turns"]
+    return " and ".join(filter(None, (", ".join(found[:-1]), found[-1])))
 
 
 def _slower(share: float) -> str:
@@ -181,6 +212,50 @@ def _speed(term: Formula, predictor: Predictor) -> str:
     return f"{whose}'s speed is not proportional to its command: {pairs}"
 
 
+def _surface(term: Formula, predictor: Predictor) -> str:
+    """Of a free surface over speed and turn rate: how much, from the least to the most that usual commands see, and where."""
+    v, w = _driven(term, predictor)
+    own, knots = (w, SURFACE_KNOTS[1]) if term.on == "w" else (v, SURFACE_KNOTS[0])
+    change = np.broadcast_to(value_of(term.term, {**term.values, "v": v, "w": w, "moving": np.ones_like(v)}), v.shape)
+    said: Callable[[float], str] = _slower_share
+    kept = np.abs(v) + np.abs(w) > 0.0
+    if term.on != SHARE:  # the surface begins at rest with nothing: from its first knot on it says what happens
+        change, kept = change * np.sign(own), np.abs(own) >= knots[1] * np.abs(own).max()
+        said = _slower_turn if term.on == "w" else _slower_way
+    if not kept.any():
+        return f"{_VELOCITIES[term.on]} depends on {term.signal} ({_largest(term, predictor)})"
+    change, v, w = change[kept], v[kept], w[kept]
+    order = np.argsort(change)
+    least, most = (order[int(end * (len(order) - 1))] for end in _ENDS)
+    verb = {"w": "turns", "v": "drives"}.get(term.on, "is")
+    if change[least] * change[most] > 0.0 and change[most] - change[least] < _FLAT * abs(float(np.median(change))):
+        return f"the robot {verb} {said(float(np.median(change)))}, at nearly all speeds and turn rates alike"
+    at = [f"{said(float(change[i]))} at {v[i]:.2g} m/s with {np.degrees(w[i]):.0f} °/s" for i in (least, most)]
+    return f"the robot {verb} {', '.join(at)}"
+
+
+def _driven(term: Formula, predictor: Predictor) -> tuple[Array, Array]:
+    """Forward velocity and turn rate in every command: what the effects of the wheels leave of them."""
+    seen = predictor.variables()
+    left, right = seen["left_m_s"].ravel(), seen["right_m_s"].ravel()
+    if isinstance(predictor, WheelPredictor):
+        turned = predictor.turned(term.fit.model)
+        left, right = turned.left_m_s.ravel(), turned.right_m_s.ravel()
+    return (left + right) / 2.0, (right - left) / term.fit.model.wheelbase_m
+
+
+def _slower_share(change: float) -> str:
+    return _slower(-change)
+
+
+def _slower_turn(change: float) -> str:
+    return f"{'slower' if change <= 0 else 'faster'} by {abs(np.degrees(change)):.2g} °/s"
+
+
+def _slower_way(change: float) -> str:
+    return f"{'slower' if change <= 0 else 'faster'} by {1e3 * abs(change):.2g} mm/s"
+
+
 def _work(term: Formula, _: Predictor) -> str:
     per_m = [-float(_curve(term, "u", np.ones(1), **ways)[0]) for ways in _WAYS]
     return (
@@ -193,7 +268,7 @@ def _steps(term: Formula, _: Predictor) -> str:
     speeds = np.linspace(0.0, 1.0, 100 * _POINTS)
     jumps = np.flatnonzero(np.diff(_curve(term, "u", speeds)) > 0)
     step = float(np.median(np.diff(speeds[jumps]))) if len(jumps) > 1 else float("nan")
-    return f"wheel speeds come in steps of {step:.3g} m/s"
+    return f"wheel speeds come in steps of {1e3 * step:.3g} mm/s"
 
 
 def _changes(term: Formula, _: Predictor) -> str:
@@ -221,20 +296,29 @@ def _response(term: Formula, _: Predictor) -> str:
             f"{_VELOCITIES[term.on]} depends on its commands of the last {RESPONSE_KNOTS_S[-1]:g} s, but not as the response "
             "of a drive to a step does"
         )
-    half = float(grid[np.argmax(speed >= end / 2.0)])
+    half_s = float(grid[np.argmax(speed >= end / 2.0)])
+    half = f"after {half_s:.2g} s" if half_s > RESPONSE_KNOTS_S[1] else f"within {RESPONSE_KNOTS_S[1]:g} s"
     settled = float(grid[np.max(np.flatnonzero(np.abs(speed - end) > 0.05 * abs(end)), initial=0)])
     over = float(speed.max()) / end - 1.0
     beyond = f", goes beyond it by {over:.0%} after {grid[int(speed.argmax())]:.2g} s" if over > 0.02 else ""
     return (
-        f"after a change of its command {what} has half of the new speed after {half:.2g} s{beyond}, and stays within 5% of it "
-        f"from {settled:.2g} s on"
+        f"after a change of its command{_left_of(term)} {what} has half of the new speed {half}{beyond}, and stays within 5% of "
+        f"it from {settled:.2g} s on"
     )
 
 
+def _left_of(term: Formula) -> str:
+    """That a response begins from what the effects of the wheels leave of a command, where the model has any."""
+    on_wheels = any(active.effect.stage == "wheel" for active in term.fit.model.effects)
+    return ", as the effects of the wheels leave it," if on_wheels else ""
+
+
 def _later(term: Formula) -> str:
-    """By how much longer a change of speed takes, from the way that it costs: each number's share of it came so long ago."""
-    middle = [(a + b) / 2.0 for a, b in pairwise(RESPONSE_KNOTS_S)]
-    late_s = sum(k * at for k, at in zip(term.values.values(), middle, strict=True))
+    """By how much longer a change of speed takes, from the way that it costs: each number's share of it came so long ago.
+
+    By the numbers' names: a model lists them as texts, k10 before k2.
+    """
+    late_s = sum(term.values[f"k{i}"] * (a + b) / 2.0 for i, (a, b) in enumerate(pairwise(RESPONSE_KNOTS_S)))
     return f"{abs(late_s):.2g} s {'later' if late_s > 0 else 'sooner'}"
 
 
@@ -258,10 +342,13 @@ def _largest(term: Formula, predictor: Predictor) -> str:
         "r": right,
         "moving": np.ones_like(left),
     }
-    places = {n: seen[m].ravel() for n, m in (("x", "x_m"), ("y", "y_m"), ("heading", "heading_rad")) if m in seen}
+    of = {"x": "x_m", "y": "y_m", "heading": "heading_rad", "tau": "time_in_trial_s", "t": "session_s", "d": "way_m"}
+    places = {name: seen[variable].ravel() for name, variable in of.items() if variable in seen}
     change = np.abs(np.broadcast_to(value_of(term.term, {**term.values, **names, **places}), left.shape))
     size = float(np.quantile(change[np.isfinite(change)], 0.95))
-    return f"by up to {size:.2%}" if term.on == SHARE else f"by up to {size:.3g} {'rad/s' if term.on == 'w' else 'm/s'}"
+    if term.on == SHARE:
+        return f"by up to {size:.2%}"
+    return f"by up to {np.degrees(size):.3g} °/s" if term.on == "w" else f"by up to {1e3 * size:.3g} mm/s"
 
 
 _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
@@ -286,4 +373,5 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     **{(signal, on): _response for on, signal in RESPONSE_OF.items()},
     **{(signal, on): _one_wheel for on, signal in RESPONSE_ALONE.items()},
     (SLOWING, "wheels"): _slowing,
+    **{(SURFACE, on): _surface for on in ("v", "w", SHARE)},
 }

@@ -8,6 +8,7 @@ does so at times, and they count.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,42 @@ from numpy.typing import NDArray
 
 from bns.diagnose.data.tracking_noise import robust_sd
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.noise import huber
+from bns.diagnose.residuals.outliers import WIDTH, Outlier, moment_at
 from bns.diagnose.settings import DEFAULTS
 
 SHARE = DEFAULTS.residuals.worst_share
 FAR = DEFAULTS.residuals.worst_far
+ONCE = DEFAULTS.report.once_share
+
+
+@dataclass(frozen=True)
+class Apart:
+    """How a trial is unlike the rest: how large its loss is, and whether it comes from one moment."""
+
+    trial: str
+    times: float
+    """Its mean loss per pose, divided by that of the median trial."""
+    share: float
+    """The part of the excess that comes from the worst moment."""
+    moment: Outlier | None
+    """None in a trial that is too short for one."""
+    jumped: bool
+    """Was the tracker seen to jump there?"""
+
+    @property
+    def once(self) -> bool:
+        """Is it one moment that makes the trial unlike the rest?"""
+        return self.moment is not None and self.share >= ONCE
+
+    @property
+    def in_words(self) -> str:
+        """All of it in a clause."""
+        begun = f"{self.times:.2g} times the loss per pose of the median trial"
+        if self.moment is None or not self.once:
+            return f"{begun}, spread over the trial"
+        jumps = ", where the tracker jumps" if self.jumped else ""
+        return f"{begun}, {min(self.share, 1.0):.0%} of the excess from one moment{jumps}: {self.moment.when}"
 
 
 @dataclass(frozen=True)
@@ -28,6 +61,8 @@ class WithoutWorst:
     trials: tuple[str, ...]
     with_them: tuple[str, tuple[str, ...]]
     without: tuple[str, tuple[str, ...]]
+    apart: tuple[Apart, ...] = ()
+    """What is known of these trials."""
 
     @property
     def same(self) -> bool:
@@ -54,3 +89,23 @@ def far_off(problem: Problem, fit: Fit) -> NDArray[np.int64]:
     spread = max(float(robust_sd(off)), 1.0 / np.sqrt(float(np.median(frames))))
     order = np.argsort(-off)
     return np.asarray(order[off[order] > FAR * spread])
+
+
+def apart(problem: Problem, fit: Fit, trials: Sequence[int]) -> Iterator[Apart]:
+    """What a fit in which all trials count says of some of them."""
+    tracks = problem.predictor.tracks
+    loss, jumped = huber(fit.whitened).reshape(len(fit.whitened), -1).sum(axis=1), tracks.jumped
+    mean = [float(loss[a:b].mean()) if b > a else 0.0 for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
+    usual = float(np.median(mean))
+    for trial in trials:
+        begin, end = (int(frame) for frame in tracks.first[trial : trial + 2])
+        name, times = tracks.names[trial], mean[trial] / max(usual, 1e-12)
+        excess = np.concatenate([[0.0], np.cumsum(loss[begin:end] - usual)])
+        windows = excess[1 + WIDTH :] - excess[1:-WIDTH]
+        if not len(windows) or excess[-1] <= 0.0:
+            yield Apart(name, times, 0.0, None, False)
+            continue
+        start = begin + 1 + int(windows.argmax())
+        moment = moment_at(problem, fit, start, float(windows.max()))
+        jumps = jumped is not None and bool(jumped[start : start + WIDTH].any())
+        yield Apart(name, times, float(windows.max() / excess[-1]), moment, jumps)

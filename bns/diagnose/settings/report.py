@@ -27,6 +27,9 @@ class Report:
     moments: int = setting(4, "trials", f"Largest number of trials whose moment that stands out is described; {BY_HAND}.")
     network_bins: int = setting(8, "bins", f"Bins of a figure of networks' errors; {BY_HAND}.")
     large: float = setting(1.0, "s or m", "From one second or one metre on, values are not shown in ms or mm.")
+    by_factor: float = setting(
+        2.0, "1", f"From this factor on, up or down, a sentence says a factor and not a percentage; {BY_HAND}."
+    )
     causes: int = setting(3, "causes", f"Largest number of causes in a headline; {BY_HAND}.")
     no_width: float = setting(
         1e-5, "1", f"An interval whose ends differ by less than this share says nothing and is not shown; {BY_HAND}."
@@ -36,6 +39,24 @@ class Report:
         "1",
         "Where a wheel's speed divided by its command differs by less than this from speed to speed, the words say that it is "
         f"slower or faster by one share, and not that it is out of proportion; {BY_HAND}.",
+    )
+    flat_share: float = setting(
+        0.3,
+        "1",
+        "Where a free surface over speed and turn rate varies by less than this share of its median, the words say that it is "
+        f"alike at nearly all speeds and turn rates; {BY_HAND}.",
+    )
+    surface_ends: tuple[float, float] = setting(
+        (0.05, 0.95), "of the commands", f"Quantiles between which the words give the values of such a surface; {BY_HAND}."
+    )
+    formula_width: int = setting(
+        90, "characters", f"A longer formula is not shown in the terminal, only said where it is written; {BY_HAND}."
+    )
+    once_share: float = setting(
+        0.5,
+        "1",
+        "Where one moment makes up this share of what a trial's loss has beyond the usual, a note says that something happened "
+        f"there, and else that the whole trial differs; {BY_HAND}.",
     )
     frame_s: float = setting(0.1, "s", f"Time between the points of a planned path that is drawn; {BY_HAND}.")
     planned_trials: int = setting(3, "trials", f"Proposed trials that a figure shows; {BY_HAND}.")

@@ -34,6 +34,7 @@ EFFECT = Effect(
     "speed become ramps.",
     lookalikes=("motor-lag", "command-delay"),
     sentence="the acceleration of the wheels is limited",
+    sized="no wheel changes its speed faster than by {max_m_s2}",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
     apply=apply,
     needs="track",

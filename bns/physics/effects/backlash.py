@@ -29,6 +29,7 @@ EFFECT = Effect(
     residuals="After each reversal of a wheel a fixed distance is missing at any speed; trials without reversals fit.",
     lookalikes=("caster-swing", "command-delay", "dead-zone"),
     sentence="play in the gears stops a wheel briefly whenever it changes direction",
+    sized="play in the gears stops a wheel for {gap_m} of its distance whenever it changes direction",
     measurement="hold the motor still, turn the wheel by hand, and measure the play at its rim",
     apply=apply,
     needs="track",

@@ -34,6 +34,7 @@ EFFECT = Effect(
     residuals="As with a lag of the motors, but a stop takes another way than a start from rest to the same speed.",
     lookalikes=("motor-lag", "gear-friction", "backlash"),
     sentence="the wheels slow down with another lag than they speed up",
+    sized="the wheels follow their commands with a lag of {tau_s}, which is {brake_ratio:longer|shorter} while they slow down",
     measurement="log the wheels' own speeds (encoders) at a high rate, from rest to a speed and from that speed to rest",
     apply=apply,
     needs="track",

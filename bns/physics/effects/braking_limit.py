@@ -36,6 +36,7 @@ EFFECT = Effect(
     residuals="As with a limit of the acceleration, but a stop takes another way than a start from rest to the same speed.",
     lookalikes=("acceleration-limit", "braking-lag"),
     sentence="the wheels' acceleration is limited, otherwise while they slow down",
+    sized="no wheel speeds up faster than by {max_m_s2}, and the limit is {brake_ratio:higher|lower} while it slows down",
     measurement="read the limits of acceleration and deceleration in the settings of the drive, or log the wheels' own speeds "
     "(encoders) from rest to a speed and back",
     apply=apply,

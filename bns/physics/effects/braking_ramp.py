@@ -39,6 +39,7 @@ EFFECT = Effect(
     residuals="As with ramps of velocity and turn rate, but a stop takes another way than a start from rest to the same speed.",
     lookalikes=("velocity-ramp", "braking-limit"),
     sentence="forward velocity and turn rate are changed by ramps, by others to slow down",
+    sized="forward velocity and turn rate are changed by ramps, which are {brake_ratio:steeper|flatter} to slow down",
     measurement="read the limits of acceleration and deceleration in the settings of the drive or of the velocity smoother",
     apply=apply,
     needs="track",

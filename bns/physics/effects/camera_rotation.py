@@ -39,6 +39,8 @@ EFFECT = Effect(
     residuals="The robot appears to drive at a constant angle to its heading, also in reverse.",
     lookalikes=("side-slip", "marker-offset"),
     sentence="the tracker's positions are rotated relative to its headings (its axes are turned, or the markers on the robot)",
+    sized="the tracker's positions are rotated {angle_rad:to the left|to the right} relative to its headings (its "
+    "axes are turned, or the markers on the robot)",
     measurement="compare the tracked heading with a straight edge along the robot; or "
     "lay a straight edge along heading zero, track both of its ends, and measure its angle to the x axis",
     apply=apply,

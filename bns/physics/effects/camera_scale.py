@@ -21,6 +21,7 @@ EFFECT = Effect(
     residuals="All distances are wrong by the same fraction, while all turns fit.",
     lookalikes=("speed-gain", "wheelbase"),
     sentence="the tracker reports all distances too long or too short by one factor",
+    sized="the tracker reports all distances {factor:too long|too short}",
     measurement="lay an object of known length on the floor, track both of its ends, and compare the lengths",
     apply=apply,
     needs="track",

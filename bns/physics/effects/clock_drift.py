@@ -25,6 +25,7 @@ EFFECT = Effect(
     residuals="The track leads or lags behind the commands by a time that grows during the trial; changes of speed show it.",
     lookalikes=("clock-offset", "speed-gain"),
     sentence="the tracker's clock runs faster or slower than the clock of the commands",
+    sized="the tracker's clock runs {rate:faster|slower} than the clock of the commands",
     measurement="compare how both clocks stamp two events that are minutes apart (an LED switched by the "
     "computer that logs the commands)",
     apply=apply,

@@ -23,6 +23,7 @@ EFFECT = Effect(
     residuals="The whole track is shifted along itself: the error is speed times offset, and zero at rest.",
     lookalikes=("command-delay", "motor-lag"),
     sentence="the tracker's clock and the clock of the commands differ by a constant time",
+    sized="the tracker's clock is {offset_s:ahead of|behind} the clock of the commands",
     measurement="film an event that both clocks time-stamp (an LED switched by the computer that logs the commands)",
     beside={
         "command-delay": "A late command and a late clock look the same in a log: time-stamp an event that both clocks see."

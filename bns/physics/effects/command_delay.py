@@ -32,6 +32,7 @@ EFFECT = Effect(
     "the delay.",
     lookalikes=("motor-lag", "acceleration-limit"),
     sentence="commands reach the motors after a delay",
+    sized="commands reach the motors after a delay of {delay_s}",
     measurement="film an LED on the robot that lights when a command arrives, with the tracker's camera",
     apply=apply,
     needs="track",

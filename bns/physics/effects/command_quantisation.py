@@ -103,6 +103,7 @@ EFFECT = Effect(
     residuals="The error depends on the command alone: positive or negative, up to half a step, and equal for equal commands.",
     lookalikes=("dead-zone", "command-truncation"),
     sentence="the wheels can run only at speeds in coarse steps",
+    sized="the wheels can run only at speeds in steps of {step_m_s}",
     measurement="lift the robot, raise one wheel's command slowly, log its encoder: its speed rises in steps",
     apply=apply,
     needs="track",

@@ -40,6 +40,7 @@ EFFECT = Effect(
     residuals="Each command takes effect at the next tick of a clock: late by between zero and one period.",
     lookalikes=("command-delay", "motor-lag"),
     sentence="the robot updates its command only at fixed intervals",
+    sized="the robot updates its command only every {period_s}",
     measurement="log on the robot the time at which each command takes effect",
     apply=apply,
     needs="track",

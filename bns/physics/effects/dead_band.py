@@ -36,6 +36,7 @@ EFFECT = Effect(
     "sharp.",
     lookalikes=("dead-zone", "stribeck"),
     sentence="a wheel stands still while its command is below a threshold",
+    sized="a wheel stands still while its command is below {threshold_m_s}",
     measurement="lift the robot, raise one wheel's command slowly from zero, and note the command at which the wheel begins to "
     "turn, and at once how fast it turns then",
     apply=apply,

@@ -31,6 +31,7 @@ EFFECT = Effect(
     "to their duration. A wheel commanded below the dead zone stands still.",
     lookalikes=("speed-gain", "motor-lag"),
     sentence="every wheel loses a constant part of its speed to friction",
+    sized="every wheel loses {width_m_s} of its speed to friction",
     measurement="lift the robot, raise one wheel's command slowly from zero, and note the command at which the "
     "wheel begins to turn",
     apply=apply,

@@ -109,6 +109,7 @@ EFFECT = Effect(
     residuals="All velocities are too small by one fraction in one area of the floor, at any heading; elsewhere trials fit.",
     lookalikes=("tether-pull", "lens-distortion"),
     sentence="the robot is slower on one patch of the floor",
+    sized="the robot is {loss:slower|faster} on one patch of the floor, {radius_m} in radius",
     measurement="inspect the floor there, or repeat trials from a start moved by twice the diameter of the patch",
     apply=apply,
     revision=3,

@@ -47,6 +47,8 @@ EFFECT = Effect(
     "instead of its mass.",
     lookalikes=("acceleration-limit", "motor-lag"),
     sentence="the motors' force limits the acceleration, in turns otherwise than on straight lines",
+    sized="the motors' force limits the acceleration to {max_m_s2} on straight lines; in turns the limit is "
+    "{turn_ratio:higher|lower}",
     measurement="weigh the robot with its load; log the wheels' own speeds (encoders) while a command changes, ahead and on "
     "the spot",
     apply=apply,

@@ -33,6 +33,8 @@ EFFECT = Effect(
     "robot's inertia instead of its mass.",
     lookalikes=("motor-lag", "force-limit", "wheelbase"),
     sentence="the motors follow their commands with a lag, in turns with another than on straight lines",
+    sized="the motors follow their commands with a lag of {tau_s} on straight lines, which is "
+    "{turn_ratio:longer|shorter} in turns",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes, ahead and on the spot; and "
     "again with a load in the robot's middle",
     apply=apply,

@@ -33,6 +33,8 @@ EFFECT = Effect(
     residuals="As with a lag of the motors; and at every change of speed the robot turns, back again where it stops.",
     lookalikes=("motor-lag", "wheel-mismatch"),
     sentence="the motors follow their commands with a lag that differs between the wheels",
+    sized="the motors follow their commands with a lag of {tau_s} on average, which is {ratio:longer|shorter} on the "
+    "right than on the left",
     measurement="log the wheels' own speeds (encoders) at a high rate while both are given the same step of speed",
     apply=apply,
     needs="track",

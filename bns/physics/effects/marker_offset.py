@@ -33,7 +33,11 @@ EFFECT = Effect(
     equation="x' = x + f·cos(theta) - s·sin(theta), y' = y + f·sin(theta) + s·cos(theta)",
     residuals="Turns on the spot move the tracked point on a circle; straight commands fit.",
     lookalikes=("side-slip", "turn-slip"),
-    sentence="the tracked marker is not above the midpoint of the axle, about which the robot turns",
+    sentence="the tracked point is not the point about which the robot turns (the midpoint of the axle in the model)",
+    sized="the tracked point is not the point about which the robot turns, but {forward_m} ahead of it and {left_m} to its left",
     measurement="measure the position of the marker from the midpoint of the axle with a ruler",
+    or_of_robot="the robot turns about another point than the midpoint of its axle, as skid-steered robots do, and the marker is "
+    "where it should be. A ruler tells which: the measured position of the marker from the midpoint of the axle is either this "
+    "offset or not",
     apply=apply,
 )

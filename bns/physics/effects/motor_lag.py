@@ -27,6 +27,7 @@ EFFECT = Effect(
     "commands begin with a rest of the previous one. Short commands are affected most.",
     lookalikes=("command-delay", "acceleration-limit", "speed-gain"),
     sentence="the motors follow their commands with a lag",
+    sized="the motors follow their commands with a lag of {tau_s}",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
     apply=apply,
     needs="track",

@@ -38,6 +38,7 @@ EFFECT = Effect(
     residuals="Every displacement points away from straight ahead by the same angle, also in reverse.",
     lookalikes=("side-slip", "marker-offset"),
     sentence="the sensor is mounted rotated relative to the robot",
+    sized="the sensor is mounted rotated {angle_rad:to the left|to the right} relative to the robot",
     measurement="drive straight along a wall, and measure the wall's direction in the sensor's data",
     apply=apply,
     needs="motions",

@@ -23,6 +23,7 @@ EFFECT = Effect(
     residuals="The path lies outside the commanded arc; the error grows with speed and turn rate. Headings fit.",
     lookalikes=("turn-slip", "marker-offset"),
     sentence="the robot slides outwards in curves",
+    sized="the robot slides {slip_s:outwards|inwards|} in curves",
     measurement="drive the same circle slowly and fast, and compare its diameters and the robot's angle to its path",
     apply=apply,
 )

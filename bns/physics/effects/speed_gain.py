@@ -25,6 +25,7 @@ EFFECT = Effect(
     residuals="Distances and turns are wrong by the same fraction in every command, whatever its speed and duration.",
     lookalikes=("motor-lag", "dead-zone", "turn-slip"),
     sentence="both wheels turn faster or slower than commanded, by one factor",
+    sized="both wheels turn {gain:faster|slower} than commanded",
     measurement="drive straight and measure the distance on the floor with a tape measure",
     apply=apply,
 )

@@ -28,6 +28,7 @@ EFFECT = Effect(
     residuals="Fast commands fall short, slow ones fit; curves in which both wheels are fast become straighter.",
     lookalikes=("turn-slip", "acceleration-limit"),
     sentence="the speed of the wheels is limited",
+    sized="no wheel runs faster than {max_m_s}",
     measurement="command full speed and log the wheels' own speeds (encoders)",
     apply=apply,
 )

@@ -29,6 +29,7 @@ EFFECT = Effect(
     residuals="Fast commands fall short, slow ones fit; fast curves are driven more slowly, with the same radius.",
     lookalikes=("speed-limit", "turn-slip"),
     sentence="both wheels are slowed in proportion where one of them would exceed a limit",
+    sized="both wheels are slowed in proportion where one of them would exceed {max_m_s}",
     measurement="command a fast curve and log the wheels' own speeds (encoders)",
     apply=apply,
 )

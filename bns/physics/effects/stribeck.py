@@ -35,6 +35,7 @@ EFFECT = Effect(
     residuals="Slow commands fall short; the loss vanishes as speed grows, so that fast commands fit.",
     lookalikes=("dead-zone", "speed-gain"),
     sentence="friction brakes slow wheels more than fast ones",
+    sized="friction takes {width_m_s} of its speed from a slow wheel, and less from a fast one",
     measurement="raise both wheels' commands slowly and log the wheels' own speeds (encoders)",
     apply=apply,
     needs="track",

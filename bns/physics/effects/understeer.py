@@ -28,6 +28,7 @@ EFFECT = Effect(
     residuals="Turns on the spot fit; curves are too straight, and more so at higher speed.",
     lookalikes=("wheelbase", "turn-slip", "speed-limit"),
     sentence="the robot turns less (or more) the faster it drives",
+    sized="the robot turns {loss_s_m:less|more|} the faster it drives",
     measurement="drive a circle of one commanded diameter at several speeds, and measure its diameter on the floor",
     apply=apply,
 )

@@ -31,6 +31,7 @@ EFFECT = Effect(
     residuals="All motion is too slow early in a trial and right later, in every trial again.",
     lookalikes=("motor-lag", "acceleration-limit", "heating"),
     sentence="the robot is slow at the beginning of every trial",
+    sized="the robot is {loss:slower|faster} at the beginning of every trial",
     measurement="run the wheels for a minute before a trial begins, and compare",
     apply=apply,
     needs="track",

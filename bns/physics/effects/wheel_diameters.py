@@ -16,6 +16,7 @@ EFFECT = Effect(
     residuals="As with wheel-mismatch, and the robot also drifts to one side while both motors are at a limit.",
     lookalikes=("wheel-mismatch", "yaw-bias"),
     sentence="the wheels differ in diameter, and their motors are limited alike",
+    sized="the right wheel's diameter is {ratio:larger|smaller} than the left one's, and their motors are limited alike",
     measurement="measure both wheels' circumferences",
     apply=OF_COMMANDS.apply,
     extends="wheel-mismatch",

@@ -23,6 +23,7 @@ EFFECT = Effect(
     "straight commands; it drifts back in reverse.",
     lookalikes=("yaw-bias",),
     sentence="the wheels differ in diameter",
+    sized="the right wheel's diameter is {ratio:larger|smaller} than the left one's",
     measurement="measure both wheels' circumferences",
     apply=apply,
 )

@@ -74,6 +74,7 @@ EFFECT = Effect(
     residuals="As with a patch of floor, and where the patch is entered at its side, the robot turns towards it.",
     lookalikes=("floor-patch", "tether-pull"),
     sentence="each wheel is slower on one patch of the floor",
+    sized="each wheel is {loss:slower|faster} on one patch of the floor, {radius_m} in radius",
     measurement="inspect the floor there, or drive straight over its edge with one wheel outside",
     apply=apply,
     revision=2,

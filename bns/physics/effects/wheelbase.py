@@ -31,6 +31,7 @@ EFFECT = Effect(
     residuals="Every turn is too small or too large by the same fraction, left and right alike; straight commands fit.",
     lookalikes=("turn-slip", "wheel-mismatch"),
     sentence="the effective wheelbase differs from that of the model",
+    sized="the effective wheelbase is {factor:longer|shorter} than that of the model",
     measurement="measure the distance between the wheels' tracks, or compare ten turns on the spot with a mark on the floor",
     apply=apply,
 )

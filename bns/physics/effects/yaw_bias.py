@@ -21,6 +21,7 @@ EFFECT = Effect(
     residuals="The heading drifts to one side in proportion to the time driven, at any speed and also in reverse.",
     lookalikes=("wheel-mismatch",),
     sentence="the robot turns to one side at a constant rate whenever it moves",
+    sized="the robot turns {rate_rad_s:to the left|to the right} whenever it moves",
     measurement="lift the robot, command equal speeds, and log both wheels' own speeds (encoders)",
     apply=apply,
 )

@@ -21,6 +21,7 @@ EFFECT = Effect(
     residuals="Displacements and the distance between markers are off by the same fraction.",
     lookalikes=("marker-offset", "tilted-camera"),
     sentence="the camera reports all distances too long or too short by one factor",
+    sized="the camera reports all distances {scale:too long|too short}",
     measurement="place a ruler in the camera's view and compare its length with the tracked one",
     apply=apply,
 )

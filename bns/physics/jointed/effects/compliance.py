@@ -23,6 +23,7 @@ EFFECT = Effect(
     residuals="Lifted parts sag, so that the distance between markers differs from the model's; more so when lifted higher.",
     lookalikes=("torque-limit", "supply-sag", "dead-band"),
     sentence="the joints are softer or stiffer than the model's",
+    sized="the joints are {stiffness:stiffer|softer} than the model's",
     measurement="hang a known weight on an arm that a servo holds level, and measure how far it sinks",
     starts=((0.79,), (0.49,), (1.25,), (1.93,)),
     apply=apply,

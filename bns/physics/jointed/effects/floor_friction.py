@@ -26,6 +26,7 @@ EFFECT = Effect(
     residuals="Cycles that push links sideways move the robot farther, or less far; postures at rest fit.",
     lookalikes=("friction-anisotropy", "torque-limit", "compliance"),
     sentence="the friction of the floor differs from the model's",
+    sized="the friction of the floor is {factor:higher|lower} than the model's",
     measurement="switch the robot off and drag it with a spring balance: pull divided by weight is the coefficient of friction",
     apply=apply,
 )

@@ -21,6 +21,7 @@ EFFECT = Effect(
     residuals="Postures are reached late: visible at the camera's frame rate, or where a cycle ends before they are reached.",
     lookalikes=("servo-speed-limit", "clock-offset"),
     sentence="the servos follow with a longer delay than in the model",
+    sized="the servos follow with a delay that is {delay_s:longer|shorter} than in the model",
     measurement="film a servo together with an LED that shows traffic on its bus",
     starts=((-0.01,), (0.08,), (0.24,)),
     apply=apply,

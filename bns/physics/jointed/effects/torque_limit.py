@@ -25,6 +25,7 @@ EFFECT = Effect(
     residuals="Postures that lift the body high are not reached; flat ones fit.",
     lookalikes=("compliance", "supply-sag", "servo-speed-limit"),
     sentence="the servos' highest torque differs from the model's",
+    sized="the servos' highest torque is {factor:higher|lower} than the model's",
     measurement="hang weights on a servo's arm, and note the torque at which it yields",
     starts=((0.63,), (0.25,), (0.1,)),
     apply=apply,

@@ -38,3 +38,24 @@ LABELS = {
 def label(variable: str) -> str:
     """In words, with the unit; a logged column keeps its own name."""
     return LABELS.get(variable, variable)
+
+
+VELOCITIES = {
+    "forward_m_s": "forward velocity (m/s)",
+    "sideways_m_s": "sideways velocity (m/s)",
+    "yaw_rad_s": "turn rate (rad/s)",
+    "share_of_motion": "the whole motion (fraction)",
+    "east_m_s": "velocity east (m/s)",
+    "north_m_s": "velocity north (m/s)",
+}
+"""What an error along a variable is an error of."""
+
+
+def velocity(channel: str) -> str:
+    """What a curve is added to, in words, with the unit."""
+    return VELOCITIES.get(channel, channel)
+
+
+def bare(words: str) -> str:
+    """Without the unit, for the middle of a sentence."""
+    return words.partition(" (")[0]

@@ -1,0 +1,72 @@
+"""An effect's sentence with the numbers that were fitted: "both wheels turn 7 % slower than commanded"."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from string import Formatter
+from typing import Any
+
+import numpy as np
+
+from bns.diagnose.report.people import for_people
+from bns.diagnose.settings import DEFAULTS
+from bns.physics.effect import Effect, Parameter
+
+_BY_FACTOR = DEFAULTS.report.by_factor
+
+
+def sized_sentence(effect: Effect, numbers: Mapping[str, Mapping[str, Any]]) -> str:
+    """The effect's `sized` with its numbers; its general sentence where there is none, or where the data leave a side open.
+
+    ``numbers``: those of the effect, by parameter, as `numbers_of` gives them.
+    """
+    if not effect.sized:
+        return effect.in_words
+    known = {p.name: p for p in effect.parameters}
+    said = []
+    for text, name, words, _ in Formatter().parse(effect.sized):
+        said.append(text)
+        if name is not None:
+            sizes = list(_said(known[name], numbers.get(name, {}), words or ""))
+            if not sizes:
+                return effect.in_words
+            said += sizes
+    return "".join(said)
+
+
+def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
+    """A number alone; with ``words`` ("above|below") how far it is from neutral, and to which side; nothing if that is open."""
+    value, low, high = (number.get(key) for key in ("value", "low", "high"))
+    if value is None or not np.isfinite(value) or number.get("per_trial"):
+        return
+    if not words:
+        yield _size(value, p)
+        return
+    open_side = low is not None and high is not None and low <= p.neutral <= high
+    if value == p.neutral or open_side:
+        return
+    above, below, *only = words.split("|")
+    side = above if value > p.neutral else below
+    if only:
+        yield side
+    elif p.is_multiple and max(value, 1.0 / value) >= _BY_FACTOR:
+        yield f"{side} by a factor of {_figures(max(value, 1.0 / value))}"
+    else:
+        yield f"{_size(abs(value - p.neutral), p)} {side}"
+
+
+def _size(value: float, p: Parameter) -> str:
+    """Two figures, in units for people."""
+    if p.unit == "1":
+        return f"{_figures(100.0 * value)} %"
+    size, unit = for_people(value, p.unit)
+    gap = "" if unit.startswith("°") else " "
+    return f"{_figures(size)}{gap}{unit}"
+
+
+def _figures(value: float) -> str:
+    """Two significant figures, without an exponent."""
+    if value == 0.0 or not np.isfinite(value):
+        return f"{value:g}"
+    digits = 1 - int(np.floor(np.log10(abs(value))))
+    return f"{round(value, digits):.{max(digits, 0)}f}".rstrip("0").rstrip(".") if digits > 0 else f"{round(value, digits):.0f}"

@@ -1,0 +1,79 @@
+"""An effect's sentence says how much, and to which side."""
+
+from dataclasses import replace
+from string import Formatter
+
+import pytest
+
+from bns.diagnose.report.sized import sized_sentence
+from bns.physics.effects import all_effects, effect_named
+from bns.registry import JOINT_EFFECTS
+
+LISTED = {
+    **all_effects(),
+    **{f"jointed {name}": getattr(part, "effect", part) for name in JOINT_EFFECTS.names() for part in [JOINT_EFFECTS.load(name)]},
+}
+
+
+def number(value, low=None, high=None, **more):
+    return {"value": value, "low": low, "high": high, **more}
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers", "said"),
+    [
+        ("speed-gain", {"gain": number(0.93, 0.92, 0.94)}, "both wheels turn 7 % slower than commanded"),
+        ("speed-gain", {"gain": number(1.125)}, "both wheels turn 12 % faster than commanded"),
+        ("wheel-mismatch", {"ratio": number(1.0296, 1.0282, 1.031)}, "the right wheel's diameter is 3 % larger than the left"),
+        ("wheelbase", {"factor": number(2.5)}, "the effective wheelbase is longer by a factor of 2.5 than that of the model"),
+        ("wheelbase", {"factor": number(0.4)}, "the effective wheelbase is shorter by a factor of 2.5 than that of the model"),
+        ("yaw-bias", {"rate_rad_s": number(-0.05)}, "the robot turns 2.9°/s to the right whenever it moves"),
+        ("motor-lag", {"tau_s": number(0.2001)}, "the motors follow their commands with a lag of 200 ms"),
+        ("clock-offset", {"offset_s": number(-1.25)}, "the tracker's clock is 1.2 s behind the clock of the commands"),
+        ("clock-drift", {"rate": number(0.003)}, "the tracker's clock runs 0.3 % faster than the clock of the commands"),
+        ("understeer", {"loss_s_m": number(-0.2)}, "the robot turns more the faster it drives"),
+        ("dead-zone", {"width_m_s": number(0.0060564)}, "every wheel loses 6.1 mm/s of its speed to friction"),
+        ("speed-limit", {"max_m_s": number(0.42)}, "no wheel runs faster than 420 mm/s"),
+    ],
+)
+def test_a_sentence_follows_the_numbers(name, numbers, said):
+    assert sized_sentence(effect_named(name), numbers).startswith(said)
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        {},
+        {"gain": number(None)},
+        {"gain": number(float("nan"))},
+        {"gain": number(1.0)},
+        {"gain": number(1.01, 0.99, 1.03)},
+        {"gain": number(0.93, per_trial=True)},
+    ],
+)
+def test_where_the_side_is_open_the_general_sentence_stands(numbers):
+    gain = effect_named("speed-gain")
+    assert sized_sentence(gain, numbers) == gain.sentence
+    assert sized_sentence(replace(gain, sized="", sentence=""), {"gain": number(0.9)}) == "the effect “speed-gain”"
+
+
+@pytest.mark.parametrize("name", [name for name, effect in LISTED.items() if effect.sized])
+def test_every_listed_sentence_has_numbers_of_its_effect(name):
+    effect = LISTED[name]
+    fields = [(field, words) for _, field, words, _ in Formatter().parse(effect.sized) if field is not None]
+    assert fields
+    for field, words in fields:
+        assert field in {p.name for p in effect.parameters}
+        assert not words or len(words.split("|")) in {2, 3}
+    above, below = (
+        sized_sentence(effect, {p.name: number(of if p.is_multiple else other) for p in effect.parameters})
+        for of, other in ((1.5, 0.1), (0.7, -0.1))
+    )
+    assert "{" not in above
+    assert above != below
+
+
+def test_a_sentence_that_leaves_a_side_open_is_followed_by_one_with_numbers():
+    open_ones = [name for name, effect in LISTED.items() if "faster or slower" in effect.sentence]
+    assert open_ones
+    assert all(LISTED[name].sized for name in open_ones)
