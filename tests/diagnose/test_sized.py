@@ -28,6 +28,15 @@ def number(value, low=None, high=None, **more):
         ("wheelbase", {"factor": number(2.5)}, "the effective wheelbase is longer by a factor of 2.5 than that of the model"),
         ("wheelbase", {"factor": number(0.4)}, "the effective wheelbase is shorter by a factor of 2.5 than that of the model"),
         ("yaw-bias", {"rate_rad_s": number(-0.05)}, "the robot turns 2.9°/s to the right whenever it moves"),
+        ("reverse-gain", {"gain": number(0.9)}, "wheels turn 10 % slower backwards than forwards"),
+        (
+            *("dead-zone-mismatch", {"width_m_s": number(0.01), "left_share": number(0.3, 0.2, 0.4)}),
+            "friction takes 10 mm/s of speed from a wheel on average, more from the right one",
+        ),
+        (
+            *("speed-limit-mismatch", {"max_m_s": number(0.1), "left_spare": number(0.3)}),
+            "the right wheel runs no faster than 100 mm/s, the other one may run faster",
+        ),
         ("motor-lag", {"tau_s": number(0.2001)}, "the motors follow their commands with a lag of 200 ms"),
         ("clock-offset", {"offset_s": number(-1.25)}, "the tracker's clock is 1.2 s behind the clock of the commands"),
         ("clock-drift", {"rate": number(0.003)}, "the tracker's clock runs 0.3 % faster than the clock of the commands"),

@@ -91,15 +91,17 @@ class CasterSwing(Cause):
 
 @dataclass
 class CasterDrag(Cause):
-    """A caster's hinge that resists: its angle in small steps, the mean of eight robots whose casters point all ways at first."""
+    """A caster's hinge that resists: its angle in small steps, the mean of robots whose casters point anywhere at first."""
 
     friction_m_s: float
     damping_m: float
     trail_m: float
     pivot_m: float
+    trailing_share: float = 0.0
 
     def body(self, body: Body, moment: Moment) -> Body:
-        angle = np.linspace(0, 2 * np.pi, 8, endpoint=False) * np.ones((len(body.forward), 1))
+        angle = np.radians([0, 45, 135, 225, 315]) * np.ones((len(body.forward), 1))
+        shares = np.array([self.trailing_share, *[(1 - self.trailing_share) / 4] * 4])
         forward, turn = np.array(body.forward), np.array(body.turn)
         for i in range(forward.shape[1]):
             v, w = body.forward[:, i, None], body.turn[:, i, None]
@@ -107,8 +109,8 @@ class CasterDrag(Cause):
             for _ in range(FINE):
                 rate = self.balanced(v, w, angle)
                 torque = self.torque(rate)
-                push = push + (torque * np.sin(angle)).mean(axis=1) / FINE
-                twist = twist + (torque * self.lever(angle)).mean(axis=1) / FINE
+                push = push + (torque * np.sin(angle)) @ shares / FINE
+                twist = twist + (torque * self.lever(angle)) @ shares / FINE
                 angle = angle + rate * moment.step_s / FINE
             forward[:, i] += push
             turn[:, i] += twist / (BASE_M / 2) ** 2

@@ -45,6 +45,7 @@ EFFECT = Effect(
     residuals="The robot is too slow by up to a step, by half a step on average; equally for equal commands.",
     lookalikes=("dead-zone", "command-quantisation"),
     sentence="the controller cuts wheel speeds off to multiples of a coarse step",
+    sized="the controller cuts wheel speeds off to multiples of {step_m_s}",
     measurement="lift the robot, raise one wheel's command slowly, log its encoder: its speed rises in steps, each where the "
     "command reaches it",
     apply=apply,

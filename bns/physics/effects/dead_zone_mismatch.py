@@ -38,6 +38,7 @@ EFFECT = Effect(
     residuals="The robot turns to one side forwards and to the same side of its own backwards, slow commands most.",
     lookalikes=("dead-zone", "wheel-mismatch", "yaw-bias"),
     sentence="friction takes more speed from one wheel than from the other",
+    sized="friction takes {width_m_s} of speed from a wheel on average, more from {left_share:the left|the right|side} one",
     measurement="lift the robot, raise each wheel's command slowly from zero, and note the command at which it begins to turn",
     apply=apply,
     extends="dead-zone",

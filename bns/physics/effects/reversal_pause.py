@@ -24,6 +24,7 @@ EFFECT = Effect(
     residuals="After a change of a wheel's direction a way of its new speed times a fixed time is missing; else all fits.",
     lookalikes=("backlash", "command-delay", "acceleration-limit"),
     sentence="a wheel stands for a moment whenever it reverses",
+    sized="a wheel stands for {pause_s} whenever it reverses",
     measurement="lift the robot, reverse one wheel, log its encoder",
     apply=apply,
     needs="track",

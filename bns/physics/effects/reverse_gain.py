@@ -27,6 +27,7 @@ EFFECT = Effect(
     residuals="Forward commands fit; backward ones are wrong by one fraction; turns on the spot move the robot along.",
     lookalikes=("speed-gain", "marker-offset"),
     sentence="wheels run faster or slower backwards than forwards",
+    sized="wheels turn {gain:faster|slower} backwards than forwards",
     measurement="drive a straight line forwards and the same backwards: the tape measure says how they differ",
     apply=apply,
 )

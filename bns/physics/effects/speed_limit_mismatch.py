@@ -42,6 +42,7 @@ EFFECT = Effect(
     residuals="Fast straight commands become curves to one side; slow ones fit.",
     lookalikes=("speed-limit", "wheel-mismatch"),
     sentence="the speed of one wheel is limited more than the other's",
+    sized="{left_spare:the right|the left|side} wheel runs no faster than {max_m_s}, the other one may run faster",
     measurement="command full speed and log the wheels' own speeds (encoders)",
     apply=apply,
     extends="speed-limit",

@@ -27,6 +27,7 @@ EFFECT = Effect(
     residuals="Slow turns fall short by a larger fraction than fast ones; slight curves are driven straight.",
     lookalikes=("wheelbase", "dead-zone", "understeer"),
     sentence="turning loses a constant part of its rate to friction",
+    sized="turning loses {width_rad_s} of its rate to friction",
     measurement="turn on the spot ever faster, and note the command at which the robot begins to turn",
     apply=apply,
 )

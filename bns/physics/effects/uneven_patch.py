@@ -47,6 +47,7 @@ EFFECT = Effect(
     residuals="On one patch of the floor the robot turns to the same side, wherever it enters; elsewhere trials fit.",
     lookalikes=("wheel-patch", "floor-patch", "wheel-mismatch"),
     sentence="one wheel loses more speed than the other on one patch of the floor",
+    sized="one patch of the floor, {radius_m} in radius, slows {left_share:the left|the right|side} wheel more",
     measurement="drive straight over the patch in both directions: the robot turns to the same side of its own",
     apply=apply,
     needs="track",
