@@ -52,6 +52,8 @@ class Parameter:
     """Bounds at which a fit may end, because real robots reach them: the strength of a servo without torque."""
     resolution: float = 0.0
     """A small change that is still visible in data; 0: a thousandth of the plausible range."""
+    optional: bool = False
+    """Whether a model file may leave it out, as those do that are older than it: then it is neutral."""
     jagged: bool = False
     """Whether the likelihood has steps or kinks along it, at commands, ticks or poses: its interval needs a search."""
 
@@ -225,12 +227,13 @@ class Effect:
         for name in values:
             if name not in names:
                 raise ModelError(unknown_name(f"parameter of {self.name}", name, names))
-        missing = [name for name in names if name not in values]
+        missing = [p.name for p in self.parameters if p.name not in values and not p.optional]
         if missing:
             raise ModelError(
                 f"{self.name} lacks {', '.join(missing)}; it needs a value for each of {', '.join(names)}."
             )
-        return tuple(number(f"{self.name}: {p.name}", values[p.name], p.low, p.high) for p in self.parameters)
+        given = self.neutral | dict(values)
+        return tuple(number(f"{self.name}: {p.name}", given[p.name], p.low, p.high) for p in self.parameters)
 
 
 def number(where: str, value: object, low: float, high: float) -> float:

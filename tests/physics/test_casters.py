@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from bns.errors import ModelError
 from bns.physics.effects import effect_named
 from bns.physics.signals import Body
 from bns.physics.wheels.casters import SLOW_RAD_S, swivelled
@@ -44,6 +45,14 @@ def test_a_caster_rolls_where_it_points_and_turns_the_robot_that_turns_it(fricti
         exact = solve_ivp(rate, (0, ends[-1]), [2.0, 0, 0], max_step=5e-3, t_eval=ends).y[1:]
         ways = np.stack([np.cumsum(one[row] * STEP[row]) for one in (pushed, turned)])
         np.testing.assert_allclose(ways, exact, atol=0.02 * np.abs(exact).max())
+
+
+def test_a_model_file_that_is_older_than_a_number_is_read():
+    effect = effect_named("caster-drag")
+    old = {"friction_m_s": 0.01, "damping_m": 0.002, "trail_m": 0.02, "pivot_m": -0.05}
+    assert effect.checked(old) == (*old.values(), 0.0)
+    with pytest.raises(ModelError, match="lacks trail_m"):
+        effect.checked({"friction_m_s": 0.01, "damping_m": 0.002, "pivot_m": -0.05})
 
 
 def test_casters_that_point_the_same_way_go_on_as_one():

@@ -66,6 +66,7 @@ EFFECT = Effect(
             *("trailing_share", "1", 0.0, 1.0, (0.0, 1.0), 0.0),
             "share of the trials at whose start the caster trails; in the others it points anywhere",
             reached=(0.0, 1.0),
+            optional=True,
         ),
     ),
     equation="d(psi)/dt = s = (omega'·p·cos(psi) - v'·sin(psi))/trail - omega'; q = f·s/(|s| + 0.1 rad/s) + k·s; "
