@@ -56,8 +56,8 @@ VALUES: dict[str, dict[str, float]] = {
     "marker-offset": {"forward_m": 0.04, "left_m": 0.03},
     "motor-lag": {"tau_s": 0.3},
     "sensor-rotation": {"angle_rad": 0.2},
-    "dead-zone-mismatch": {"width_m_s": 0.01, "left_share": 1.8},
-    "speed-limit-mismatch": {"max_m_s": 0.1, "left_spare": 0.2},
+    "dead-zone-mismatch": {"width_m_s": 0.004, "left_share": 1.8},
+    "speed-limit-mismatch": {"max_m_s": 0.12, "left_spare": 0.1},
     "reverse-gain": {"gain": 0.8},
     "reversal-pause": {"pause_s": 0.5},
     "side-slip": {"slip_s": 0.3},
@@ -68,7 +68,7 @@ VALUES: dict[str, dict[str, float]] = {
     "stribeck": {"width_m_s": 0.03, "fade_m_s": 0.05},
     "dead-band": {"threshold_m_s": 0.04},
     "tether-load": {
-        "pull_per_s": 0.1,
+        "pull_per_s": 0.02,
         "anchor_x_m": 0.2,
         "anchor_y_m": 0.4,
         "free_m": 0.1,
@@ -80,7 +80,7 @@ VALUES: dict[str, dict[str, float]] = {
     "turn-dead-zone": {"width_rad_s": 0.3},
     "turn-slip": {"slip_s": 0.12},
     "turn-slip-quadratic": {"slip_s2": 0.1},
-    "uneven-patch": {"x_m": 0.35, "y_m": 0.0, "radius_m": 0.12, "loss": 0.2, "apart_share": 1.0, "left_share": 2.0},
+    "uneven-patch": {"x_m": 0.35, "y_m": 0.0, "radius_m": 0.12, "loss": 0.08, "apart_share": 1.0, "left_share": 2.0},
     "understeer": {"loss_s_m": 1.5},
     "warm-up": {"loss": 0.5, "time_s": 3.0},
     "wheel-eccentricity": {"left_share": 0.6, "right_share": -0.6, "turn_m": 0.4},
@@ -113,7 +113,11 @@ def demonstrate(effect: Effect) -> Demonstration:
     plain = load_model("khepera")
     t_s, alone = seen(plain)
     _, altered = seen(plain.with_effect(effect.name, **values))
-    drawn = as_motions(alone, altered) if effect.needs == "motions" else altered[:, :2]
+    drawn = altered[:, :2]
+    if effect.needs == "motions":
+        drawn = added_up(alone, alone[:-1, 2] - altered[:-1, 2], altered)
+    elif np.array_equal(drawn, alone[:, :2]):  # headings alone are wrong: the path that somebody steers by them
+        drawn = added_up(alone, altered[:-1, 2] - alone[:-1, 2], alone)
     return Demonstration(values, t_s, alone[:, :2], drawn)
 
 
@@ -124,10 +128,14 @@ def seen(model: Model) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return found.t_s[0], observe(found.poses[0], None, model)
 
 
-def as_motions(plain: NDArray[np.float64], sensor: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The path that motions measured by a sensor on the robot add up to, taken for the robot's own: (frames, 2)."""
-    turned = plain[:-1, 2] - sensor[:-1, 2]
-    step = np.diff(sensor[:, :2], axis=0)
+def added_up(
+    plain: NDArray[np.float64], turned: NDArray[np.float64], steps_of: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The path that steps add up to, each turned by an angle (frames - 1,), from where the plain path begins: (frames, 2).
+
+    Of motions that a sensor on the robot measures, taken for the robot's own; or of the robot's own, by a wrong heading.
+    """
+    step = np.diff(steps_of[:, :2], axis=0)
     cos, sin = np.cos(turned), np.sin(turned)
     steps = np.stack([cos * step[:, 0] - sin * step[:, 1], sin * step[:, 0] + cos * step[:, 1]], axis=1)
     return np.vstack([plain[:1, :2], plain[0, :2] + np.cumsum(steps, axis=0)])

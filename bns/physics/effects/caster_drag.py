@@ -64,14 +64,14 @@ EFFECT = Effect(
         Parameter("pivot_m", "m", -2.0, 2.0, (-0.2, 0.2), -0.0442, "from the axle forward to the hinge", size_power=1.0),
         Parameter(
             *("trailing_share", "1", 0.0, 1.0, (0.0, 1.0), 0.0),
-            "share of the trials at whose start the caster trails; in the others it points anywhere",
+            "fraction of the trials at whose start the caster trails; in the others it points anywhere",
             reached=(0.0, 1.0),
             optional=True,
         ),
     ),
     equation="d(psi)/dt = s = (omega'·p·cos(psi) - v'·sin(psi))/trail - omega'; q = f·s/(|s| + 0.1 rad/s) + k·s; "
     "v' = v + q·sin(psi), omega' = omega + q·(trail - p·cos(psi))·4/b^2; "
-    "mean over psi at the start: 0 in a share g of the trials, else anywhere",
+    "mean over psi at the start: 0 in a fraction g of the trials, else anywhere",
     residuals="After each change between forward, backward and turning, the robot is pushed aside and slowed for some trails "
     "of the caster, by nearly the same speed whether it is fast or slow; long commands of one kind fit.",
     lookalikes=("caster-swing", "backlash", "motor-lag"),

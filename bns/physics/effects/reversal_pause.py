@@ -21,7 +21,7 @@ EFFECT = Effect(
         Parameter("pause_s", "s", 0.0, 5.0, (0.0, 1.0), 0.0, "time for which a wheel stands before it reverses", resolution=1e-3),
     ),
     equation="u' = 0 for a time T after u changed its sign, for each wheel",
-    residuals="After a change of a wheel's direction a way of its new speed times a fixed time is missing; else all fits.",
+    residuals="After a change of a wheel's direction a distance is missing that is proportional to its new speed; all else fits.",
     lookalikes=("backlash", "command-delay", "acceleration-limit"),
     sentence="a wheel stands for a moment whenever it reverses",
     sized="a wheel stands for {pause_s} whenever it reverses",
