@@ -80,5 +80,5 @@ EFFECT = Effect(
     apply=apply,
     revision=3,
     needs="track",
-    starts=tuple((0.004, 0.002, trail, pivot, 0.5) for trail in (0.005, 0.012, 0.03) for pivot in (-0.0442, 0.0442)),
+    starts=tuple((0.004, 0.002, trail, pivot, 0.5) for trail in (0.004, 0.0075, 0.015, 0.03) for pivot in (-0.0442, 0.0442)),
 )
