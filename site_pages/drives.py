@@ -99,6 +99,8 @@ class Demonstration:
     t_s: NDArray[np.float64]
     plain_m: NDArray[np.float64]
     with_effect_m: NDArray[np.float64]
+    by_heading: bool = False
+    """Whether the second path is that of wrong headings: the places themselves are right."""
 
     @property
     def apart_m(self) -> NDArray[np.float64]:
@@ -113,12 +115,12 @@ def demonstrate(effect: Effect) -> Demonstration:
     plain = load_model("khepera")
     t_s, alone = seen(plain)
     _, altered = seen(plain.with_effect(effect.name, **values))
-    drawn = altered[:, :2]
+    drawn, by_heading = altered[:, :2], False
     if effect.needs == "motions":
         drawn = added_up(alone, alone[:-1, 2] - altered[:-1, 2], altered)
-    elif np.array_equal(drawn, alone[:, :2]):  # headings alone are wrong: the path that somebody steers by them
+    elif by_heading := np.array_equal(drawn, alone[:, :2]):
         drawn = added_up(alone, altered[:-1, 2] - alone[:-1, 2], alone)
-    return Demonstration(values, t_s, alone[:, :2], drawn)
+    return Demonstration(values, t_s, alone[:, :2], drawn, by_heading)
 
 
 def seen(model: Model) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -97,7 +97,8 @@ def page(effect: Effect, shown: Demonstration) -> str:
             f"**{effect.in_words[:1].upper()}{effect.in_words[1:]}.**\n",
             f"Stage: {effect.stage}. Equation: `{effect.equation}`\n",
             f"![Path with and without {effect.name}]({effect.name}.svg)\n",
-            f"Drawn with {_drawn_with(effect, shown)}; the commands are the same on every page of this gallery.\n",
+            f"Drawn with {_drawn_with(effect, shown)}; the commands are the same on every page of this gallery."
+            f"{' The path is the one that its headings add up to; the robot drives the plain one.' * shown.by_heading}\n",
             "## In a log\n",
             f"{effect.residuals}\n",
             "## Parameters\n",

@@ -7,6 +7,7 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import bns
@@ -107,6 +108,14 @@ def test_every_public_name_has_its_docstring_on_the_page(site):
 def test_pictures_show_a_difference(name):
     shown = demonstrate(all_effects()[name])
     assert 0.01 < shown.apart_m.max() < 0.7
+
+
+def test_of_a_compass_the_path_of_its_headings_is_drawn():
+    shown = demonstrate(all_effects()["compass-deviation"])
+    assert shown.by_heading
+    lengths = [np.hypot(*np.diff(path, axis=0).T).sum() for path in (shown.plain_m, shown.with_effect_m)]
+    assert lengths[0] == pytest.approx(lengths[1])
+    assert not demonstrate(all_effects()["wheelbase"]).by_heading
 
 
 def test_an_effect_of_a_package_has_a_picture_too():
