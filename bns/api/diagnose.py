@@ -199,6 +199,8 @@ class DiagnoseResult(Shown):
         """The fitted model; effects of the user's own with their files, without which nobody could read them back."""
         model = documented(fit, self.ready.model, self.ready.measured, errors)
         files = {n: {"file": str(Path(file).resolve())} for n, file in own_files(self.asked.get("also", ())).items()}
+        if not files:
+            return model
         known = tuple(replace(a, written=files.get(a.effect.name, a.written)) for a in model.effects)
         return Model(replace(model, effects=known))
 
@@ -221,7 +223,7 @@ def diagnose(
     """Find what a model lacks.
 
     Args:
-        log: a file, a table, or `bns.Measurements`; at least eleven trials.
+        log: a file, a table, or `bns.Measurements`; at least twelve trials.
         model: `bns.Model`, or the name or file of one.
         also: effects of your own, tried in addition to the listed ones: `bns.Effect` or a Python file with an ``EFFECT``.
         without_effects: names of listed effects to exclude.

@@ -17,7 +17,7 @@ from tests.hidden_snake.worlds import Hidden, World, driven
 pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
 
 from bns.app.explore import tabs_of
-from bns.app.html import found_errors, velocity
+from bns.app.html import found_errors
 from bns.app.jobs import Jobs
 from bns.app.log.part import Part
 from bns.app.screens.data import DataScreen
@@ -27,6 +27,7 @@ from bns.app.screens.next import NextScreen
 from bns.app.screens.where import WhereScreen
 from bns.app.session import opened, session_yaml
 from bns.app.tab import Tab
+from bns.diagnose.data.variables import velocity
 
 LOG = FOLDER / "khepera-log.csv"
 

@@ -174,5 +174,5 @@ def test_per_trial_is_refused_where_it_makes_no_sense(tmp_path, capsys):
     write_measurements(measured(NOMINAL, trials=8), data)
     arguments = ["--model", "khepera", "--data", str(data), "-o", str(tmp_path / "n.yaml")]
     assert main(["add", "wheelbase", "--per-trial", *arguments]) == 2
-    assert "--per-trial goes with clock-offset" in capsys.readouterr().err
+    assert "--per-trial (in Python: per_trial=True) goes with clock-offset" in capsys.readouterr().err
     assert not (tmp_path / "n.yaml").exists()

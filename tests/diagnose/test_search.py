@@ -78,7 +78,7 @@ def test_a_model_that_has_the_effect_already_lacks_nothing():
     ("change", "message"),
     [
         (lambda t: t[t.trial == 0], r"^1 trial: anything"),
-        (lambda t: t[t.trial < 10], r"^10 trials: .* At least 11 trials are needed"),
+        (lambda t: t[t.trial < 10], r"^10 trials: .* At least 12 trials are needed"),
         (lambda t: t.groupby("trial").head(1), "only one tracked pose"),
         (lambda t: t.assign(left_m_s=0.0, right_m_s=0.0), "never commanded to move"),
         (lambda t: t.assign(x_m=0.1, y_m=0.2), "never moved by more than 5 mm"),
