@@ -199,10 +199,10 @@ class DiagnoseResult(Shown):
         """The fitted model; effects of the user's own with their files, without which nobody could read them back."""
         model = documented(fit, self.ready.model, self.ready.measured, errors)
         files = {n: {"file": str(Path(file).resolve())} for n, file in own_files(self.asked.get("also", ())).items()}
-        if not files:
-            return model
-        known = tuple(replace(a, written=files.get(a.effect.name, a.written)) for a in model.effects)
-        return Model(replace(model, effects=known))
+        if files:
+            known = tuple(replace(a, written=files.get(a.effect.name, a.written)) for a in model.effects)
+            model = replace(model, effects=known)
+        return Model(model)
 
     def _line(self) -> str:
         lacks = f" ({', '.join(self.effects)})" if self.effects else ""

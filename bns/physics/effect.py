@@ -52,8 +52,6 @@ class Parameter:
     """Bounds at which a fit may end, because real robots reach them: the strength of a servo without torque."""
     resolution: float = 0.0
     """A small change that is still visible in data; 0: a thousandth of the plausible range."""
-    optional: bool = False
-    """Whether a model file may leave it out, as those do that are older than it: then it is neutral."""
     jagged: bool = False
     """Whether the likelihood has steps or kinks along it, at commands, ticks or poses: its interval needs a search."""
 
@@ -227,13 +225,12 @@ class Effect:
         for name in values:
             if name not in names:
                 raise ModelError(unknown_name(f"parameter of {self.name}", name, names))
-        missing = [p.name for p in self.parameters if p.name not in values and not p.optional]
+        missing = [name for name in names if name not in values]
         if missing:
             raise ModelError(
                 f"{self.name} lacks {', '.join(missing)}; it needs a value for each of {', '.join(names)}."
             )
-        given = self.neutral | dict(values)
-        return tuple(number(f"{self.name}: {p.name}", given[p.name], p.low, p.high) for p in self.parameters)
+        return tuple(number(f"{self.name}: {p.name}", values[p.name], p.low, p.high) for p in self.parameters)
 
 
 def number(where: str, value: object, low: float, high: float) -> float:

@@ -113,7 +113,7 @@ def test_what_an_unlisted_verdict_says_of_a_column_holds_its_name_and_its_comman
     write_measurements(table, data)
     found = bns.diagnose(data, "khepera")
     assert found.verdict == "unlisted"
-    assert re.search(r"Left unexplained by listed effects: forward_m_s along load, [0-9.]+% of the loss", found.summary())
+    assert re.search(r"Left unexplained by listed effects, [^:]*: [^;]*forward velocity along load \([0-9.]+%\)", found.summary())
     problem, term = problem_for(found.ready.predictor, found.ready.model), "k * load * v"
     before = problem.fit(found.ready.model)
     after = problem.fit(before.model.with_active(formula_effect("loss", term, "v", ("load",)), (0.0,)))

@@ -91,53 +91,30 @@ class CasterSwing(Cause):
 
 @dataclass
 class CasterDrag(Cause):
-    """A caster's hinge that resists: its angle in small steps, the mean of robots whose casters point anywhere at first."""
+    """A caster's hinge that resists: its angle in small steps, the mean of eight robots whose casters point all ways at first."""
 
     friction_m_s: float
     damping_m: float
     trail_m: float
     pivot_m: float
-    trailing_share: float = 0.0
 
     def body(self, body: Body, moment: Moment) -> Body:
-        angle = np.radians([0, 45, 135, 225, 315]) * np.ones((len(body.forward), 1))
-        shares = np.array([self.trailing_share, *[(1 - self.trailing_share) / 4] * 4])
+        angle = np.linspace(0, 2 * np.pi, 8, endpoint=False) * np.ones((len(body.forward), 1))
         forward, turn = np.array(body.forward), np.array(body.turn)
         for i in range(forward.shape[1]):
             v, w = body.forward[:, i, None], body.turn[:, i, None]
             push, twist = 0.0, 0.0
             for _ in range(FINE):
-                rate = self.balanced(v, w, angle)
-                torque = self.torque(rate)
-                push = push + (torque * np.sin(angle)) @ shares / FINE
-                twist = twist + (torque * self.lever(angle)) @ shares / FINE
+                hinge = np.stack([v + 0 * angle, w * self.pivot_m + 0 * angle])  # velocity of the hinge, ahead and left
+                across = hinge[1] * np.cos(angle) - hinge[0] * np.sin(angle)
+                rate = across / self.trail_m - w
+                torque = self.friction_m_s * rate / (np.abs(rate) + SLOW_RAD_S) + self.damping_m * rate
+                push = push + (torque * np.sin(angle)).mean(axis=1) / FINE
+                twist = twist + (torque * (self.trail_m - self.pivot_m * np.cos(angle))).mean(axis=1) / FINE
                 angle = angle + rate * moment.step_s / FINE
             forward[:, i] += push
             turn[:, i] += twist / (BASE_M / 2) ** 2
         return body._replace(forward=forward, turn=turn)
-
-    def torque(self, rate: np.ndarray) -> np.ndarray:
-        return self.friction_m_s * rate / (np.abs(rate) + SLOW_RAD_S) + self.damping_m * rate
-
-    def lever(self, angle: np.ndarray) -> np.ndarray:
-        return self.trail_m - self.pivot_m * np.cos(angle)
-
-    def balanced(self, v: np.ndarray, w: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """The rate at which the hinge turns if its torque moves the robot as much as it does: by bisection."""
-
-        def rolled(rate: np.ndarray) -> np.ndarray:
-            ahead = v + self.torque(rate) * np.sin(angle)
-            turn = w + self.torque(rate) * self.lever(angle) / (BASE_M / 2) ** 2
-            across = turn * self.pivot_m * np.cos(angle) - ahead * np.sin(angle)
-            return across / self.trail_m - turn
-
-        free = (w * self.pivot_m * np.cos(angle) - v * np.sin(angle)) / self.trail_m - w
-        low, high = np.minimum(free, 0.0), np.maximum(free, 0.0)
-        for _ in range(40):
-            rate = (low + high) / 2
-            above = rolled(rate) > rate
-            low, high = np.where(above, rate, low), np.where(above, high, rate)
-        return (low + high) / 2
 
 
 class Picture(Cause):
