@@ -35,7 +35,7 @@ def test_each_is_named_with_its_numbers(name, values):
     assert {key: one["value"] for key, one in found.numbers[name].items()} == pytest.approx(values, rel=0.03)
 
 
-@pytest.mark.parametrize("step_m_s", [0.0113, 0.027, 0.045])
+@pytest.mark.parametrize("step_m_s", [0.0113, *(pytest.param(step, marks=pytest.mark.slow) for step in (0.027, 0.045))])
 @pytest.mark.parametrize("name", ["command-truncation", "command-quantisation"])
 def test_a_step_is_found_that_is_no_round_number(name, step_m_s):
     """The loss has a valley for each number of steps below the fastest speed."""

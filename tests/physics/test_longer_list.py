@@ -132,7 +132,7 @@ def test_the_judges_second_equations_agree(name):
 
 
 @pytest.mark.parametrize("name", ["floor-patch", "wheel-patch"])
-@pytest.mark.parametrize("loss", [0.48, 0.55])
+@pytest.mark.parametrize("loss", [pytest.param(0.48, marks=pytest.mark.slow), 0.55])
 def test_a_patch_that_takes_half_of_the_speed_agrees_too(name, loss):
     """Driven again only four times where the path led, these ended several millimetres off."""
     alone = {"apart_share": 1.0} if name == "wheel-patch" else {}
