@@ -10,8 +10,7 @@ from pathlib import Path
 CHROMIUM = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
 )
-SLOW_MS = 300_000
-"""For hangs alone: a diagnosis takes as long as the machine is busy."""
+SLOW_MS = 120_000
 
 
 class Visit:
