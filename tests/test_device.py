@@ -1,6 +1,7 @@
 """Machines without a GPU: a sentence and exit code 2, and nothing written. In processes of their own: no simulator here."""
 
 import re
+import warnings
 
 import pytest
 
@@ -44,6 +45,30 @@ def test_the_package_does_not_load_cuda_unless_asked(tmp_path, bns):
     assert "numba.core" in done.stderr
     assert "numba.cuda.cudadrv" not in done.stderr
     assert "bns.cuda" not in done.stderr
+
+
+def test_a_numpy_that_numba_cuda_does_not_load_beside(monkeypatch):
+    from bns.cuda import device
+
+    def broken(name):
+        raise AttributeError("module 'numpy' has no attribute 'row_stack'")
+
+    monkeypatch.setattr(device.importlib, "import_module", broken)
+    with pytest.raises(DeviceError, match=r"does not load beside the numpy .*row_stack.*pip install 'bns\[cuda\]', or leave"):
+        device._module()
+
+
+def test_batches_that_leave_most_of_the_gpu_idle_are_not_warned_of(monkeypatch):
+    """What numba-cuda 0.30.4 said on an H100, in bold."""
+    from bns.cuda import device
+
+    monkeypatch.setattr(device.importlib, "import_module", lambda name: None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        device._module()
+        warnings.warn(
+            "\x1b[1mGrid size 14 will likely result in GPU under-utilization due to low occupancy.\x1b[0m", stacklevel=1
+        )
 
 
 def test_bench_says_that_there_is_no_gpu(monkeypatch, capsys):

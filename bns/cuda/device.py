@@ -50,12 +50,17 @@ def device_name() -> str:
 
 
 def _module() -> Any:
-    warnings.filterwarnings("ignore", message="Grid size .* under-utilization")  # one run alone is allowed, too
+    warnings.filterwarnings("ignore", message=".*Grid size .* under-utilization")  # one run alone is allowed, too
     try:
         return importlib.import_module("numba.cuda")
     except ImportError as error:
         raise DeviceError(
             f"--device cuda needs numba-cuda ({_first_line(error)}). Install it with: pip install 'bns[cuda]', {_ELSE}."
+        ) from error
+    except AttributeError as error:  # as numba-cuda 0.30 with numpy 2.5, which no longer has a function that it asks for
+        raise DeviceError(
+            f"--device cuda: numba-cuda does not load beside the numpy that is installed ({_first_line(error)}). Install those "
+            f"that go together with: pip install 'bns[cuda]', {_ELSE}."
         ) from error
 
 

@@ -1,19 +1,13 @@
-"""The kernels run in numba's CUDA simulator: Python threads, no GPU, no driver.
+"""Numba's CUDA simulator, made fit for these kernels: Python threads, no GPU, no driver.
 
 It lacks three things. Warps cannot exchange values there; its arrays cannot be handed to the compiled functions that kernels
 share with the CPU engine: here kernels see plain numpy arrays; and its threads wait for each other in a busy loop.
 """
 
-import sys
 import threading
 
-import numba
 import numpy as np
-
-assert "numba.cuda" not in sys.modules, "something has loaded numba's CUDA support before the simulator could be chosen"
-numba.config.ENABLE_CUDASIM = 1
-
-from numba.cuda.simulator import kernel, kernelapi  # noqa: E402
+from numba.cuda.simulator import kernel, kernelapi
 
 
 def _shfl_xor_sync(self, mask, value, apart):

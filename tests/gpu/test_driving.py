@@ -10,7 +10,7 @@ from bns.engine.snn import predict
 from bns.robots.simulator import load_static_simulator
 from bns.tasks import Task
 from bns.worlds import build_world
-from tests.cuda.arrays import KEY, Arrays
+from tests.gpu.arrays import KEY, Arrays
 
 
 def drive(robot, learning, **changes):

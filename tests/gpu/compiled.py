@@ -1,4 +1,4 @@
-"""Compile every kernel for an H200 and say what it needs: python -m tests.cuda.compiled
+"""Compile every kernel for an H200 and say what it needs: python -m tests.gpu.compiled
 
 Needs bns[cuda], but no GPU. It finds what the simulator cannot, which knows no types: functions that a GPU's compiler lacks.
 """

@@ -6,7 +6,7 @@ import pytest
 from bns.engine.evolution import Population, rank
 from bns.engine.snn import predict
 from bns.robots.base import RandomStream
-from tests.cuda.arrays import KEY, SIZE, Arrays
+from tests.gpu.arrays import KEY, SIZE, Arrays
 
 ROBOTS = ["khepera", "snake"]
 
