@@ -129,6 +129,19 @@ def _worlds(place: Path, *, fresh: bool):  # type: ignore[no-untyped-def]  # tab
     return [worlds.table(own) for _, own in rows.groupby("robot")]
 
 
+def _gpus(store: Results) -> list[str]:
+    """How many of the runs GPUs carried out, a line for each kind of GPU."""
+    rows = store.query(
+        """SELECT robot, versions->>'$.device' AS device, count(*) AS runs FROM runs
+        WHERE versions->>'$.device' IS NOT NULL GROUP BY ALL ORDER BY ALL"""
+    )
+    return [
+        f"A GPU ({device}) carried out {' and '.join(f'{n:,} of the {robot}' for robot, n in zip(of.robot, of.runs, strict=True))}; "
+        "the other runs, the CPU. [Do the two differ?](cuda.md#does-it-give-the-same-study)"
+        for device, of in rows.groupby("device")
+    ]
+
+
 def _origin(store: Results, archive: Path, *, fresh: bool) -> list[str]:
     made = f"Written on {date.today().isoformat()}"  # a day is all that is said
     if fresh:
@@ -137,9 +150,10 @@ def _origin(store: Results, archive: Path, *, fresh: bool) -> list[str]:
     engines = sorted({str(engine) for one in said for engine in one["engine_versions"]})
     commits = sorted({sha[:12] for one in said for sha in one["git_sha"] if sha})
     specs = sorted({text for one in said for text in one["spec_hashes"]})
-    versions = sorted({version for one in said for version in one["bns_version"]})
+    versions = sorted({version for one in said for version in one["bns_version"] if version})
     return [
         f"{made} from `results/{PUBLISHED.as_posix()}`, {sum(one['runs'] for one in said):,} runs (`make replication`).",
+        *_gpus(store),
         f"Engine version {', '.join(engines)}; bns {', '.join(versions)}; commits {', '.join(commits)}.",
         f"Sweep files {', '.join(specs)}.",
     ]
