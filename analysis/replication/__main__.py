@@ -135,10 +135,11 @@ def _gpus(store: Results) -> list[str]:
         """SELECT robot, versions->>'$.device' AS device, count(*) AS runs FROM runs
         WHERE versions->>'$.device' IS NOT NULL GROUP BY ALL ORDER BY ALL"""
     )
+    said = rows.runs.map("{:,} runs of the ".format) + rows.robot
     return [
-        f"A GPU ({device}) carried out {' and '.join(f'{n:,} of the {robot}' for robot, n in zip(of.robot, of.runs, strict=True))}; "
-        "the other runs, the CPU. [Do the two differ?](cuda.md#does-it-give-the-same-study)"
-        for device, of in rows.groupby("device")
+        f"A GPU ({device}) carried out {' and '.join(own)}; the CPU, the others. "
+        "[Do the two differ?](cuda.md#does-it-give-the-same-study)"
+        for device, own in said.groupby(rows.device)
     ]
 
 
