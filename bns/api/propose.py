@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from bns.api.common.next_command import limits_in_words
 from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown
@@ -44,6 +45,8 @@ class ProposeResult(Shown):
 
     diagnosis: DiagnoseResult
     proposal: Proposal
+    limits: Mapping[str, str] = field(default_factory=dict)
+    """What a command line would repeat of minutes, arena, start and speeds."""
 
     @cached_property
     def commands(self) -> pd.DataFrame:
@@ -68,7 +71,12 @@ class ProposeResult(Shown):
 
         ``written``: the file with the commands; ``command``: words (data, model) that further commands repeat.
         """
-        return proposal_text(self.proposal, written, command or self.diagnosis.command)
+        return proposal_text(self.proposal, written, command or self.command)
+
+    @property
+    def command(self) -> dict[str, str]:
+        """Words (data, model and what else was given) for the commands that follow."""
+        return {**self.diagnosis.command, **self.limits}
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
         """Write the commands as a file that `bns trial --commands` drives; its path. DataError where there are none."""
@@ -147,7 +155,11 @@ def proposed(
     inside, bounds = _limits(found, arena, start, speeds)
     meter = Meter(progress, PHASES, pace=GENERATIONS)
     with in_force(found.settings):
-        result = ProposeResult(found, search(found.diagnosis, inside, bounds, minutes, tick=meter))
+        result = ProposeResult(
+            found,
+            search(found.diagnosis, inside, bounds, minutes, tick=meter),
+            limits_in_words(minutes, arena, start, speeds),
+        )
     meter.done()
     return result
 

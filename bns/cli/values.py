@@ -9,17 +9,23 @@ import sys
 from bns.errors import DataError
 
 
-def size_of(text: str | None) -> tuple[float, float] | None:
-    """Width and height of ``WxH``, in its own unit; None stays None. DataError for what is none."""
+def arena_of(text: str | None) -> tuple[float, ...] | None:
+    """Width and height of ``WxH``, or the four sides of ``X0,X1,Y0,Y1``, in m; None stays None. DataError for what is neither."""
     if text is None:
         return None
+    sides = _numbers(text, 4)
+    if sides is not None:
+        return tuple(sides)
     found = re.fullmatch(r"\s*([0-9.]+)\s*[xX×]\s*([0-9.]+)\s*", text)
     try:
         width, height = (float(v) for v in found.groups()) if found else (math.nan, math.nan)
     except ValueError:
         width = height = math.nan
     if not math.isfinite(width + height):
-        raise DataError(f"--arena {text!r} is no size; write width x height in metres, each above 0.1: --arena 1.8x1.3")
+        raise DataError(
+            f"--arena {text!r} is no size; write width x height in metres, each above 0.1: --arena 1.8x1.3, or the lowest and "
+            "highest x and y: --arena=-0.5,1.3,0,1.3"
+        )
     return width, height
 
 

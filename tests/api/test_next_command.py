@@ -2,6 +2,7 @@
 of an option is said for Python, too."""
 
 import ast
+import math
 import re
 import shlex
 from pathlib import Path
@@ -10,11 +11,13 @@ from types import SimpleNamespace
 import pytest
 
 import bns
-from bns.api.common.next_command import model_words, repeated
+from bns.api.common.next_command import limits_in_words, model_words, repeated
 from bns.api.common.prepared import prepared
+from bns.api.propose import ProposeResult
 from bns.cli.commands.diagnose import words_of
 from bns.cli.main import _parser
-from bns.diagnose.report.proposal_text import proposal_text
+from bns.cli.values import arena_of, pose_of, speeds_of
+from bns.diagnose.report.proposal_text import _next, proposal_text
 from bns.diagnose.report.tables import next_commands
 from bns.errors import DataError
 from bns.measurements import write_measurements
@@ -132,6 +135,30 @@ def test_python_repeats_what_it_was_given(tmp_path, own):
     found = bns.diagnose(log, "khepera", settings={"data": {"jump_m": 0.5}})  # read again under these
     assert found.command["model"].endswith("--robot ada --without 2 --without '1-more: 3'")
     assert found.ready.log.name == "log.csv"
+
+
+@pytest.mark.parametrize("arena", [(1.8, 1.3), (-0.5, 1.3, 0.0, 1.25), None])
+def test_limits_of_python_are_those_of_the_command_line(arena):
+    words = limits_in_words(3, arena, (0.1, -0.2, math.pi / 2), (-0.2, 0.15))
+    said = _parser().parse_args(shlex.split(f"propose log.csv --model khepera {words['limits']}"))
+    assert (said.minutes, arena_of(said.arena)) == (3.0, arena)
+    assert pose_of(said.start) == pytest.approx((0.1, -0.2, math.pi / 2))
+    assert speeds_of(said.speeds) == (-0.2, 0.15)
+    assert limits_in_words(None, None, None, None) == {"area": "", "limits": ""}
+
+
+def test_an_experiment_planned_in_python_says_its_limits_again():
+    diagnosis = SimpleNamespace(command={"data": "log.csv", "model": "--model khepera", "search": "--model khepera"})
+    proposal = SimpleNamespace(
+        verdict="tie", competing_models=(), model_pairs=(), minutes=3.0, plan=range(1), bounds=SimpleNamespace(robot="khepera"),
+        arena=SimpleNamespace(start=(0.5, 0.2, 0.0)),
+    )  # fmt: skip
+    limits = limits_in_words(3, (1.8, 1.3), None, (-0.2, 0.2))
+    result = ProposeResult(diagnosis, proposal, limits)
+    again = next(_next(proposal, "next.csv", result.command))
+    assert again.endswith(
+        "bns propose log.csv --model khepera --minutes 3 --arena 1.8x1.3 --speeds=-0.2,0.2 --start=0,0,90 -o next.csv"
+    )
 
 
 def test_a_wheelbase_is_written_where_the_name_means_another():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterable, Sequence
 from os import PathLike, fspath
@@ -12,6 +13,8 @@ from bns.physics.effects import effect_in_file
 from bns.physics.model import BASES, Model, load_model, model_names
 
 _Path = str | PathLike[str]
+_SIZE = 2
+"""Numbers of an arena that is given by its width and height."""
 
 
 def repeated(
@@ -43,17 +46,33 @@ def repeated(
     thresholds = [None if settings is None else fspath(settings)]
     tried = [*_options("--without-effect", [*without_effects]), *_options("--settings", thresholds)]
     base = ["--model", fspath(model), *([] if wheelbase_m is None else ["--wheelbase", f"{wheelbase_m:g}"]), *shared]
+    words = {"model": base, "shared": shared, "search": [*base, *tried]}
+    files = {f"effect {name}": shlex.quote(file) for name, file in own_files(own).items()}
+    quoted = {key: shlex.join(given) for key, given in words.items()}
+    return {"data": shlex.quote(fspath(data)), **quoted, **limits(minutes, arena, start, speeds), **files}
+
+
+def limits(minutes: float | None, arena: str | None, start: str | None, speeds: str | None) -> dict[str, str]:
+    """``area`` and ``limits`` of `repeated`."""
     area = _options("--arena", [arena]) + _options("--speeds", [speeds])
     time = _options("--minutes", [None if minutes is None else f"{minutes:g}"])
-    words = {
-        "model": base,
-        "shared": shared,
-        "search": [*base, *tried],
-        "area": area,
-        "limits": [*time, *area, *_options("--start", [start])],
-    }
-    files = {f"effect {name}": shlex.quote(file) for name, file in own_files(own).items()}
-    return {"data": shlex.quote(fspath(data)), **{key: shlex.join(given) for key, given in words.items()}, **files}
+    return {"area": shlex.join(area), "limits": shlex.join([*time, *area, *_options("--start", [start])])}
+
+
+def limits_in_words(
+    minutes: float | None,
+    arena: Sequence[float] | None,
+    start: Sequence[float] | None,
+    speeds: Sequence[float] | None,
+) -> dict[str, str]:
+    """The same of what `bns.propose` was given: m, rad (the start's heading) and m/s."""
+    size = None if arena is None else "x".join(map(_short, arena)) if len(arena) == _SIZE else ",".join(map(_short, arena))
+    pose = None if start is None else ",".join(map(_short, (*start[:2], math.degrees(start[2]))))
+    return limits(minutes, size, pose, None if speeds is None else ",".join(map(_short, speeds)))
+
+
+def _short(number: float) -> str:
+    return f"{number:.6g}"
 
 
 def model_words(model: Model) -> dict[str, Any]:

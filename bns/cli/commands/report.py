@@ -49,7 +49,11 @@ def add_commands(command: Adder) -> None:
 def add_experiment_options(parser: argparse.ArgumentParser) -> None:
     """How long, where and how fast."""
     parser.add_argument("--minutes", type=float, default=MINUTES, metavar="N", help="minutes of driving to plan (default: 10)")
-    parser.add_argument("--arena", metavar="WxH", help="size of the arena in metres (default: where the robot was seen)")
+    parser.add_argument(
+        "--arena",
+        metavar="WxH",
+        help="size of the arena in metres, or its sides X0,X1,Y0,Y1 (default: where the robot was seen)",
+    )
     parser.add_argument(
         "--start",
         metavar="X,Y,DEG",
@@ -95,11 +99,11 @@ def report(options: argparse.Namespace) -> int:
 
 def _limits(options: argparse.Namespace) -> dict[str, Any]:
     """How long, where and how fast, as values."""
-    from bns.cli.values import pose_of, size_of, speeds_of
+    from bns.cli.values import arena_of, pose_of, speeds_of
 
     return {
         "minutes": options.minutes,
-        "arena": size_of(options.arena),
+        "arena": arena_of(options.arena),
         "start": pose_of(options.start),
         "speeds": speeds_of(options.speeds),
     }
