@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from bns.api.common.cache import remembered
-from bns.api.common.next_command import model_words, own_files, repeated
+from bns.api.common.next_command import model_words, noted, own_files, repeated
 from bns.api.common.parameters import parameter_table
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown
-from bns.api.measurements import Log, Measurements
+from bns.api.measurements import SAVED, Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.adding import documented
 from bns.diagnose.design.competing_models import Rival, rivals_of
@@ -153,12 +153,14 @@ class DiagnoseResult(Shown):
 
     def summary(self, command: Mapping[str, str] | None = None) -> str:
         """Verdict first; then numbers, errors, ranking, notes. ``command``: words (data, model) that further commands repeat."""
-        return changes_text(self.settings) + diagnosis_text(self.diagnosis, self.rivals, command or self.command)
+        words = command or self.command
+        return changes_text(self.settings) + noted(diagnosis_text(self.diagnosis, self.rivals, words), words)
 
     @property
     def command(self) -> dict[str, str]:
         """Words (data, model and what else was given) for the commands that follow."""
-        return repeated(**{**self.ready.log.given, **model_words(self.ready.model), **self.asked})
+        words = repeated(**{**self.ready.log.given, **model_words(self.ready.model), **self.asked})
+        return {**words, "before": SAVED} if self.ready.log.only_in_memory else words
 
     def to_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""

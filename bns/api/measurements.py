@@ -34,6 +34,10 @@ Rules = Mapping[str, Any] | str | PathLike[str]
 """A mapping of columns and units, or its file."""
 MARGIN_S = 0.5
 """What spoils a pose (a hidden marker, a push) often lasts, so so much before and after goes with it."""
+_SAVED_AS = "measurements.csv"
+SAVED = f'log.frame.to_csv("{_SAVED_AS}", index=False)'
+"""Python that writes the file which a command line reads instead of what is only in memory; ``log`` is the measurements."""
+_GIVEN_IN_MEMORY: dict[str, Any] = {"data": _SAVED_AS, "more": (), "robot": None, "without": ()}
 _TABLE = Path("table")
 """What a table that came from no file is called."""
 
@@ -58,7 +62,11 @@ class Measurements(Shown):
         self, log: Log, *more: str | PathLike[str], robot: str | None = None, mapping: Rules | None = None
     ) -> None:
         self._measured = _read(log, more, robot, mapping)
-        self._given = log.given if isinstance(log, Measurements) else _words_given(self._measured.path, log, more, robot)
+        if isinstance(log, Measurements):
+            self._in_memory, self._given = log.only_in_memory, log.given
+        else:
+            self._in_memory = isinstance(log, pd.DataFrame) or mapping is not None
+            self._given = _GIVEN_IN_MEMORY if self._in_memory else _words_given(log, more, robot)
 
     @property
     def frame(self) -> pd.DataFrame:
@@ -93,8 +101,16 @@ class Measurements(Shown):
 
     @property
     def given(self) -> dict[str, Any]:
-        """What a command line repeats to read the same: data and more (files), robot (or None), without (names of trials)."""
+        """What a command line repeats to read the same: data and more (files), robot (or None), without (names of trials).
+
+        Of what no file holds (`only_in_memory`), the file that `SAVED` writes.
+        """
         return dict(self._given)
+
+    @property
+    def only_in_memory(self) -> bool:
+        """Whether a command line cannot read the same: a table, a mapping given in Python, rows that were left out here."""
+        return self._in_memory
 
     @property
     def measured(self) -> Measured:
@@ -115,7 +131,8 @@ class Measurements(Shown):
         kept = np.ones(len(self._measured.table), dtype=bool)
         kept[np.concatenate([there[name] for name in left_out])] = False
         fewer = self._of(self._measured.table[kept])
-        fewer._given = {**self._given, "without": (*self._given["without"], *dict.fromkeys(trials))}
+        if not self.only_in_memory:
+            fewer._given = {**self._given, "without": (*self._given["without"], *dict.fromkeys(trials))}
         return fewer
 
     def checked_again(self) -> Measurements:
@@ -196,12 +213,18 @@ class Measurements(Shown):
         if not out.any():
             return self
         table = self._measured.table
-        return self._of(table.assign(**{LEFT_OUT: (out | left_out_rows(table)).astype(int)}))
+        fewer = self._of(table.assign(**{LEFT_OUT: (out | left_out_rows(table)).astype(int)}))
+        fewer._given, fewer._in_memory = _GIVEN_IN_MEMORY, True
+        return fewer
 
     def _of(self, table: pd.DataFrame) -> Measurements:
         """Some of the same rows, or the same with other marks."""
         fewer = copy(self)
-        fewer.__dict__ = {"_measured": measured_table(table, self._measured.path), "_given": self._given}
+        fewer.__dict__ = {
+            "_measured": measured_table(table, self._measured.path),
+            "_given": self._given,
+            "_in_memory": self._in_memory,
+        }
         return fewer
 
     @cached_property
@@ -252,10 +275,10 @@ def _seen(table: pd.DataFrame) -> NDArray[np.bool_]:
     return np.asarray(table[places].notna().all(axis=1), dtype=bool)
 
 
-def _words_given(path: Path, log: Log, more: Iterable[str | PathLike[str]], robot: str | None) -> dict[str, Any]:
-    """As `Measurements.given` has it."""
-    further = [*(log[1:] if isinstance(log, list | tuple) else ()), *more]
-    return {"data": fspath(path), "more": tuple(map(fspath, further)), "robot": robot, "without": ()}
+def _words_given(log: Any, more: Iterable[str | PathLike[str]], robot: str | None) -> dict[str, Any]:
+    """As `Measurements.given` has it, of files."""
+    files = [*(log if isinstance(log, list | tuple) else (log,)), *more]
+    return {"data": fspath(files[0]), "more": tuple(map(fspath, files[1:])), "robot": robot, "without": ()}
 
 
 def as_measurements(log: Log) -> Measurements:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from bns.api.common.next_command import limits_in_words
+from bns.api.common.next_command import limits_in_words, noted
 from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown
@@ -71,7 +71,8 @@ class ProposeResult(Shown):
 
         ``written``: the file with the commands; ``command``: words (data, model) that further commands repeat.
         """
-        return proposal_text(self.proposal, written, command or self.command)
+        words = command or self.command
+        return noted(proposal_text(self.proposal, written, words), words)
 
     @property
     def command(self) -> dict[str, str]:

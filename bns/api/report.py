@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 
+from bns.api.common.next_command import limits_in_words
 from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.shown import Shown
 from bns.api.diagnose import DiagnoseResult, diagnose
@@ -106,7 +107,8 @@ def reported(
             lambda: proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=planning).proposal,
             meter,
         )
-        page = report_html(material, command or found.command).encode()
+        words = command or {**found.command, **limits_in_words(minutes, arena, start, speeds)}
+        page = report_html(material, words).encode()
     publish(page, target.with_name(f".{target.name}.part"), target)
     meter.done()
     return ReportResult(target, found, len(page))

@@ -11,8 +11,9 @@ from types import SimpleNamespace
 import pytest
 
 import bns
-from bns.api.common.next_command import limits_in_words, model_words, repeated
+from bns.api.common.next_command import limits_in_words, model_words, noted, repeated
 from bns.api.common.prepared import prepared
+from bns.api.measurements import SAVED
 from bns.api.propose import ProposeResult
 from bns.cli.commands.diagnose import words_of
 from bns.cli.main import _parser
@@ -135,6 +136,36 @@ def test_python_repeats_what_it_was_given(tmp_path, own):
     found = bns.diagnose(log, "khepera", settings={"data": {"jump_m": 0.5}})  # read again under these
     assert found.command["model"].endswith("--robot ada --without 2 --without '1-more: 3'")
     assert found.ready.log.name == "log.csv"
+
+
+def in_memory(table, path):
+    """Measurements that no file holds, each its own way."""
+    table.to_csv(path, index=False)
+    log = bns.Measurements(path)
+    yield bns.Measurements(table)
+    yield bns.Measurements(path, mapping={"columns": {"x_m": {"from": "x_m", "unit": "m"}}})
+    yield log.without(["2"]).without_rows([3])
+    yield log.without_rows([3]).without(["2"])
+
+
+def test_what_is_only_in_memory_is_written_before_a_command_reads_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    table = measured(NOMINAL, trials=4)
+    for log in in_memory(table, tmp_path / "log.csv"):
+        found = bns.diagnose(log, "khepera")
+        assert found.command["data"] == "measurements.csv"
+        assert "--without" not in found.command["model"]
+        first, *then = next_commands(found_with("motor-lag"), None, found.command)
+        assert first == f"# first, in Python: {SAVED}"
+        assert asked(then[0])["data"].name == "measurements.csv"
+        exec(SAVED, {"log": log})
+        again = bns.Measurements("measurements.csv")
+        assert again.trials.equals(log.trials)
+        assert not again.only_in_memory
+        text = noted(f"to try it: bns add {found.command['data']}", found.command)
+        assert text.endswith(f"The commands read measurements.csv. Write it first, in Python: {SAVED}")
+    assert "before" not in bns.diagnose("measurements.csv", "khepera").command
+    assert noted("bns add measurements.csv", {"data": "measurements.csv"}) == "bns add measurements.csv"
 
 
 @pytest.mark.parametrize("arena", [(1.8, 1.3), (-0.5, 1.3, 0.0, 1.25), None])

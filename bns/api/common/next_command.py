@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,8 @@ def repeated(
 
     ``data``; ``model``: the model with all that every command takes; ``shared``: the same without the model;
     ``search``: as ``model``, with what only diagnose, propose and report take; ``area``, ``limits``: what propose takes in
-    addition, ``limits`` with the time and the start; ``effect NAME``: the file of an effect of the user's own.
+    addition, ``limits`` with the time and the start; ``effect NAME``: the file of an effect of the user's own. There may be
+    ``before`` as well: Python that writes the file ``data`` first.
     """
     own, further = [fspath(file) for file in also], [fspath(file) for file in more]
     shared = [*_options("--more", further), *_options("--robot", [robot]), *_options("--without", [*without])]
@@ -73,6 +74,13 @@ def limits_in_words(
 
 def _short(number: float) -> str:
     return f"{number:.6g}"
+
+
+def noted(text: str, words: Mapping[str, str]) -> str:
+    """The text, and where its commands read what is only in memory (``before``), how to write that file first."""
+    if "before" not in words or "bns " not in text or words["data"] not in text:
+        return text
+    return f"{text}\nThe commands read {words['data']}. Write it first, in Python: {words['before']}"
 
 
 def model_words(model: Model) -> dict[str, Any]:

@@ -188,7 +188,7 @@ def next_commands(d: Diagnosis, p: Proposal | None, command: Mapping[str, str]) 
             out.append(f"bns trial --robot {p.bounds.robot} --rig RIG.yaml --commands next.csv")
         driven = "results/trials/experiment-next/measurements.csv" if p.bounds is not None and p.bounds.robot else "NEW-LOG.csv"
         out.append(f"bns diagnose {data} {search} --more {driven}")
-    return out
+    return [f"# first, in Python: {command['before']}", *out] if out and "before" in command else out
 
 
 def _table(columns: list[str], rows: list[list[Any]]) -> Table:
