@@ -8,6 +8,7 @@ import pytest
 import bns
 import bns.api.diagnose
 from bns.api.common import cache
+from bns.api.common.prepared import prepared
 from bns.cli.main import main
 from bns.diagnose.settings import DEFAULTS, Settings
 from bns.physics.formula import formula_effect
@@ -102,7 +103,7 @@ def test_whatever_changes_is_asked_again(table, asked, monkeypatch):
 
 
 def test_settings_are_part_of_the_question(table):
-    ready = bns.diagnose(table, NOMINAL).ready
+    ready = prepared(table, NOMINAL)
     before = cache.key("diagnose", ready, ())
     assert cache.key("diagnose", ready, ()) == before
     assert cache.key("compare", ready, ()) != before
