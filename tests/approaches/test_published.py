@@ -22,6 +22,7 @@ def test_the_tables_are_those_of_the_archive():
         assert f"| {' | '.join(one.table.columns)} |" in TEXT
 
 
+@pytest.mark.slow
 def test_what_is_said_of_pairs_is_what_the_archive_gives():
     figures = approach_pairs.draw(Results(ARCHIVE, archived=True))
     drawn = {one.name.removeprefix("approach-pairs-approaches-"): one.data for one in figures}

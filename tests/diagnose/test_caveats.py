@@ -43,6 +43,7 @@ def test_an_error_that_may_have_changed_by_luck_neither_fell_nor_rose():
     assert (errors.fell_in_the_end, errors.rose_in_the_end) == (("command",), ("trial",))
 
 
+@pytest.mark.slow
 def test_a_measured_number_that_the_data_contradict_is_said_to():
     truth = NOMINAL.with_effect("wheelbase", factor=1.06).with_effect("motor-lag", tau_s=0.2)
     predictor = WheelPredictor(tracks_of(measured(truth, trials=14, seed=2)))

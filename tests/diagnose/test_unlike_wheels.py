@@ -111,6 +111,7 @@ def test_a_warm_up_takes_no_longer_than_the_longest_trial():
     assert effect_named("warm-up").lasting(1e4) == effect_named("warm-up")
 
 
+@pytest.mark.slow
 def test_a_gain_is_no_tie_with_a_warm_up_that_outlasts_every_trial():
     found = diagnose(driven(trials=12, speed_gain={"gain": 0.95}), NOMINAL)
     assert (found.verdict, found.effects) == ("effects", ("speed-gain",))

@@ -94,6 +94,7 @@ def held_from(table, shares):
     return out
 
 
+@pytest.mark.slow
 def test_the_worst_trials_hide_the_next_ones_and_together_they_count():
     """Two are held for nearly a whole trial, two for its last part: next to the first, the others look like the rest."""
     table = held_from(measured(NOMINAL, trials=40, seed=2), {3: 0.05, 17: 0.05, 22: 0.9, 31: 0.9})

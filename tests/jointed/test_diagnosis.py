@@ -158,6 +158,7 @@ def arm(tmp_path_factory):
     return file
 
 
+@pytest.mark.slow
 def test_a_sound_arm_lacks_nothing(arm):
     found = bns.diagnose(log(12, seed=1), bns.Model(arm))
     assert (found.verdict, found.effects) == ("none", ())

@@ -63,6 +63,7 @@ def test_of_two_that_touch_the_one_with_priority_counts(body):
     assert (model.pair_dim[leg], model.pair_friction[leg, 0]) == (3, 1.0)  # of equals the larger ones: the floor's
 
 
+@pytest.mark.slow
 def test_the_model_predicts_what_a_loop_of_its_own_did(file, table):
     error = bns.compare(table, bns.Model(file, sites=list(dog.SITES))).errors
     assert error.loc["stretch", "median_position_m"] < 0.004  # a millimetre of it is the camera's, per coordinate

@@ -60,7 +60,7 @@ def test_program_of_a_model_does_not_run_unless_it_is_allowed(colleague):
     assert colleague.with_name("ran").exists()
 
 
-@pytest.mark.parametrize("command", ["compare", "run"])
+@pytest.mark.parametrize("command", ["compare", pytest.param("run", marks=pytest.mark.slow)])
 def test_commands_refuse_the_program_and_say_how_to_allow_it(colleague, bns, command):
     words = {
         "compare": ["compare", colleague.with_name("log.csv"), "--model", colleague],
