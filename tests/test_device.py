@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from types import SimpleNamespace
 
 import pytest
 
@@ -47,15 +48,28 @@ def test_the_package_does_not_load_cuda_unless_asked(tmp_path, bns):
     assert "bns.cuda" not in done.stderr
 
 
-def test_a_numpy_that_numba_cuda_does_not_load_beside(monkeypatch):
+LACKING = AttributeError("module 'numpy' has no attribute 'row_stack'")
+"""What numba-cuda 0.30.4 raises beside numpy 2.5."""
+
+
+def test_a_numpy_that_does_not_go_with_numba_cuda(monkeypatch):
     from bns.cuda import device
 
-    def broken(name):
-        raise AttributeError("module 'numpy' has no attribute 'row_stack'")
+    def broken(*_):
+        raise LACKING
 
-    monkeypatch.setattr(device.importlib, "import_module", broken)
-    with pytest.raises(DeviceError, match=r"does not load beside the numpy .*row_stack.*pip install 'bns\[cuda\]', or leave"):
-        device._module()
+    told = r"does not go with the numpy .*row_stack.*pip install 'bns\[cuda\]', or leave"
+    usable = SimpleNamespace(is_available=lambda: True)
+    for loads in (False, True):
+        device.device_name.cache_clear()
+        with monkeypatch.context() as patch:
+            if loads:  # and fails with the first kernel
+                patch.setattr(device, "_module", lambda: usable)
+                patch.setattr(device, "_tried", broken)
+            else:
+                patch.setattr(device.importlib, "import_module", broken)
+            with pytest.raises(DeviceError, match=told):
+                device.device_name()
 
 
 def test_batches_that_leave_most_of_the_gpu_idle_are_not_warned_of(monkeypatch):

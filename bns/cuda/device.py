@@ -43,6 +43,8 @@ def device_name() -> str:
     except Exception as error:  # of many kinds, from the compiler down to the driver
         if _is_full(error):
             raise full(error) from error
+        if isinstance(error, AttributeError):
+            raise _mismatched(error) from error
         raise DeviceError(
             f"--device cuda: a GPU is there, but a trial kernel failed: {_first_line(error)}. Most often its driver is older "
             f"than the CUDA version of numba-cuda: update the driver, install an older numba-cuda, {_ELSE}."
@@ -57,11 +59,16 @@ def _module() -> Any:
         raise DeviceError(
             f"--device cuda needs numba-cuda ({_first_line(error)}). Install it with: pip install 'bns[cuda]', {_ELSE}."
         ) from error
-    except AttributeError as error:  # as numba-cuda 0.30 with numpy 2.5, which no longer has a function that it asks for
-        raise DeviceError(
-            f"--device cuda: numba-cuda does not load beside the numpy that is installed ({_first_line(error)}). Install those "
-            f"that go together with: pip install 'bns[cuda]', {_ELSE}."
-        ) from error
+    except AttributeError as error:
+        raise _mismatched(error) from error
+
+
+def _mismatched(error: AttributeError) -> DeviceError:
+    """As numba-cuda 0.30 with numpy 2.5, which lacks a function that it asks for: on loading, or with the first kernel."""
+    return DeviceError(
+        f"--device cuda: numba-cuda does not go with the numpy that is installed ({_first_line(error)}). Install those that go "
+        f"together with: pip install 'bns[cuda]', {_ELSE}."
+    )
 
 
 def _tried(cuda: Any) -> str:
