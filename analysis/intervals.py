@@ -16,7 +16,7 @@ POOLED = "bands: pointwise 95 %, the wider of Wilson's interval and a bootstrap 
 """For curves that pool combinations: with a seed's luck in common, they scatter more than independent runs would."""
 BOOTSTRAP = "pointwise 95 % bootstrap intervals over seeds"
 DRAWS = 1000
-_Z = 1.959963984540054
+Z = 1.959963984540054
 """The 97.5 % point of the normal distribution."""
 FEWEST_SEEDS = 5
 """From fewer seeds no bootstrap interval is given: a handful of values says little of how far others would lie."""
@@ -29,8 +29,8 @@ def wilson(successes: Any, runs: Any) -> tuple[np.ndarray, np.ndarray]:
     # Written out, because the library that has it (statsmodels, which the tests compare with) takes longer to load than a
     # figure takes to draw.
     k, n = np.asarray(successes, float), np.asarray(runs, float)
-    centre = (k + _Z**2 / 2) / (n + _Z**2)
-    half = _Z * np.sqrt(k * (n - k) / n + _Z**2 / 4) / (n + _Z**2)
+    centre = (k + Z**2 / 2) / (n + Z**2)
+    half = Z * np.sqrt(k * (n - k) / n + Z**2 / 4) / (n + Z**2)
     return np.clip(centre - half, 0, k / n), np.clip(centre + half, k / n, 1)
 
 

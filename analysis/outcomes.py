@@ -17,13 +17,25 @@ FEWEST = 5
 """Runs behind a curve or dot; thinner ones jump between 0 and 100 % and are left out."""
 FEWEST_PLANNED = 2
 """Runs behind a dot of a sweep that asks for no more: less can never be drawn of it, and the intervals say how little that is."""
+FEWEST_OF_ALL = 3
+"""Runs behind a dot where all combinations have so many: those of them that have `FEWEST` were chosen by another sweep's plan,
+and stand for fewer values of the parameters. Three runs have a majority; two may have none."""
 _KEPT = ("success", *NEAR, "ever_success", "diversity", "fitness_error", "fitness_world")
 
 
+@remembered
 def fewest(store: Results, chosen: Selection) -> int:
-    """Runs that a combination must have to be drawn and ranked: `FEWEST`, or all that are asked for of it, where that is less."""
-    planned = [store.plans[sweep].seeds for sweep in chosen.sweeps if sweep in store.plans]
-    return min(FEWEST, max(FEWEST_PLANNED, *planned)) if planned else FEWEST
+    """Runs that a combination must have to be drawn and ranked: `FEWEST`, or all that are asked for of it, where that is less.
+
+    It is fewer, down to `FEWEST_OF_ALL`, where every combination of the largest sweep has so many and not all have `FEWEST`.
+    """
+    plans = [store.plans[sweep] for sweep in chosen.sweeps if sweep in store.plans]
+    if not plans:
+        return FEWEST
+    least = min(FEWEST, max(FEWEST_PLANNED, *(plan.seeds for plan in plans)))
+    runs = store.query(f"SELECT count(*) AS n FROM {last_outcomes(store, chosen)} GROUP BY task, {', '.join(CELL)}").n
+    of_all = int(runs.min()) if len(runs) and len(runs) >= max(plan.cells for plan in plans) else 0
+    return min(least, of_all) if of_all >= FEWEST_OF_ALL else least
 
 
 def outcomes(store: Results, chosen: Selection) -> str:

@@ -133,13 +133,22 @@ def test_low_diversity_spreads_error_and_success(tmp_path):
     assert both(tmp_path, spread(True), spread(False), "low_diversity_spreads", measure="fitness_error") == ["agrees", "differs"]
 
 
-def test_two_clusters_and_whose_the_lower_one_is(tmp_path):
+def test_two_clusters_and_whose_the_lower_one_is(tmp_path, monkeypatch):
     def at(middle):
-        return lambda rate, size, seed: {"diversity": middle(rate, size) + 0.0005 * size + 0.01 * seed}
+        def runs(rate, size, seed):
+            return {"diversity": middle(rate) + 0.1 * np.random.default_rng([int(100 * rate), size]).normal()}
 
-    two, one = at(lambda rate, size: 2.0 if rate == 0.1 else 3.4), at(lambda rate, size: 2.0 + 0.1 * rate)
+        return runs
+
+    two, one = at(lambda rate: 2.0 if rate == 0.1 else 3.4), at(lambda rate: 2.0 + 0.1 * rate)
     where = {"robot": "snake", "task": "two-regions"}
     assert both(tmp_path, two, one, "two_clusters", **where, centres=[2, 3.4]) == ["agrees", "differs"]
+    elsewhere = checked(tmp_path / "holds", "two_clusters", "two-regions", centres=[1, 3.4])
+    assert (elsewhere.verdict, elsewhere.ours.startswith("best two at 2.0")) == ("differs", True)
+    monkeypatch.setitem(globals(), "SIZES", tuple(range(50, 650, 50)))
+    store_of(tmp_path / "three", at(lambda rate: {0.1: 1.0, 0.3: 2.5}.get(rate, 4.0)), "snake", "two-regions")
+    three = checked(tmp_path / "three", "two_clusters", "two-regions", centres=[2, 3.4])
+    assert (three.verdict, three.ours[:36]) == ("differs", "3 describe them better than two, at ")
     lower = [
         checked(tmp_path / "holds", "lower_cluster_is", "two-regions", parameter="mutation_rate", value=value).verdict
         for value in (0.1, 0.9)
@@ -147,10 +156,15 @@ def test_two_clusters_and_whose_the_lower_one_is(tmp_path):
     assert lower == ["undecided", "differs"]  # 20 combinations of 20 leave a lower end of 84 %
 
 
-def test_a_large_population_has_fewer_bad_combinations(tmp_path):
+def test_a_large_population_removes_most_bad_combinations(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "RATES", tuple(np.round(np.linspace(0.05, 0.95, 19), 2)))
+    monkeypatch.setitem(globals(), "SEEDS", 5)
     holds = lambda rate, size, seed: {"success": size == 400 or rate < 0.2}  # noqa: E731
     fails = lambda rate, size, seed: {"success": size < 400}  # noqa: E731
     assert both(tmp_path, holds, fails, "large_population_has_fewer_bad") == ["agrees", "differs"]
+    store_of(tmp_path / "some", lambda rate, size, seed: {"success": rate < (0.4 if size == 400 else 0.1)})
+    some = checked(tmp_path / "some", "large_population_has_fewer_bad")  # fewer for sure (p = 0.002), but not half of them
+    assert (some.verdict, some.ours[:37]) == ("undecided", "12 of 19 are bad, 54 of 57 with small")
 
 
 def test_a_task_needs_more_evaluations_than_another(tmp_path):

@@ -264,6 +264,19 @@ def test_one_run_of_a_planned_grid_is_drawn_with_its_wide_interval(tmp_path):
         success_by_diversity.draw(Results(tmp_path))
 
 
+@pytest.mark.parametrize(("runs", "enough"), [(3, True), (2, False)])
+def test_all_combinations_with_three_runs_are_dots_rather_than_those_of_another_sweep_with_five(tmp_path, runs, enough):
+    plan = "name: {}\nrobot: khepera\nseeds: {}\nfixed: {{evaluations: 4, task: circle}}\ngrid: {{mutation_rate: {}}}"
+    rates, some = [0.1, 0.3, 0.5, 0.7, 0.9], [0.1, 0.5]
+    of_all = [RunSpec(seed=seed, evaluations=4, mutation_rate=rate) for rate in rates for seed in range(runs)]
+    of_some = [RunSpec(seed=seed, evaluations=4, mutation_rate=rate) for rate in some for seed in range(6)]
+    written(tmp_path, "all", [record(spec) for spec in of_all], sweep_text=plan.format("all", 30, rates), sweep_runs=150)
+    written(tmp_path, "some", [record(spec) for spec in of_some], sweep_text=plan.format("some", 6, some), sweep_runs=12)
+    drawn = success_by_diversity.draw(Results(tmp_path))[0]
+    assert len(curves(drawn.figure)) == (5 if enough else 2)
+    assert any("runs left out" in text for text in drawn.missing) is not enough
+
+
 def test_only_combinations_with_enough_runs_are_dots_and_the_others_are_counted(tmp_path):
     few = [RunSpec(seed=seed, evaluations=4, mutation_rate=0.9) for seed in range(2)]
     written(tmp_path, "grid", [record(spec) for spec in [*specs(6), *few]])
