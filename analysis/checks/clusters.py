@@ -20,6 +20,7 @@ NEARLY_ALL = 0.9
 BAD = 0.5
 """A combination is bad with less than this share of the best one's success."""
 MOST = 0.5
+"""Of the bad combinations most are gone where at most this share of them is left."""
 MOST_PARTS = 5
 """Normal distributions in a mixture: there are five mutation rates."""
 _FEWEST = 10

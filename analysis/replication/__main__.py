@@ -135,10 +135,10 @@ def _gpus(store: Results) -> list[str]:
         """SELECT robot, versions->>'$.device' AS device, count(*) AS runs FROM runs
         WHERE versions->>'$.device' IS NOT NULL GROUP BY ALL ORDER BY ALL"""
     )
-    said = rows.runs.map("{:,} runs of the ".format) + rows.robot
+    said = rows.runs.map("{:,} of the ".format) + rows.robot.replace("khepera", "Khepera")
     return [
-        f"A GPU ({device}) carried out {' and '.join(own)}; the CPU, the others. "
-        "[Do the two differ?](cuda.md#does-it-give-the-same-study)"
+        f"Of these runs, {' and '.join(own)} ran on a GPU ({device}). "
+        "[Does it give the same as a CPU?](cuda.md#does-it-give-the-same-study)"
         for device, own in said.groupby(rows.device)
     ]
 
