@@ -32,7 +32,7 @@ _STARTS = 2
 class DaskLink:
     """A client of the scheduler at ``address``, or of one with ``workers`` processes on this machine.
 
-    ``deaths`` counts by key of a future how many workers died that had it.
+    ``deaths`` counts by key of a future how many workers died that were at it, or had its result and nobody had fetched it.
     """
 
     def __init__(self, address: str | None, workers: int, patience_s: float) -> None:
@@ -141,7 +141,8 @@ class DaskLink:
 
     def _note(self, event: tuple[float, Mapping[str, Any]]) -> None:
         if event[1].get("action") in {"add-worker", "remove-worker"}:
-            self.deaths.update(event[1].get("processing-tasks", ()))
+            for lost in ("processing-tasks", "lost-computed-tasks"):
+                self.deaths.update(event[1].get(lost, ()))
             self._looked_at = float("-inf")
 
 

@@ -124,9 +124,9 @@ class DaskExecutor:
         assert flight.future is not None  # only futures are noted
         if flight.future.status in {"cancelled", "pending"}:  # the note was of an earlier future
             return None
-        deaths = sum(self._link.deaths[key] for key in flight.keys)
         try:
             record = flight.future.result(timeout=_FETCH_S)
+            deaths = sum(self._link.deaths[key] for key in flight.keys)  # also of workers that died while it was fetched
         except KilledWorker as fault:
             deaths, record = fault.allowed_failures, self._quarantined(flight, fault)
         except TimeoutError:  # its worker died with the result: the scheduler does the run again
