@@ -41,6 +41,7 @@ def many(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_numbers_of_many_poses_are_those_of_the_command_line(many, capsys):
     tab = Tab()
     tab.take(bns.Model(NOMINAL), ("khepera",))

@@ -186,6 +186,7 @@ def thinned(every):
     return WheelPredictor(tracks_of(table))
 
 
+@pytest.mark.slow
 def test_a_clock_that_comes_from_commands_logged_with_poses_is_said_to():
     """A command between two poses seems to begin with the second one: half an interval late on average."""
     found = diagnose(thinned(4), NOMINAL)

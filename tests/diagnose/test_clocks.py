@@ -36,6 +36,7 @@ def predictor():
     return WheelPredictor(tracks_of(apart(LATE_S, wheelbase={"factor": 1.05})))
 
 
+@pytest.mark.slow
 def test_clocks_and_what_they_hide_are_found(predictor):
     found = diagnose(predictor, NOMINAL)
     answer = found.as_json()

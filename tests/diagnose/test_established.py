@@ -149,10 +149,16 @@ def test_honest_robots_leave_nothing(seed):
     ("on", "term", "value", "signal", "says"),
     [
         ("left", "-k * sign(u)", 0.012, "speed of the left wheel", r"the left .* 0\.0199 m/s gives 0\.008\d* m/s \(-5\d\..*"),
-        ("wheels", "-k * min(u, 0)", 0.1, "speed of each wheel", r"a wheel's .* -0\.199 m/s gives -0\.179 m/s \(-10\.\d%\)"),
+        pytest.param(
+            "wheels", "-k * min(u, 0)", 0.1, "speed of each wheel", r"a wheel's .* -0\.199 m/s gives -0\.179 m/s \(-10\.\d%\)",
+            marks=pytest.mark.slow,
+        ),
         ("v", "-k * abs(v) * cos(heading)", 0.06, "direction of travel",
          r"slower by [56]\.\d+% when it travels towards -?[0-5]°, faster by [56]\.\d+% .* -?1[78]\d°"),
-        ("w", "-k * moving * exp(-((x - 0.1)**2 + y**2) / 0.08)", 0.3, "place", "turning velocity depends on place .*"),
+        pytest.param(
+            "w", "-k * moving * exp(-((x - 0.1)**2 + y**2) / 0.08)", 0.3, "place", "turning velocity depends on place .*",
+            marks=pytest.mark.slow,
+        ),
     ],
 )  # fmt: skip
 def test_what_one_wheel_or_a_place_does_is_described(on, term, value, signal, says):

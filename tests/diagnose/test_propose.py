@@ -179,6 +179,7 @@ def test_what_is_the_same_from_outside_is_said_to_be_so():
     assert proposal.power == 0
 
 
+@pytest.mark.slow
 def test_after_a_clear_verdict_only_the_accepted_one_is_contested():
     d, _ = found_in(hidden(turn_slip={"slip_s": 0.12}), trials=12, seed=2)
     competing_models = competing_models_of(d)

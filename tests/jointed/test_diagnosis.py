@@ -202,6 +202,7 @@ def test_a_weak_joint_of_an_arm_is_named_with_its_strength(arm):
     assert found.diagnosis.numbers["weak-joint-elbow"]["strength"]["value"] == pytest.approx(0.5, abs=0.05)
 
 
+@pytest.mark.slow
 def test_an_offset_is_added_by_the_command_line_and_read_back(arm, tmp_path, capsys):
     data, out = tmp_path / "log.csv", tmp_path / "mended.yaml"
     log(8, seed=3, zero_rad=0.08).to_csv(data, index=False)
