@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from figure_helpers import with_evals, written
 from store.synthetic import record
 
 from analysis import margins, readings
-from analysis.replication.__main__ import main
+from analysis.replication.__main__ import _gpus, main
 from analysis.replication.numbers import studies
 from analysis.results import NoDataError, Results
 from bns.spec import RunSpec
@@ -101,6 +103,16 @@ def test_the_page_has_every_finding_with_its_verdict_and_the_same_from_archive_a
     assert main(["--results", str(study), "--fresh", "--out", str(fresh)]) == 0
     part = [page.partition("## Finding by finding")[2].partition("## Readings")[0] for page in (text, fresh.read_text())]
     assert part[0] == part[1]
+
+
+def test_runs_of_a_gpu_are_counted_on_the_page(study):
+    assert _gpus(Results(study)) == []
+    [line] = _gpus(Results(ROOT / "results/published/study.parquet", archived=True))
+    page = " ".join((ROOT / "docs/replication.md").read_text().split())
+    assert line in page
+    counts = [int(number.replace(",", "")) for number in re.findall(r"([\d,]+) of the (?:Khepera|snake)", line)]
+    table = pq.read_table(ROOT / "results/published/study.parquet", columns=["versions"])
+    assert sum(counts) == sum("device" in json.loads(text) for text in table["versions"].to_pylist())
 
 
 def test_the_committed_page_is_of_the_committed_archive():
