@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,6 +21,8 @@ Z = 1.959963984540054
 """The 97.5 % point of the normal distribution."""
 FEWEST_SEEDS = 5
 """From fewer seeds no bootstrap interval is given: a handful of values says little of how far others would lie."""
+_LARGEST = 1 - 1e-12
+"""Correlation that Fisher's transformation is still finite for."""
 _STREAM = 20260101
 """Seed of the bootstrap: the same results give the same intervals."""
 
@@ -32,6 +35,21 @@ def wilson(successes: Any, runs: Any) -> tuple[np.ndarray, np.ndarray]:
     centre = (k + Z**2 / 2) / (n + Z**2)
     half = Z * np.sqrt(k * (n - k) / n + Z**2 / 4) / (n + Z**2)
     return np.clip(centre - half, 0, k / n), np.clip(centre + half, k / n, 1)
+
+
+def rank_correlation(first: Any, second: Any) -> tuple[float, float, float]:
+    """Spearman's rank correlation of two columns (n,), and the ends of its 95 % interval; NaN from fewer than four.
+
+    Fisher's transformation, with the variance of D. G. Bonett and T. A. Wright (Psychometrika 65, 2000): (1 + r^2/2) / (n - 3).
+    """
+    from scipy.stats import spearmanr  # noqa: PLC0415  # slow to load
+
+    found, n = float(spearmanr(first, second).statistic), len(first)
+    if n < 4:
+        return found, math.nan, math.nan
+    reach = Z * math.sqrt((1 + found**2 / 2) / (n - 3))
+    middle = math.atanh(max(-_LARGEST, min(_LARGEST, found)))
+    return found, math.tanh(middle - reach), math.tanh(middle + reach)
 
 
 def resampled(seeds: int, draws: int = DRAWS) -> np.ndarray:

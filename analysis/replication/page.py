@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from textwrap import fill
+from textwrap import fill, indent
 
 import pandas as pd
 
@@ -16,6 +16,16 @@ WAITS = "no "
 """How the reason begins where a finding cannot be measured yet: no combination, no run has enough."""
 TEMPLATE = Path(__file__).with_name("page.md")
 ROBOTS = {"khepera": "Khepera", "snake": "Snake"}
+RUNS = 30
+"""Of each combination (section 4.5)."""
+UNFINISHED = (
+    f"It requires {RUNS} runs of each of the {COMBINATIONS} combinations; the table below says how many there are. Runs are "
+    "made seed by seed: where all combinations have the same number of runs, the design is balanced, and only the intervals are "
+    "wider than they will be. A number without an interval comes from fewer than five seeds and is a first estimate. The largest "
+    "of several gaps is partly due to chance, and shrinks as runs are added. Findings about the best and the worst combinations "
+    "are the last to be decided: with few runs of each, the ten that look best are partly lucky. Where fewer than "
+    f"{COMBINATIONS} combinations are listed, a smaller sweep was run, which does not vary all parameters."
+)
 
 
 def page(
@@ -43,6 +53,7 @@ def page(
         origin: lines that say where the numbers come from.
     """
     parts = {
+        "STATE": _state(studies),
         "LOOK": "\n\n".join(_look(one) for one in studies),
         "FINDINGS": "\n\n".join(_findings(one, pictures) for one in studies),
         "EITHER": "There are no such findings yet." if either is None or either.empty else _either(either),
@@ -79,6 +90,18 @@ def _either(rows: pd.DataFrame) -> str:
         ],
     })  # fmt: skip
     return f"{table(counts)}\n\n{table(shown)}"
+
+
+def _state(studies: Sequence[Study]) -> str:
+    """Which robots have all runs that the study asks for, and what follows where one has not."""
+    lacking = [one for one in studies if one.tasks.least.min() < RUNS or one.tasks.combinations.min() < COMBINATIONS]
+    whole = [ROBOTS.get(one.chosen.robot, one.chosen.robot) for one in studies if one not in lacking]
+    complete = f"{RUNS} runs of each of the {COMBINATIONS} combinations on each task"
+    lines = [fill(f"The study of the {name} is complete: {complete}.", 120) for name in whole]
+    if lacking:
+        names = " and the ".join(ROBOTS.get(one.chosen.robot, one.chosen.robot).lower() for one in lacking)
+        lines.append(f'!!! warning "The study of the {names} is not complete"\n{indent(fill(UNFINISHED, 116), "    ")}')
+    return "\n\n".join(lines)
 
 
 def _look(one: Study) -> str:

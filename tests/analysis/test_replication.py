@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from figure_helpers import with_evals, written
 from store.synthetic import record
 
 from analysis import margins, readings
+from analysis.replication import page
 from analysis.replication.__main__ import _gpus, main
 from analysis.replication.numbers import studies
 from analysis.results import NoDataError, Results
@@ -119,3 +121,17 @@ def test_the_committed_page_is_of_the_committed_archive():
     said = described(ROOT / "results/published/study.parquet")
     assert f"{said['runs']:,} runs (`make replication`)" in (ROOT / "docs/replication.md").read_text()
     assert (ROOT / "results/published/study.parquet").stat().st_size < 30e6
+
+
+@pytest.mark.parametrize(
+    ("least", "combinations", "complete"), [(30, 500, True), (29, 500, False), (30, 499, False)], ids=str
+)
+def test_page_says_which_study_is_complete(least, combinations, complete):
+    def study(robot, runs, of):
+        tasks = pd.DataFrame({"least": [30, runs], "combinations": [500, of]})
+        return SimpleNamespace(chosen=SimpleNamespace(robot=robot), tasks=tasks)
+
+    said = page._state([study("khepera", least, combinations), study("snake", 5, 500)])
+    assert ("The study of the Khepera is complete: 30 runs of each of the 500 combinations" in said) == complete
+    assert f'"The study of the {"snake" if complete else "khepera and the snake"} is not complete"' in said
+    assert "warning" not in page._state([study("snake", 30, 500)])
