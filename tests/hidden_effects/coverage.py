@@ -86,10 +86,11 @@ def look(world: World, out: dict[tuple[str, str], Found], clean: bool, draws: in
     again = np.array(list(drawn(problem, fit, draws)))
     for i, (number, truth) in enumerate(values):
         low, high = fit.interval(i)
-        found, se = out[world.name, number.parameter.name], max(fit.se(i), 1e-300)
-        found.z.append((fit.values[i] - truth) / se)
+        found, se = out[world.name, number.parameter.name], fit.se(i)
         found.inside.append(bool(low <= truth <= high))
-        if clean:
+        if se > 0:
+            found.z.append((fit.values[i] - truth) / se)
+        if se > 0 and clean:
             found.clean.append((bare.values[i] - truth) / se)
         if draws:
             found.widths.append((high - low) / max(float(np.ptp(np.quantile(again[:, i], [0.025, 0.975]))), 1e-300))
@@ -109,7 +110,8 @@ def main() -> None:
             if world.hidden and not world.unlisted:
                 look(world, out, options.clean, options.bootstrap)
     for (name, number), found in out.items():
-        text = f"{name:40} {number:14} mean {np.mean(found.z):6.2f}  sd {np.std(found.z):5.2f}"
+        text = f"{name:40} {number:14} "
+        text += f"mean {np.mean(found.z):6.2f}  sd {np.std(found.z):5.2f}" if found.z else "no standard error: at a bound"
         text += f"  inside {sum(found.inside)} of {len(found.inside)}"
         text += f"  without noise {np.mean(found.clean):6.2f}" if found.clean else ""
         print(text + (f"  width over bootstrap's {np.mean(found.widths):5.2f}" if found.widths else ""))

@@ -5,6 +5,7 @@ every time measured here is the board's, whatever else this computer does.
 """
 
 import os
+import select
 import shutil
 import struct
 import subprocess
@@ -19,6 +20,7 @@ CORE = Path("/usr/share/arduino/hardware/arduino/avr")
 BOOT_LOADER = CORE / "bootloaders" / "stk500v2" / "stk500boot_v2_mega2560.hex"
 HZ = 16_000_000
 _SLICE_S = 0.01
+_WRITTEN_S = 0.25  # by the computer's clock; a question takes so long at most from one end of the terminal to the other
 _USED = ("wiring.c", "wiring_digital.c", "hooks.c", "main.cpp", "Print.cpp", "abi.cpp", "new.cpp")
 _USED_SERIAL = ("HardwareSerial.cpp", "HardwareSerial0.cpp", "HardwareSerial1.cpp")
 # As `platform.txt` of the core has them for a Mega 2560, without link-time optimisation; warnings are errors in the sketch only.
@@ -93,6 +95,10 @@ class Board:
         self.cycle, self.faults, count = struct.unpack("<QIH", self._process.stdout.read(14))
         put_through(self._master, self._slave, self._process.stdout.read(count))
 
+    def await_question(self):
+        """Until what was written is at the board's end: the kernel takes its time for that, the board's time does not wait."""
+        select.select([self._master], [], [], _WRITTEN_S)
+
     def run_until(self, seconds):
         """Let it run so long, whatever it says."""
         end = self.cycle + round(seconds * HZ)
@@ -155,9 +161,13 @@ class BoardClock:
         pass
 
     def in_vain(self, seconds):
-        end_s = self.now_s() + seconds
+        end_s, asked = self.now_s() + seconds, False
 
         def passed():
+            nonlocal asked
+            if not asked:
+                self._board.await_question()
+            asked = True
             self._board.run(_SLICE_S)
             return self.now_s() > end_s
 
