@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -84,6 +85,9 @@ def write_measurements(table: pd.DataFrame, path: str | Path, columns: Sequence[
         else:
             table.to_parquet(unfinished, index=False)
         unfinished.replace(path)
-    except BaseException:  # a part of a table would take the space that is missing
-        unfinished.unlink(missing_ok=True)
+    except BaseException as error:  # a part of a table would take the space that is missing
+        if isinstance(error, OSError) and error.filename is not None:
+            error.filename = str(path)  # the name that was given, not that of the unfinished file
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
         raise

@@ -141,6 +141,14 @@ def test_one_and_two_jobs_and_a_resumed_sweep_give_the_same_rows(tmp_path, sweep
         (["status", "--results", "nowhere"], r"bns sweep khepera-small"),
         (["query", "SELECT 1", "--results", "nowhere"], r"bns sweep"),
         (["precompute", "--robot", "kepera"], r"unknown robot"),
+        (["sweep", "khepera-small", "--scheduler", "tcp://10.0.0.1:1"], r"--scheduler: only with --executor dask\. Give"),
+        (["sweep", "khepera-small", "--executor", "dask", "--wait"], r"--wait: only with --executor slurm"),
+        (
+            ["sweep", "khepera-small", "--try-locally", "--time-limit", "4h", "--slurm", "a=b", "--shards", "3"],
+            r"--shards and --time-limit and --slurm and --try-locally: only with --executor slurm",
+        ),
+        (["query", "SELECT 1", "--json", "--csv"], r"--json and --csv exclude each other"),
+        (["query", "SELECT 1", "--no-header"], r"--no-header: only with --csv"),
     ],
 )
 def test_bad_input_is_named_and_ends_with_2(arguments, message, capsys, tmp_path, monkeypatch):
@@ -150,6 +158,18 @@ def test_bad_input_is_named_and_ends_with_2(arguments, message, capsys, tmp_path
     assert re.search(message, captured.err), captured.err
     assert captured.out == ""
     assert list(tmp_path.iterdir()) == [], "nothing is half-written"
+
+
+@pytest.mark.parametrize("world", ["nowhere.yaml", "physics>nowhere.yaml@3", "broken.yaml"])
+@pytest.mark.parametrize("more", [[], ["--dry-run"]])
+def test_a_sweep_in_a_model_file_that_is_missing_or_none_writes_nothing(tmp_path, monkeypatch, capsys, world, more):
+    monkeypatch.chdir(tmp_path)
+    Path("broken.yaml").write_text("wheelbase_m: wide\n")
+    Path("s.yaml").write_text(f"name: s\nrobot: khepera\nseeds: 2\nfixed: {{evaluations: 5, world: '{world}'}}\n")
+    assert main(["sweep", "s.yaml", "--results", "r", "--jobs", "1", *more]) == 2
+    said = capsys.readouterr()
+    assert re.search(r"There is no model file nowhere\.yaml|model broken lacks base", said.err), said.err
+    assert (said.out, Path("r").exists()) == ("", False)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from bns.api.common.arguments import checked_progress, several
 from bns.api.common.parameters import parameter_table
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Progress, silent
@@ -122,7 +123,8 @@ def add(
         ModelError: there is no such effect or model, or the model already has the effect.
         DataError: measurements that cannot be used, or of another robot.
     """
-    wanted = [effects] if isinstance(effects, str | PathLike | Effect) else list(effects)
+    wanted = several("effects", effects)
+    checked_progress(progress)
     if not wanted:
         raise ModelError("No effect is given; give at least one name of bns.effects().")
     if term is not None and len(wanted) != 1:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import pandas as pd
 
+from bns.api.common.arguments import checked_progress
 from bns.api.common.cache import remembered
 from bns.api.common.prepared import Prepared, prepared, prepared_networks
 from bns.api.common.progress import Meter, Progress
@@ -116,6 +117,7 @@ def compare(
         DataError: measurements that cannot be used, or of another robot.
         ModelError: no such model.
     """
+    checked_progress(progress)
     networks = prepared_networks(log, model)
     ready = networks or prepared(log, model)
     meter = Meter(progress, PHASES, pace=1)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from bns.api.common.arguments import checked_progress, several
 from bns.api.common.cache import remembered
 from bns.api.common.next_command import model_words, noted, own_files, repeated
 from bns.api.common.parameters import parameter_table
@@ -240,7 +241,9 @@ def diagnose(
         DataError: measurements that cannot be used, or of another robot.
         ModelError: there is no such model, or the file of an effect cannot be used.
     """
-    chosen, also, without_effects = settings_of(settings), tuple(also), tuple(without_effects)
+    checked_progress(progress)
+    chosen = settings_of(settings)
+    also, without_effects = several("also", also), several("without_effects", without_effects)
     with in_force(chosen):
         found = _found(_checked_again(log, chosen), model, also, without_effects, chosen, fresh, progress, alone)
     return replace(found, asked=_asked(model, also, without_effects, settings))

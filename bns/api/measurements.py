@@ -18,7 +18,7 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.bodies.cycles import CycleTracks
 from bns.diagnose.data.checks import left_out_rows, own_rows, rows_by_trial, rows_of_losses
 from bns.diagnose.data.load import Measured, load_measured, measured_table, table_sha256
-from bns.diagnose.data.mapping import checked_mapping, load_mapping
+from bns.diagnose.data.mapping import checked_mapping, files_behind, load_mapping
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.predict.check_robot import suggested_wheelbase_m
 from bns.diagnose.report.text import findings_text
@@ -108,6 +108,13 @@ class Measurements(Shown):
         return dict(self._given)
 
     @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that were read, with their mappings; none for a table."""
+        if self._given is _GIVEN_IN_MEMORY:
+            return ()
+        return tuple(files_behind([Path(self._given["data"]), *map(Path, self._given["more"])]))
+
+    @property
     def only_in_memory(self) -> bool:
         """Whether a command line cannot read the same: a table, a mapping given in Python, rows that were left out here."""
         return self._in_memory
@@ -119,7 +126,7 @@ class Measurements(Shown):
 
     def without(self, trials: Iterable[str]) -> Measurements:
         """The same measurements without some trials, by their names. DataError if there is no such trial, or none is left."""
-        trials = tuple(map(str, trials))
+        trials = (str(trials),) if isinstance(trials, str) or not isinstance(trials, Iterable) else tuple(map(str, trials))
         left_out, there = set(trials), self._rows_of_trials
         unknown = sorted(left_out - set(there))
         if unknown:

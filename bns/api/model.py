@@ -10,6 +10,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+from bns.api.common.arguments import as_path, named_model
 from bns.errors import ModelError, in_both, unknown_name
 from bns.physics import model as physics
 from bns.physics.jointed.mechanism import machine
@@ -53,7 +54,7 @@ class Model(physics.Model):
         """
         from bns.store.disk.files import publish  # noqa: PLC0415  # a model that is not saved needs no store
 
-        target = checked_target(Path(path))
+        target = checked_target(as_path(path))
         publish(self.to_yaml().encode(), target.with_name(f".{target.name}.part"), target)
         return target
 
@@ -130,7 +131,7 @@ class BodyModel(Model, JointedModel):
 def _names_a_body(given: Given | None) -> bool:
     if given is None or isinstance(given, physics.Model):
         return isinstance(given, JointedModel)
-    path = Path(given)
+    path = Path(named_model(given))
     if is_body(fspath(given)):
         return True
     return path.suffix in {".yaml", ".yml"} and path.is_file() and _BODY.search(path.read_text(errors="replace")) is not None
@@ -165,5 +166,5 @@ def _fields(given: Given | None, fields: dict[str, Any]) -> dict[str, Any]:
                 f"{in_both('--wheelbase METRES', 'bns.Model(wheelbase_m=0.2)')}."
             )
         return {} if given is None else {"name": given}
-    model = given if isinstance(given, physics.Model) else load_model(fspath(given))
+    model = given if isinstance(given, physics.Model) else load_model(named_model(given))
     return {field.name: getattr(model, field.name) for field in dataclasses.fields(physics.Model)}

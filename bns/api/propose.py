@@ -6,12 +6,14 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from bns.api.common.arguments import as_path, checked_progress
 from bns.api.common.next_command import limits_in_words, noted
 from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.provenance import provenance
@@ -19,6 +21,7 @@ from bns.api.common.shown import Shown
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log
 from bns.api.model import Given
+from bns.diagnose.data.mapping import refuse_to_replace
 from bns.diagnose.design.limits import arena_of, bounds_of
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.design.proposal import propose as search
@@ -81,7 +84,8 @@ class ProposeResult(Shown):
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
         """Write the commands as a file that `bns trial --commands` drives; its path. DataError where there are none."""
-        target = checked_output(Path(path), "The commands", ".csv")
+        target = checked_output(as_path(path), "The commands", ".csv")
+        refuse_to_replace(target, self.diagnosis.ready.log.files)
         if not len(self.proposal.plan):
             raise DataError(f"{target} is not written: no commands would decide anything.")
         publish(self.commands.to_csv(index=False).encode(), target.with_name(f".{target.name}.part"), target)
@@ -137,6 +141,7 @@ def propose(
         DataError: as `bns.diagnose`; limits that make no sense; or there are no two explanations to tell apart.
     """
     checked_minutes(minutes)
+    checked_progress(progress)
     found = diagnose(log, model, also=also, fresh=fresh, progress=part(progress, 0.0, 0.5))
     rest = part(progress, 0.5, 1.0)
     return proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
@@ -185,6 +190,8 @@ def _limits(
 
 def checked_minutes(minutes: float) -> None:
     """DataError unless an experiment can last so long."""
+    if not isinstance(minutes, Real):
+        raise DataError(f"minutes is {minutes!r}; it must be a number above 0 and at most {MOST_MINUTES:g}.")
     if not (math.isfinite(minutes) and 0 < minutes <= MOST_MINUTES):
         raise DataError(f"minutes is {minutes:g}; it must be above 0 and at most {MOST_MINUTES:g}.")
 

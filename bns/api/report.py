@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 
+from bns.api.common.arguments import as_path, checked_progress
 from bns.api.common.next_command import limits_in_words
 from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.shown import Shown
@@ -76,7 +77,8 @@ def report(
         ModelError: no such model.
     """
     checked_minutes(minutes)
-    checked_output(Path(path), "The report", ".html")
+    checked_output(as_path(path), "The report", ".html")
+    checked_progress(progress)
     found = diagnose(log, model, also=also, fresh=fresh, progress=part(progress, 0.0, 0.4))
     rest = part(progress, 0.4, 1.0)
     return reported(found, path, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
@@ -95,7 +97,7 @@ def reported(
 ) -> ReportResult:
     """The page of a diagnosis that is there. ``command``: words (data, model) that the commands shown on the page repeat."""
     checked_minutes(minutes)
-    target, ready = checked_output(Path(path), "The report", ".html"), found.ready
+    target, ready = checked_output(as_path(path), "The report", ".html"), found.ready
     meter = Meter(progress, PHASES, pace=1)
     planning = part(progress, PHASES["the next experiment"], PHASES["paths"])
     with in_force(found.settings):

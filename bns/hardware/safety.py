@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -190,7 +191,7 @@ class Stopping:
 class StopsAtTheEnd:
     """Whatever happens inside, the robot is stopped when it is left, and StopNotConfirmedError raised if it may still move.
 
-    The fault inside stays attached as the cause. `stop` must never raise.
+    The fault inside stays attached as the cause. A stop that is not confirmed is said on stderr at once. `stop` must never raise.
     """
 
     def __init__(self, stop: Callable[[], Stop]) -> None:
@@ -203,6 +204,9 @@ class StopsAtTheEnd:
     def __exit__(self, _kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> None:
         self.last = self._stop()
         if not self.last.confirmed:
+            if isinstance(error, StopNotConfirmedError):
+                return  # said already, and this attempt changes nothing
+            print(f"bns: {CUT_THE_POWER}", file=sys.stderr, flush=True)  # at once: closing the rig takes seconds more
             why = f" It was being stopped because {error}." if error is not None else ""
             raise StopNotConfirmedError(
                 f"{CUT_THE_POWER} It did not confirm a stop for {self.last.seconds:.1f} s: {self.last.problem}.{why}"

@@ -21,7 +21,7 @@ from bns.sweep.expand.order import ordered_specs
 from bns.sweep.expand.shard import Shard
 from bns.sweep.interrupt import GRACE_S, Interrupts
 from bns.sweep.jobs.executor import Executor, Job
-from bns.sweep.jobs.job import prepare, run_job
+from bns.sweep.jobs.job import check_world_files, names_a_file, prepare, run_job
 from bns.sweep.jobs.workers import LokyExecutor
 
 _POLL_S = 0.2
@@ -83,8 +83,12 @@ def run_sweep(
     Raises:
         StoreError: another process writes this sweep (this shard), the disk is full, or the store's runs of this sweep
             come from other world files. What was finished before is kept.
+        ModelError: a model file that runs to do name as their world is missing or no such file; nothing is written.
     """
     sweep_run = _SweepRun(sweep, Path(results), budget or Budget(), on_progress, shard)
+    if job is run_job and any(names_a_file(str(combo.get("world", ""))) for combo in sweep.combos):
+        known = recorded(Path(results), sweep.name)
+        check_world_files(spec for spec in ordered_specs(sweep) if spec.run_id not in known)
     name = shard.name if shard else ""
     with Interrupts(grace_s) as sweep_run.interrupts:
         try:

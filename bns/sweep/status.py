@@ -8,6 +8,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bns.errors import SpecError
 from bns.spec import RunSpec
 from bns.store.archive.read import connect_archives, stored_archives
@@ -63,7 +65,8 @@ def sweep_status(results: Path) -> list[SweepRow]:
 def _that_count(results: Path, runs: pd.DataFrame) -> pd.DataFrame:
     """``runs`` without those that are ok and have lost rows: the sweep does them again."""
     known = {name: finished(results, str(name)) for name in runs["sweep"].unique()}
-    return runs[[run in known[sweep] for run, sweep in zip(runs["run_id"], runs["sweep"], strict=True)]]
+    whole = [run in known[sweep] for run, sweep in zip(runs["run_id"], runs["sweep"], strict=True)]
+    return runs.loc[np.array(whole, bool)]  # an empty list would choose no columns
 
 
 def _with_archived(results: Path, runs: pd.DataFrame) -> pd.DataFrame:

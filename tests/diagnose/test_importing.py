@@ -1,5 +1,8 @@
 """A user's own columns, units and conventions."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,9 +10,8 @@ import pytest
 from bns.api.measurements import Measurements
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
-from bns.diagnose.data.import_log import refuse_to_overwrite
-from bns.diagnose.data.load import load_measured
-from bns.diagnose.data.mapping import load_mapping
+from bns.diagnose.data.load import load_measured, measured_table
+from bns.diagnose.data.mapping import files_behind, load_mapping, refuse_to_replace
 from bns.errors import DataError
 from bns.measurements import write_measurements
 from tests.diagnose.worlds import NOMINAL, measured
@@ -138,8 +140,56 @@ def test_neither_is_a_second_file_of_the_log(log):
     mapping = {"also": [{"file": "other.csv", "columns": {}}]}
     (folder / "other.csv").write_text("x")
     with pytest.raises(DataError, match=r"other\.csv is what is imported"):
-        refuse_to_overwrite(folder / "other.csv", [folder / "log.csv"], None, mapping)
-    refuse_to_overwrite(folder / "new.csv", [folder / "log.csv"], folder / "map.yaml", mapping)
+        refuse_to_replace(folder / "other.csv", files_behind([folder / "log.csv"], mapping), "imported")
+    refuse_to_replace(folder / "new.csv", [*files_behind([folder / "log.csv"], mapping), folder / "map.yaml"])
+
+
+@pytest.mark.parametrize(
+    ("words", "output"),
+    [
+        (("propose", "log.csv"), "log.csv"),
+        (("propose", "other.csv", "--more", "log.csv"), "log.csv"),
+        (("diagnose", "log.csv", "--settings", "mine.yaml"), "mine.yaml"),
+        (("diagnose", "log.csv"), "log.csv.import.yaml"),
+        (("add", "log.csv", "motor-lag"), "log.csv.import.yaml"),
+    ],
+)
+def test_no_command_replaces_what_it_reads(tmp_path, monkeypatch, capsys, words, output):
+    monkeypatch.chdir(tmp_path)
+    for name in ("log.csv", "other.csv", "mine.yaml"):
+        Path(name).write_text("as it was")
+    Path("log.csv.import.yaml").write_text("columns: {x_m: {from: x}}\n")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert main([*words, "--model", "khepera", "-o", output]) == 2
+    assert re.search(rf"{re.escape(output)} is what is read \(.*\); nothing was written\. Give another", capsys.readouterr().err)
+    assert before == {path: path.read_bytes() for path in tmp_path.iterdir()}
+
+
+def test_a_table_that_cannot_be_written_is_named_as_it_was_given(tmp_path, monkeypatch):
+    def full(*_, **__):
+        raise OSError(30, "Read-only file system", str(tmp_path / ".m.csv.7.part"))
+
+    monkeypatch.setattr(pd.DataFrame, "to_csv", full)
+    with pytest.raises(OSError, match="Read-only") as told:
+        write_measurements(measured(NOMINAL, trials=1), tmp_path / "m.csv")
+    assert told.value.filename == str(tmp_path / "m.csv")
+
+
+@pytest.mark.parametrize("more", [False, True])
+def test_trials_keep_their_names_where_some_rows_have_none(tmp_path, more):
+    table = measured(NOMINAL, trials=4)
+    table.to_csv(tmp_path / "whole.csv", index=False)
+    lost = table.assign(trial=table["trial"].where(table.index % 97 != 3))
+    assert lost["trial"].isna().any()
+    lost.to_csv(tmp_path / "lost.csv", index=False)
+    if more:
+        shifted = table.assign(x_m=table["x_m"] + 1.0)
+        shifted.to_csv(tmp_path / "first.csv", index=False)
+        names = load_measured(tmp_path / "first.csv", None, [tmp_path / "lost.csv"]).tracks.names
+        assert list(names) == [*"0123", *(f"1-lost: {n}" for n in range(4))]
+    else:
+        assert list(load_measured(tmp_path / "lost.csv").tracks.names) == list("0123")
+        assert list(measured_table(lost, Path("table")).tracks.names) == list("0123")
 
 
 def test_the_same_trial_in_two_files_is_refused(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -289,6 +290,21 @@ def test_limits_that_make_no_sense_are_refused(narrow, arena, start, speeds, mes
     tracks = narrow[1].tracks
     with pytest.raises(DataError, match=message):
         (arena_of(tracks, arena, start), bounds_of(tracks, NOMINAL, speeds))
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (1e-3, -1e-9)])
+def test_a_robot_that_always_starts_at_the_edge_may_start_there_again(x, y):
+    """Nobody chose the arena, so it includes where the trials began, and no more beyond."""
+    begins = np.tile([x, y, np.pi / 2], (6, 1))
+    away = np.linspace(0, 1, 50)[:, None] * [0.2, 0.9, 0.0]
+    poses = np.concatenate([begin + away for begin in begins])
+    tracks = SimpleNamespace(pose=poses, first=np.arange(0, 301, 50))
+    arena = arena_of(tracks)
+    assert arena.start == pytest.approx((x, y, np.pi / 2))
+    assert (arena.x_low_m, arena.y_low_m) == pytest.approx((x - 0.05, y - 0.05), abs=1e-6)
+    assert (arena.x_high_m, arena.y_high_m) == pytest.approx((x + 0.2, y + 0.9), abs=0.02)
+    with pytest.raises(DataError, match="outside of the arena"):
+        arena_of(tracks, None, (x, y, 0.0))
 
 
 def test_no_rivals_no_experiment():

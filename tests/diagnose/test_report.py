@@ -17,7 +17,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report import tables
-from bns.diagnose.report.plain_language import figures_in_words
+from bns.diagnose.report.plain_language import _rounded_up, figures_in_words
 from bns.diagnose.report.shown_paths import shown_paths
 from bns.diagnose.report.tables import error_table
 from bns.diagnose.report.text import comparison_text
@@ -213,7 +213,12 @@ def test_a_gain_by_chance_is_that_of_the_best_of_all_effects_that_were_tried(pag
     said = re.search(r"to any of the (\d+) effects tried is at most ([0-9.e-]+)\.", page_of("effects").read_text())
     tried, chance = int(said[1]), float(said[2])
     assert tried > 20
-    assert chance >= 0.9 * tried * 5e-5
+    assert chance >= tried * 5e-5
+
+
+def test_a_bound_that_is_rounded_stays_a_bound():
+    for bound, said in ((0.00215, 0.003), (0.002, 0.002), (0.96, 1.0), (1.0, 1.0), (0.0, 0.0), (3e-7, 3e-7), (9.01e-5, 1e-4)):
+        assert _rounded_up(bound) == pytest.approx(said, rel=1e-6)
 
 
 @pytest.mark.parametrize(

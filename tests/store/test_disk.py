@@ -19,7 +19,7 @@ from bns.store.read.snapshot import full_snapshot
 from .synthetic import records
 
 FULL = "limit is full. Nothing that was finished is lost: free some space"
-READ_ONLY = r"read-only for this user. .*choose another folder with --results DIR"
+READ_ONLY = r"read-only for this user. .*give another place \(--results DIR for results, -o FILE for a file\)"
 
 
 class Disk:

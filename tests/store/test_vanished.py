@@ -105,7 +105,7 @@ def test_file_where_the_results_should_be(tmp_path, below):
         with pytest.raises(StoreError, match=rf"no results in {file / below}: {file} is a file, not a folder\."):
             read(file / below)
     with (
-        pytest.raises(StoreError, match=rf"{file} is a file\. .*choose a folder with --results DIR"),
+        pytest.raises(StoreError, match=rf"{file} is a file\. .*give a folder \(--results DIR"),
         Writer(file / below, "s"),
     ):
         pass

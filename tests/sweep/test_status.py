@@ -119,6 +119,11 @@ def test_tasks_and_sweeps_that_are_not_begun_are_listed(tmp_path):
     assert all(line.split()[2:] == ["0", "6", "0", "0", "0", "-", "-"] for line in lines[2:])
 
 
+def test_a_sweep_whose_first_run_is_under_way_is_listed_alone(tmp_path):
+    serial(sweep_of(tmp_path), tmp_path, limit=0)
+    assert [(row.task, row.done, row.total) for row in sweep_status(tmp_path)] == [("circle", 0, 6), ("letter-s", 0, 6)]
+
+
 def test_runs_of_an_earlier_file_of_that_name_are_counted_apart(tmp_path):
     serial(sweep_of(tmp_path), tmp_path)
     text = "name: demo\nrobot: khepera\nseeds: 1\nfixed: {evaluations: 3}\ngrid: {population_size: [10, 12, 13]}"

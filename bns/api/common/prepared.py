@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from os import fspath
 from pathlib import Path
 
+from bns.api.common.arguments import named_model
 from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
 from bns.diagnose.data.bodies.cycles import CycleTracks, marker_noise_m
@@ -142,8 +142,8 @@ def are_networks(model: Given) -> bool:
 
 
 def _networks(model: Given) -> tuple[Path, str] | None:
-    return None if isinstance(model, physics.Model) else networks_file(fspath(model), [*model_names(), SNAKE])
+    return None if isinstance(model, physics.Model) else networks_file(named_model(model), [*model_names(), SNAKE])
 
 
 def _name(model: Given) -> str:
-    return model.name if isinstance(model, physics.Model) else fspath(model)
+    return model.name if isinstance(model, physics.Model) else named_model(model)

@@ -162,8 +162,8 @@ def import_(options: argparse.Namespace) -> int:
     """A log as a table of measurements; the mapping is kept beside it."""
     import yaml
 
-    from bns.diagnose.data.import_log import check_new_mapping, import_log, proposal, refuse_to_overwrite
-    from bns.diagnose.data.mapping import load_mapping, mapping_beside
+    from bns.diagnose.data.import_log import check_new_mapping, import_log, proposal
+    from bns.diagnose.data.mapping import files_behind, load_mapping, refuse_to_replace
     from bns.diagnose.report.text import findings_text
     from bns.errors import DataError
     from bns.measurements import check_table_name, write_measurements
@@ -183,7 +183,8 @@ def import_(options: argparse.Namespace) -> int:
     check_table_name(options.output)
     first = options.data[0]
     given = load_mapping(options.map) if options.map else None
-    refuse_to_overwrite(options.output, options.data, options.map, given or mapping_beside(first))
+    sources = [*files_behind(options.data, given), *([options.map] if options.map else ())]
+    refuse_to_replace(options.output, sources, "imported")
     found = import_log(options.data, given)
     write_measurements(found.table, options.output)
     if options.map:
@@ -228,6 +229,7 @@ def diagnose(options: argparse.Namespace) -> int:
 
     if options.output is not None:
         checked_target(options.output)
+        refuse_sources(options)
     found = diagnosed(options)
     extended = found.extended
     if options.output is not None and extended is not None:
@@ -290,6 +292,7 @@ def add(options: argparse.Namespace) -> int:
     from bns.api.model import checked_target
 
     checked_target(options.output)
+    refuse_sources(options)
     model, log = model_of(options), log_of(options)
     with ticking("fitting") as tick:
         result = fitted(
@@ -327,6 +330,14 @@ def log_of(options: argparse.Namespace) -> Measurements:
         most = len(findings) if getattr(options, "findings", False) else 5
         print(findings_text(findings, most), file=sys.stderr)
     return log
+
+
+def refuse_sources(options: argparse.Namespace) -> None:
+    """DataError, before anything is computed, if the output would replace the measurements, a mapping or the settings."""
+    from bns.diagnose.data.mapping import files_behind, refuse_to_replace
+
+    settings = getattr(options, "settings", None)
+    refuse_to_replace(options.output, [*files_behind([options.data, *options.more]), *([settings] if settings else ())])
 
 
 def words_of(options: argparse.Namespace) -> dict[str, str]:

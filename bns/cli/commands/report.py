@@ -14,6 +14,7 @@ from bns.cli.commands.diagnose import (
     add_effect_options,
     add_model_options,
     diagnosed,
+    refuse_sources,
     ticking,
     words_of,
 )
@@ -74,6 +75,7 @@ def propose(options: argparse.Namespace) -> int:
     out, limits = options.output, _limits(options)
     if out is not None:
         checked_output(out, "The commands", ".csv")
+        refuse_sources(options)
     found = diagnosed(options)
     with ticking("planning") as tick:
         proposal = found.propose(**limits, progress=tick)

@@ -57,8 +57,13 @@ def status(options: argparse.Namespace) -> int:
 
 def query(options: argparse.Namespace) -> int:
     """Rows of a query, as a table, as CSV or as JSON."""
+    from bns.errors import SpecError
     from bns.store import query as answer
 
+    if options.json and (options.csv or options.no_header):
+        raise SpecError(f"--json and {'--csv' if options.csv else '--no-header'} exclude each other. Give one of them.")
+    if options.no_header and not options.csv:
+        raise SpecError("--no-header: only with --csv. Give that too, or leave --no-header out.")
     rows = answer(options.results, options.sql)
     if options.json:
         print(as_json([dict(zip(rows.columns, row, strict=True)) for row in rows.itertuples(index=False, name=None)]))

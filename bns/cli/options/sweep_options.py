@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 DEVICES = ("cpu", "cuda")
 _ON_CPU = "joblib"
 _TIME_LIMIT_S = 4 * 3600.0
+_ONLY_WITH = {"dask": ("scheduler",), "slurm": ("shards", "time_limit", "slurm", "try_locally", "wait")}
 
 
 def add_cluster_options(
@@ -38,7 +39,6 @@ def add_cluster_options(
     add(
         "--time-limit",
         type=duration,
-        default=_TIME_LIMIT_S,
         metavar="TIME",
         help="time limit of each SLURM job (default: 4h)",
     )
@@ -58,7 +58,12 @@ def say_if_experimental(device: str) -> None:
 
 
 def backend_name(options: argparse.Namespace) -> str:
-    """Name of the executor; SpecError if a GPU and other machines are asked for at once."""
+    """Name of the executor; SpecError if a GPU and other machines are asked for at once, or for an option of another executor."""
+    for executor, names in _ONLY_WITH.items():
+        asked = [name for name in names if getattr(options, name) not in (None, False, [])]
+        if asked and options.executor != executor:
+            words = " and ".join(f"--{name.replace('_', '-')}" for name in asked)
+            raise SpecError(f"{words}: only with --executor {executor}. Give that too, or leave {words} out.")
     if options.device == "cpu":
         return options.executor or _ON_CPU
     if options.executor not in {None, options.device} or options.jobs is not None:
@@ -84,7 +89,7 @@ def request_of(options: argparse.Namespace, bar: SweepProgress) -> Request:
         on_progress=bar,
         scheduler=options.scheduler,
         shards=options.shards,
-        time_limit_s=options.time_limit,
+        time_limit_s=_TIME_LIMIT_S if options.time_limit is None else options.time_limit,
         options=tuple(options.slurm),
         cluster="local" if options.try_locally else "slurm",
         wait=options.wait,

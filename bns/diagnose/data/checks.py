@@ -78,6 +78,14 @@ def rows_by_trial(table: pd.DataFrame) -> list[tuple[str, np.ndarray]]:
     return list(zip(map(str, names), np.split(order, ends[:-1]) if len(names) else [], strict=True))
 
 
+def whole_names(trials: pd.Series) -> pd.Series:
+    """Trials numbered 8 stay 8 where rows without a name have made 8.0 of them; a row without a name stays without."""
+    if not pd.api.types.is_float_dtype(trials) or trials.notna().all():
+        return trials
+    whole = trials.notna() & (trials % 1 == 0)
+    return trials.astype(object).mask(whole, trials.where(whole, 0).astype("int64").astype(object))
+
+
 def own_rows(table: pd.DataFrame) -> np.ndarray:
     """Rows that are no run-up, (rows,) of bool."""
     return (table[RUN_UP] != 1).to_numpy() if RUN_UP in table.columns else np.ones(len(table), dtype=bool)

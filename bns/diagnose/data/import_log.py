@@ -42,17 +42,6 @@ class Imported:
         return f"{len(self.table)} rows of {self.trials} trials written to {where}: {self.poses} with a pose{rest}"
 
 
-def refuse_to_overwrite(
-    output: Path, files: Sequence[Path], map_file: Path | None, mapping: Mapping[str, Any] | None
-) -> None:
-    """DataError if the table would replace a file that it is made from: a log is not made a second time."""
-    also = [files[0].parent / str(one["file"]) for one in (mapping or {}).get("also", ())]
-    beside = [files[0].with_name(files[0].name + ".import.yaml")]
-    for source in (*files, *also, *beside, *([map_file] if map_file else ())):
-        if output.resolve() == source.resolve() or (output.exists() and source.exists() and output.samefile(source)):
-            raise DataError(f"{output} is what is imported ({source}); nothing was written. Give another file with -o.")
-
-
 def check_new_mapping(output: Path) -> None:
     """DataError if a proposed mapping may not be written there: a mapping that was checked by hand is not replaced."""
     if output.suffix not in {".yaml", ".yml"}:

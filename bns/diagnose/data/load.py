@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.bodies.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.data.bodies.joints import are_joints, joint_tracks
-from bns.diagnose.data.checks import Finding, checked
+from bns.diagnose.data.checks import Finding, checked, whole_names
 from bns.diagnose.data.located import BEGINS
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
@@ -55,6 +55,8 @@ def measured_table(table: pd.DataFrame, path: Path, digest: str = "", robot: str
     """Check a table that was read and mapped already. ``path`` names it; ``digest``: by default that of its values."""
     with naming(path):
         table = _kept(_of_one_robot(table, robot))
+    if "trial" in table.columns:
+        table = table.assign(trial=whole_names(table["trial"]))
     of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
     with naming(path):
         tracks, findings = _tracks(table)
@@ -129,7 +131,8 @@ def _joined(paths: Sequence[Path]) -> pd.DataFrame:
     for number, (path, table) in enumerate(zip(paths, tables, strict=True)):
         if "trial" in table.columns:
             before = f"{number}-{path.stem}: " if number else ""
-            table["trial"] = before + table["trial"].astype(str)
+            names = whole_names(table["trial"])
+            table["trial"] = (before + names.astype(str)).where(names.notna())
     return pd.concat(tables, ignore_index=True)
 
 

@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +87,23 @@ def mapping_beside(data: Path) -> LocatedMapping | None:
     """The mapping kept beside a data file; None if there is none."""
     path = data.with_name(data.name + ".import.yaml")
     return load_mapping(path) if path.is_file() else None
+
+
+def files_behind(files: Sequence[Path], mapping: Mapping[str, Any] | None = None) -> list[Path]:
+    """All files that a table is made from: those given, the mapping beside each, and the files that a mapping joins.
+
+    ``mapping``: of the first; by default the one beside it.
+    """
+    beside = [file.with_name(file.name + ".import.yaml") for file in files]
+    rules = mapping if mapping is not None else mapping_beside(files[0])
+    return [*files, *beside, *(files[0].parent / str(one["file"]) for one in (rules or {}).get("also", ()))]
+
+
+def refuse_to_replace(output: Path, sources: Iterable[Path], how: str = "read") -> None:
+    """DataError if a file to be written is one of these: a log is not made a second time."""
+    for source in sources:
+        if output.resolve() == source.resolve() or (output.exists() and source.exists() and output.samefile(source)):
+            raise DataError(f"{output} is what is {how} ({source}); nothing was written. Give another file with -o.")
 
 
 def load_mapping(path: Path) -> LocatedMapping:

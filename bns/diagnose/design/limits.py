@@ -19,6 +19,7 @@ _TOGETHER_M = DEFAULTS.design.together_m
 _TRIAL_S = DEFAULTS.design.trial_s
 _HEADING_RAD = DEFAULTS.design.heading_rad
 _LARGEST_M = DEFAULTS.design.largest_m
+_AROUND_M = MARGIN_M * (1 + 1e-6)
 _ARENA = in_both("--arena 1.8x1.3, in metres", "arena=(1.8, 1.3)")
 START = in_both("--start X,Y,DEGREES, such as --start 0,0,90", "start=(x_m, y_m, heading_rad)")
 _SPEEDS = in_both("--speeds=LOW,HIGH, such as --speeds=-0.2,0.2", "speeds=(-0.2, 0.2)")
@@ -32,8 +33,8 @@ def arena_of(
     The arena is where the robot was seen; or ``size``: (width, height) in m around the start, or (lowest x, highest x, lowest y,
     highest y) in m.
 
-    The start is ``start`` (x_m, y_m, heading_rad), else where the trials seen so far started if that was one place, else
-    the arena's middle, facing north. DataError for what is no arena or start.
+    The start is ``start`` (x_m, y_m, heading_rad), else where the trials seen so far started if that was one place, which the
+    arena then includes, else the arena's middle, facing north. DataError for what is no arena or start.
     """
     begins = tracks.pose[tracks.first[:-1]]
     middle = np.median(begins[:, :2], axis=0)
@@ -49,6 +50,8 @@ def arena_of(
         centre = np.array(begin[:2]) if begin is not None else (low + high) / 2
         half = _checked_size(size) / 2
         low, high = centre - half, centre + half
+    elif begin is not None and start is None:  # nobody chose either: the robot may stand where it always started
+        low, high = np.minimum(low, np.array(begin[:2]) - _AROUND_M), np.maximum(high, np.array(begin[:2]) + _AROUND_M)
     centre = (low + high) / 2
     begin = begin or (float(centre[0]), float(centre[1]), _HEADING_RAD)
     arena = Arena(float(low[0]), float(high[0]), float(low[1]), float(high[1]), begin)

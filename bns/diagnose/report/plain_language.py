@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -133,8 +134,17 @@ def certainty(d: Diagnosis) -> str:
     chance, tried = next(
         (c.paired_comparison.p_value, len(s.ranking)) for s in found.steps for c in s.ranking if c.name in d.effects
     )
+    bound = _rounded_up(min(1.0, tried * chance))
     better = int((found.problem.fit(without_last(found)).held_out > found.fit.held_out).sum())
     return (
         f"{with_what(d)}, {better} of {trials} trials are predicted better, each by a fit to other trials. The probability that "
-        f"chance alone gives such a gain to any of the {tried} effects tried is at most {min(1.0, tried * chance):.1g}."
+        f"chance alone gives such a gain to any of the {tried} effects tried is at most {bound:.1g}."
     )
+
+
+def _rounded_up(bound: float) -> float:
+    """To one digit, so that it stays a bound."""
+    if bound <= 0:
+        return bound
+    unit = 10.0 ** math.floor(math.log10(bound))
+    return min(1.0, math.ceil(bound / unit - 1e-9) * unit)

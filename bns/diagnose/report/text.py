@@ -158,7 +158,7 @@ def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
 def _number(name: str, n: Mapping[str, Any]) -> str:
     said = f"{name} = {n['value']:.5g}{_unit(n)}"
     if without_width(n["low"], n["high"]):
-        return f"{said} (no interval: it is at a bound, or no small change of it changes the loss)"
+        return f"{said} (no interval: one trial only, at a bound, or no small change changes the loss)"
     return f"{said} (95 %: {n['low']:.5g} to {n['high']:.5g})"
 
 

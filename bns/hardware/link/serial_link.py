@@ -41,6 +41,8 @@ class SerialLink:
         self.times = ReplyTime(limits)
         self._owed: list[tuple[float, bytes]] = []
         """When questions were asked whose answers have not come and may still do so."""
+        self._twice: list[tuple[float, bytes]] = []
+        """Likewise, of questions that were asked more than once and have been answered once."""
         self._serial: serial.Serial | None = None
         self._serial = open_port(port, baud, clock)
 
@@ -51,10 +53,11 @@ class SerialLink:
         be answered by what is on its way since it was asked before.
         """
         began_s = self._clock.now_s()
-        self._owed = [(asked_s, what) for asked_s, what in self._owed if began_s - asked_s < _OWED_S]
+        for late in (self._owed, self._twice):
+            late[:] = [(asked_s, what) for asked_s, what in late if began_s - asked_s < _OWED_S]
         try:
             if self._serial is None:
-                self._serial, self._owed = open_port(self.port, self._baud, self._clock), []
+                self._serial, self._owed, self._twice = open_port(self.port, self._baud, self._clock), [], []
             if not again:
                 self.forget()
             self._journal.note("sent", data=request.decode("latin-1"))
@@ -76,16 +79,17 @@ class SerialLink:
             raise NoReplyError(f"no answer to {request!r} within {timeout_s:.2g} s")
         if not any(what == request for _, what in self._owed):  # else nobody knows which one was answered
             self.times.measured(took_s)
-        self._owed = [(asked_s, what) for asked_s, what in self._owed if what != request]
+        self._twice += [pair for pair in self._owed if pair[1] == request]
+        self._owed = [pair for pair in self._owed if pair[1] != request]
         return line.strip(b"\r\n")
 
     def _is_older(self, line: bytes, request: bytes, began_s: float) -> bool:
         """Whether a line answers a question from before: another letter, or the same one sooner than any answer has ever come."""
-        older = [pair for pair in self._owed if pair[1] != request and pair[1][:1].lower() == line[:1]]
+        older = [pair for pair in (*self._owed, *self._twice) if pair[1] != request and pair[1][:1].lower() == line[:1]]
         too_soon = self._clock.now_s() - began_s < 0.5 * self.times.quickest_s
         if not older or (line[:1] == request[:1].lower() and not too_soon):
             return False
-        self._owed.remove(older[0])
+        (self._owed if older[0] in self._owed else self._twice).remove(older[0])
         return True
 
     def forget(self) -> None:

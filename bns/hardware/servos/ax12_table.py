@@ -86,6 +86,7 @@ AX12 = ServoTable(
     wanted={"return_delay": 0, "status_return": 2, "cw_angle_limit": 0, "ccw_angle_limit": 1023},
     needed=("status_return",),
     alarms=ERRORS,
+    garbled_bit=CHECKSUM,
     minus_bit=1024,
 )
 """No load: 59 turns a minute at 12 V."""

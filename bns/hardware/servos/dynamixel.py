@@ -128,12 +128,15 @@ class DynamixelChain:
             finally:
                 self._port.is_using = False  # an exchange broken off leaves it set, and every later call fails
             self._journal.note("servo", id=number, what=what, result=result, error=bits, value=value)
-            if result == COMM_SUCCESS:
+            if result == COMM_SUCCESS and self.table.garbled(bits):
+                problem = "what reached it was garbled"
+            elif result == COMM_SUCCESS:
                 if bits & ~self.table.alarm_bits or (bits and not alarms):
                     alarm = self.table.in_words(bits, self._hardware_error(number, bits))
                     raise ServoAlarmError(f"servo {number}: {alarm}")
                 return value
-            problem = problem or str(self._packets.getTxRxResult(result))
+            else:
+                problem = problem or str(self._packets.getTxRxResult(result))
         raise ServoError(f"servo {number}: {what}: {problem}; asked {attempts} times")
 
     def _hardware_error(self, number: int, bits: int) -> int:
@@ -272,21 +275,20 @@ class DynamixelChain:
     def stop(self, patience_s: float = 5.0) -> Stop:
         """Torque off, confirmed by every servo: torque reads 0, and no joint moves from one look to the next. Never raises.
 
-        The order goes to all at once, and again for those that have not confirmed it; each is asked once a round, so that one
-        that is silent holds up nobody's else confirmation.
+        The order goes to all at once, in every round; each is asked once a round, so that one that is silent holds up nobody's
+        else confirmation.
         """
         began_s, acknowledged_s, off = self._clock.now_s(), None, dict[int, int]()
         while True:
             round_s = self._clock.now_s()
-            if len(off) < len(self.ids):
-                self._all_off()
+            self._all_off()  # every round: a guard that has taken the port gives it back for an order to stop alone
             left = {number: why for number in self.ids if (why := self._not_still(number, off))}
             now_s = self._clock.now_s()
             acknowledged_s = acknowledged_s or (now_s - began_s if len(off) == len(self.ids) else None)
             if not left or now_s - began_s > patience_s:
                 break
             self._clock.sleep(round_s + _BETWEEN_S - now_s)
-        stop = Stop(not left, now_s - began_s, acknowledged_s, "; ".join(left.values()))
+        stop = Stop(not left, now_s - began_s, acknowledged_s, _in_words(left))
         self._journal.note("stop", **asdict(stop))
         return stop
 
@@ -303,13 +305,13 @@ class DynamixelChain:
         try:
             powered, place = self._torque_and_place(number)
         except ServoError as error:
-            return str(error)
+            return str(error).removeprefix(f"servo {number}: ")
         if powered:
             places.pop(number, None)
-            return f"servo {number} still has its torque on"
+            return "torque still on"
         before, places[number] = places.get(number), place
         still = before is not None and abs(place - before) <= self.table.still_steps
-        return "" if still else f"servo {number} still moves"
+        return "" if still else "still moving"
 
     def _torque_and_place(self, number: int) -> tuple[int, int]:
         """Together, where no register is missing in between: reading one that is not there is refused."""
@@ -322,3 +324,12 @@ class DynamixelChain:
         address = self.table.registers["present_position"].address
         return torque[0], self.table.in_block("present_position", place, address)
 
+
+def _in_words(problems: Mapping[int, str]) -> str:
+    """Servo -> what keeps it from being confirmed; servos with the same problem are named together."""
+    servos: dict[str, list[int]] = {}
+    for number, why in problems.items():
+        servos.setdefault(why, []).append(number)
+    return "; ".join(
+        f"servo{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}: {why}" for why, numbers in servos.items()
+    )

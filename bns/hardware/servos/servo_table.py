@@ -61,6 +61,14 @@ class ServoTable:
     alarm_bits: int = 0xFF
     """Of an error byte: the servo's own alarms. The rest is a number: why an instruction was refused."""
     refusals: Mapping[int, str] = field(default_factory=dict)
+    garbled_bit: int = 0
+    """Of an error byte: the packet that the servo received was damaged; 0 where a number says so."""
+    garbled_number: int = 0
+    """Of a refusal: the same; 0 where a bit says so."""
+
+    def garbled(self, error: int) -> bool:
+        """Whether an error byte says that the instruction arrived damaged, so that it should be sent again."""
+        return bool(error & self.garbled_bit) or bool(self.garbled_number and error & ~self.alarm_bits == self.garbled_number)
 
     @property
     def gapless(self) -> bool:

@@ -120,6 +120,7 @@ XL430_W250 = ServoTable(
     still_steps=3,
     locked_below=64,
     alarm_bits=0x80,
+    garbled_number=3,
     refusals=REFUSALS,
 )
 """Drive mode 0: profiles of speed, forward, and no torque that comes on with a goal. Operating mode 3: position control."""

@@ -21,7 +21,7 @@ from bns.hardware.wheels.wheel_drive import RobotLostError
 
 BAUD = 115200
 ATTEMPTS = 4
-"""How often a question is asked, waited for twice as long each time, before the robot counts as lost."""
+"""After so many answers that make no sense the robot counts as lost; after none, when the link's patience is over."""
 STILL_M_S = 0.005
 """A wheel slower than this stands still: three quanta of the speed reading, and less than half a millimetre to coast."""
 _READINGS = 2
@@ -34,6 +34,10 @@ HIGHEST_UNITS = 43_000
 """End of the range that the firmware regulates."""
 _FLAT_V = 6.0
 _SPEEDS = r"e,(-?\d+),(-?\d+)"
+
+
+class _NonsenseError(NoReplyError):
+    """Something came back, but no answer to what was asked."""
 
 
 class Exchange(Protocol):
@@ -142,21 +146,21 @@ class KheperaIII:
 
     def _ask(self, command: bytes, answer: str) -> tuple[str, ...]:
         """The groups of the robot's answer; asked again when nothing or nonsense comes back."""
-        problem, times, began_s, attempt = "", self._link.times, self._clock.now_s(), 0
+        problem, times, began_s, attempt, nonsense = "", self._link.times, self._clock.now_s(), 0, 0
         patience_s = times.patience_s
-        while attempt < ATTEMPTS and (left_s := began_s + patience_s - self._clock.now_s()) > 0:
+        while nonsense < ATTEMPTS and (left_s := began_s + patience_s - self._clock.now_s()) > 0:
             self.retries += attempt > 0
             try:
                 return self._once(command, answer, min(times.timeout_s * 2**attempt, left_s), attempt > 0)
             except NoReplyError as error:
-                problem, attempt = str(error), attempt + 1
+                problem, attempt, nonsense = str(error), attempt + 1, nonsense + isinstance(error, _NonsenseError)
         raise RobotLostError(f"{problem}; asked {attempt} times in {self._clock.now_s() - began_s:.1f} s")
 
     def _once(self, command: bytes, answer: str, timeout_s: float, again: bool = False) -> tuple[str, ...]:
         line = self._link.exchange(command + b"\n", timeout_s, again).decode("latin-1")
         match = re.fullmatch(answer, line)
         if match is None:
-            raise NoReplyError(f"the answer to {command.decode()} was {line!r}")
+            raise _NonsenseError(f"the answer to {command.decode()} was {line!r}")
         return match.groups()
 
 

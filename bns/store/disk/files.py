@@ -55,7 +55,7 @@ def explained(action: str, path: Path) -> Iterator[None]:
     except OSError as error:
         obstacle = _obstacle(path) if error.errno in _NO_FOLDER else None
         if obstacle is not None:
-            reason, remedy = f"{obstacle} is a file.", "choose a folder with --results DIR."
+            reason, remedy = f"{obstacle} is a file.", "give a folder (--results DIR for results, -o FILE for a file)."
         elif error.errno in _FULL:
             reason, remedy = (
                 "The disk, quota or file size limit is full.",
@@ -64,7 +64,7 @@ def explained(action: str, path: Path) -> Iterator[None]:
         elif error.errno in _LOCKED_OUT:
             reason, remedy = (
                 "The folder is read-only for this user.",
-                "make it writable, or choose another folder with --results DIR.",
+                "make it writable, or give another place (--results DIR for results, -o FILE for a file).",
             )
         elif error.errno == errno.ENOENT and path.parent.is_dir():
             reason, remedy = f"Nothing can be made in the folder {path.parent}.", "choose another folder."

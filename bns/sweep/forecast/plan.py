@@ -17,7 +17,7 @@ from bns.sweep.expand.order import ordered_specs
 from bns.sweep.expand.shard import Shard
 from bns.sweep.forecast.pace import Pace
 from bns.sweep.jobs.executor import Job
-from bns.sweep.jobs.job import run_job
+from bns.sweep.jobs.job import check_world_files, run_job
 
 if TYPE_CHECKING:  # a third of a second to load, and a sweep needs no table
     import pandas as pd
@@ -66,6 +66,9 @@ def plan(
     """Count and estimate, the whole or one ``shard``. Without stored runs of this sweep, one short run is carried out and timed.
 
     Nothing is written. The seconds are wall time with ``jobs`` workers; NaN if the trial run failed.
+
+    Raises:
+        ModelError: a model file that runs to do name as their world is missing or no such file.
     """
     had = {run for run, status in recorded(results, sweep.name).items() if status == "ok" or not retry_failed}
     everything = ordered_specs(sweep)
@@ -73,6 +76,8 @@ def plan(
     todo = [spec for spec in specs if spec.run_id not in had] if had else specs
     if not todo:
         return Plan(sweep.name, len(specs), len(specs), 0, 0.0, 0.0, "nothing is left to do")
+    if job is run_job:
+        check_world_files(todo)
     stored = "ok" in finished(results, sweep.name).values()
     seconds, basis = _from_store(results, sweep.name, todo) if stored else _from_trial(todo, job, warm_up)
     return Plan(

@@ -81,6 +81,25 @@ def prepare(specs: Iterable[RunSpec]) -> None:
             warm(robot, world)
 
 
+def check_world_files(specs: Iterable[RunSpec]) -> None:
+    """Before anything is written: the model files that these runs name as worlds are there, and are models of the robot.
+
+    Raises:
+        ModelError: one is missing or cannot be used.
+    """
+    from bns.robots import load_robot  # noqa: PLC0415  # as above
+    from bns.worlds import build_world  # noqa: PLC0415
+
+    for world, robot in sorted({(spec.world, spec.robot) for spec in specs if names_a_file(spec.world)}):
+        build_world(world, load_robot(robot))
+
+
+def names_a_file(world: str) -> bool:
+    """Whether a world is a model file, or changes from or to one."""
+    change = change_of(world)
+    return any(name.endswith((".yaml", ".yml")) for name in (change[:2] if change else (world,)))
+
+
 class _Meter:
     """Time and memory from its making on."""
 

@@ -11,7 +11,7 @@ from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.servos.ax12_table import RAD_PER_STEP, REGISTERS
 from bns.hardware.servos.dynamixel import DynamixelChain
-from bns.hardware.servos.packets import WIRES
+from bns.hardware.servos.packets import BROADCAST, WIRES
 from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits, StrainWatch
 
 IDS = (1, 2, 3)
@@ -236,6 +236,52 @@ def test_lost_and_garbled_answers_are_asked_for_again(chain, clock):
     for angle in (0.1, 0.2, 0.3):
         driver.move([angle] * 3, [1.0] * 3)
     assert driver.retries > 0
+
+
+def test_an_instruction_that_reached_a_servo_damaged_is_sent_again(chain):
+    """Protocol 1.0, error bit 4: the checksum of the instruction packet is wrong."""
+    driver, bus, _ = chain()
+    receive, damaged = bus.receive, []
+
+    def one_byte_wrong(data):
+        if data[4:5] == b"\x03" and len(damaged) < 2:  # a write
+            damaged.append(data)
+            return receive(data[:-1] + bytes([data[-1] ^ 0x20]))
+        return receive(data)
+
+    bus.receive = one_byte_wrong
+    driver.write(2, "moving_speed", 77)
+    assert (len(damaged), driver.retries, bus.servos[1].get("moving_speed")) == (2, 2, 77)
+    bus.receive = lambda data: receive(data[:-1] + bytes([data[-1] ^ 0x20]) if data[4:5] == b"\x03" else data)
+    with pytest.raises(ServoError, match=r"servo 2: write moving_speed 9: what reached it was garbled; asked 6 times"):
+        driver.write(2, "moving_speed", 9)
+    assert bus.servos[1].get("moving_speed") == 77
+
+
+def test_a_port_that_falls_dead_during_a_stop_is_had_back_by_another_order(chain):
+    """As a guard gives it back: all torque is off already, and nothing but an order to stop opens the way."""
+    driver, bus, _ = chain()
+    driver.arm()
+    receive, reads = bus.receive, []
+
+    def taken(data):
+        if data[2:3] == bytes([BROADCAST]):
+            reads.clear()
+        else:
+            reads.append(data)
+        return receive(data) if len(reads) <= len(IDS) else b""
+
+    bus.receive = taken
+    stop = driver.stop(patience_s=3.0)
+    assert stop.confirmed, stop.problem
+
+
+def test_servos_with_the_same_problem_are_named_together(chain):
+    driver, _, line = chain()
+    line.cut()
+    stop = driver.stop(patience_s=0.1)
+    assert stop.problem.startswith("servos 1, 2, 3: the port is gone (")
+    assert stop.problem.count("the port is gone") == 1
 
 
 def test_the_port_is_usable_after_an_exchange_broke_off(chain):

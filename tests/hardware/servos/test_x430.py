@@ -39,6 +39,12 @@ def test_tables_do_not_overlap_and_know_their_models():
     assert (XL430_W250.gapless, AX12.gapless) == (False, True)
 
 
+def test_either_protocol_says_that_an_instruction_arrived_damaged():
+    """Protocol 2.0: error number 3, beside the alarm bit or without; protocol 1.0: bit 4, beside others or alone."""
+    assert [XL430_W250.garbled(error) for error in (0, 2, 3, 4, 0x80, 0x83)] == [False, False, True, False, False, True]
+    assert [AX12.garbled(error) for error in (0, 0x10, 0x20, 0x30)] == [False, True, False, True]
+
+
 @pytest.fixture
 def chain(tmp_path, clock):
     """chain(*faults, kind, **registers) -> driver, bus, line."""
@@ -160,7 +166,7 @@ def test_a_servo_that_keeps_its_torque_leaves_the_stop_unconfirmed(chain):
     driver.arm()
     bus.servos[1].write = lambda *_: 0  # deaf to the order
     stop = driver.stop(patience_s=0.5)
-    assert (stop.confirmed, stop.problem) == (False, "servo 2 still has its torque on")
+    assert (stop.confirmed, stop.problem) == (False, "servo 2: torque still on")
 
 
 def test_an_order_to_all_that_is_heard_late_ends_no_other_question(chain):
@@ -176,7 +182,7 @@ def test_an_order_to_all_that_is_heard_late_ends_no_other_question(chain):
 
     bus.receive = slowly
     stop = driver.stop(patience_s=0.3)
-    assert (stop.confirmed, stop.problem) == (False, "servo 2 still has its torque on")
+    assert (stop.confirmed, stop.problem) == (False, "servo 2: torque still on")
 
 
 def test_the_guard_stops_by_the_bytes_of_the_driver_and_confirms_by_what_servos_answer(chain, clock):

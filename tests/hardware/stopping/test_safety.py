@@ -86,6 +86,24 @@ def test_a_stop_not_confirmed_is_louder_than_any_fault(fault):
     assert ("It was being stopped because" in str(caught.value)) == (fault is not None)
 
 
+def test_a_robot_that_is_not_seen_to_stand_is_cried_out_at_once_and_once(capsys):
+    """The second attempt, when the rig is closed, takes five seconds more; nobody may wait for it to hear the first."""
+    heard = []
+
+    def again():
+        heard.append(capsys.readouterr().err)
+        return Stop(False, 5.0, None, "still gone")
+
+    def inside():
+        with StopsAtTheEnd(again), StopsAtTheEnd(lambda: Stop(False, 5.0, None, "the port is gone")):
+            raise RuntimeError("broken")
+
+    with pytest.raises(StopNotConfirmedError, match=r"5\.0 s: the port is gone\. It was being stopped because broken\.$"):
+        inside()
+    assert heard == ["bns: THE ROBOT MAY STILL BE MOVING: CUT THE POWER NOW.\n"]
+    assert capsys.readouterr().err == ""
+
+
 def test_a_confirmed_stop_lets_the_fault_through():
     stops = []
 

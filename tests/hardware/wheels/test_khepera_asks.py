@@ -19,6 +19,7 @@ class Link:
     def __init__(self, speeds=(), timeout_s=0.125, patience_s=10.0, deaf=()):
         self.times = SimpleNamespace(timeout_s=timeout_s, patience_s=patience_s)
         self.speeds, self.deaf, self.asked, self.t_s = list(speeds), set(deaf), [], 64.0
+        self.nonsense = False
 
     def now_s(self):
         return self.t_s
@@ -30,6 +31,8 @@ class Link:
             self.t_s += timeout_s
             raise NoReplyError(f"no answer to {request!r}")
         self.t_s += ANSWER_S
+        if request == b"R\n" and self.nonsense:
+            return b"d"
         said = {b"B\n": b"b,2,4", b"E\n": b"e,%d,%d" % speeds, b"R\n": b"r,2764,-2764", b"V,0\n": b"v,7,412"}
         return said.get(request, b"d")
 
@@ -56,6 +59,24 @@ def test_a_question_is_waited_for_twice_as_long_each_time_and_never_beyond_the_p
     with pytest.raises(RobotLostError, match="asked 2 times"):
         robot.encoders_m()
     assert [asked[1] for asked in link.asked] == [0.125, 0.25]
+
+
+@pytest.mark.parametrize(("timeout_s", "asked"), [(0.03125, 5), (0.0625, 4), (0.25, 3)])
+def test_a_quick_link_has_as_much_patience_as_a_slow_one(timeout_s, asked):
+    link = Link(timeout_s=timeout_s, patience_s=0.8125)
+    robot = driver(link)
+    link.deaf = {b"R\n"}
+    with pytest.raises(RobotLostError, match=rf"asked {asked} times in 0.8 s"):
+        robot.encoders_m()
+
+
+def test_answers_that_make_no_sense_are_not_asked_for_without_end():
+    link = Link()
+    robot = driver(link)
+    link.nonsense = True
+    with pytest.raises(RobotLostError, match=r"the answer to R was 'd'; asked 4 times"):
+        robot.encoders_m()
+    assert len(link.asked) == ATTEMPTS
 
 
 def test_ways_voltage_and_speeds_are_in_metres_and_volts():

@@ -136,6 +136,21 @@ def test_an_answer_to_what_was_asked_before_is_none_to_what_is_asked_now(tmp_pat
     assert [e["data"] for e in events(tmp_path / "journal.jsonl", "passed-over")] == ["d\r\n"]
 
 
+def test_the_second_answer_to_a_question_asked_twice_is_none_to_the_next(tmp_path):
+    robot = DistantRobot(tmp_path, 0.3, 0.0, 0.0)
+    clock = RealClock()
+    journal = HardwareLog(tmp_path / "journal.jsonl", clock)
+    link = SerialLink(str(robot.path), BAUD, clock, journal)
+    with pytest.raises(Exception, match="no answer to"):
+        link.exchange(b"V,0\n", 0.1)
+    assert link.exchange(b"V,0\n", 5.0, again=True).startswith(b"v,")
+    assert link.exchange(b"E\n", 5.0, again=True).startswith(b"e,")
+    link.close()
+    journal.close()
+    robot.close()
+    assert [e["data"][:2] for e in events(tmp_path / "journal.jsonl", "passed-over")] == ["v,"]
+
+
 @pytest.mark.parametrize(
     ("driver", "message"),
     [
