@@ -70,6 +70,7 @@ def test_a_run_and_a_sweep_do_not_wait_for_pandas(tmp_path):
     assert not {"pandas", "matplotlib"} & loaded
 
 
+@pytest.mark.slow
 def test_a_new_sweep_starts_its_first_run_before_it_loads_pandas(tmp_path):
     """A third of a second, which the first run would wait; it is loaded when the first result is stored."""
     spec = tmp_path / "tiny.yaml"

@@ -78,6 +78,7 @@ for library, (_, arguments) in {missing!r}.items():
 """
 
 
+@pytest.mark.slow
 def test_a_library_that_is_missing_is_named_with_its_extra(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = carried_out(ONE_BY_ONE.format(missing=MISSING))

@@ -44,6 +44,7 @@ def files_of(part):
     }
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_the_package_the_figures_and_the_sweeps_and_nothing_else(built):
     held = {name for name in zipfile.ZipFile(wheel_in(built)).namelist() if ".dist-info/" not in name}
     shipped = {f"bns/_shipped/{name}" for part in ("analysis", "sweeps") for name in files_of(part)}
@@ -51,6 +52,7 @@ def test_the_wheel_holds_the_package_the_figures_and_the_sweeps_and_nothing_else
     assert wheel_in(built).stat().st_size < 5e6
 
 
+@pytest.mark.slow
 def test_the_sdist_holds_what_the_wheel_is_made_of_and_the_tests(built):
     [path] = built.glob("*.tar.gz")
     with tarfile.open(path) as file:
@@ -67,6 +69,7 @@ def test_the_sdist_holds_what_the_wheel_is_made_of_and_the_tests(built):
     assert not any(name.endswith(".pyc") for name in held)
 
 
+@pytest.mark.slow
 def test_the_metadata_say_what_is_needed_and_where_it_runs(built):
     with zipfile.ZipFile(wheel_in(built)) as file:
         [name] = [name for name in file.namelist() if name.endswith(".dist-info/METADATA")]
@@ -103,6 +106,7 @@ def test_each_library_that_an_error_names_comes_with_its_extra():
     assert set(re.search(r"\[(.*)\]", everything).group(1).split(",")) == set(LIBRARIES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "answer"),
     [
@@ -126,6 +130,7 @@ def test_what_is_installed_finds_its_parts(installed, tmp_path, code, answer):
     assert done.stdout.strip() == answer.format(place=installed), done.stderr
 
 
+@pytest.mark.slow
 def test_figures_are_drawn_from_what_is_installed(installed, tmp_path):
     command = [sys.executable, "-m", "bns", "figures", "--results", "none"]
     done = subprocess.run(

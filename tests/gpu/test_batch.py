@@ -81,6 +81,7 @@ def test_runs_side_by_side_are_those_of_the_cpu_engine(together):
             assert_same(columns, here.tables["evals"])
 
 
+@pytest.mark.slow
 def test_result_is_that_of_the_loop(together):
     for number, spec in enumerate(together.specs):
         there, here = together.result(number), run(spec)

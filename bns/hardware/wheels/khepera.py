@@ -157,7 +157,7 @@ class KheperaIII:
         raise RobotLostError(f"{problem}; asked {attempt} times in {self._clock.now_s() - began_s:.1f} s")
 
     def _once(self, command: bytes, answer: str, timeout_s: float, again: bool = False) -> tuple[str, ...]:
-        line = self._link.exchange(command + b"\n", timeout_s, again).decode("latin-1")
+        line = self._link.exchange(command + b"\n", timeout_s, again).decode("latin-1").strip()
         match = re.fullmatch(answer, line)
         if match is None:
             raise _NonsenseError(f"the answer to {command.decode()} was {line!r}")

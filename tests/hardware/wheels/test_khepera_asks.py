@@ -33,7 +33,7 @@ class Link:
         self.t_s += ANSWER_S
         if request == b"R\n" and self.nonsense:
             return b"d"
-        said = {b"B\n": b"b,2,4", b"E\n": b"e,%d,%d" % speeds, b"R\n": b"r,2764,-2764", b"V,0\n": b"v,7,412"}
+        said = {b"B\n": b"b,2,4", b"E\n": b"e,%d,%d" % speeds, b"R\n": b"r,2764,-2764", b"V,0\n": b"v,7,412 "}
         return said.get(request, b"d")
 
     def close(self):
