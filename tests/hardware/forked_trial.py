@@ -92,8 +92,11 @@ def freeze(what):
     return freezes
 
 
-def drive(link, port, journal):
-    """The trial's process: drives for ever, and hangs when a signal says so."""
+def drive(link, port, journal, patient):
+    """The trial's process: drives for ever, and hangs when a signal says so.
+
+    `patient`: a computer that is too busy for its limits stops nothing, so that only what befalls it does.
+    """
     robot = "khepera" if link == "serial" else "snake"
     wheels = np.array([15000.0, 20000.0]) / UNITS_PER_M_S if link == "serial" else None
     khepera.open_tracker = snake.open_tracker = lambda _settings, clock: Glances(clock, wheels)
@@ -101,6 +104,9 @@ def drive(link, port, journal):
     rig = shipped_rig(robot)
     settings = {} if robot == "khepera" else {**rig.driver, "wiring": link}
     everywhere = replace(rig.limits, surface=Surface(-9.0, 9.0, -9.0, 9.0))
+    if patient:
+        everywhere = replace(everywhere, silent_s=HANGS_S, late_s=HANGS_S, lost_s=HANGS_S)
+        settings = settings | ({"most_reply_s": HANGS_S} if robot == "khepera" else {})
     rig = replace(rig, port=port, driver=settings, limits=everywhere)
     signal.signal(signal.SIGRTMIN, freeze("bits"))
     signal.signal(signal.SIGRTMIN + 1, freeze("scene"))
@@ -138,7 +144,7 @@ def shell_of(asked, out):
         os.tcsetpgrp(0, os.getpgrp())
         code = 70
         try:
-            code = drive(asked["link"], asked["port"], asked["journal"])
+            code = drive(asked["link"], asked["port"], asked["journal"], asked["patient"])
         finally:
             os._exit(code)
     signal.signal(signal.SIGHUP, lambda *_: os.kill(child, signal.SIGHUP))
@@ -164,10 +170,10 @@ class Nursery:
             env=os.environ | sleepless(Path(self._folder.name), self.slept),
         )
 
-    def begin(self, link, port, journal):
+    def begin(self, link, port, journal, patient=False):
         """Process number and terminal of a new one."""
         terminal, far = pty.openpty()
-        asked = {"link": link, "port": str(port), "journal": str(journal), "terminal": os.ttyname(far)}
+        asked = {"link": link, "port": str(port), "journal": str(journal), "terminal": os.ttyname(far), "patient": patient}
         self._zygote.stdin.write(json.dumps(asked) + "\n")
         self._zygote.stdin.flush()
         number = int(self._zygote.stdout.readline())

@@ -138,11 +138,14 @@ GONE_S = {"link gone": 1.0, "link gone, then SIGKILL": 1.0}
 """How long the link stays away; the time until the robot stands counts from its return."""
 
 
-def outlived(nursery, link, cause, folder, gone_s=0.0, kind=Robot):
-    """One trial that this befell while its robot moved; AssertionError if the robot went on, or anything is left over."""
+def outlived(nursery, link, cause, folder, gone_s=0.0, kind=Robot, patient=False):
+    """One trial that this befell while its robot moved; AssertionError if the robot went on, or anything is left over.
+
+    `patient`: as `forked_trial.drive` has it.
+    """
     robot = kind(link, folder)
     try:
-        still_s, alone_s, ended = _befell(nursery, robot, cause, folder, gone_s)
+        still_s, alone_s, ended = _befell(nursery, robot, cause, folder, gone_s, patient)
         _guard_ends(robot, folder)
     except BaseException:
         for event in _events(folder):  # it would try for ever, at a port that another one may have by then
@@ -157,8 +160,8 @@ def outlived(nursery, link, cause, folder, gone_s=0.0, kind=Robot):
     return Seen(still_s, ended, said.read_text() if said.exists() else "", _events(folder), alone_s)
 
 
-def _befell(nursery, robot, cause, folder, gone_s):
-    process, terminal = nursery.begin(robot.link, robot.path, folder / "journal.jsonl")
+def _befell(nursery, robot, cause, folder, gone_s, patient):
+    process, terminal = nursery.begin(robot.link, robot.path, folder / "journal.jsonl", patient)
     try:
         robot.until(True, HANGS_S)
         time.sleep(_ARMED_S if cause.startswith("camera") and robot.link != "serial" else 0.25)

@@ -96,7 +96,7 @@ class Guard:
 
     def _start(self) -> None:
         folder = Path(self.path).parent if self.path else Path(tempfile.mkdtemp(prefix="bns-guard-"))
-        self.path = str(folder / "port")
+        self.path = str(folder / (Path(self._port).name or "port"))  # messages name it
         answer = self._begin(folder)
         self._control.setblocking(False)
         if answer["kind"] == "refused":

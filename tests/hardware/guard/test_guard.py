@@ -95,7 +95,7 @@ def trial_dies(guard):
 
 @pytest.mark.parametrize(("link", "kind"), [*((link, Robot) for link in LINKS), ("serial", ManualRobot), ("bus", ManualRobot)])
 def test_a_robot_stands_when_its_trial_is_killed(tmp_path, nursery, link, kind):
-    seen = outlive.outlived(nursery, link, "SIGKILL", tmp_path, kind=kind)
+    seen = outlive.outlived(nursery, link, "SIGKILL", tmp_path, kind=kind, patient=True)
     assert seen.ended == -signal.SIGKILL
     assert [e["kind"] for e in seen.events] == ["tripped", "stopped"]
     assert seen.events[0]["why"] == "the trial's process is gone"
@@ -109,7 +109,7 @@ def test_a_robot_stands_when_its_trial_is_killed(tmp_path, nursery, link, kind):
     ],
 )
 def test_a_robot_stands_when_its_trial_is_there_and_does_nothing(tmp_path, nursery, cause, link, why):
-    seen = outlive.outlived(nursery, link, cause, tmp_path)
+    seen = outlive.outlived(nursery, link, cause, tmp_path, patient=cause != "hang")
     assert seen.events[0]["why"].startswith(why)
     assert "stopped" in [e["kind"] for e in seen.events]
 
@@ -122,14 +122,14 @@ def test_a_robot_stands_when_its_trial_is_there_and_does_nothing(tmp_path, nurse
     ],
 )
 def test_a_camera_that_hangs_under_a_running_clock_pauses_the_trial(tmp_path, nursery, cause, link, why):
-    seen = outlive.outlived(nursery, link, cause, tmp_path)
+    seen = outlive.outlived(nursery, link, cause, tmp_path, patient=True)
     assert seen.ended == 3
     assert re.search(why, seen.said)
 
 
 @pytest.mark.parametrize("link", ["serial", "bridge"])
 def test_a_camera_that_sends_its_last_picture_again_stops_the_robot(tmp_path, nursery, link):
-    seen = outlive.outlived(nursery, link, "camera frozen (bits)", tmp_path)
+    seen = outlive.outlived(nursery, link, "camera frozen (bits)", tmp_path, patient=True)
     assert seen.ended == 0  # the drive is over before its commands are
     assert seen.events == []
 
@@ -140,7 +140,7 @@ def test_a_camera_that_sends_its_last_picture_again_stops_the_robot(tmp_path, nu
 )
 def test_what_the_terminal_does_stops_the_robot_first(tmp_path, nursery, cause, link, said):
     """Ctrl-Z suspends the process once the robot stands (the helper sees to it); gone on with, the trial is paused."""
-    seen = outlive.outlived(nursery, link, cause, tmp_path)
+    seen = outlive.outlived(nursery, link, cause, tmp_path, patient=True)
     assert (seen.ended, seen.said) == (3, said)
 
 
@@ -148,7 +148,7 @@ def test_what_the_terminal_does_stops_the_robot_first(tmp_path, nursery, cause, 
 @pytest.mark.parametrize("link", ["serial", "bus"])
 def test_a_computer_that_slept_stops_the_robot_first(tmp_path, nursery, link):
     """Trial and guard stand still for 0.02 s, and the clocks say ten minutes: no other cause is there."""
-    seen = outlive.outlived(nursery, link, outlive.SLEPT, tmp_path)
+    seen = outlive.outlived(nursery, link, outlive.SLEPT, tmp_path, patient=True)
     assert seen.ended == 3
     assert seen.events[0]["why"] == "the computer slept for 600.0 s"
     assert "the computer slept for 600.0 s" in seen.said
