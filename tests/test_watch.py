@@ -12,6 +12,7 @@ from store.synthetic import record
 
 from bns.cli.commands import watch as watching
 from bns.cli.commands.watch import trace, watch
+from bns.cli.main import main
 from bns.errors import BnsError
 from bns.spec import RunSpec
 from bns.store import Writer
@@ -85,6 +86,12 @@ def test_without_the_scripts_the_message_says_what_to_do(tmp_path, monkeypatch):
     monkeypatch.setattr("bns.shipped.PACKAGE", tmp_path / "bns")
     with pytest.raises(BnsError, match=r"did not come with this package.*pip install --force-reinstall bns"):
         watch(tmp_path)
+
+
+def test_a_message_of_the_scripts_says_once_who_speaks(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("bns.cli.commands.watch.watch", lambda _results, _every, say: (say("bns: no runs"), say("drawn")))
+    assert main(["watch", "--results", str(tmp_path)]) == 0
+    assert capsys.readouterr().err == "bns: no runs\nbns: drawn\n"
 
 
 def test_ctrl_c_ends_the_command_quietly(tmp_path):

@@ -103,6 +103,20 @@ def test_order_is_kept(store):
     assert values == sorted(values, reverse=True)
 
 
+@pytest.mark.parametrize(
+    ("sql", "line"),
+    [
+        ("SELECT * FROM nope", "LINE 1: SELECT * FROM nope\n" + 22 * " " + "^"),
+        ("SELECT *\nFROM nope", "LINE 2: FROM nope\n" + 13 * " " + "^"),
+    ],
+)
+def test_a_mistake_is_shown_in_the_words_of_the_statement(store, sql, line):
+    with pytest.raises(StoreError) as told:
+        query(store, sql)
+    assert line in str(told.value)
+    assert "EXPLAIN" not in str(told.value)
+
+
 def test_files_outside_the_results_and_python_variables_are_out_of_reach(store):
     mine = pa.table({"a": [1]})
     assert mine.num_rows == 1

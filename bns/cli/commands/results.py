@@ -103,5 +103,8 @@ def watch(options: argparse.Namespace) -> int:
     """The page of figures, kept up to date."""
     from bns.cli.commands.watch import watch as keep_drawing
 
-    keep_drawing(options.results, options.every, say=lambda text: print(f"bns: {text}", file=sys.stderr, flush=True))
+    def say(text: str) -> None:
+        print(f"bns: {text.removeprefix('bns: ')}", file=sys.stderr, flush=True)  # a script that failed says bns itself
+
+    keep_drawing(options.results, options.every, say=say)
     return 0

@@ -19,6 +19,7 @@ _ROWS_AT_ONCE = 2_048
 _LEVELS = ("", "/sweep=*", "/sweep=*/task=*")
 _PARQUET_NAME = re.compile(r"""["']([^"']+\.parquet)["']""")
 _EXPLAIN = re.compile(r"\s*EXPLAIN\s+(ANALYZE\s+)?", re.IGNORECASE)
+_LINE = re.compile(r"^LINE (\d+):", re.M)
 
 
 def answer(connection: duckdb.DuckDBPyConnection, results: Path, sql: str, *, bounded: bool = False) -> pa.Table:
@@ -120,7 +121,10 @@ def _check(connection: duckdb.DuckDBPyConnection, sql: str) -> None:
         # WITH a AS (COPY ... TO 'file') SELECT 1 is of type SELECT and writes; in a view DuckDB refuses it.
         connection.execute(f"CREATE OR REPLACE TEMP VIEW store_asked AS {asked}")
     except duckdb.Error:
-        connection.execute(f"EXPLAIN {asked}")  # a plain mistake is reported here, in the words of the statement
+        try:  # a plain mistake is reported here, in the words of the statement
+            connection.execute(f"EXPLAIN\n{asked}")
+        except duckdb.Error as error:
+            raise type(error)(_LINE.sub(lambda found: f"LINE {int(found[1]) - 1}:", str(error))) from None
         raise _refused(sql, "a SELECT that writes, or one that cannot be a view") from None
     connection.execute("DROP VIEW store_asked")
 
