@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import bns
+from bns.cli.main import main
 from bns.errors import DataError, ModelError
 from bns.physics.jointed.drives import at_times, through_postures, told_speed_rad_s
 from bns.physics.jointed.effects.floor_patch import tent
-from bns.physics.jointed.mechanism import machine
+from bns.physics.jointed.mechanism import Mechanism, machine
 from bns.physics.jointed.model_files import load_body
 from bns.physics.jointed.pieced import PiecedEffect
 from bns.physics.jointed.plant import Plant, Rough, Sighting
@@ -18,7 +19,7 @@ from bns.physics.model import load_model
 from bns.physics.snake.body import Body
 from bns.physics.snake.gait import cycle_angles
 from bns.physics.snake.parameters import shipped_parameters
-from tests.jointed.arm import xml
+from tests.jointed.arm import JOINTS, log, xml
 
 SNAKE = load_body("snake")
 GAITS = (
@@ -184,6 +185,9 @@ def test_any_mjcf_file_with_servos_and_sites_is_a_model(tmp_path):
         ("no xml", {}, "does not read"),
         (xml(), {"delay_s": -1.0}, "delay_s is -1.0"),
         (xml(), {"colour": "red"}, "colour"),
+        (xml(), {"sites": ["hand", "elbow", "hand"]}, "sites has hand more than once"),
+        (xml().replace('kp="6.0"', 'kp="6.0" gear="2"', 1), {}, "Actuator 0 of the body has gear 2; only servos without a gear"),
+        (xml().replace('kp="6.0"', 'kp="6.0" timeconst="0.1"', 1), {}, "Actuator 0 of the body has dynamics of its own"),
     ],
 )
 def test_a_body_that_cannot_be_used_is_refused_with_what_to_do(tmp_path, text, settings, said):
@@ -201,9 +205,60 @@ def test_data_of_another_kind_of_robot_are_refused(tmp_path):
 
 
 def _no_elbow():
-    from tests.jointed.arm import log
-
     return log(1).drop(columns=["elbow_set_rad"])
+
+
+SEEN = [f"{site}_{axis}_m" for site in ("elbow", "hand") for axis in "xy"]
+TOLD = [f"{joint}_set_rad" for joint in JOINTS]
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        (lambda t: t.assign(**1000 * t[SEEN]), r"The sites move over \d+\.\d m, .* must be in metres, .* millimetres"),
+        (lambda t: t.assign(**t[TOLD] * 180 / np.pi), r"shoulder_set_rad goes from -\d+\.?\d* to .* must be in radians"),
+        (lambda t: t.assign(t_s=1000 * t["t_s"]), r"Rows are 40 s apart; t_s must be in seconds"),
+        (lambda t: t.assign(**0 * t[TOLD]), r"Every set point is the same in all rows, and the sites move over 0\.\d+ m"),
+        (lambda t: t.drop(columns="hand_y_m"), r"lack hand_y_m: a tracked site has both"),
+        (lambda t: t.drop(columns="hand_x_m"), r"lack hand_x_m: a tracked site has both"),
+    ],
+)
+@pytest.mark.parametrize("ranged", [False, True])
+def test_a_log_in_other_units_is_refused_with_the_column(tmp_path, changed, said, ranged):
+    table, text = log(2), xml()
+    file = tmp_path / "arm.xml"
+    file.write_text(text.replace('kp="6.0"', 'kp="6.0" ctrlrange="-1.6 1.6"') if ranged else text)
+    model = bns.Model(file)
+    bns.compare(table, model)
+    with pytest.raises(DataError, match=said):
+        bns.compare(changed(table), model)
+
+
+def test_a_log_of_joints_is_none_of_wheels_and_needs_no_import(tmp_path, capsys):
+    with pytest.raises(DataError, match="holds set points of joints, and the model khepera drives wheels"):
+        bns.compare(log(1), "khepera")
+    file = tmp_path / "arm.csv"
+    log(1).to_csv(file, index=False)
+    for more in (["--propose"], ["-o", str(tmp_path / "table.csv")]):
+        assert main(["import", str(file), *more]) == 2
+        assert "holds set points of joints (JOINT_set_rad), which need no mapping and no import" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_links_that_the_file_keeps_from_touching_the_floor_do_not_touch_it():
+    """As in MuJoCo itself: an excluded pair of bodies, and a pair of geoms that the file gives, are not given again."""
+    floor = '<geom name="floor" type="plane" size="1 1 0.1"/>'
+    touching = xml().replace("<worldbody>", f"<worldbody>{floor}").replace('contype="0" conaffinity="0"', "")
+    without = '<contact><exclude body1="world" body2="elbow-link"/></contact>'
+    paired = '<contact><pair geom1="floor" geom2="wrist-geom" friction="2 2 0.1 0.1 0.1"/></contact>'
+
+    def pairs(more):
+        return machine(Mechanism(touching.replace("<actuator>", more + "<actuator>"), ("hand",)))
+
+    assert [name for name, _ in pairs("").on_the_floor] == ["shoulder-link", "elbow-link", "wrist-link"]
+    assert [name for name, _ in pairs(without).on_the_floor] == ["shoulder-link", "wrist-link"]
+    own = pairs(paired).model
+    assert (own.npair, sorted(own.pair_friction[:, 0])) == (3, [1.0, 1.0, 2.0])
 
 
 def test_a_joint_without_torque_is_not_put_where_its_servo_was_told_to_bring_it():

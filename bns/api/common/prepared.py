@@ -9,9 +9,9 @@ from bns.api.common.arguments import named_model
 from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
 from bns.diagnose.data.bodies.cycles import CycleTracks, marker_noise_m
-from bns.diagnose.data.bodies.joints import JointTracks, check_names
+from bns.diagnose.data.bodies.joints import JointTracks, check_names, check_scales
 from bns.diagnose.data.bodies.stretches import stretches_of_cycles, stretches_of_joints
-from bns.diagnose.data.load import Measured
+from bns.diagnose.data.load import Measured, naming
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.check_robot import check_named_robot, check_same_robot
@@ -76,6 +76,11 @@ def prepared(log: Log, model: Given) -> Prepared:
             f"{measured.path} holds cycles and markers, and the model {robot.name} drives wheels; give the model of the robot "
             f"that was driven in cycles: {_SNAKE}."
         )
+    if isinstance(measured.tracks, JointTracks):
+        raise DataError(
+            f"{measured.path} holds set points of joints, and the model {robot.name} drives wheels; give the model of the "
+            "body, an MJCF file (.xml) or a model file that names one."
+        )
     predictor = predictor_for_search(measured.tracks)
     if len(predictor.tracks.t_s) < len(measured.tracks.t_s):
         measured = replace(measured, tracks=predictor.tracks)
@@ -110,6 +115,8 @@ def _prepared_body(read: Measurements, model: Model) -> Prepared:
         predictor = JointedPredictor(stretches, model, "cycle", marker_noise_m(tracks))
     else:
         check_names(tracks, body.joints, model.mechanism.sites)
+        with naming(measured.path):
+            check_scales(tracks, body.joints, body.told, None if body.free else float(body.model.stat.extent))
         predictor = JointedPredictor(stretches_of_joints(tracks, model.mechanism, body.joints), model, "stretch")
     return Prepared(read, replace(measured, tracks=predictor.tracks), predictor, model)
 

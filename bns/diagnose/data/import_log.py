@@ -11,6 +11,8 @@ from typing import Any
 import pandas as pd
 
 from bns.diagnose.data.apply_mapping import applied
+from bns.diagnose.data.bodies.cycles import are_cycles
+from bns.diagnose.data.bodies.joints import are_joints
 from bns.diagnose.data.checks import Finding, checked, own_rows
 from bns.diagnose.data.guess.mapping import guessed, lacking
 from bns.diagnose.data.load import naming
@@ -63,6 +65,7 @@ def import_log(files: Sequence[Path], mapping: Mapping[str, Any] | None = None) 
     if mapping is None and not others and set(COLUMNS) <= set(table.columns):
         return _checked(first, table, None)
     if mapping is None:
+        _refuse_bodies(first, table)
         raise DataError(_proposed(first, table, others))
     rules = located(mapping)
     named = {one["file"] for one in rules.get("also", ())}
@@ -82,6 +85,16 @@ def import_log(files: Sequence[Path], mapping: Mapping[str, Any] | None = None) 
     return _checked(first, out, mapping)
 
 
+def _refuse_bodies(path: Path, table: pd.DataFrame) -> None:
+    """DataError for a log of joints or cycles: these are read as they are, and a mapping of wheels would lose their commands."""
+    if are_joints(table) or are_cycles(table):
+        kind = "set points of joints (JOINT_set_rad)" if are_joints(table) else "cycles and markers"
+        raise DataError(
+            f"{path} holds {kind}, which need no mapping and no import: give it to bns compare or bns diagnose as it is, in "
+            "radians, metres and seconds."
+        )
+
+
 def _checked(path: Path, table: pd.DataFrame, mapping: Mapping[str, Any] | None) -> Imported:
     with naming(path):
         usable, findings = checked(table)
@@ -91,6 +104,7 @@ def _checked(path: Path, table: pd.DataFrame, mapping: Mapping[str, Any] | None)
 def proposal(files: Sequence[Path]) -> str:
     """The mapping that names and numbers suggest for the first file, joined with the others by time: YAML with comments."""
     first, *others = files
+    _refuse_bodies(first, read_table(first))
     return guessed(read_table(first), _tables(first, others)).text
 
 

@@ -19,7 +19,6 @@ _TOGETHER_M = DEFAULTS.design.together_m
 _TRIAL_S = DEFAULTS.design.trial_s
 _HEADING_RAD = DEFAULTS.design.heading_rad
 _LARGEST_M = DEFAULTS.design.largest_m
-_AROUND_M = MARGIN_M * (1 + 1e-6)
 _ARENA = in_both("--arena 1.8x1.3, in metres", "arena=(1.8, 1.3)")
 START = in_both("--start X,Y,DEGREES, such as --start 0,0,90", "start=(x_m, y_m, heading_rad)")
 _SPEEDS = in_both("--speeds=LOW,HIGH, such as --speeds=-0.2,0.2", "speeds=(-0.2, 0.2)")
@@ -51,7 +50,8 @@ def arena_of(
         half = _checked_size(size) / 2
         low, high = centre - half, centre + half
     elif begin is not None and start is None:  # nobody chose either: the robot may stand where it always started
-        low, high = np.minimum(low, np.array(begin[:2]) - _AROUND_M), np.maximum(high, np.array(begin[:2]) + _AROUND_M)
+        around_m = MARGIN_M + 1e-9  # it holds the place whatever is rounded
+        low, high = np.minimum(low, np.array(begin[:2]) - around_m), np.maximum(high, np.array(begin[:2]) + around_m)
     centre = (low + high) / 2
     begin = begin or (float(centre[0]), float(centre[1]), _HEADING_RAD)
     arena = Arena(float(low[0]), float(high[0]), float(low[1]), float(high[1]), begin)

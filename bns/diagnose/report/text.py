@@ -222,6 +222,10 @@ def _ranking(d: Diagnosis) -> Iterator[str]:
         rejected = f"not considered: {c.rejected_because}" if c.rejected_because else ""
         e = c.paired_comparison
         yield f"  {c.name:20}{e.elpd_diff:10.3f}{e.dse:10.3f}{e.p_value:10.2g}  {rejected}".rstrip()
+    ranked = [c.name for c in d.selection.steps[0].ranking]
+    later = [name for name in d.effects if name not in ranked]
+    if later:
+        yield f"  (not fitted alone in this round, though found: {', '.join(later)})"
     yield f"  (gain of the best of {len(DECOYS)} decoys: {d.selection.steps[0].decoy_threshold:.3f})"
 
 

@@ -214,6 +214,36 @@ class Data:
         "The parameters of a cycle are angles: beyond a full turn they are taken to be degrees (with room for "
         "rounding).",
     )
+    set_point_beyond: float = setting(
+        0.25,
+        "1",
+        "A set point that lies outside of a servo's range by more than this share of the range counts as being in "
+        f"other units (1.6 rad are 90 degrees: 57 times as much); {BY_HAND}.",
+    )
+    set_point_turns_rad: float = setting(
+        4 * math.pi,
+        "rad",
+        "The same for a servo without a range: beyond two turns to either side. Servos that go on turning are "
+        f"velocity servos, which a diagnosis does not take; {BY_HAND}.",
+    )
+    set_points_in_other_units: float = setting(
+        0.5,
+        "1",
+        "If more than this share of a servo's set points are in other units, the log is refused: single ones are "
+        f"errors of the log; {BY_HAND}.",
+    )
+    sites_reach: float = setting(
+        10.0,
+        "1",
+        "Sites of a body that is fixed at its base move over at most this many times its extent; otherwise their "
+        "positions are not in metres (a site cannot leave the body; centimetres are 100 times as much).",
+    )
+    sites_still: float = setting(
+        0.1,
+        "1",
+        "Sites that move over more than this share of the extent of a body that is fixed, while no set point ever "
+        f"changes, mean that set points were not logged; a body that sags into its rest moves less; {BY_HAND}.",
+    )
     cycle_longest_m: float = setting(
         5.0,
         "m",

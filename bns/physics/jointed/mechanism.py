@@ -201,11 +201,17 @@ def _of_the_one_that_counts(values: NDArray[Any], plain: Any, floor: int, other:
 
 
 def _floor_pairs(plain: Any) -> Iterator[tuple[int, int]]:
+    """Those that MuJoCo would let touch: excluded pairs of links and those that the file pairs itself are left out."""
     planes = np.flatnonzero(plain.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    excluded = {(int(one) >> 16, int(one) & 0xFFFF) for one in plain.exclude_signature}
+    paired = {frozenset(pair) for pair in zip(plain.pair_geom1.tolist(), plain.pair_geom2.tolist(), strict=True)}
     for floor in map(int, planes):
         for other in range(plain.ngeom):
             meets = plain.geom_contype[floor] & plain.geom_conaffinity[other]
             met = plain.geom_contype[other] & plain.geom_conaffinity[floor]
+            links = sorted((int(plain.geom_bodyid[floor]), int(plain.geom_bodyid[other])))
+            if tuple(links) in excluded or frozenset((floor, other)) in paired:
+                continue
             if plain.geom_bodyid[other] > 0 and (meets or met):
                 yield floor, other
 
@@ -223,6 +229,17 @@ def _check(model: Any) -> None:
             raise ModelError(
                 f"Actuator {model.actuator(k).name or k} of the body is no position servo on a joint; "
                 "only <position joint=...> actuators can be diagnosed."
+            )
+        name = model.actuator(k).name or k
+        if model.actuator_gear[k, 0] != 1.0:
+            raise ModelError(
+                f"Actuator {name} of the body has gear {model.actuator_gear[k, 0]:g}; only servos without a gear (gear 1) can be "
+                "diagnosed: set points are angles of the joint."
+            )
+        if model.actuator_dyntype[k] != mujoco.mjtDyn.mjDYN_NONE:
+            raise ModelError(
+                f"Actuator {name} of the body has dynamics of its own (timeconst or dyntype); only servos without can be "
+                "diagnosed. Leave them out: bns adds servo-delay and compliance where measurements show them."
             )
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
     if len(free) > 1 or (len(free) and (free[0] != 0 or model.nmocap)):

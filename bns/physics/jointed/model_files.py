@@ -106,6 +106,9 @@ def _of_mjcf(path: Path, settings: Mapping[str, Any], name: str) -> JointedModel
         raise ModelError(
             f"model {name}: sites is {shown(sites)}; give the names of the sites that are tracked, at least one."
         )
+    twice = sorted({str(site) for site in sites if list(sites).count(site) > 1})
+    if twice:
+        raise ModelError(f"model {name}: sites has {', '.join(twice)} more than once; name each tracked site once.")
     numbers = {key: number(f"model {name}: {key}", settings.get(key, 0.0), 0.0, 10.0) for key in NUMBERS}
     tether = str(settings.get("tether", ""))
     mechanism = Mechanism(xml, tuple(map(str, sites)), tether=tether, **numbers)

@@ -14,8 +14,13 @@ import pandas as pd
 
 from bns.diagnose.data.checks import Finding, check_columns, forward_in_time, left_out_rows, to_numbers
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 
+_SLOWEST_S = DEFAULTS.data.stretch_s
+_BEYOND, _TURNS_RAD = DEFAULTS.data.set_point_beyond, DEFAULTS.data.set_point_turns_rad
+_MOSTLY = DEFAULTS.data.set_points_in_other_units
+_REACHES, _STILL = DEFAULTS.data.sites_reach, DEFAULTS.data.sites_still
 SET = "_set_rad"
 X, Y = "_x_m", "_y_m"
 
@@ -39,8 +44,10 @@ def are_joints(table: pd.DataFrame) -> bool:
 def joint_tracks(table: pd.DataFrame) -> tuple[JointTracks, list[Finding]]:
     """Tracks of all trials in which the robot was seen, and what was odd. DataError where going on would be guessing."""
     joints = tuple(str(c).removesuffix(SET) for c in table.columns if str(c).endswith(SET))
-    east = (str(c).removesuffix(X) for c in table.columns if str(c).endswith(X))
-    sites = tuple(name for name in east if name + Y in table.columns)
+    sites = tuple(name for name in _named(table, X) if name + Y in table.columns)
+    half = [name + other for end, other in ((X, Y), (Y, X)) for name in _named(table, end) if name + other not in table.columns]
+    if half:
+        raise DataError(f"The measurements lack {', '.join(half)}: a tracked site has both of SITE{X} and SITE{Y}.")
     if not sites:
         raise DataError(f"No site was tracked: there is no pair of columns SITE{X} and SITE{Y}; add one for each tracked site.")
     numbers = ["t_s", *(name + SET for name in joints), *(name + end for name in sites for end in (X, Y))]
@@ -86,6 +93,43 @@ def joint_tracks(table: pd.DataFrame) -> tuple[JointTracks, list[Finding]]:
         rows=tuple(rows),
     )
     return tracks, findings
+
+
+def _named(table: pd.DataFrame, ending: str) -> list[str]:
+    return [str(c).removesuffix(ending) for c in table.columns if str(c).endswith(ending)]
+
+
+def check_scales(tracks: JointTracks, joints: Sequence[str], told: Array, extent_m: float | None) -> None:
+    """DataError where columns look like other units, or set points were never logged.
+
+    ``told`` (joints, 2): the range in which each servo follows; ``extent_m``: of a body that stands still at its base.
+    """
+    steps = np.concatenate([np.diff(t) for t, _ in tracks.rows])
+    if len(steps) and np.median(steps) > _SLOWEST_S:
+        raise DataError(f"Rows are {np.median(steps):g} s apart; t_s must be in seconds, and these look like milliseconds.")
+    at = [tracks.joints.index(name) for name in joints]
+    points = np.concatenate([values for _, values in tracks.rows])[:, at]
+    spare = _BEYOND * (told[:, 1] - told[:, 0])
+    beyond = ((points < told[:, 0] - spare) | (points > told[:, 1] + spare)).mean(axis=0)
+    free = ~np.isfinite(told).all(axis=1)
+    beyond[free] = (np.abs(points[:, free]) > _TURNS_RAD).mean(axis=0)
+    for name, share, values in zip(joints, beyond, points.T, strict=True):
+        if share > _MOSTLY:
+            raise DataError(
+                f"{name}{SET} goes from {values.min():.4g} to {values.max():.4g}, and {share:.0%} of it lies beyond what the "
+                "servo follows; set points must be in radians (of a slide in metres), and these look like degrees or steps."
+            )
+    spread_m = float(np.ptp(tracks.points_m, axis=0).max())
+    if extent_m is not None and spread_m > _REACHES * extent_m:
+        raise DataError(
+            f"The sites move over {spread_m:.4g} m, and the whole body measures {extent_m:.3g} m; positions must be in metres, "
+            "and these look like millimetres or centimetres."
+        )
+    if (np.ptp(points, axis=0) == 0).all() and extent_m is not None and spread_m > _STILL * extent_m:
+        raise DataError(
+            f"Every set point is the same in all rows, and the sites move over {spread_m:.3g} m; log the set points that the "
+            f"robot was given, in the columns JOINT{SET}."
+        )
 
 
 def check_names(tracks: JointTracks, joints: Sequence[str], sites: Sequence[str]) -> None:
