@@ -110,8 +110,8 @@ class Measurements(Shown):
     @property
     def files(self) -> tuple[Path, ...]:
         """The files that were read, with their mappings; none for a table."""
-        if self._given is _GIVEN_IN_MEMORY:
-            return ()
+        if self.only_in_memory:
+            return (self._measured.path,) if self._measured.path.is_file() else ()
         return tuple(files_behind([Path(self._given["data"]), *map(Path, self._given["more"])]))
 
     @property

@@ -1,5 +1,7 @@
 """Arguments of another type than is meant are answered in a sentence, before anything is computed."""
 
+from pathlib import Path
+
 import pandas as pd
 import pytest
 
@@ -36,6 +38,15 @@ def table():
 def test_another_type_is_an_error_of_the_package(table, call, error, said):
     with pytest.raises(error, match=said):
         call(table)
+
+
+def test_an_experiment_does_not_replace_the_log_it_comes_from(table, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    table.to_csv("log.csv", index=False)
+    assert bns.Measurements("log.csv").files == (Path("log.csv"), Path("log.csv.import.yaml"))
+    assert bns.Measurements(bns.Measurements(table)).files == ()
+    read = bns.Measurements("log.csv", mapping={"columns": {name: {"from": name} for name in table}})
+    assert read.files == (Path("log.csv"),)
 
 
 def test_one_name_is_as_good_as_several(table):
