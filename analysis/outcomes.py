@@ -13,6 +13,8 @@ from analysis.selection import Selection
 from bns.store.schema import NEAR_CM
 
 NEAR = tuple(f"success_{cm}cm" for cm in NEAR_CM)
+RUNS = 30
+"""Of each combination in the dissertation (section 4.5)."""
 FEWEST = 5
 """Runs behind a curve or dot; thinner ones jump between 0 and 100 % and are left out."""
 FEWEST_PLANNED = 2
@@ -101,6 +103,11 @@ def by_seed(store: Results, chosen: Selection, columns: Sequence[str], where: st
         "count(*) FILTER (isfinite(diversity)) AS diversities",
     )
     return _by_seed(store, chosen, columns, where, more)
+
+
+def within_by_seed(store: Results, chosen: Selection, columns: Sequence[str], where: str, column: str) -> pd.DataFrame:
+    """As `successes_by_seed`, with ``within``: how often ``column`` (success_10cm, say) holds."""
+    return _by_seed(store, chosen, columns, where, (f"count(*) FILTER ({column}) AS within",))
 
 
 def ever_by_seed(store: Results, chosen: Selection, task: str) -> pd.DataFrame:

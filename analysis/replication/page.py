@@ -10,14 +10,13 @@ import pandas as pd
 
 from analysis.findings import COMBINATIONS
 from analysis.labels import source_position
+from analysis.outcomes import RUNS
 from analysis.replication.numbers import VERDICTS, Study
 
 WAITS = "no "
 """How the reason begins where a finding cannot be measured yet: no combination, no run has enough."""
 TEMPLATE = Path(__file__).with_name("page.md")
 ROBOTS = {"khepera": "Khepera", "snake": "Snake"}
-RUNS = 30
-"""Of each combination (section 4.5)."""
 UNFINISHED = (
     f"It requires {RUNS} runs of each of the {COMBINATIONS} combinations; the table below says how many there are. Runs are "
     "made seed by seed: where all combinations have the same number of runs, the design is balanced, and only the intervals are "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 
 import numpy as np
@@ -105,6 +106,23 @@ def test_confirmed_shares_are_of_fresh_seeds_alone_and_stand_beside_the_swept(tm
     assert said.verdict == "differs"
     wide = best_combination(store, selections(store)[0], "circle", "success_20cm", 25)
     assert "8 runs on fresh seeds" in wide.ours
+
+
+def test_of_as_many_runs_as_the_dissertation_has_the_best_is_taken_as_swept(tmp_path):
+    """Both are the luckiest of as many; the spread is that of the best share over bootstrap samples of the seeds."""
+    rates = [0.1, 0.3, 0.5, 0.7, 0.9]
+    written(tmp_path, "grid", [one for n, rate in enumerate(rates) for one in rated(rate, seeds=30, good=(18, 21, 20, 3, 19)[n])])
+    written(tmp_path, "grid-confirm", rated(0.3, seeds=40, sweep_seed=100, good=12))
+    store = Results(tmp_path)
+    said = best_combination(store, selections(store)[0], "circle", "success", 76)
+    assert re.fullmatch(
+        r"70 \(\d+ to \d+\) % of 30 runs, the best of 5 as swept; the same combination on fresh seeds 30 % of 40", said.ours
+    )
+    low, high = map(int, re.findall(r"\d+", said.ours)[1:3])
+    # all combinations succeed on the first seeds here, so the best share scatters as one of 30 runs: 1.96 x 8.4 points
+    assert (low, high) == pytest.approx((53.6, 86.4), abs=1.5)
+    assert said.verdict == "undecided"
+    assert best_combination(store, selections(store)[0], "circle", "success", 37).verdict == "differs"
 
 
 def test_a_confirming_sweep_is_not_pooled_with_what_it_confirms(tmp_path):
