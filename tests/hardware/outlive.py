@@ -85,7 +85,7 @@ def _held(seconds, slept_s=0.0):
     """Trial and guard stand still together, as on a computer that sleeps, and go on; the clock says how long it slept."""
 
     def cause(to):
-        both = to.process, guard_of(to.process, to.robot.path)
+        both = guard_of(to.process, to.robot.path), to.process  # a guard that still runs would see that the trial is stopped
         for process in both:
             os.kill(process, signal.SIGSTOP)
         time.sleep(seconds)
@@ -93,7 +93,7 @@ def _held(seconds, slept_s=0.0):
             written = to.slept.with_suffix(".new")
             written.write_text(str(slept_s + (float(to.slept.read_text()) if to.slept.exists() else 0.0)))
             written.replace(to.slept)
-        for process in both[::-1]:
+        for process in both:
             os.kill(process, signal.SIGCONT)
 
     return cause
