@@ -88,6 +88,8 @@ class Guard:
 
     def _judge(self) -> None:
         """Trip if the trial does not look after the robot."""
+        # before the clocks: a trial whose computer slept in between is found stopped, and that is no cause of its own
+        stopped = self._armed and not self.why and frozen(self._setup["process"])
         now_s, slept = time.monotonic(), slept_s()
         slept, self._slept_s = slept - self._slept_s, slept
         if self._terminated and not self._gone:
@@ -97,7 +99,7 @@ class Guard:
             return
         if slept > _SLEPT_S:
             self._trip(f"the computer slept for {slept:.1f} s")
-        elif frozen(self._setup["process"]):
+        elif stopped:
             self._trip("the trial's process was stopped")
         elif now_s - self._beat_s > self._setup["silent_s"]:
             self._trip(f"the trial gave no sign of life for {now_s - self._beat_s:.2f} s")

@@ -271,6 +271,29 @@ def test_a_computer_that_slept_stops_the_robot_when_it_wakes(tmp_path, monkeypat
     far.close()
 
 
+def test_a_computer_that_sleeps_while_its_guard_looks_at_the_trial_is_said_to_have_slept(tmp_path, monkeypatch):
+    """The trial that is found stopped then is so because of that."""
+    clock = {"slept_s": 0.0}
+
+    def sleeps(_process):
+        clock["slept_s"] = 31.0
+        return True
+
+    monkeypatch.setattr(guard_process, "slept_s", lambda: clock["slept_s"])
+    near, far = socket.socketpair()
+    setup = {"process": os.getpid(), "silent_s": HANGS_S, "log": None, "link": str(tmp_path / "x" / "y")}
+    setup |= {"port": "none", "sysfs": "/sys", "identity": None, "gives_up_s": HANGS_S}
+    guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far)
+    near.send(b"a")
+    guard._turn(1.0)
+    monkeypatch.setattr(guard_process, "frozen", sleeps)
+    guard._judge()
+    assert guard.why == "the computer slept for 31.0 s"
+    near.close()
+    far.close()
+
+
+
 def test_a_robot_is_stopped_over_a_slow_link(tmp_path):
     """Answers that take 0.3 s: the guard waits longer each time."""
     robot = Robot("serial", tmp_path)
