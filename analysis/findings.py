@@ -12,7 +12,7 @@ from analysis import checks
 from analysis.coverage import coverage
 from analysis.figure_result import FigureResult
 from analysis.labels import TITLES, task_number, task_title, valued
-from analysis.outcomes import fewest
+from analysis.outcomes import COMBINATIONS, fewest
 from analysis.results import NoDataError, Results
 from analysis.scatter import combinations
 from analysis.selection import Selection, selections
@@ -27,8 +27,6 @@ OF_EXTREMES = frozenset((
     "half_by",
 ))  # fmt: skip
 """Checks that speak of the best or the worst combinations."""
-COMBINATIONS = 500
-"""That the dissertation compared on each task."""
 _NOWHERE = ""
 """Where the findings of a task with too few runs stand."""
 

@@ -13,8 +13,8 @@ from analysis.selection import Selection
 from bns.store.schema import NEAR_CM
 
 NEAR = tuple(f"success_{cm}cm" for cm in NEAR_CM)
-RUNS = 30
-"""Of each combination in the dissertation (section 4.5)."""
+COMBINATIONS, RUNS = 500, 30
+"""That the dissertation compared on each task, and of each combination (section 4.5)."""
 FEWEST = 5
 """Runs behind a curve or dot; thinner ones jump between 0 and 100 % and are left out."""
 FEWEST_PLANNED = 2

@@ -10,7 +10,7 @@ from analysis.best_combinations import confirmed
 from analysis.checks.bootstrap import bootstrapped, ends, interval, mostly, whole_and_samples
 from analysis.intervals import Z, wilson
 from analysis.labels import CELL, TITLES, task_number, task_title, valued
-from analysis.outcomes import RUNS, by_seed, ever_by_seed, lost_and_regained, radii_cm, within_by_seed
+from analysis.outcomes import COMBINATIONS, RUNS, by_seed, ever_by_seed, lost_and_regained, radii_cm, within_by_seed
 from analysis.potential_success import RADIUS_CM
 from analysis.ranking import any_of, by_seed_array, extremes, ranking
 from analysis.results import NoDataError, Results
@@ -43,13 +43,13 @@ def grows_evenly(store: Results, chosen: Selection, task: str, since: int) -> Ch
 
 
 def best_combination(store: Results, chosen: Selection, task: str, column: str, percent: float) -> Checked:
-    """With as many runs of each as the dissertation has: as swept, which is lucky in both (the best of 500). With fewer: on fresh
+    """With as many combinations and runs of each as the dissertation has: as swept, which is lucky in both. With fewer: on fresh
     seeds, where the best were rerun."""
     radius = f" within {column.removeprefix('success_')[:-2]} cm" if column != "success" else ""
     claim = f"best combination {percent:g} %{radius}"
     rows = combinations(store, chosen)[0].query("task == @task")
     again = confirmed(store, chosen, task)
-    if rows.runs.min() >= RUNS:
+    if len(rows) >= COMBINATIONS and rows.runs.min() >= RUNS:
         return _best_as_swept(store, chosen, task, column, percent, claim)
     if len(again):
         successes, runs = again[_confirmed(column)], again.confirm_runs

@@ -8,9 +8,8 @@ from textwrap import fill, indent
 
 import pandas as pd
 
-from analysis.findings import COMBINATIONS
 from analysis.labels import source_position
-from analysis.outcomes import RUNS
+from analysis.outcomes import COMBINATIONS, RUNS
 from analysis.replication.numbers import VERDICTS, Study
 
 WAITS = "no "

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from analysis import importance
-from analysis.findings import COMBINATIONS, _among_all
+from analysis.findings import _among_all
+from analysis.outcomes import COMBINATIONS
 from analysis.verdicts import AGREES, DIFFERS, UNDECIDED, Checked
 
 

@@ -20,7 +20,7 @@ from bns.diagnose.report import tables
 from bns.diagnose.report.plain_language import _rounded_up, figures_in_words
 from bns.diagnose.report.shown_paths import shown_paths
 from bns.diagnose.report.tables import error_table
-from bns.diagnose.report.text import comparison_text
+from bns.diagnose.report.text import _ranking, comparison_text
 from bns.measurements import write_measurements
 from bns.physics.effects import effect_named
 from bns.physics.formula import formula_effect
@@ -214,6 +214,15 @@ def test_a_gain_by_chance_is_that_of_the_best_of_all_effects_that_were_tried(pag
     tried, chance = int(said[1]), float(said[2])
     assert tried > 20
     assert chance >= tried * 5e-5
+
+
+def test_an_effect_that_was_found_and_is_not_in_the_ranking_is_named_beside_it():
+    """As where a screening came before it, of a body on joints."""
+    first = SimpleNamespace(ranking=[], decoy_threshold=0.1)
+    lines = list(_ranking(SimpleNamespace(selection=SimpleNamespace(steps=[first]), effects=("servo-delay",))))
+    assert "  (not fitted alone in this round, though found: servo-delay)" in lines
+    lines = list(_ranking(SimpleNamespace(selection=SimpleNamespace(steps=[first]), effects=())))
+    assert not any("not fitted alone" in line for line in lines)
 
 
 def test_a_bound_that_is_rounded_stays_a_bound():

@@ -188,5 +188,12 @@ def _assigned(module: Any, tree: ast.Module, found: Mapping[tuple[str, str], Any
             elif isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
                 target = node.targets[0] if isinstance(node, ast.Assign) else node.target
                 used = {one.id for one in ast.walk(node.value) if isinstance(one, ast.Name)}
-                if isinstance(target, ast.Name) and used & own and target.id != "DEFAULTS":
+                if not used & own:
+                    continue
+                if isinstance(target, ast.Name) and target.id != "DEFAULTS":
                     yield owner, target.id, node.value
+                elif isinstance(target, ast.Tuple):  # A, B = two settings, or one of two values
+                    for at, one in enumerate(target.elts):
+                        assert isinstance(one, ast.Name)
+                        part = ast.Subscript(node.value, ast.Constant(at), ast.Load())
+                        yield owner, one.id, ast.fix_missing_locations(ast.copy_location(part, node.value))
