@@ -5,19 +5,27 @@ from __future__ import annotations
 import argparse
 import sys
 import traceback
+from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.progress import track
 
+from analysis.figure_result import FigureResult
 from analysis.gallery import write_page
 from analysis.labels import source_position
 from analysis.publish import forget_all_but, forget_skipped, publish_figure, publish_skipped
+from analysis.rendering import Renderer
 from analysis.results import PUBLISHED, NoDataError, Results
 from bns.errors import BnsError, SpecError
+from bns.plotting.style import rendered
 from bns.registry import FIGURES
+
+_WAITING = 8
+"""Figures that may be drawn and not yet written: each holds its points in memory."""
 
 
 def figures(broken: list[str] | None = None) -> dict[str, Any]:
@@ -83,30 +91,77 @@ def _parser() -> argparse.ArgumentParser:
 
 def _draw_all(modules: dict[str, Any], store: Results, out: Path, *, everything: bool) -> bool:
     """Whether every script could be carried through: one that cannot does not cost the others their figures."""
-    made, failed = set(), False
     console = Console(stderr=True)
-    for name, module in track(modules.items(), "figures", console=console, disable=not console.is_terminal):
+    with Renderer(jobs=None if len(modules) > 1 else 1) as renderer:
+        drawing = _Drawing(store, out, renderer)
+        for name, module in track(modules.items(), "figures", console=console, disable=not console.is_terminal):
+            drawing.draw(name, module)
+        drawing.publish_all()
+    if everything:
+        forget_all_but(drawing.made, out)
+    return not drawing.failed
+
+
+class _Drawing:
+    """Draws script after script; what is drawn is published, in the order of drawing, once it is rendered."""
+
+    def __init__(self, store: Results, out: Path, renderer: Renderer) -> None:
+        self.made: set[str] = set()
+        self.failed = False
+        self._store, self._out, self._renderer = store, out, renderer
+        self._waiting: deque[tuple[str, str, FigureResult, Future[Any] | None]] = deque()
+
+    def draw(self, name: str, module: Any) -> None:
+        """What a script draws; where it cannot, that is written down."""
+        forget_skipped(name, self._out)
         try:
-            forget_skipped(name, out)
-            for drawn in module.draw(store):
-                place = publish_figure(drawn, module.PAPER, store, out)
-                print(f"{place}  ({module.PAPER}, n = {drawn.n:,} runs)")
-                made.add(drawn.name)
+            for drawn in module.draw(self._store):
+                figure = drawn.figure
+                rendering = None if figure is None else self._renderer.submit(rendered, figure)
+                self._waiting.append((name, module.PAPER, drawn, rendering))
+                while len(self._waiting) > _WAITING or (self._waiting and _is_ready(self._waiting[0][3])):
+                    self._publish_next()
         except NoDataError as reason:
+            self.publish_all()
             print(f"{name} ({module.PAPER}) skipped: {reason}")
-            publish_skipped(name, module.PAPER, str(reason), out)
-            made.add(name)
+            self._skip(name, module.PAPER, str(reason))
         except BnsError:
             raise
         except Exception as fault:
-            failed = True
-            traceback.print_exc()
-            print(f"bns: {name} ({module.PAPER}) could not be drawn; the others are", file=sys.stderr)
-            publish_skipped(name, module.PAPER, f"its script failed: {type(fault).__name__}: {fault}", out)
-            made.add(name)
-    if everything:
-        forget_all_but(made, out)
-    return not failed
+            self.publish_all()
+            self._note_failure(name, module.PAPER, fault)
+
+    def publish_all(self) -> None:
+        """Whatever is drawn and not yet written."""
+        while self._waiting:
+            self._publish_next()
+
+    def _publish_next(self) -> None:
+        name, paper, drawn, rendering = self._waiting.popleft()
+        try:
+            pictures = None if rendering is None else rendering.result()
+            place = publish_figure(drawn, pictures, paper, self._store, self._out)
+        except BnsError:
+            raise
+        except Exception as fault:
+            self._note_failure(name, paper, fault)
+            return
+        print(f"{place}  ({paper}, n = {drawn.n:,} runs)")
+        self.made.add(drawn.name)
+
+    def _note_failure(self, name: str, paper: str, fault: Exception) -> None:
+        self.failed = True
+        traceback.print_exception(fault)
+        print(f"bns: {name} ({paper}) could not be drawn; the others are", file=sys.stderr)
+        self._skip(name, paper, f"its script failed: {type(fault).__name__}: {fault}")
+
+    def _skip(self, name: str, paper: str, why: str) -> None:
+        publish_skipped(name, paper, why, self._out)
+        self.made.add(name)
+
+
+def _is_ready(rendering: Future[Any] | None) -> bool:
+    return rendering is None or rendering.done()
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import pandas as pd
 
 from analysis.figure_result import FigureResult
 from analysis.results import Results, among
-from bns.plotting.style import save
+from bns.plotting.style import put
 from bns.store.disk.files import publish, remove
 
 DIGITS = "%.12g"
@@ -19,13 +19,17 @@ DIGITS = "%.12g"
 KINDS = ("png", "svg", "csv", "json")
 
 
-def publish_figure(drawn: FigureResult, paper: str, store: Results, out: Path) -> Path:
+def publish_figure(
+    drawn: FigureResult, pictures: tuple[bytes, bytes] | None, paper: str, store: Results, out: Path
+) -> Path:
     """Write a figure, its numbers and its caption; the path of the PNG, or of the CSV of a table without a picture.
+
+    ``pictures``: the figure `rendered`, None where there is none.
 
     Raises:
         StoreError: the disk does not take a file.
     """
-    files: list[Path] = [*save(drawn.figure, out / drawn.name)] if drawn.figure is not None else []
+    files: list[Path] = [*put(pictures, out / drawn.name)] if pictures is not None else []
     if drawn.data is not None:
         files.append(_put(out / f"{drawn.name}.csv", drawn.data.to_csv(index=False, float_format=DIGITS)))
     caption = {

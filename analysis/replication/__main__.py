@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import io
 import re
 import sys
 from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from analysis import advice, prototype_worlds, random_behaviour, worlds
 from analysis.__main__ import figures
 from analysis.intervals import FEWEST_SEEDS
 from analysis.readings import compared, in_words
+from analysis.rendering import Renderer
 from analysis.replication.numbers import Study, by_either_reading, studies
 from analysis.replication.page import page
 from analysis.results import PUBLISHED, NoDataError, Results
@@ -63,20 +67,29 @@ def _parser() -> argparse.ArgumentParser:
 
 def drawn(store: Results, found: Sequence[Study], folder: Path, beside: Path) -> dict[str, str]:
     """Draw what the dissertation has a figure of; "figure 4.7" -> path of the picture from the folder ``beside``."""
-    pictures = {}
-    for module in figures([]).values():
-        numbers = re.findall(r"\b([45])\.(\d+)", module.PAPER) if module.PAPER.startswith("figure") else []
-        for one in _of_the_archive(module, store):
-            robot = next((study.chosen.robot for study in found if f"-{study.chosen.robot}" in one.name), None)
-            own = [f"{chapter}.{number}" for chapter, number in numbers if chapter == _CHAPTER.get(str(robot))]
-            if not own or one.figure is None:
-                continue
-            place = folder / f"{one.name}.png"
+    pictures, contents = {}, {}
+    with Renderer() as renderer:
+        for module in figures([]).values():
+            numbers = re.findall(r"\b([45])\.(\d+)", module.PAPER) if module.PAPER.startswith("figure") else []
+            for one in _of_the_archive(module, store):
+                robot = next((study.chosen.robot for study in found if f"-{study.chosen.robot}" in one.name), None)
+                own = [f"{chapter}.{number}" for chapter, number in numbers if chapter == _CHAPTER.get(str(robot))]
+                if not own or one.figure is None:
+                    continue
+                place = folder / f"{one.name}.png"
+                contents[place] = renderer.submit(_png, one.figure)
+                where = f"figure {own[0]}" if len(own) == 1 else f"figures {own[0]} to {own[-1]}"
+                pictures.setdefault(where, place.relative_to(beside).as_posix())
+        for place, content in contents.items():
             place.parent.mkdir(parents=True, exist_ok=True)
-            one.figure.savefig(place, dpi=110, metadata={"Software": None})
-            where = f"figure {own[0]}" if len(own) == 1 else f"figures {own[0]} to {own[-1]}"
-            pictures.setdefault(where, place.relative_to(beside).as_posix())
+            publish(content.result(), place.with_name(f".{place.name}.part"), place)
     return pictures
+
+
+def _png(figure: Figure) -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
+    return buffer.getvalue()
 
 
 def _of_the_archive(module, store: Results) -> list:  # type: ignore[no-untyped-def,type-arg]  # a figure's script

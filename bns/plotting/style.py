@@ -95,18 +95,34 @@ def save(figure: Figure, stem: Path | str) -> tuple[Path, Path]:
     Raises:
         StoreError: the disk does not take a file.
     """
-    stem = Path(stem)
-    made = []
+    return put(rendered(figure), stem)
+
+
+def rendered(figure: Figure) -> tuple[bytes, bytes]:
+    """The contents of a PNG (200 dpi) and an SVG of a figure, always the same; its layout is settled by this."""
     with style():
         figure.draw_without_rendering()
     figure.set_layout_engine("none")  # the places are found: to find them again for each file would take as long
+    made = []
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
-        buffer, place = io.BytesIO(), stem.with_name(f"{stem.name}.{kind}")
+        buffer = io.BytesIO()
         with style():
             figure.savefig(buffer, format=kind, metadata=metadata)
-        publish(buffer.getvalue(), place.with_name(f".{place.name}.part"), place)
-        made.append(place)
+        made.append(buffer.getvalue())
     return made[0], made[1]
+
+
+def put(contents: tuple[bytes, bytes], stem: Path | str) -> tuple[Path, Path]:
+    """Write what was `rendered` as ``stem``.png and ``stem``.svg, each all at once.
+
+    Raises:
+        StoreError: the disk does not take a file.
+    """
+    stem = Path(stem)
+    png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg"))
+    for content, place in zip(contents, (png, svg), strict=True):
+        publish(content, place.with_name(f".{place.name}.part"), place)
+    return png, svg
 
 
 def arcs(poses: np.ndarray, step_rad: float = 0.05) -> np.ndarray:
