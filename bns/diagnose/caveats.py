@@ -73,7 +73,7 @@ def notes_on(
             f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "
             f"more, so it is not named.{why}"
         )
-    yield from _on_effects(selection, tracks)
+    yield from _on_effects(selection, tracks, found.imitating)
     yield from _on_the_cone(selection.fit.model)
     for names in longer:
         yield f"{' with '.join(names)} would explain as much, with one more effect."
@@ -186,7 +186,7 @@ def _on_the_cone(model: Model) -> Iterator[str]:
         )
 
 
-def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
+def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[str]) -> Iterator[str]:
     names = {*selection.accepted, *(name for competitor in selection.competing_models for name in competitor)}
     known = known_effects(selection)
     tied = {name for group in ties_of(selection) for name in group if not all(known[one].of_measuring for one in group)}
@@ -197,7 +197,9 @@ def _on_effects(selection: SelectionResult, tracks: Tracks) -> Iterator[str]:
             yield f"{begun}, or else one of the model of the robot: {also}." if also else f"{begun}, not of the robot."
     chain = sorted((known[name] for name in names), key=lambda effect: (effect.place, effect.name))
     logged = {*tracks.extra, *(("session_s",) if tracks.start_known else ())}
-    yield from (effect.caveat for effect in chain if effect.caveat and not logged.intersection(effect.explained_by))
+    # what an effect takes for granted may be why it seems to imitate something
+    assuming = [*chain, *(known[name] for name in imitating if name in known)]
+    yield from (effect.caveat for effect in assuming if effect.caveat and not logged.intersection(effect.explained_by))
     yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
     yield from _on_times(selection, tracks, names)
     per_trial_effect = selection.fit.model.per_trial_effect

@@ -153,6 +153,10 @@ def test_honest_robots_leave_nothing(seed):
             "wheels", "-k * min(u, 0)", 0.1, "speed of each wheel", r"a wheel's .* -0\.199 m/s gives -0\.179 m/s \(-10\.\d%\)",
             marks=pytest.mark.slow,
         ),
+        ("left", "-k * u * max(u, 0)", 1.5, "speed of the left wheel, forwards and backwards",
+         r"the left .* 0\.199 m/s gives 0\.1[34]\d* m/s \(-\d\d\.\d%\), -0\.199 m/s gives -0\.(199|2)\d* m/s \(.*%\)"),
+        ("right", "-k * max(fresh, 0)", 0.5, "changes of speed of the right wheel",
+         r"just after a change of the right wheel's speed, \d\d% of it is missing, .*"),
         ("v", "-k * abs(v) * cos(heading)", 0.06, "direction of travel",
          r"slower by [56]\.\d+% when it travels towards -?[0-5]°, faster by [56]\.\d+% .* -?1[78]\d°"),
         pytest.param(

@@ -152,6 +152,15 @@ def test_opposed_ways_are_a_motion_where_no_errors_of_a_tracker_could_be_so_oppo
     assert not _moves([np.repeat(np.diff(e)[:, None], 3, axis=1) for e in errors], 2, opposed)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_stationary_errors_of_short_trials_are_no_motion_however_opposed_by_chance(seed):
+    rng, errors = np.random.default_rng(seed), np.zeros((40, 101))
+    for k in range(1, 101):
+        errors[:, k] = 2 / 3 * errors[:, k - 1] + rng.standard_normal(40)
+    ways = [np.repeat(np.diff(e)[:, None], 3, axis=1) for e in errors]
+    assert not _moves(ways, 2, Autocorrelation("heading", "within", 3, -0.2, -9.0))
+
+
 def variables_of(left_m_s, command_s=0.4):
     """Of one trial of these left speeds in turn; the right wheel stands."""
     t = np.arange(0, len(left_m_s) * command_s + 1e-9, FRAME_S)

@@ -32,6 +32,10 @@ _VERDICTS = {
     "unlisted": "Something is missing that no listed effect explains.",
     "insufficient-data": "These measurements do not suffice for a verdict.",
 }
+UNKNOWN_NOISE = (
+    f"it takes poses at rest, or {DEFAULTS.data.parabola_frames} poses of one command in a row at "
+    f"{DEFAULTS.data.parabola_slowest_hz:g} Hz or more"
+)
 _SHOWN = DEFAULTS.report.rows
 _WIDTH = DEFAULTS.report.formula_width
 
@@ -194,12 +198,13 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
         yield f"  (windows excluded because the tracker jumps within them or poses were left out: {left_out})"
     if errors.noise is None:
         of_body = {"cycle", "stretch"} & set(errors.horizons)
-        why = "of a body only the ends of a stretch are compared" if of_body else "the poses are too far apart in time"
+        why = "of a body only the ends of a stretch are compared" if of_body else UNKNOWN_NOISE
         yield f"  (noise not known: {why})"
     else:
         pose_mm, basis = 1e3 * errors.noise.position_m, errors.noise.basis
         of = {"at rest": "poses at rest", "high frequency": "poses at high frequency"}.get(basis, basis)
-        yield f"  (noise: error that the tracking alone causes; {pose_mm:.2f} mm per pose, estimated from {of})"
+        least = "at least " if basis == "high frequency" else ""
+        yield f"  (noise: error that the tracking alone causes; {least}{pose_mm:.2f} mm per pose, estimated from {of})"
 
 
 def _change(c: Change) -> tuple[str, str]:

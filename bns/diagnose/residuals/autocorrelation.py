@@ -86,7 +86,8 @@ def _moves(moved: list[Array], direction: int, found: Autocorrelation) -> bool:
     lag = found.lag
     frames = _pooled("", "", lag, [_lagged(ways[:, direction], lag) for ways in moved if len(ways) > lag + 6])
     if found.correlation < 0:
-        return frames.correlation < -MEMORY and frames.z < -MOVES_Z
+        # further than stationary errors reach, and that not by chance
+        return frames.correlation < -MEMORY and frames.z * (1 + MEMORY / frames.correlation) < -MOVES_Z
     longer = [np.concatenate([[0.0], np.cumsum(ways[:, direction])]) for ways in moved]
     values = [way[lag:] - way[:-lag] for way in longer if len(way) > 2 * lag + APART + 6]
     return frames.z > MOVES_Z or _pooled("", "", lag, [_lagged(v, lag + APART) for v in values]).z > MOVES_Z

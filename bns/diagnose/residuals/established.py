@@ -37,6 +37,7 @@ from bns.diagnose.residuals.grammar import (
     ranked,
     rounding,
     significant,
+    simpler_first,
 )
 from bns.diagnose.residuals.symbolic import Formula, fitted, free_name, patch
 from bns.diagnose.residuals.unexplained import unexplained
@@ -147,7 +148,8 @@ def _curves(problem: Problem, fit: Fit, grammar: Sequence[Family], terms: Sequen
     if len(terms) >= TERMS or not grammar:
         return []
     used = [(term.signal, term.on) for term in terms]
-    return significant(ranked(problem, fit, may_join(used, [*grammar, rounding(problem, fit)])))
+    found = significant(ranked(problem, fit, may_join(used, [*grammar, rounding(problem, fit)])))
+    return simpler_first(found, float(fit.losses.mean()))
 
 
 def _written_out(problem: Problem, fit: Fit, family: Family) -> Formula | None:

@@ -16,7 +16,7 @@ import numpy as np
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import weights
-from bns.diagnose.estimate.significance import MIN_Z, PairedComparison
+from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.along_variables import with_columns
@@ -34,8 +34,17 @@ RESPONSE_ALONE = {LEFT: "response of the left wheel in time", RIGHT: "response o
 SLOWING = "response of each wheel in time while it slows down"
 SESSION = "time of the session"
 CHANGES = "changes of speed of each wheel"
-PAST = frozenset({RESPONSE, SLOWING, CHANGES, *RESPONSE_OF.values(), *RESPONSE_ALONE.values()})
+CHANGES_ALONE = {LEFT: "changes of speed of the left wheel", RIGHT: "changes of speed of the right wheel"}
+"""What one wheel loses while it speeds up: a tyre with less grip, a joint that gives."""
+PAST = frozenset({RESPONSE, SLOWING, CHANGES, *RESPONSE_OF.values(), *RESPONSE_ALONE.values(), *CHANGES_ALONE.values()})
 """Answers to past commands."""
+BY_DIRECTION = {
+    WHEELS: "speed of each wheel, forwards and backwards",
+    LEFT: "speed of the left wheel, forwards and backwards",
+    RIGHT: "speed of the right wheel, forwards and backwards",
+}
+"""A curve of its own in each direction: what an odd one beside a share cannot draw, others would repair between them."""
+OF_SPEED = {WHEELS: "speed of each wheel", LEFT: "speed of the left wheel", RIGHT: "speed of the right wheel"}
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 SPEED_THERE = "forward speed at a place"
 TRAVEL = "direction of travel"
@@ -92,11 +101,11 @@ def families(predictor: Predictor, wheelbase_m: float, response: bool = True) ->
     if "left_m_s" not in seen:
         return []
     wheels = np.concatenate([seen["left_m_s"].ravel(), seen["right_m_s"].ravel()])
-    of_speed = _of_speed(float(np.abs(wheels).max()), bool((wheels < 0.0).any()))
+    reverses, knots = bool((wheels < 0.0).any()), [share * float(np.abs(wheels).max()) for share in SPEED_KNOTS]
+    of_speed, by_direction = _of_speed(knots, reverses), _by_direction(knots)
     found = [
-        Family("speed of each wheel", WHEELS, of_speed),
-        Family("speed of the left wheel", LEFT, of_speed),
-        Family("speed of the right wheel", RIGHT, of_speed),
+        *(Family(signal, on, of_speed) for on, signal in OF_SPEED.items()),
+        *(Family(signal, on, by_direction) for on, signal in BY_DIRECTION.items() if reverses),
         Family("speed and turn", "v", ("v * w", "v * w**2", "v * abs(v)", "v**3", "moving * abs(w)")),
         Family("speed and turn", "w", ("w * abs(w)", "w * abs(v)", "w**3", "w * v**2", "w * v", "v * abs(w)")),
         Family("speed and turn", "s", ("v * w * abs(w)", "v * w * abs(v)", "w")),
@@ -119,10 +128,15 @@ def may_join(terms: Iterable[tuple[str, str]], tried: Iterable[Family]) -> list[
     return [f for f in tried if (f.signal, f.on) not in used and f.signal not in barred]
 
 
-def _of_speed(fastest_m_s: float, reverses: bool) -> tuple[str, ...]:
+def _of_speed(knots: Sequence[float], reverses: bool) -> tuple[str, ...]:
     """A free curve of a wheel's own speed that is nothing at rest, odd but for a share of backward speeds."""
-    hats = _hats("abs(u)", [share * fastest_m_s for share in SPEED_KNOTS])[1:]
+    hats = _hats("abs(u)", knots)[1:]
     return (*(f"sign(u) * {h}" for h in hats), *(("min(u, 0)",) if reverses else ()))
+
+
+def _by_direction(knots: Sequence[float]) -> tuple[str, ...]:
+    """Two free curves of a wheel's own speed that are nothing at rest: one forwards, one backwards."""
+    return tuple(hat for ahead in ("u", "-u") for hat in _hats(f"({ahead})", knots)[1:])
 
 
 def _surfaces(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
@@ -139,7 +153,8 @@ def _surfaces(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
 
 def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
     """Families of what single motions have not: times, memories, places."""
-    yield Family(CHANGES, WHEELS, ("fresh", "max(fresh, 0)", "fresh * abs(fresh)", "fresh * abs(u)"))
+    for signal, on in ((CHANGES, WHEELS), *((signal, on) for on, signal in CHANGES_ALONE.items())):
+        yield Family(signal, on, ("fresh", "max(fresh, 0)", "fresh * abs(fresh)", "fresh * abs(u)"))
     of_wheels = ((RESPONSE, WHEELS, "u"), *((signal, on, "u") for on, signal in RESPONSE_ALONE.items()))
     for signal, on, now in (*of_wheels, *((signal, on, on) for on, signal in RESPONSE_OF.items())):
         yield Family(signal, on, tuple(f"(ago({a:g}, {b:g}) - {now})" for a, b in pairwise(RESPONSE_KNOTS_S)))
@@ -214,6 +229,23 @@ def significant(earned: Sequence[Earned]) -> list[Earned]:
         for e in earned
         if e.paired_comparison.p_value < level and e.share > LEAST and certain(e.paired_comparison, e.share)
     ]
+
+
+def simpler_first(found: Sequence[Earned], usual: float) -> list[Earned]:
+    """The same, but the odd curve of a wheel's speed comes before the curves of each direction unless these predict better.
+
+    For certain, and by more than `LEAST` of ``usual``, the loss of a trial: the larger family contains what the odd one can draw.
+    """
+    out = list(found)
+    for larger in [e for e in found if e.family.signal == BY_DIRECTION.get(e.family.on)]:
+        odd = next((e for e in found if (e.family.signal, e.family.on) == (OF_SPEED[larger.family.on], larger.family.on)), None)
+        if odd is None:
+            continue
+        gain, se = paired_elpd_diff(odd.losses, larger.losses)
+        if not (gain > LEAST * usual and certain(PairedComparison(gain, se, 0.0), gain / usual)):
+            out.remove(odd)
+            out.insert(min(out.index(larger), found.index(odd)), odd)
+    return out
 
 
 def certain(comparison: PairedComparison, share: float) -> bool:

@@ -11,7 +11,9 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.grammar import (
+    BY_DIRECTION,
     CHANGES,
+    CHANGES_ALONE,
     PLACE,
     RESPONSE,
     RESPONSE_ALONE,
@@ -275,7 +277,8 @@ def _changes(term: Formula, _: Predictor) -> str:
     jump = np.array([0.1])
     rest = float(_curve(term, "fresh", jump, u=0.1)[0] / jump[0])
     share = "less than 1%" if abs(rest) < 0.01 else f"{abs(rest):.0%}"
-    return f"just after a change of speed, {share} of it is {'missing' if rest < 0 else 'added'}, fading within 0.15 s"
+    whose = {LEFT: " of the left wheel's", RIGHT: " of the right wheel's"}.get(term.on, " of")
+    return f"just after a change{whose} speed, {share} of it is {'missing' if rest < 0 else 'added'}, fading within 0.15 s"
 
 
 _RESPONDS = {"wheels": ("u", "a wheel"), "v": ("v", "the robot's forward motion"), "w": ("w", "the robot's turning")}
@@ -368,7 +371,9 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("speed of the right wheel", "right"): _speed,
     ("recent work of each wheel", "wheels"): _work,
     ("speed in steps", "wheels"): _steps,
+    **{(signal, on): _speed for on, signal in BY_DIRECTION.items()},
     (CHANGES, "wheels"): _changes,
+    **{(signal, on): _changes for on, signal in CHANGES_ALONE.items()},
     (RESPONSE, "wheels"): _response,
     **{(signal, on): _response for on, signal in RESPONSE_OF.items()},
     **{(signal, on): _one_wheel for on, signal in RESPONSE_ALONE.items()},
