@@ -15,6 +15,7 @@ from bns.app.background import Background
 from bns.app.results.study import Study, is_store
 from bns.app.session import is_session, opened
 from bns.app.tab import FIRST_MODEL, Tab, Tabs, files_of
+from bns.errors import DataError
 from bns.extras import require
 
 
@@ -94,6 +95,9 @@ def tabs_of(
         kept, model, log = Background(log), log.ready.model, log.ready.log
     first.take(model, model_words or (_words(model),))
     files = files_of(log)
+    for file in files:
+        if is_store(Path(file)):
+            raise DataError(f"{file} is a folder of results, which has a page of its own: give it alone.")
     if files:
         first.ask([Path(file) for file in files], data_words or tuple(map(str, files)))
     elif log is not None:

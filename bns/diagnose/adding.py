@@ -168,6 +168,9 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
             yield f"{name} fits best with an implausible value: {why}."
         elif does_nothing(fit, name):
             yield f"{name} has no visible effect in these data: its 95 % interval includes the neutral value (no effect)."
+    if errors.trials < 2:
+        yield "there is one trial, and the error is that of the trial to which the numbers were fitted, not of others."
+        return
     for before, after in pairwise(next(iter(errors.horizons.values())).models):
         if not errors.between(before.name, after.name):
             yield f"with {after.name}, the error on held-out trials does not fall."

@@ -186,7 +186,7 @@ def _on_the_cone(model: Model) -> Iterator[str]:
         )
 
 
-def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[str]) -> Iterator[str]:
+def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[str] = ()) -> Iterator[str]:
     names = {*selection.accepted, *(name for competitor in selection.competing_models for name in competitor)}
     known = known_effects(selection)
     tied = {name for group in ties_of(selection) for name in group if not all(known[one].of_measuring for one in group)}

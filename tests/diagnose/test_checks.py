@@ -4,11 +4,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bns.api.add import add
+from bns.api.compare import compare
 from bns.api.measurements import Measurements
+from bns.api.model import Model
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.report.text import findings_text
 from bns.errors import DataError
 from tests.diagnose.worlds import NOMINAL, measured
+
+NOMINAL_MODEL = Model(NOMINAL)
 
 
 @pytest.fixture(scope="module")
@@ -107,6 +113,49 @@ def test_missing_columns_are_named(table):
         checked(table.drop(columns="heading_rad"))
     with pytest.raises(DataError, match="no rows"):
         checked(table.iloc[:0])
+    with pytest.raises(DataError, match=r"lack trial; they have trial in the index \(`table.reset_index\(\)`.*\), and t_s, l"):
+        checked(table.set_index("trial"))
+    with pytest.raises(DataError, match="they have no columns"):
+        checked(pd.DataFrame())
+
+
+def test_a_column_that_is_there_twice_is_refused(table):
+    with pytest.raises(DataError, match="more than one column x_m; leave out all but one"):
+        checked(pd.concat([table, table[["x_m"]]], axis=1))
+
+
+def test_poses_of_no_trial_are_said_to_be_left_out(table):
+    usable, findings = checked(table.assign(trial=table.trial.where(table.index >= 20)))
+    assert len(usable) == len(table) - 20
+    assert [(f.trial, f.row) for f in findings if "20 poses belong to no trial" in f.text] == [("", 0)]
+    assert "\n  row 0: 20 poses belong" in findings_text(tuple(findings))
+
+
+@pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
+def test_times_may_be_dates_or_differences(table, zone):
+    since = pd.to_timedelta(table.t_s, unit="s")
+    expected = tracks_of(checked(table)[0])
+    for times in (since, pd.Timestamp("2026-11-26 12:00", tz=zone) + since):
+        tracks = tracks_of(checked(table.assign(t_s=times))[0])
+        np.testing.assert_allclose(tracks.t_s, expected.t_s, atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", ["ns", "s"])
+def test_dates_are_no_numbers_in_a_unit(table, unit):
+    dates = table.assign(t_s=pd.Timestamp("2026-11-26") + pd.to_timedelta(table.t_s, unit="s"))
+    rules = {"columns": {name: {"from": name} for name in table.columns} | {"t_s": {"from": "t_s", "unit": unit}}}
+    with pytest.raises(DataError, match=r"t_s, which holds Timestamp.*no number; a date and time of day takes unit: date"):
+        Measurements(dates, mapping=rules)
+
+
+def test_one_trial_has_no_standard_error_and_holds_nothing_out(table):
+    alone = table[table.trial == table.trial.iloc[0]]
+    assert compare(alone, NOMINAL_MODEL).errors.position_se_m.isna().all()
+    assert compare(table, NOMINAL_MODEL).errors.position_se_m.gt(0).all()
+    added = add(alone, "motor-lag", NOMINAL_MODEL)
+    assert "position error on the one trial, to which the numbers were fitted (none is held out)" in added.summary()
+    assert any(warning.startswith("there is one trial") for warning in added.warnings)
+    assert not any("does not fall" in warning for warning in added.warnings)
 
 
 def test_jumps_are_found_also_in_pairs_and_at_the_ends(table):

@@ -282,6 +282,7 @@ def test_what_cannot_be_asked_is_refused_before_the_work(tmp_path, more, message
         (None, (1, 2), None, "X,Y,DEGREES"),
         (None, (1, 2, np.nan), None, "X,Y,DEGREES"),
         (None, (99, 0, 0), None, "outside of the arena"),
+        (None, (0, 0, 90), None, r"heading is 90 rad, more than a whole round.*in radians \(1\.571 for 90 degrees\)"),
         (None, None, (0.3, 0.1), "LOW,HIGH"),
         (None, None, "fast", "LOW,HIGH"),
     ],

@@ -86,7 +86,7 @@ class ResultsScreen:
 
     def _fill_menus(self) -> None:
         for name, menu in self._filters.items():
-            values = sorted(self._study.runs[name].dropna().unique().tolist(), key=str)
+            values = sorted(self._study.runs[name].dropna().unique().tolist(), key=_numbers_first)
             menu.options = {str(value): value for value in values}
             menu.visible = len(values) > 1
 
@@ -159,6 +159,11 @@ def _menu(name: str) -> Any:
 
 def _options(words: dict[str, str]) -> dict[str, str]:
     return {text: name for name, text in words.items()}
+
+
+def _numbers_first(value: object) -> tuple[bool, float, str]:
+    """Numbers by their size, then all else by its text."""
+    return (False, float(value), "") if isinstance(value, int | float) else (True, 0.0, str(value))
 
 
 def _named(run: dict[Any, Any], varied: list[str]) -> str:

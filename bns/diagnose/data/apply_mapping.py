@@ -132,9 +132,17 @@ def _numbers(name: str, values: pd.Series) -> pd.Series:
     try:
         return values.astype(float)
     except (ValueError, TypeError) as fault:
-        wrong = values[pd.to_numeric(values, errors="coerce").isna() & values.notna()].iloc[0]
+        wrong = values[values.notna() & values.map(_is_no_number)].iloc[0]
         hint = "; a date and time of day takes unit: date" if name == "t_s" else ""
         raise DataError(f"{name} is taken from {values.name}, which holds {wrong!r}: no number{hint}.") from fault
+
+
+def _is_no_number(value: object) -> bool:
+    try:
+        float(value)  # type: ignore[arg-type]  # whatever a cell holds
+    except (ValueError, TypeError):
+        return True
+    return False
 
 
 def _dated(name: str, values: pd.Series) -> pd.Series:

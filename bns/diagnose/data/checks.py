@@ -29,7 +29,7 @@ _LARGEST = DEFAULTS.data.largest_number
 
 @dataclass(frozen=True)
 class Finding:
-    """One oddity: what, in which trial, in which row of the table (counted from 0), and what was done about it."""
+    """One oddity: what, in which trial ("": in none), in which row of the table (from 0), and what was done about it."""
 
     trial: str
     row: int
@@ -40,6 +40,7 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     """The rows that can be used, by their numbers in the table, and findings. DataError where going on would be guessing."""
     check_columns(table, COLUMNS)
     table = table.reset_index(drop=True)
+    table["t_s"] = _in_seconds(table["t_s"])
     to_numbers(table, COLUMNS[1:])
     table.loc[left_out_rows(table), list(POSE)] = np.nan
     findings: list[Finding] = []
@@ -65,9 +66,26 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     refuse_still_heading(usable, trials)
     note = check_units(usable, trials)
     unit: tuple[int, str] | None = (int(usable.index[0]), note) if note else None
-    oddities = (unit, odd, untold_trials(usable, trials), never_told(usable))
-    told = [Finding(str(table["trial"].iloc[row]), row, text) for row, text in filter(None, oddities)]
+    oddities = (unit, odd, untold_trials(usable, trials), never_told(usable), _nameless(table))
+    names = table["trial"].astype(object).where(table["trial"].notna(), "")
+    told = [Finding(str(names.iloc[row]), row, text) for row, text in filter(None, oddities)]
     return usable, told + findings
+
+
+def _in_seconds(times: pd.Series) -> pd.Series:
+    """Dates (with or without a time zone) and differences of time, as pandas has them, as seconds; all else as it is."""
+    if pd.api.types.is_datetime64_any_dtype(times):
+        times = times - times.min()
+    return times.dt.total_seconds() if pd.api.types.is_timedelta64_dtype(times) else times
+
+
+def _nameless(table: pd.DataFrame) -> tuple[int, str] | None:
+    """Poses that belong to no trial, the first of them."""
+    lost = np.flatnonzero(table["trial"].isna() & _tracked(table))
+    if not len(lost):
+        return None
+    many = "1 pose belongs" if len(lost) == 1 else f"{len(lost)} poses belong"
+    return int(lost[0]), f"{many} to no trial (the column trial is empty): not used; the first here"
 
 
 def rows_by_trial(table: pd.DataFrame) -> list[tuple[str, np.ndarray]]:
@@ -126,10 +144,16 @@ def _tracked(rows: pd.DataFrame) -> pd.Series[bool]:
 
 def check_columns(table: pd.DataFrame, columns: Sequence[str]) -> None:
     """DataError if one of the columns is missing, or if there are no rows."""
+    twice = [name for name in columns if (table.columns == name).sum() > 1]
+    if twice:
+        raise DataError(f"The measurements have more than one column {', '.join(twice)}; leave out all but one of that name.")
     missing = [name for name in columns if name not in table.columns]
     if missing:
+        index = [str(name) for name in table.index.names if name in missing]
+        in_index = f"{' and '.join(index)} in the index (`table.reset_index()` makes columns of it), and " if index else ""
         raise DataError(
-            f"The measurements lack {', '.join(missing)}; they have {', '.join(map(str, table.columns))}. "
+            f"The measurements lack {', '.join(missing)}; they have {in_index}"
+            f"{', '.join(map(str, table.columns)) or 'no columns'}. "
             "Name the columns with `bns import` (in Python: bns.Measurements(table, mapping=...)), or write "
             + ", ".join(columns)
             + "."

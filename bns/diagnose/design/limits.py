@@ -119,6 +119,11 @@ def _checked_start(start: tuple[float, float, float]) -> tuple[float, float, flo
         raise DataError(
             f"The start is {start!r}; it must be three numbers: {START}."
         )
+    if abs(pose[2]) > 2 * np.pi + 1e-9:
+        raise DataError(
+            f"The start's heading is {pose[2]:g} rad, more than a whole round. In Python it is in radians "
+            f"({np.radians(pose[2]):.4g} for {pose[2]:g} degrees), on the command line in degrees."
+        )
     return float(pose[0]), float(pose[1]), float(pose[2])
 
 

@@ -56,7 +56,10 @@ class Errors:
         return middle_m if self.points_m is None else np.hypot(middle_m, self.points_m)
 
     def summary(self, trials: int) -> dict[str, float]:
-        """Root mean squares, the median position error, its standard error by trial, and the number of windows."""
+        """Root mean squares, the median position error, its standard error by trial, and the number of windows.
+
+        One trial has no standard error: NaN.
+        """
         if not len(self.start):
             return {"windows": 0}
         square = self.position_m**2
@@ -67,7 +70,7 @@ class Errors:
         scatter = float(np.sqrt(((sums - mean * counts) ** 2).sum()) / counts.sum())
         return {
             "position_m": rms,
-            "position_se_m": scatter / (2 * rms) if rms > 0 else 0.0,
+            "position_se_m": float("nan") if np.count_nonzero(counts) < 2 else scatter / (2 * rms) if rms > 0 else 0.0,
             "median_position_m": float(np.median(self.position_m)),
             "forward_m": _rms(self.forward_m),
             "left_m": _rms(self.left_m),

@@ -42,7 +42,7 @@ _WIDTH = DEFAULTS.report.formula_width
 
 def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
     """What was odd about the data; the first ones in full, the rest counted."""
-    lines = [f"  trial {f.trial}, row {f.row}: {f.text}" for f in findings[:most]]
+    lines = [f"  {f'trial {f.trial}, ' if f.trial else ''}row {f.row}: {f.text}" for f in findings[:most]]
     if len(findings) > most:
         lines.append(f"  … and {len(findings) - most} more (--findings lists all)")
     many = "1 irregularity" if len(findings) == 1 else f"{len(findings)} irregularities"
@@ -174,8 +174,12 @@ def _unit(number: Mapping[str, Any]) -> str:
 def _errors(errors: PairedErrors | None) -> Iterator[str]:
     if errors is None:
         return
-    yield "\nposition error on held-out trials, mm: root mean square (median), all on the same windows:"
+    yield f"\nposition error on {_whose(errors)}, mm: root mean square (median), all on the same windows:"
     yield from error_lines(errors)
+
+
+def _whose(errors: PairedErrors) -> str:
+    return "held-out trials" if errors.trials > 1 else "the one trial, to which the numbers were fitted (none is held out)"
 
 
 def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
@@ -247,7 +251,7 @@ def _comparison(c: Comparison) -> Iterator[str]:
     for horizon, e in c.errors.items():
         if e["windows"]:
             noise = f"{1e3 * c.noise_floor_m(horizon):10.2f}" if np.isfinite(c.noise_floor_m(horizon)) else f"{'?':>10}"
-            scatter = f" ±{1e3 * e['position_se_m']:4.2f}" if c.trials > 1 else f"{'':6}"
+            scatter = f" ±{1e3 * e['position_se_m']:4.2f}" if np.isfinite(e["position_se_m"]) else f"{'':6}"
             yield (
                 f"  {horizon:10}{1e3 * e['position_m']:8.2f}{scatter}{1e3 * e['forward_m']:10.2f}"
                 f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{noise}{e['windows']:9.0f}"
@@ -288,7 +292,7 @@ def _scores(scores: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
 
 def extension_text(m: ExtendedModel) -> str:
     """The error by step on held-out trials, and the numbers."""
-    lines = ["position error on held-out trials, mm: root mean square (median), all on the same windows:"]
+    lines = [f"position error on {_whose(m.errors)}, mm: root mean square (median), all on the same windows:"]
     lines += error_lines(m.errors, "+ ")
     for effect, numbers in numbers_of(m.fit).items():
         lines += [
