@@ -10,10 +10,12 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.jagged import _drawn, _middle_of_least, _searched, with_jagged
 from bns.diagnose.estimate.normal_equations import normal_equations
+from bns.diagnose.estimate.parameters import FreeParameter, active_mask
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import jackknife_covariance
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
@@ -126,3 +128,14 @@ def test_the_bootstrap_of_a_parabola_is_the_jackknifes_interval():
 def test_of_equally_good_values_the_middle_is_taken():
     losses = np.array([9.0, 2.0, 1.0, 1.0, 1.01, 1.0, 5.0, 1.0])
     assert _middle_of_least(np.arange(8.0), losses) == 3.5
+
+
+@pytest.mark.parametrize(("end", "outwards"), [("low", 1.0), ("high", -1.0)])
+def test_only_a_gradient_that_presses_a_number_against_its_bound_holds_it_there(end, outwards):
+    """The loss falls against its gradient: at the lower bound a positive one presses."""
+    factor = next(p for p in effect_named("wheelbase").parameters if p.name == "factor")
+    free = (FreeParameter("wheelbase", factor),)
+    there, inside = (hidden(wheelbase={"factor": value}) for value in (getattr(factor, end), factor.neutral))
+    assert active_mask(there, free, np.array([outwards])).tolist() == [False]
+    assert active_mask(there, free, np.array([-outwards])).tolist() == [True]
+    assert active_mask(inside, free, np.array([outwards])).tolist() == [True]

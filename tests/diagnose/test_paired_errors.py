@@ -13,7 +13,7 @@ from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracking_noise import tracking_noise
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.predict.paired_errors import paired_errors
+from bns.diagnose.predict.paired_errors import FEWEST_TRIALS, Change, paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.measurements import write_measurements
 from bns.physics.model import Model
@@ -173,3 +173,20 @@ def test_what_lowers_nothing_is_said_so(table, tmp_path, capsys):
     write_measurements(measured(NOMINAL, trials=12, seed=9), data)
     assert main(["add", "wheelbase", "--model", "khepera", "--data", str(data), "-o", str(tmp_path / "n.yaml")]) == 0
     assert "warning: " in capsys.readouterr().out
+
+
+def test_a_change_without_an_interval_is_taken_by_its_sign():
+    nan = float("nan")
+    assert [(c.fell, c.rose) for c in (Change(-1.0, nan, nan), Change(1.0, nan, nan))] == [(True, False), (False, True)]
+    unsure = Change(-1.0, -2.0, 0.5), Change(1.0, -0.5, 2.0), Change(nan, nan, nan)
+    assert not any(c.fell or c.rose for c in unsure)
+
+
+@pytest.mark.parametrize(("trials", "known"), [(FEWEST_TRIALS - 1, False), (FEWEST_TRIALS, True)])
+def test_intervals_begin_with_the_fewest_trials(trials, known):
+    predictor = WheelPredictor(tracks(measured(NOMINAL, trials=trials, seed=3)))
+    models = [(name, predictor.steps(model)) for name, model in (("right", NOMINAL), ("wrong", Model(wheelbase_m=0.12)))]
+    error = paired_errors(predictor, models).horizons["trial"]
+    assert error.windows == trials
+    ends = [error.models[0].low_m, error.models[0].high_m, error.total.low_m, error.total.high_m]
+    assert (np.isfinite(ends) == known).all()

@@ -103,6 +103,44 @@ def test_a_marker_mistaken_at_the_start_does_not_lose_the_trial(followed_world):
     assert np.linalg.norm(whitened[8 : tracks.first[1]], axis=1).max() < 20
 
 
+def standing(frames=60, begins=(0,)):
+    """A robot that stands before a camera, and a filter for it: poses (frames, 3), and what the filter says of them."""
+    pose = np.random.default_rng(8).normal(size=(frames, 3)) * [2e-3, 2e-3, 8e-3]
+    nothing, first = np.zeros((frames, 3)), np.isin(np.arange(frames), begins)
+    gain, whiten, _ = filter_gains(nothing, first, np.zeros(frames), NOISE)
+    return pose, lambda seen: innovations(nothing, nothing[:, :2], seen, first, gain, whiten)
+
+
+def begun_anew(whitened):
+    """Frames that were taken as they are."""
+    return np.flatnonzero((whitened == 0).all(axis=1)).tolist()
+
+
+def test_single_mistaken_markers_do_not_begin_a_trial_anew_and_four_in_a_row_do():
+    pose, filtered = standing()
+    assert begun_anew(filtered(pose)) == [0]
+    single, row = pose.copy(), pose.copy()
+    single[[10, 20, 30, 40, 50], 0] += 0.4
+    row[10:14, 0] += 0.4
+    assert begun_anew(filtered(single)) == [0]
+    assert begun_anew(filtered(row)) == [0, 14]
+
+
+def test_mistaken_markers_at_the_end_of_a_trial_say_nothing_of_the_next():
+    pose, filtered = standing(begins=(0, 30))
+    pose[27:30, 0] += 0.4
+    pose[31, 0] -= 0.4
+    assert begun_anew(filtered(pose)) == [0, 30]
+
+
+def test_a_heading_that_is_given_a_round_more_is_the_same_heading():
+    pose, filtered = standing()
+    more = pose.copy()
+    more[20:40, 2] += 2 * np.pi
+    more[40:, 2] -= 4 * np.pi
+    np.testing.assert_allclose(filtered(more), filtered(pose), atol=1e-9)
+
+
 def test_the_clock_shifts_a_track_along_itself():
     late = track(hidden(clock_offset={"offset_s": 2 * FRAME_S}), [[0.1]], [[0.12]], [[2.0]], dense_dt_s=FRAME_S).poses[
         0

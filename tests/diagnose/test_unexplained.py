@@ -11,7 +11,7 @@ from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.predict.wheels import RECENT_S, WheelPredictor
 from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence, probe_effect, significant_dependence
 from bns.diagnose.residuals.autocorrelation import Autocorrelation, _moves
-from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, outliers
+from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, _windows, outliers
 from bns.diagnose.residuals.unexplained import unexplained
 from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
 
@@ -107,6 +107,11 @@ def test_a_diagnosis_says_where_to_look():
     assert found.verdict == "unlisted"
     assert {o["trial"] for o in found.as_json()["outliers"]} == {"1", "8", "9", "15"}
     assert any(note.startswith("4 of 20 trials have moments with more than 6 times") for note in found.notes)
+
+
+def test_windows_reach_to_the_last_frame_where_they_fit():
+    first = np.cumsum([0, 1 + 2 * WIDTH, 2 * WIDTH, 1 + WIDTH, 1, 2])
+    assert _windows(first).tolist() == [1, 1 + WIDTH, first[1] + 1, first[2] + 1]
 
 
 def largest(table):

@@ -76,3 +76,13 @@ def test_nothing_added_is_nothing_there():
     data = TrainingData.empty(5, 3)
     data.add(*numbered(0, 0), Key(0, 0), 1)
     assert (data.training.count, data.validation.count) == (0, 0)
+
+
+def test_what_is_forgotten_takes_along_who_may_learn_from_it():
+    X, y = numbered(0, 12)
+    present = np.random.default_rng(5).uniform(size=y.shape) < 0.5
+    patterns = PatternSet.empty(5, 3)
+    patterns.add(X, y, present)
+    patterns.forget(5)
+    np.testing.assert_array_equal(numbers(patterns), np.arange(5, 12))
+    np.testing.assert_array_equal(patterns.present[:, : patterns.count], present[:, 5:])

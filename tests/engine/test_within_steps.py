@@ -46,6 +46,27 @@ def test_headings_within_a_step_likewise():
     assert abs(error.mean()) < 0.1 * straight.mean()
 
 
+def test_headings_rise_with_the_turns_alone_where_only_these_change():
+    """A steady forward speed; the turn rate rises steadily, so that its integral is known everywhere."""
+    rise, ends = 0.9, np.arange(9) * STEP_S
+    means = rise * (ends[1:] + ends[:-1]) / 2
+    t = np.linspace(STEP_S, ends[-2], 61)
+    poses = path(np.full(8, SPEED), t, turns=means)
+    np.testing.assert_allclose(poses[:, 2], rise * t**2 / 2, atol=1e-12)
+    fine = np.linspace(0.0, ends[-1], 80001)
+    heading = rise * fine**2 / 2
+    for column, rate in enumerate((np.cos(heading), np.sin(heading))):
+        way = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) * SPEED * fine[1]
+        np.testing.assert_allclose(poses[:, column], np.interp(t, fine, way), atol=1e-3)
+
+
+def test_times_that_go_back_within_a_trial_are_followed_from_its_begin():
+    speeds, turns = [0.2, 0.3, 0.4, 0.5], [0.5, 0.4, 0.2, 0.1]
+    t = np.array([0.05, 0.32, 0.21, 0.39, 0.02])
+    alone = np.concatenate([path(speeds, [one], turns=turns) for one in t])
+    np.testing.assert_allclose(path(speeds, t, turns=turns), alone, atol=1e-15)
+
+
 @pytest.mark.parametrize("speeds", [[0.2, 0.2, 0.5, 0.5, -0.1, -0.1], [0.3, 0.1, 0.4, 0.0, 0.2, -0.2]])
 def test_what_jumps_at_the_ends_of_steps_stays_as_it_is(speeds):
     """Constant over two steps each, or up and down: no neighbour says how a speed changes within its step."""

@@ -1,0 +1,40 @@
+"""What is added to a model: the warnings that go with it, and what earlier calls know."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from bns.diagnose.adding import Memory, add_effects, warnings_on
+from bns.diagnose.data.load import measured_table
+from bns.diagnose.estimate.parameters import FreeParameter
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.physics.effects import effect_named
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def test_a_number_at_its_bound_that_changes_nothing_there_is_not_said_to_ask_for_more():
+    effect = effect_named("dead-zone")
+    number = effect.parameters[0]
+    assert number.low == number.neutral
+    errors = SimpleNamespace(horizons={"1s": SimpleNamespace(models=())})
+
+    def said(value):
+        fit = SimpleNamespace(
+            free=(FreeParameter("dead-zone", number),), values=np.array([value]), interval=lambda _: (0.0, 0.002)
+        )
+        return [one for one in warnings_on(fit, [(effect, {})], errors) if "at its bound" in one]
+
+    assert said(number.low) == []
+    assert len(said(number.high)) == 1
+
+
+def test_an_effect_of_each_trial_is_fitted_though_the_shared_one_is_known():
+    table = measured(hidden(clock_offset={"offset_s": 0.08}), trials=6, seed=3, commands=3)
+    data = measured_table(table, Path("log.csv"))
+    predictor, effects, memory = WheelPredictor(data.tracks), [(effect_named("clock-offset"), {})], Memory()
+    shared = add_effects(predictor, NOMINAL, effects, data, per_trial=False, memory=memory).model
+    own = add_effects(predictor, NOMINAL, effects, data, per_trial=True, memory=memory).model
+    again = add_effects(predictor, NOMINAL, effects, data, per_trial=False, memory=memory).model
+    assert [model.effects[0].per_trial for model in (shared, own, again)] == [False, True, False]
+    assert [len(model.effects[0].trial_values) for model in (shared, own, again)] == [0, 6, 0]
