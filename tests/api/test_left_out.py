@@ -9,6 +9,7 @@ import pytest
 import bns
 from bns.api.common.prepared import prepared
 from bns.cli.main import main
+from bns.diagnose.data.split_trials import split
 from bns.diagnose.predict.paired_errors import judged_windows
 from bns.errors import DataError
 from bns.examples import FOLDER
@@ -47,6 +48,23 @@ def test_a_trial_that_is_cut_goes_on_as_it_was_driven(log, lagging):
     assert np.allclose(less_body[1:], body[inside][1:], atol=1e-12)
     others = [str(n) for n in log.trials["trial"] if str(n) != name]
     assert [len(frames_of(cut, lagging, n)[0]) for n in others] == [len(frames_of(log, lagging, n)[0]) for n in others]
+
+
+def test_times_of_a_piece_of_a_log_begin_where_it_does_and_not_with_what_goes_before():
+    t_s = np.arange(600) / 10
+    drive = pd.DataFrame({"t_s": t_s, "left_m_s": 0.1, "right_m_s": 0.1, "x_m": 0.1 * t_s, "y_m": 0.0, "heading_rad": 0.0})
+    log = bns.Measurements(split(drive, "lasting_s", 20.0))
+    name = str(log.trials["trial"].iloc[1])
+    rows, time_s = log.times_of(name)
+    own = (log.frame["run_up"].iloc[rows] == 0).to_numpy()
+    assert 0 < own.sum() < len(own)
+    assert time_s[own][0] == 0.0
+    assert (time_s[~own] < 0.0).all()
+    cut = log.cut({name: (2.0, 5.0)})
+    again, less_s = cut.times_of(name)
+    left = cut.frame["left_out"].iloc[again].to_numpy() == 0
+    assert (less_s[left].min(), less_s[left].max()) == (pytest.approx(2.0), pytest.approx(5.0))
+    assert less_s[own][0] == 0.0
 
 
 def test_no_window_spans_poses_that_were_left_out(log):

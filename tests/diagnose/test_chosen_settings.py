@@ -13,11 +13,12 @@ from bns.diagnose.data.bodies import joints
 from bns.diagnose.residuals import grammar
 from bns.diagnose.select import stepwise
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.settings.chosen import _lines, in_force, settings_of
+from bns.diagnose.settings.chosen import _TURNS, _lines, in_force, settings_of
 from bns.errors import DataError
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 STRICT = {"select": {"min_gain": 1e6}}
+HANGS_S = 30.0
 
 
 @pytest.fixture(scope="module")
@@ -140,3 +141,25 @@ def test_questions_under_other_settings_wait_for_those_under_way():
         seen.append(checks._JUMP_M)
     thread.join()
     assert seen == [DEFAULTS.data.jump_m, 0.5]
+
+
+def test_all_that_wait_for_a_question_under_other_settings_go_on_when_it_is_answered(monkeypatch):
+    """Those under the default settings together: each of them waits for the others here."""
+    strict, seen, waiting, together = settings_of({"data": {"jump_m": 0.5}}), [], threading.Semaphore(0), threading.Barrier(3)
+    wait = _TURNS._free.wait
+    monkeypatch.setattr(_TURNS._free, "wait", lambda *given: (waiting.release(), wait(*given))[1])
+
+    def ask(settings):
+        with in_force(settings):
+            if settings == DEFAULTS:
+                together.wait(HANGS_S)
+            seen.append(checks._JUMP_M)
+
+    threads = [threading.Thread(target=ask, args=(each,)) for each in (DEFAULTS, DEFAULTS, strict, DEFAULTS)]
+    with in_force(settings_of({"data": {"jump_m": 0.25}})):
+        for thread in threads:
+            thread.start()
+            assert waiting.acquire(timeout=HANGS_S)
+    for thread in threads:
+        thread.join(2 * HANGS_S)
+    assert sorted(seen) == sorted([0.5, *[DEFAULTS.data.jump_m] * 3])

@@ -129,3 +129,12 @@ def test_digest_follows_numbers_and_not_words(tmp_path):
     assert model.digest != loaded(tmp_path, TEXT.replace("heading_rad: 0.01", "heading_rad: 0.02")).digest
     assert pickle.loads(pickle.dumps(model)) == model
     assert " at 0x" not in repr(model)
+
+
+@pytest.mark.parametrize(("old", "new"), [("k * v * abs(w)", "k * v * w"), ("on: v", "on: w")])
+def test_digest_follows_the_text_of_a_formula_and_what_it_acts_on(tmp_path, old, new):
+    entry = "  - {name: rub, term: k * v * abs(w), on: v, values: {k: 0.1}, basis: guess, reason: a test}\n"
+    rub = loaded(tmp_path, TEXT + entry)
+    other = loaded(tmp_path, TEXT + entry.replace(old, new))
+    assert rub.values_of("rub") == other.values_of("rub")
+    assert rub.digest != other.digest

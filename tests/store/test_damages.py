@@ -2,19 +2,20 @@
 
 import json
 import os
+import warnings
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from bns.store import StoreWarning, Writer, compact, finished, load, query
-from bns.store.disk.digest import Memory, identity
+from bns.store.disk.digest import Memory, digest_in, identity, is_intact
 from bns.store.disk.parquet import file_bytes
 from bns.store.disk.parts import find_parts
 from bns.sweep.status import sweep_status
 
 from .damages import survey
-from .synthetic import record, records, specs
+from .synthetic import failed, record, records, specs
 
 
 def files(results, table):
@@ -71,6 +72,22 @@ def test_compaction_does_not_take_runs_with_lost_rows_for_finished(tmp_path):
     compact(tmp_path)
     assert len(finished(tmp_path, "s")) == 3
     assert len(load(tmp_path, "paths")) == sum(len(run.tables["paths"]["step"]) for run in runs)
+
+
+@pytest.mark.parametrize("status", ["failed", "quarantined"])
+def test_a_failed_run_beside_lost_rows_lacks_nothing_once_those_were_run_again(tmp_path, status):
+    broken, good = specs(2, 3)
+    store(tmp_path, [failed(broken, status), record(good)])
+    files(tmp_path, "evals")[0].unlink()
+    with pytest.warns(StoreWarning, match="gone, though"):
+        assert good.run_id not in finished(tmp_path, "s")
+    store(tmp_path, [record(good)])
+    compact(tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert finished(tmp_path, "s") == {broken.run_id: status, good.run_id: "ok"}
+        assert len(load(tmp_path)) == 3
+    assert len(files(tmp_path, "runs")) == 1
 
 
 def test_damaged_spec_file_is_written_again(tmp_path):
@@ -137,6 +154,21 @@ def test_second_look_reads_no_file_again_and_a_changed_one_is_read(tmp_path, mon
     path.write_bytes(data)
     os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))  # as a copy that keeps the times
     assert find_parts(results, "evals")[0] == []
+
+
+def test_a_part_larger_than_what_is_read_at_once_is_verified_wherever_its_digest_stands(tmp_path, monkeypatch):
+    """In several pieces, in a later one, where one begins, half in one and half in the next."""
+    store(tmp_path, records(3))
+    path = files(tmp_path, "evals")[0]
+    data = path.read_bytes()
+    at = data.index(digest_in(data).encode())
+    for chunk in (7, 64, 100, at, at + 32):
+        monkeypatch.setattr("bns.store.disk.digest._CHUNK", chunk)
+        path.write_bytes(data)
+        assert is_intact(path), chunk
+        for place in (10, at - 30, at + 64, len(data) - 1):
+            path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+            assert not is_intact(path), (chunk, place)
 
 
 def test_large_stores_are_remembered_by_the_next_process(tmp_path, monkeypatch):

@@ -115,6 +115,16 @@ def test_retry_that_goes_well_hides_the_failure(tmp_path):
         assert len(load(tmp_path, where={"sweep": sweep})) == 3
 
 
+def test_of_two_results_of_a_run_that_both_went_well_the_first_counts(tmp_path):
+    spec = next(specs(1, 3))
+    with Writer(tmp_path, "s") as writer:
+        for wall_s in (1.0, 2.0):
+            writer.append(record(spec, wall_s=wall_s))
+        assert load(tmp_path, "runs")["wall_s"].tolist() == [1.0]
+    assert not journals(tmp_path)
+    assert load(tmp_path, "runs")["wall_s"].tolist() == [1.0]
+
+
 def test_journal_of_another_sweep_is_left_alone(left):
     results, path, runs, _ = left
     with Writer(results, "s--j"), Writer(results, "t"):

@@ -104,6 +104,17 @@ def test_compaction(tmp_path, steps):
     check_folders_are_synced(steps)
 
 
+def test_both_folders_of_what_is_set_aside_are_synced_before_anything_else_is_done(tmp_path, steps):
+    store(tmp_path, records(2))
+    path = next((tmp_path / "evals").rglob("*.parquet"))
+    with path.open("rb+") as file:
+        file.truncate(path.stat().st_size - 1)
+        os.fsync(file.fileno())
+    (moved,) = compact(tmp_path).set_aside
+    at = steps.index(("publish", moved))
+    assert {*steps[at + 1 : at + 3]} == {("sync", path.parent), ("sync", moved.parent)}
+
+
 class KilledError(Exception):
     """Stands for a power cut at this very step."""
 

@@ -1,17 +1,28 @@
 """A sweep that stops when its best are known: the same ranking as the complete one, from fewer runs, after any kill."""
 
+from collections import Counter
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import sweep_jobs
+from sweep_jobs import make_sweep
 
 import bns
 from bns.cli.main import main
 from bns.errors import SpecError
+from bns.store.record import RunRecord
 from bns.sweep.confirm import best
 from bns.sweep.expand.grid import parse_sweep
+from bns.sweep.expand.order import ordered_specs
+from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.ranking.betting import capital
 from bns.sweep.ranking.confidence import confidences
 from bns.sweep.ranking.race import Aim, Results, bar, next_runs, possible
 from bns.sweep.ranking.stored import Race
+from bns.sweep.ranking.until import run_until_ranked
+from bns.sweep.request import Request
+from bns.sweep.runner import run_sweep
 from tests.sweep.ranking_study import TOP, least_runs, outcome, published_rates, raced, ranked, spread_rates
 
 CERTAIN, SURE = Aim(TOP, confidence=1.0), Aim(TOP)
@@ -198,6 +209,26 @@ def test_a_race_killed_anywhere_goes_the_same_way():
     for _ in range(4):
         assert sorted(asked(kills=True)) == sorted(whole)
     assert len(whole) < 19 * 12
+
+
+def test_a_run_that_always_fails_is_tried_once_a_call_when_failed_ones_are_to_be_retried(tmp_path):
+    sweep, tried = make_sweep(combos=12), Counter()
+    broken = ordered_specs(sweep)[0].run_id
+
+    def job(spec):
+        tried[spec.run_id] += 1
+        if tried[spec.run_id] > 3:
+            raise RuntimeError(f"{spec.run_id} is tried again and again")
+        well = sweep_jobs.ok(spec)
+        return RunRecord(spec, {**well.run, "status": "failed", "error": "ValueError: no"}) if spec.run_id == broken else well
+
+    def carry_out(part, request):
+        return run_sweep(part, request.results, job=job, executor=SerialExecutor(job), retry_failed=request.retry_failed)
+
+    for call in (1, 2):
+        request = Request(tmp_path, retry_failed=True)
+        summary, ranking = run_until_ranked(SimpleNamespace(carry_out=carry_out), sweep, request)
+        assert (tried[broken], summary.failed, summary.new_failed, ranking.open) == (call, 1, 1, 0)
 
 
 @pytest.mark.slow

@@ -131,6 +131,28 @@ def test_budget_begins_no_run_that_would_end_after_it(tmp_path):
     assert (summary.new, summary.remaining, summary.stopped_by) == (3, 5, "budget")
 
 
+def test_a_run_that_would_end_with_the_last_of_the_budget_is_not_begun(tmp_path):
+    clock = Clock()
+    nothing = serial(make_sweep(), tmp_path, clock.job, budget=Budget(0.0, clock))
+    assert (nothing.new, nothing.stopped_by) == (0, "budget")
+    summary = serial(make_sweep(), tmp_path, clock.job, budget=Budget(4.0, clock))
+    assert (summary.new, summary.stopped_by) == (1, "budget")
+
+
+def test_failures_that_took_no_time_do_not_make_runs_seem_shorter(tmp_path):
+    clock, begun = Clock(), []
+
+    def job(spec):
+        begun.append(spec)
+        if len(begun) <= 3:
+            return RunRecord(spec, {**sweep_jobs.ok(spec, wall_s=0.0).run, "status": "failed", "error": "ValueError: no"})
+        clock.now += 10.0
+        return sweep_jobs.ok(spec, wall_s=10.0)
+
+    summary = serial(make_sweep(), tmp_path, job, budget=Budget(15.0, clock))
+    assert (summary.failed, summary.done, summary.stopped_by) == (3, 1, "budget")
+
+
 def test_budget_is_shared_by_sweeps(tmp_path):
     clock = Clock()
     budget = Budget(21.0, clock)

@@ -21,6 +21,7 @@ from bns.hardware.guard import client as guard_client
 from bns.hardware.guard import process as guard_process
 from bns.hardware.guard import signs
 from bns.hardware.guard.client import Guard, GuardedClock
+from bns.hardware.guard.order import StopOrder
 from bns.hardware.guard.recipe import bridge_recipe, bus_recipe, khepera_recipe
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.link.serial_link import NoReplyError, SerialLink
@@ -308,6 +309,27 @@ def test_a_robot_is_stopped_over_a_slow_link(tmp_path):
     assert guard._process.wait(HANGS_S) == 0
     os.close(line)
     robot.close()
+
+
+def test_a_robot_whose_trial_dies_before_it_armed_the_guard_is_ordered_to_stop(tmp_path):
+    """A driver's first orders may be on their way by then."""
+    robot = Robot("serial", tmp_path)
+    guard = Guard(str(robot.path), RECIPES["serial"], HANGS_S, tmp_path / "guard.jsonl")
+    line = os.open(guard.path, os.O_RDWR | os.O_NOCTTY)
+    os.write(line, b"D,l20000,l20000\n")
+    robot.until(True)
+    trial_dies(guard)
+    assert guard._process.wait(HANGS_S) == 0
+    assert [e["why"] for e in outlive._events(tmp_path) if e["kind"] == "tripped"] == ["the trial's process is gone"]
+    robot.until(False)
+    assert b"D,l0,l0\n" in b"".join(data for _, data in robot.heard)
+    os.close(line)
+    robot.close()
+
+
+def test_places_before_a_round_without_an_answer_confirm_no_stop():
+    order = StopOrder(RECIPES["bus"].as_json())
+    assert [order.confirmed(places) for places in ([5], None, [5], [5], [5])] == [False, False, False, False, True]
 
 
 def test_a_trial_that_ends_leaves_no_guard(held):

@@ -203,6 +203,22 @@ def test_arming_does_not_jerk(chain):
         assert servo.get("torque_limit") == round(0.8 * 1023)
 
 
+def test_torque_never_comes_on_with_the_speed_that_a_servo_was_left_at(chain):
+    driver, bus, _ = chain(moving_speed=500)
+    speeds = {}
+    for servo in bus.servos:
+
+        def watched(address, data, servo=servo, write=servo.write):
+            refused = write(address, data)
+            if servo.get("torque_enable"):
+                speeds.setdefault(servo.get("id"), set()).add(servo.get("moving_speed"))
+            return refused
+
+        servo.write = watched
+    driver.arm()
+    assert speeds == {number: {1} for number in IDS}
+
+
 def test_moving_takes_its_time_and_says_what_was_sent(chain, clock):
     driver, bus, _ = chain()
     driver.arm()
@@ -411,6 +427,15 @@ def test_a_joint_stands_still_within_one_step_between_two_looks(chain, steps, st
     assert driver._not_still(1, places)  # one look says nothing
     places[1] += steps
     assert (driver._not_still(1, places) == "") is stands
+
+
+def test_a_place_from_before_the_torque_came_on_again_confirms_no_stop(chain):
+    driver, bus, _ = chain()
+    servo, places, said = bus.servos[0], {}, []
+    for torque in (0, 1, 0, 0):
+        servo.put("torque_enable", torque)
+        said.append(driver._not_still(1, places))
+    assert said == ["still moving", "torque still on", "still moving", ""]
 
 
 def test_a_port_that_cannot_even_be_closed_is_opened_anew(chain, monkeypatch):

@@ -88,6 +88,23 @@ def test_a_chain_arms_moves_and_stops(chain, clock, kind):
     assert not any(s.get("torque_enable") for s in bus.servos)
 
 
+@pytest.mark.parametrize("kind", X430)
+def test_torque_never_comes_on_with_the_speed_that_a_servo_was_left_at(chain, kind):
+    driver, bus, _ = chain(kind=kind, moving_speed=500)
+    speeds = {}
+    for servo in bus.servos:
+
+        def watched(address, data, servo=servo, write=servo.write):
+            refused = write(address, data)
+            if servo.get("torque_enable"):
+                speeds.setdefault(servo.get("id"), set()).add(servo.get("moving_speed"))
+            return refused
+
+        servo.write = watched
+    driver.arm()
+    assert speeds == {number: {1} for number in IDS}
+
+
 def test_answers_that_must_be_stuffed_arrive(chain):
     """A joint that turns back slowly, at a place that ends in FD: FF FF FF FF FD."""
     driver, bus, _ = chain()

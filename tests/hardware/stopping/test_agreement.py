@@ -155,6 +155,19 @@ def test_one_that_does_something_else_is_not(left, right):
         follow(lambda v, w: (v * left, w * right))
 
 
+def test_short_disagreements_far_apart_do_not_pause_the_trial_and_a_long_one_does():
+    agreement = Agreement(0.5, WHEELBASE_M)
+    agreement.ordered(0.0, 0.0, 0.0)
+
+    def seen(tenths, *aside):
+        for tenth in tenths:
+            agreement.seen(Sight(tenth / 10, START + np.array([0.1 * (tenth in aside), 0.0, 0.0])))
+
+    seen(range(120), 30, 31, 32, 70, 71, 72)
+    with pytest.raises(TrialPausedError, match="10 cm from where its commands lead"):
+        seen(range(120, 130), *range(120, 130))
+
+
 def follow(really, seconds=12.0):
     """A robot whose wheels do something of what is ordered, seen ten times a second."""
     agreement, pose, draw = Agreement(0.5, WHEELBASE_M), START.copy(), np.random.default_rng(0)
