@@ -9,6 +9,7 @@ from scipy.special import stdtr
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.variables import bare, label, velocity
+from bns.diagnose.estimate.smoothing_tracker import LAG, smoothing_tracker
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import PairedErrors
@@ -200,6 +201,9 @@ def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[
     # what an effect takes for granted may be why it seems to imitate something
     assuming = [*chain, *(known[name] for name in imitating if name in known)]
     yield from (effect.caveat for effect in assuming if effect.caveat and not logged.intersection(effect.explained_by))
+    tracker = smoothing_tracker(selection.problem, selection.fit) if LAG in names else None
+    if tracker is not None and tracker.in_words:
+        yield tracker.in_words
     yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
     yield from _on_times(selection, tracks, names)
     per_trial_effect = selection.fit.model.per_trial_effect

@@ -26,6 +26,8 @@ from bns.diagnose.residuals.established import (
 )
 from bns.diagnose.residuals.grammar import (
     CHANGES,
+    CHANGES_ALONE,
+    PAST,
     RESPONSE,
     RESPONSE_ALONE,
     RESPONSE_OF,
@@ -446,8 +448,10 @@ def test_a_model_that_was_extended_before_keeps_its_term():
 def test_of_answers_to_past_commands_only_one_is_a_term():
     predictor = predictor_of(NOMINAL)
     every = families(predictor, NOMINAL.wheelbase_m)
-    past = [f for f in every if f.signal in {RESPONSE, SLOWING, CHANGES, *RESPONSE_OF.values(), *RESPONSE_ALONE.values()}]
-    assert len(past) == 7
+    past = [f for f in every if f.signal in PAST]
+    of_one = [signal for each in (RESPONSE_OF, RESPONSE_ALONE, CHANGES_ALONE) for signal in each.values()]
+    assert {f.signal for f in past} == {RESPONSE, SLOWING, CHANGES, *of_one}
+    assert len(past) == 9
     assert all(may_join([(f.signal, f.on)], past) == [] for f in past)
     assert len(may_join([], every)) == len(every)
     assert len(may_join([(CHANGES, "wheels")], every)) == len(every) - len(past)

@@ -28,7 +28,7 @@ from bns.diagnose.estimate.normal_equations import (
 )
 from bns.diagnose.estimate.parameters import FreeParameter, active_mask, increment, increments, moved_by
 from bns.diagnose.estimate.significance import PairedComparison, chance, jackknife_covariance, paired_elpd_diff
-from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
@@ -146,7 +146,11 @@ class Problem:
         return whitened
 
     def _worked_out(self, model: Model) -> Array:
-        whitened = self.pose_filter.whitened(self.predictor.tracks, self.predictor.steps(model))
+        return self.whitened_steps(self.predictor.steps(model))
+
+    def whitened_steps(self, steps: Steps) -> Array:
+        """Whitened innovations under steps that no model of the catalogue may predict, (frames, 3)."""
+        whitened = self.pose_filter.whitened(self.predictor.tracks, steps)
         if self.predictor.luck is not None:
             whitened = gathered(whitened)
         return whitened if self._counted is None else whitened * self._counted

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -25,6 +25,7 @@ from bns.physics.signals import Body, Conditions, Logged, View, Wheels
 from bns.physics.wheels.differential_drive import taken_at
 from bns.physics.wheels.grid import Grid
 from bns.physics.wheels.motion import flow_of, wheel_motion, with_body_effects
+from bns.physics.wheels.scans import low_passed
 
 RECENT_S = DEFAULTS.predict.recent_s
 _COARSE_S = DEFAULTS.predict.coarse_s
@@ -85,8 +86,15 @@ class WheelPredictor:
 
     def steps(self, model: Model) -> Steps:
         """Displacement of the tracked point since the frame before, in the frame of the robot there."""
+        return self._seen_as(model, lambda poses: poses)
+
+    def smoothed_steps(self, model: Model, tau_s: float) -> Steps:
+        """The same as a tracker sees them that smooths its poses: a first-order low-pass filter with this time constant."""
+        return self._seen_as(model, lambda poses: low_passed(poses, self.tracks.t_s, self.tracks.is_first, tau_s))
+
+    def _seen_as(self, model: Model, tracker: Callable[[Array], Array]) -> Steps:
         poses, sums = self._at(model.wheelbase_m, _chain(model, (*_MOVING, "clock")))
-        view, placed = View(poses), [active for active in model.at("measure") if active.effect.needs_place]
+        view, placed = View(tracker(poses)), [active for active in model.at("measure") if active.effect.needs_place]
         for active in model.at("measure"):
             if not active.effect.needs_place:
                 view = active.effect.apply(view, **active.by_name)

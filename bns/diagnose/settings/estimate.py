@@ -47,6 +47,12 @@ class Estimate:
         "Noise and parameters are estimated alternately this many times; the second round changes parameters by "
         "hundredths of a standard error.",
     )
+    smoothing_within: float = setting(
+        3.0,
+        "1",
+        "The time constant of a tracker that smooths its poses is sought within this factor of that of the motors' lag, in whose "
+        f"place it would stand; {BY_HAND}.",
+    )
     huber: float = setting(
         3.5,
         "standard deviations",

@@ -29,8 +29,6 @@ EFFECT = Effect(
     sentence="the motors follow their commands with a lag",
     sized="the motors follow their commands with a lag of {tau_s}",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
-    caveat="motor-lag: a tracker that smooths its poses (a low-pass or Kalman filter) leaves nearly the same log. Ask whether "
-    "yours does, and compare with raw poses or with the wheels' own speeds.",
     apply=apply,
     needs="track",
 )

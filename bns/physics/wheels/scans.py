@@ -37,6 +37,22 @@ def first_order(target: Array, step_s: Array, tau_s: float) -> Array:
 
 
 @exact
+def low_passed(values: Array, t_s: Array, is_first: NDArray[np.bool_], tau_s: float) -> Array:
+    """y at every frame, (frames, 3), where dy/dt = (x - y)/tau and y = x where a trial begins; x is straight between frames."""
+    out = np.empty_like(values)
+    for k in range(values.shape[0]):
+        if is_first[k] or t_s[k] <= t_s[k - 1]:
+            out[k] = values[k]
+            continue
+        h = t_s[k] - t_s[k - 1]
+        left = np.exp(-h / tau_s)
+        for i in range(values.shape[1]):
+            behind = (values[k, i] - values[k - 1, i]) / h * tau_s
+            out[k, i] = values[k, i] - behind + (out[k - 1, i] - values[k - 1, i] + behind) * left
+    return out
+
+
+@exact
 def paused(target: Array, step_s: Array, pause_s: float) -> Array:
     """Mean over each step of a speed that is 0 within ``pause_s`` after the last step of the other direction."""
     mean = np.zeros_like(target)

@@ -1,0 +1,78 @@
+"""Do the motors lag, or does the tracker smooth its poses? On straight lines the two are the same.
+
+A first-order low-pass filter of the poses delays all motion as a lag of both wheels does, and shortens curves besides: by half of
+the squared product of turn rate and time constant, so that turns tell the two apart. No effect of the catalogue is a filter of
+the tracker's, so it is compared here with a lag that was found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.noise import huber
+from bns.diagnose.estimate.significance import MIN_Z, paired_elpd_diff
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.settings import DEFAULTS
+from bns.physics.model import Model
+
+LAG = "motor-lag"
+CURVES = ("turn-slip", "turn-slip-quadratic", "clock-offset")
+"""Effects that may stand beside a lag for what a filter does in curves, and for when it begins."""
+_WITHIN = DEFAULTS.estimate.smoothing_within
+
+
+@dataclass(frozen=True)
+class SmoothingTracker:
+    """A tracker that smooths with a time constant, in place of some effects; ``z``: standard errors by which it fits better."""
+
+    tau_s: float
+    z: float
+    instead_of: tuple[str, ...] = (LAG,)
+
+    @property
+    def in_words(self) -> str:
+        """What to say of a lag that was found; "" where the tracks speak for it."""
+        if self.z < -MIN_Z:
+            return ""
+        effects, many = " and ".join(self.instead_of), len(self.instead_of) > 1
+        tracker = f"a tracker that smooths its poses (a low-pass filter with a time constant of {1e3 * self.tau_s:.0f} ms)"
+        known = "Ask whether yours does, and compare with raw poses or with the wheels' own speeds."
+        if self.z <= MIN_Z:
+            return f"{effects}: {tracker} fits this log as well as {'these effects' if many else 'motors that lag'}. {known}"
+        return (
+            f"{effects}: {tracker} fits this log better than {'these effects' if many else 'motors that lag'}, by {self.z:.1f} "
+            f"standard errors: it shortens curves, too. {known}"
+        )
+
+
+def smoothing_tracker(problem: Problem, fit: Fit) -> SmoothingTracker | None:
+    """The alternative to the lag of a fitted model; None where the model has none, or its robot no wheels."""
+    predictor, own = problem.predictor, [a.effect.name for a in fit.model.effects if not a.per_trial]
+    if not isinstance(predictor, WheelPredictor) or predictor.tracks.relative or LAG not in own:
+        return None
+    lag_s = fit.model.values_of(LAG)["tau_s"]
+    if not lag_s > 0.0:
+        return None
+    bare = fit.model.without(LAG)
+    imitated = tuple(name for name in own if name in CURVES)
+    found = [((LAG, *names), *_best(problem, predictor, reduce(Model.without, names, bare), lag_s)) for names in {(), imitated}]
+    instead_of, tau_s, losses = min(found, key=lambda one: float(one[2].sum()))
+    gain, se = paired_elpd_diff(fit.losses, losses)
+    return SmoothingTracker(tau_s, gain / se if se > 0 else 0.0, instead_of)
+
+
+def _best(problem: Problem, predictor: WheelPredictor, model: Model, lag_s: float) -> tuple[float, Array]:
+    """The time constant (s) with which a model without the lag fits best, and the losses (trials,) with it."""
+
+    def losses(log_tau: float) -> Array:
+        return problem.per_trial(huber(problem.whitened_steps(predictor.smoothed_steps(model, float(np.exp(log_tau))))))
+
+    bounds = np.log(lag_s) + np.array([-1.0, 1.0]) * np.log(_WITHIN)
+    best = minimize_scalar(lambda log_tau: float(losses(log_tau).sum()), bounds=bounds, method="bounded", options={"xatol": 0.01})
+    return float(np.exp(best.x)), losses(float(best.x))
