@@ -42,10 +42,28 @@ def test_nothing_planned_nothing_strikes():
 
 def test_a_changed_byte_is_always_another_one():
     faults = Faults((), 1)
-    for _ in range(50):
+    for _ in range(2000):
         changed = faults.byte(b"e,100,100\r\n")
         assert sum(a != b for a, b in zip(changed, b"e,100,100\r\n", strict=True)) == 1
     assert faults.byte(b"") == b""
+
+
+def test_a_fault_lasts_as_long_as_the_longest_of_its_kind():
+    faults = Faults((Fault("hang-up", 0.1, for_s=0.5), Fault("hang-up", at_s=3.0, for_s=1.5), Fault("brown-out", 0.1, for_s=9.0)))
+    assert faults.length_s("hang-up") == 1.5
+    assert faults.length_s("lost-reply") == 0.0
+
+
+def test_a_frozen_scene_thaws_and_a_late_tracker_stays_late():
+    faults = Faults((Fault("frozen-scene", at_s=1.0, for_s=0.5), Fault("late-tracker", at_s=2.0, for_s=0.25)))
+    assert [faults.filmed_s(t_s) for t_s in (0.5, 1.0, 1.25, 1.5, 1.75, 2.0)] == [0.5, 1.0, 1.0, 1.5, 1.75, 1.75]
+
+
+def test_every_id_that_a_servo_can_have_may_be_silent(tmp_path):
+    text = "faults: [{kind: silent-servo, at_s: 1, id: 253}]"
+    assert plan(tmp_path, text).faults[0].servo == 253
+    with pytest.raises(HardwareError, match="id is 254; it must be the number of a servo, from 0 to 253"):
+        plan(tmp_path, text.replace("253", "254"))
 
 
 @pytest.mark.parametrize(

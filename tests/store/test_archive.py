@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
@@ -23,7 +25,7 @@ from bns.store.archive.kept import (
     rounded_evals,
     rounded_rows,
 )
-from bns.store.archive.read import archives, connect_archives, described, recorded_tables
+from bns.store.archive.read import archives, connect_archives, described, recorded, recorded_tables
 from bns.store.archive.write import archive
 from bns.sweep.expand.grid import parse_sweep
 from bns.sweep.runner import run_sweep
@@ -138,6 +140,39 @@ def test_runs_of_an_archive_beside_the_results_count_as_done_and_are_kept(tmp_pa
     joined = archive(second, tmp_path / "joined.parquet")
     assert joined.runs == whole.runs == 2
     assert described(joined.path)["spec_hashes"] == described(whole.path)["spec_hashes"]
+
+
+def test_runs_of_the_results_count_beside_those_of_their_archives_and_before_them(tmp_path):
+    results, runs = tmp_path / "results", [record(RunSpec(seed=seed, evaluations=4)) for seed in (1, 2, 3)]
+    broken = failed(RunSpec(seed=3, evaluations=4))
+    former = archive_of(tmp_path / "there", "grid", [runs[0], broken], tmp_path)
+    (results / "archived").mkdir(parents=True)
+    former.rename(results / "archived" / "former.parquet")
+    assert recorded(results, "grid") == {runs[0].spec.run_id: "ok", broken.spec.run_id: "failed"}
+    archive_of(results, "grid", runs[1:], tmp_path)
+    assert recorded(results, "grid") == {run.spec.run_id: "ok" for run in runs}
+
+
+@pytest.mark.parametrize("well", ["in the archive", "in the results"])
+def test_of_a_run_that_failed_once_the_next_archive_keeps_what_went_well(tmp_path, well):
+    results, spec = tmp_path / "results", RunSpec(seed=3, evaluations=4)
+    older, newer = (record(spec), failed(spec)) if well == "in the archive" else (failed(spec), record(spec))
+    former = archive_of(tmp_path / "there", "grid", [older], tmp_path)
+    (results / "archived").mkdir(parents=True)
+    former.rename(results / "archived" / "former.parquet")
+    with connect_archives([archive_of(results, "grid", [newer], tmp_path)]) as back:
+        assert back.execute("SELECT status, count(evaluation) FROM runs JOIN evals USING (run_id) GROUP BY ALL").fetchall() == [
+            ("ok", 4)
+        ]
+
+
+def test_of_a_run_that_went_well_twice_the_next_archive_keeps_that_of_the_results(tmp_path):
+    results, once = tmp_path / "results", record(RunSpec(seed=3, evaluations=4))
+    former = archive_of(tmp_path / "there", "grid", [once], tmp_path)
+    (results / "archived").mkdir(parents=True)
+    former.rename(results / "archived" / "former.parquet")
+    again = replace(once, run={**once.run, "world_digest": "w9"})
+    assert described(archive_of(results, "grid", [again], tmp_path))["world_digest"] == ["w9"]
 
 
 def test_sweeps_of_several_approaches_keep_what_they_are_compared_by(tmp_path):

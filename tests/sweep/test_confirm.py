@@ -105,6 +105,12 @@ def test_runs_that_failed_and_runs_of_an_earlier_file_have_no_say(sweep, tmp_pat
     assert named(best(sweep, tmp_path, 1)) == [("circle", 12, 0.3), ("infinity", 12, 0.3)]
 
 
+def test_the_last_evaluation_is_that_of_each_run_however_short(tmp_path):
+    sweep = parse_sweep("{name: mixed, robot: khepera, seeds: 2, grid: {evaluations: [2, 3]}}", tmp_path / "mixed.yaml")
+    carried_out(sweep, tmp_path)
+    assert sorted(combo["evaluations"] for combo in best(sweep, tmp_path, 2)) == [2, 3]
+
+
 def test_a_confirmation_has_the_same_runs_on_seeds_beyond_those_of_the_file(sweep, tmp_path):
     carried_out(sweep, tmp_path, luck)
     more = confirmation(sweep, tmp_path, 3)

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from bns.errors import SpecError
+from bns.spec import FIELDS
 from bns.sweep.expand.grid import Sweep, load_sweep, load_sweeps
 from bns.tasks import task_names
 
@@ -80,7 +81,14 @@ def test_equal_combinations_are_one(tmp_path):
     sweep = sweep_of(
         tmp_path, "grid: {mutation_rate: [0.1, 0.1, 0.2]}\ninclude: [{mutation_rate: 0.2, world: substitute}]"
     )
-    assert len(sweep.combos) == 2
+    assert sweep.combos == ({"mutation_rate": 0.1}, {"mutation_rate": 0.2})  # the order of runs goes by what is written
+
+
+def test_the_last_seed_there_is_may_be_the_last_of_a_sweep(tmp_path):
+    last = FIELDS["seed"].metadata["high"]
+    assert sweep_of(tmp_path, f"seeds: 2\nfirst_seed: {last - 1}\n").all_seeds == range(last - 1, last + 1)
+    with pytest.raises(SpecError, match=f"3 seeds from {last - 1} on go beyond the last seed, {last}"):
+        sweep_of(tmp_path, f"seeds: 3\nfirst_seed: {last - 1}\n")
 
 
 ERRORS = {

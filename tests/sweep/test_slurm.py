@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from slurm_shards import WaitingShard
-from sweep_jobs import make_sweep
+from sweep_jobs import make_sweep, ok
 
 pytest.importorskip("submitit")
 
@@ -17,7 +17,7 @@ import submitit
 
 from bns.errors import ClusterError
 from bns.registry import EXECUTORS
-from bns.store import finished, load
+from bns.store import RunRecord, finished, load
 from bns.sweep.budget import Budget
 from bns.sweep.executors import executor_names, load_executor, slurm
 from bns.sweep.expand.grid import parse_sweep
@@ -115,6 +115,27 @@ def test_only_a_job_that_was_not_cancelled_asks_for_another_turn(slurm_commands,
     assert asked == ([] if returns else [True])
 
 
+def test_a_job_comes_back_only_if_somebody_says_that_it_is_running_and_it_is_not_done(slurm_commands, monkeypatch, tmp_path):
+    asked, ended = [], [_terminated(), _done()]
+    monkeypatch.setenv("SLURM_JOB_ID", "7")
+    monkeypatch.setenv("JOB_STATE", "RUNNING")
+    monkeypatch.setattr("bns.sweep.slurm_job.run_sweep", lambda *_, **__: ended.pop())
+    former = signal.signal(signal.SIGUSR2, lambda *_: asked.append(True))
+    try:
+        assert ShardJob(small(), tmp_path, Shard(1, 1), 1)().stopped_by is None
+        (slurm_commands / "scontrol").write_text("#!/bin/sh\nexit 1\n")
+        assert ShardJob(small(), tmp_path, Shard(1, 1), 1)().stopped_by == "terminated"
+    finally:
+        signal.signal(signal.SIGUSR2, former)
+    assert asked == []
+
+
+def _done():
+    from bns.sweep.runner import Summary
+
+    return Summary("small", 4, done=4)
+
+
 def _terminated():
     from bns.sweep.runner import Summary
 
@@ -139,6 +160,33 @@ def test_a_node_is_used_whole_where_no_number_is_given(slurm_commands, tmp_path)
     slurm.carry_out(small(), Request(tmp_path, shards=2))
     (script,) = [path.read_text() for path in slurm_commands.glob("sbatch.*")]
     assert "#SBATCH --exclusive" in script
+
+
+def test_a_limit_below_a_minute_is_one_because_none_is_no_limit_to_slurm(slurm_commands, tmp_path):
+    slurm.carry_out(small(), Request(tmp_path, shards=2, time_limit_s=20.0))
+    (script,) = [path.read_text() for path in slurm_commands.glob("sbatch.*")]
+    assert "#SBATCH --time=1\n" in script
+
+
+def test_shards_of_which_every_run_has_failed_are_queued_only_on_request(slurm_commands, tmp_path):
+    def never(spec):
+        return RunRecord(spec, {**ok(spec).run, "status": "failed", "error": "ValueError: no"})
+
+    run_sweep(small(), tmp_path, job=never, executor=SerialExecutor(never))
+    assert slurm.carry_out(small(), Request(tmp_path, shards=2)).stopped_by is None
+    assert not list(slurm_commands.glob("sbatch.*"))
+    assert slurm.carry_out(small(), Request(tmp_path, shards=2, retry_failed=True)).stopped_by == "submitted"
+    assert len(list(slurm_commands.glob("sbatch.*"))) == 1
+
+
+def test_runs_that_went_wrong_before_are_not_counted_as_new(slurm_commands, monkeypatch, tmp_path):
+    def never(spec):
+        return RunRecord(spec, {**ok(spec).run, "status": ("failed", "quarantined")[spec.seed], "error": "ValueError: no"})
+
+    run_sweep(small(), tmp_path, job=never, executor=SerialExecutor(never))
+    monkeypatch.setattr(slurm, "_submit", lambda *_: [])
+    waited = slurm.carry_out(small(), Request(tmp_path, shards=2, retry_failed=True, wait=True))
+    assert (waited.failed, waited.quarantined, waited.new, waited.new_failed) == (2, 2, 0, 0)
 
 
 def test_what_slurm_refuses_is_told(slurm_commands, tmp_path):

@@ -202,6 +202,8 @@ def test_plan_without_results_times_one_short_run(tmp_path):
     # Training on 6, 12, ... 600 patterns, evolution of 10 controllers, the rest; four runs by two workers.
     assert found.seconds_estimate == pytest.approx(2 * (1000 * (100 * 1e-6 + 30300 * 5e-8) + 100 * (210e-6 + 1e-3)))
     assert found.bytes_estimate == 4 * 100 * 100
+    more = plan(sweep, tmp_path / "none", 64, job=trial)  # a run cannot be divided
+    assert more.seconds_estimate == pytest.approx(found.seconds_estimate / 2)
     assert not (tmp_path / "none").exists()
 
 

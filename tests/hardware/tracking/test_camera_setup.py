@@ -129,6 +129,7 @@ def test_a_camera_is_set_and_read_back(monkeypatch, tmp_path, clock):
     assert noted["picture"] == wanted
     for change, message in (
         ({"focus": 30}, "takes no focus 30: it reads back 0"),
+        ({"focus": 5}, "takes no focus 5: it reads back 0"),
         ({"exposure": "bright"}, "exposure is 'bright'; it is a number"),
     ):
         with pytest.raises(HardwareError, match=message):

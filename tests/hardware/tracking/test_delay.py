@@ -14,6 +14,7 @@ from bns.hardware.guard.client import GuardedPlatform
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
 from bns.hardware.servos.shape import apart_m
+from bns.hardware.tracking.kinds import checked, delay_of
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 from bns.trial.delay import measured_delay
@@ -127,6 +128,10 @@ def test_the_delay_is_that_of_the_motion_whatever_scale_and_drift(late_s):
     assert found.delay_s == pytest.approx(late_s, abs=0.003)
 
 
+def test_the_delay_by_which_times_were_corrected_already_is_added():
+    assert delay_between(turns(0.08), known_s=0.04).delay_s == pytest.approx(0.12, abs=0.003)
+
+
 def test_the_standard_error_is_the_scatter():
     found = [delay_between(turns(0.1, noise=0.05, seed=seed)) for seed in range(40)]
     scatter = np.std([one.delay_s for one in found])
@@ -144,6 +149,13 @@ def test_the_standard_error_is_the_scatter():
 def test_what_tells_no_delay_is_refused(given, message):
     with pytest.raises(HardwareError, match=message):
         delay_between(given)
+
+
+def test_a_delay_may_be_up_to_a_second_either_way():
+    assert [delay_of({"delay_s": given}) for given in (-1, -0.02, 0, 1.0)] == [-1.0, -0.02, 0.0, 1.0]
+    for given in (-1.01, 1.01, np.nan, True):
+        with pytest.raises(HardwareError, match="it is a number of seconds, up to 1"):
+            checked({**ARUCO, "delay_s": given})
 
 
 def test_a_delay_that_makes_no_sense_is_named():

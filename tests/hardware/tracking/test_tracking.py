@@ -91,6 +91,9 @@ def test_calibration_file_round_trip(calibration, tmp_path):
     again = load_calibration(tmp_path / "camera.json")
     np.testing.assert_array_equal(again.lens.matrix, calibration.lens.matrix)
     assert again.camera == "emulated"
+    assert (again.views, again.floor_views) == (calibration.views, 1)
+    assert (again.floor_rms_m, again.floor_worst_m) == (calibration.floor_rms_m, calibration.floor_worst_m)
+    assert 0.0 < again.floor_rms_m < again.floor_worst_m
     assert [f.name for f in tmp_path.iterdir()] == ["camera.json"]
 
 

@@ -1,6 +1,7 @@
 """Work that goes on in the background while a robot drives: how many rounds, what becomes of faults, what is repeated."""
 
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -103,6 +104,15 @@ def test_a_trial_repeats_its_past_with_as_many_rounds_and_goes_on_to_the_same_nu
     _, half, _ = driven(past[:2])
     assert len(half.driven) == 2
     np.testing.assert_array_equal(half.driven[0].picked, robot.driven[2].picked)
+
+
+def test_a_trial_has_finished_when_so_many_have_succeeded_in_a_row():
+    with BackgroundDriver(load_robot("khepera"), StraightRobot(), (), 1, until_success=2) as driver:
+        found = []
+        for success in (True, False, True, True):
+            driver.evaluated(1, SimpleNamespace(rounds=1), {"evaluated_success": success})
+            found.append(driver.finished)
+    assert found == [False, False, False, True]
 
 
 def test_a_past_that_drove_something_else_is_refused():

@@ -103,12 +103,29 @@ def test_a_signal_ends_the_countdown(trial):
     assert counted == [1.0]
 
 
+def test_cycles_that_are_not_there_are_asked_for_again(capsys):
+    answers = iter(["u", "0 2", "2 3", "none", "2, 1"])
+    decided = TerminalOperator(lambda _question: next(answers)).accept("driven", [(0.0, 1.0), (1.0, 2.0)])
+    assert decided == ("next", (1, 2))
+    assert capsys.readouterr().err.count("names no cycle, or one that is not there: write numbers from 1 to 2") == 3
+
+
 def test_what_is_driven_again_is_discarded_first(trial):
     on = trial(["", "r", ""])
     kept = on.driver.evaluate(1, COMMANDS)
     assert not kept.skipped
     assert kinds(on, "driven", "discarded") == [("driven", None), ("discarded", "repeat"), ("driven", None)]
     assert measured(on.journal).groupby("trial")["discarded"].first().tolist() == [1, 0]
+
+
+def test_what_was_unstable_the_time_before_is_not_so_again(trial):
+    on = trial([])
+    for marks in ([2], [1], []):
+        on.log.note("driven", evaluation=1, picked=COMMANDS.tolist(), commands=COMMANDS.tolist(), poses=np.zeros((3, 3)).tolist())
+        if marks:
+            on.log.note("marked", evaluation=1, unstable=marks)
+        on.log.sync()
+        assert past_evaluations(on.journal)[0].unstable == tuple(marks)
 
 
 def test_skip_skips(trial):

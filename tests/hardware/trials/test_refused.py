@@ -6,6 +6,8 @@ import re
 import pytest
 import yaml
 
+from bns.hardware.rig import parse_rig
+
 from .. import soak
 from .calls import TRIAL, call, journal_of
 
@@ -34,6 +36,7 @@ def test_bad_input_is_named(tmp_path, monkeypatch, capsys, arguments, message):
     [
         ({"surface_m": {"x": [-0.1, 0.1], "y": [-0.1, 0.1]}}, r"goal at \(0.20, 0.20\) m, off the surface"),
         ({"surface_m": {"x": [0.1, -0.1], "y": [0, 1]}}, "must be the smaller one"),
+        ({"surface_m": {"x": [-1, 1], "y": [0.5, 0.5]}}, "must be the smaller one"),
         ({"surface_m": 3}, "surface_m is 3; write"),
         ({"robot": "snake"}, "is a rig for snake, and the trial is for khepera"),
         ({"prot": 1}, "unknown key 'prot'. Did you mean 'port'"),
@@ -50,6 +53,15 @@ def test_bad_rigs_are_named_before_anything_moves(tmp_path, capsys, change, mess
     assert call("trial", "--robot", "khepera", "--rig", file, "--yes", "--results", tmp_path / "r") == 2
     assert re.search(message, capsys.readouterr().err)
     assert not list((tmp_path / "r").rglob("journal.jsonl"))
+
+
+@pytest.mark.parametrize(
+    ("said", "near"), [("", (0.1, 0.35)), ("placed_within_m: 0.05\n", (0.05, 0.35)), ("placed_within_rad: 0.2\n", (0.1, 0.2))]
+)
+def test_how_near_its_start_a_robot_is_placed_is_said_of_place_and_heading_apart(said, near):
+    rig = parse_rig(f"robot: khepera\nport: x\nsurface_m: {{x: [-1, 1], y: [-1, 1]}}\ntracker: {{kind: wii}}\n{said}", "rig")
+    assert (rig.placed_within_m, rig.placed_within_rad) == near
+
 
 WII = {"kind": "wii", "device": "x", "height_m": 2.4, "view_rad": 0.75}
 COLOUR = {"kind": "colour", "camera": 0, "calibration": "none.json", "diameter_m": 0.04, "height_m": 0.07}

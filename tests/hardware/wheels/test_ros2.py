@@ -157,6 +157,7 @@ def test_a_silent_robot_is_lost(base, driver):
     [
         ({}, "lacks wheelbase_m"),
         ({"wheelbase_m": 0}, "wheelbase_m is 0; it must be a number above 0"),
+        ({"wheelbase_m": 0.2, "stop_s": 0}, "stop_s is 0; it must be a number above 0"),
         ({"wheelbase_m": 0.2, "cmd_vell": "/x"}, "unknown setting 'cmd_vell'. Did you mean 'cmd_vel'"),
         ({"wheelbase_m": 0.2, "odometry": "odom"}, "odometry is 'odom'; write a whole topic"),
     ],
