@@ -101,13 +101,20 @@ def _rig(content: Mapping[str, Any], where: str, lines: Lines) -> Rig:
 def _surface(where: str, given: Any) -> Surface:
     try:
         (x_low, x_high), (y_low, y_high) = given["x"], given["y"]
-        surface = Surface(*(float(v) for v in (x_low, x_high, y_low, y_high)))
+        sides = (x_low, x_high, y_low, y_high)
+        surface = Surface(*map(_side, sides))
     except (TypeError, KeyError, ValueError, OverflowError) as error:
         raise HardwareError(f"{where}: surface_m is {shown(given)}; write {{x: [-0.9, 0.9], y: [-0.7, 0.7]}}, metres.") from error
     ordered = surface.x_low_m < surface.x_high_m and surface.y_low_m < surface.y_high_m
-    if not ordered or not all(map(math.isfinite, (x_low, x_high, y_low, y_high))):
+    if not ordered or not all(map(math.isfinite, sides)):
         raise HardwareError(f"{where}: surface_m is {shown(given)}; the first number of x and of y must be the smaller one.")
     return surface
+
+
+def _side(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError(f"{value!r} is no number")
+    return float(value)
 
 
 def _positive(where: str, name: str, value: Any) -> float:

@@ -111,7 +111,8 @@ def _with_former(
         connection.register("stored", table)
         both: pa.Table = connection.sql(
             f"""SELECT * FROM (
-                SELECT *, 0 AS place FROM stored UNION ALL BY NAME SELECT *, 1 FROM archived WHERE list_contains(?, sweep))
+                SELECT *, 0 AS place FROM stored
+                UNION ALL BY NAME SELECT *, 1 AS place FROM archived WHERE list_contains(?, sweep))
             QUALIFY row_number() OVER (PARTITION BY sweep, run_id ORDER BY status <> 'ok', place) = 1 ORDER BY {_ORDER}""",
             params=[list(chosen)],
         ).to_arrow_table()

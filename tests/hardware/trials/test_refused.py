@@ -37,6 +37,8 @@ def test_bad_input_is_named(tmp_path, monkeypatch, capsys, arguments, message):
         ({"surface_m": {"x": [-0.1, 0.1], "y": [-0.1, 0.1]}}, r"goal at \(0.20, 0.20\) m, off the surface"),
         ({"surface_m": {"x": [0.1, -0.1], "y": [0, 1]}}, "must be the smaller one"),
         ({"surface_m": {"x": [-1, 1], "y": [0.5, 0.5]}}, "must be the smaller one"),
+        ({"surface_m": {"x": ["-0.9", "0.9"], "y": [-1, 1]}}, "write {x: "),
+        ({"surface_m": {"x": [True, 2], "y": [-1, 1]}}, "write {x: "),
         ({"surface_m": 3}, "surface_m is 3; write"),
         ({"robot": "snake"}, "is a rig for snake, and the trial is for khepera"),
         ({"prot": 1}, "unknown key 'prot'. Did you mean 'port'"),
