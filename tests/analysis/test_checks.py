@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from figure_helpers import with_evals, written
 from store.synthetic import publish_chunk, record
 
 from analysis import checks
+from analysis.checks.clusters import _ashman, _intervals, _listed
 from analysis.results import NoDataError, Results
 from analysis.selection import selections
 from bns.spec import RunSpec
@@ -217,3 +219,14 @@ def test_from_too_few_seeds_there_are_estimates_and_no_verdict(tmp_path):
     found = checked(tmp_path, "worst_value", parameter="mutation_rate", value=0.9)
     assert (found.verdict, found.ours) == ("undecided", "worst 90 % over all evaluations")
     assert checked(tmp_path, "half_by", evaluation=6).verdict == "undecided"
+
+
+def test_clusters_lie_apart_by_their_usual_width_and_means_are_as_sure_as_their_own_values_are_many():
+    mixture = SimpleNamespace(
+        means_=np.array([[3.0], [1.0]]), covariances_=np.array([0.36, 0.04]).reshape(2, 1, 1), weights_=np.array([0.75, 0.25])
+    )
+    assert _ashman(mixture) == pytest.approx(2.0 / np.sqrt(0.2))
+    low, high = np.array(_intervals(mixture, 48)).T
+    assert low == pytest.approx([1.0 - 1.96 * 0.2 / np.sqrt(12), 3.0 - 1.96 * 0.6 / 6], abs=1e-4)
+    assert high == pytest.approx([1.0 + 1.96 * 0.2 / np.sqrt(12), 3.0 + 1.96 * 0.6 / 6], abs=1e-4)
+    assert _listed(mixture) == "1.00 and 3.00"

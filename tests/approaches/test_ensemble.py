@@ -137,3 +137,18 @@ def test_the_mean_can_be_kept_and_read_again(tmp_path):
 def test_what_cannot_be_is_refused(approach, said):
     with pytest.raises(SpecError, match=said):
         run(RunSpec(**SMALL | {"approach": approach}))
+
+
+def test_what_a_member_forgets_are_the_counts_of_the_oldest_rows():
+    ensemble = started("bns+ensemble=3").trainer
+    robot = load_robot("khepera")
+    for drive in (1, 2, 3):
+        commands = robot.random_controllers(KEY, 4, 20).controller(drive)
+        ensemble.add(commands, robot.poses(np.random.default_rng(drive).normal(size=(len(commands), 3)) / 20), drive)
+    before = ensemble.times.copy()
+    inputs = ensemble.data.training.inputs[:, : before.shape[1]].copy()
+    ensemble.forget(2)
+    left = ensemble.data.training.count
+    assert 0 < left < before.shape[1]
+    np.testing.assert_array_equal(ensemble.data.training.inputs[:, :left], inputs[:, -left:])
+    np.testing.assert_array_equal(ensemble.times, before[:, -left:])

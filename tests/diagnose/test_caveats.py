@@ -10,13 +10,22 @@ import pytest
 import bns.api.diagnose as asked_of
 import bns.diagnose.diagnosis as said_by
 from bns.api.diagnose import DiagnoseResult
-from bns.diagnose.caveats import _no_lower, _on_drift, _on_effects, _on_rest, _on_times, on_worst
+from bns.diagnose.caveats import (
+    _no_lower,
+    _on_drift,
+    _on_effects,
+    _on_rest,
+    _on_times,
+    implausible_text,
+    notes_on,
+    on_worst,
+)
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis, diagnose
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, ModelError, PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence
-from bns.diagnose.residuals.unexplained import Unexplained
+from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.residuals.worst_trials import Apart, WithoutWorst
 from bns.physics.effects import all_effects, effect_named
 from tests.diagnose.worlds import NOMINAL, measured
@@ -214,3 +223,36 @@ def test_only_times_shorter_than_that_between_poses_are_doubted(tau_s, said):
     tracks = tracks_of(measured(NOMINAL, trials=3, seed=5))
     assert bool(list(_on_times(selection, tracks, {"motor-lag"}))) == said
     assert not list(_on_times(selection, tracks, {"wheelbase"}))
+
+
+@pytest.mark.parametrize(("z", "more"), [(2.0, 16), (3.0, 5), (0.1, 400)])
+def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more):
+    """The gain in standard errors grows with the root of the trials: from 2 to 3.2 it takes 2.56 times as many."""
+    selection = SimpleNamespace(
+        implausible={}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
+        fit=SimpleNamespace(model=NOMINAL), nominal=SimpleNamespace(losses=np.ones(10)),
+    )  # fmt: skip
+    nothing = dict.fromkeys(("imitating", "withdrawn", "unseen", "negligible", "formula", "errors_with_terms"))
+    found = SimpleNamespace(**nothing | {"selection": selection, "negligible": {}, "imitating": (), "rest": NOTHING})
+    hint = SimpleNamespace(name="turn-slip", paired_comparison=SimpleNamespace(z=z))
+    (note,) = notes_on(found, tracks_of(measured(NOMINAL, trials=10)), hint)
+    assert note == f"turn-slip may be missing, but 10 trials are too few to decide; about {more} more would decide."
+
+
+def test_an_implausible_wheelbase_is_asked_about_with_both_distances():
+    fit = SimpleNamespace(model=NOMINAL.with_effect("wheelbase", factor=1.5).with_effect("speed-gain", gain=1.5))
+    selection = SimpleNamespace(fit=fit, implausible={"wheelbase": "factor = 1.5 is too much", "speed-gain": "so is gain"})
+    said = implausible_text(selection, "wheelbase")
+    assert said.endswith("is the wheelbase really 0.0884 m, and not 0.133 m?")
+    assert implausible_text(selection, "speed-gain").endswith("check it by an independent measurement.")
+
+
+@pytest.mark.parametrize(("r", "said"), [(0.80, True), (0.78, False), (-0.80, True)])
+def test_of_a_few_clocks_only_a_correlation_that_is_hardly_luck_is_a_drift(r, said):
+    """Of eight clocks; p is 0.017 and 0.022, by the table of Student's distribution with six degrees of freedom."""
+    start_s = 30.0 * np.arange(8)
+    along = (start_s - start_s.mean()) / start_s.std()
+    beside = np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0])  # no trend, no mean
+    notes = list(_on_drift("clock-offset", start_s, 0.01 * (r * along + np.sqrt(1 - r * r) * beside)))
+    assert bool(notes) == said
+    assert not said or f"(correlation {r:+.2f})" in notes[0]

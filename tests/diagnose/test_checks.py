@@ -9,7 +9,9 @@ from bns.api.compare import compare
 from bns.api.measurements import Measurements
 from bns.api.model import Model
 from bns.diagnose.data.checks import checked
+from bns.diagnose.data.still_heading import _turned_m
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.data.units import _check_length, check_units
 from bns.diagnose.report.text import findings_text
 from bns.errors import DataError
 from tests.diagnose.worlds import NOMINAL, measured
@@ -269,3 +271,23 @@ def test_rows_that_were_written_twice_are_one_finding_of_a_trial_and_no_slow_tra
     rows = int((table.trial == 0).sum())
     assert findings[0].text == f"in {rows} rows, the first here (time 0 s), the time repeats an earlier one; they are excluded"
     assert findings[0].row == 1
+
+
+def test_a_robot_that_is_turned_and_turned_back_was_turned():
+    rows = pd.DataFrame({"t_s": [0.0, 1.0, 3.0, 4.0], "left_m_s": 0.0, "right_m_s": [0.1, 0.2, -0.5, 9.0]})
+    assert _turned_m(rows) == pytest.approx(0.5)
+    assert _turned_m(rows.assign(right_m_s=[np.nan, 0.2, -0.4, 0.0])) == pytest.approx(0.4)
+
+
+def test_one_trial_that_lasts_too_long_is_named_whatever_the_others_do():
+    table = pd.DataFrame({"trial": ["a", "a", "b", "b"], "t_s": [0.0, 1.0, 0.0, 2e6]})
+    with pytest.raises(DataError, match="Trial b lasts 2e\\+06 s"):
+        _check_length(table)
+
+
+def test_milliseconds_of_a_fast_tracker_are_known_by_how_far_the_robot_went():
+    rows = np.arange(800.0)  # at 200 Hz: the pauses between rows alone might be seconds
+    table = pd.DataFrame({"trial": "0", "t_s": 5.0 * rows, "left_m_s": 0.1, "right_m_s": 0.1, "x_m": 0.0005 * rows})
+    table = table.assign(y_m=0.0, heading_rad=0.0)
+    with pytest.raises(DataError, match="Successive rows are 5 s apart: t_s looks like milliseconds"):
+        check_units(table, [("0", np.arange(800))])

@@ -15,7 +15,7 @@ from bns.diagnose.estimate.clocks.trial_clock_test import every_other_block, fit
 from bns.diagnose.estimate.clocks.trial_clocks import eliminate_clocks, with_fitted_clocks
 from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.outcome import Outcome
+from bns.diagnose.outcome import Outcome, predicts_better_throughout
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import ModelError
 from bns.measurements import write_measurements
@@ -177,3 +177,19 @@ def test_per_trial_is_refused_where_it_makes_no_sense(tmp_path, capsys):
     assert main(["add", "wheelbase", "--per-trial", *arguments]) == 2
     assert "--per-trial (in Python: per_trial=True) goes with clock-offset" in capsys.readouterr().err
     assert not (tmp_path / "n.yaml").exists()
+
+
+def test_clocks_of_trials_may_stand_only_where_they_predict_better_at_every_horizon():
+    def errors(**rms_m):
+        at = {h: SimpleNamespace(models=[SimpleNamespace(rms_m=9.0), SimpleNamespace(rms_m=one)]) for h, one in rms_m.items()}
+        return SimpleNamespace(horizons=at)
+
+    def ended(with_terms=None, **rms_m):
+        return SimpleNamespace(errors=errors(**rms_m), errors_with_terms=with_terms)
+
+    one, nan = ended(near=0.1, far=0.2), float("nan")
+    assert predicts_better_throughout(one, ended(near=0.11, far=0.21))
+    assert not predicts_better_throughout(one, ended(near=0.11, far=0.19))
+    assert not predicts_better_throughout(one, ended(near=0.1, far=0.21))
+    assert predicts_better_throughout(one, ended(near=0.11, far=nan))
+    assert not predicts_better_throughout(one, ended(errors(near=0.05, far=0.05), near=0.11, far=0.21))

@@ -8,7 +8,7 @@ import pytest
 
 from bns.diagnose.comparison import compare
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.predict.check_robot import check_same_robot, suggested_wheelbase_m
+from bns.diagnose.predict.check_robot import _scale, check_same_robot, suggested_wheelbase_m
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError
 from bns.physics.wheels.differential_drive import track
@@ -84,3 +84,9 @@ def test_no_wheelbase_is_suggested_that_no_model_may_have():
         check_same_robot(WheelPredictor(tracks), NOMINAL)
     assert "--wheelbase" not in str(error.value)
     assert suggested_wheelbase_m(tracks) is None
+
+
+def test_a_factor_on_turns_is_the_one_that_most_of_the_turning_agrees_on():
+    predicted = np.array([1.0, 0.1, -0.1, 0.2])
+    assert _scale(predicted * [3.0, 2.0, 1.0, 0.5], predicted) == 3.0
+    assert _scale(predicted[1:] * [2.0, 1.0, 0.5], predicted[1:]) == 0.5

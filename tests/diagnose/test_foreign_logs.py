@@ -14,6 +14,8 @@ from bns.diagnose.data.checks import checked
 from bns.diagnose.data.guess.mapping import drafted
 from bns.diagnose.data.load import load_measured
 from bns.diagnose.data.mapping import load_mapping
+from bns.diagnose.data.merge_topics import held, without_commands
+from bns.diagnose.data.quaternions import yaw
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.split_trials import KEPT_S, RUN_UP_S, split
 from bns.diagnose.data.tracks import tracks_of
@@ -287,3 +289,45 @@ def test_mirrored_positions_are_refused():
 def test_a_camera_that_is_askew_is_left_to_the_diagnosis():
     table = measured(hidden(camera_rotation={"angle_rad": 0.6}), trials=6)
     check_same_robot(WheelPredictor(tracks_of(table)), NOMINAL)
+
+
+def test_a_short_stand_belongs_by_halves_to_the_drives_before_and_after_it():
+    t = np.arange(0.0, 7.0, 0.1).round(1)
+    moving = np.where((t >= 3.0) & (t < 4.0), 0.0, 0.1)  # it stands for a second, less than twice what is kept
+    assert 2 * KEPT_S > 1.0
+    out = split(pd.DataFrame({"t_s": t, "left_m_s": moving, "right_m_s": moving}), "standing_s", 0.8)
+    assert out.groupby("trial")["session_s"].agg(["first", "last"]).round(1).to_numpy().tolist() == [[0.0, 3.5], [3.6, 6.9]]
+
+
+def test_a_piece_brings_along_the_commands_before_it():
+    t = np.arange(0.0, 20.5, 0.5)
+    out = split(pd.DataFrame({"t_s": t, "left_m_s": 0.1, "right_m_s": t}), "lasting_s", 10.0)
+    ahead = out[out["run_up"] == 1]
+    assert ahead["trial"].unique().tolist() == [1]
+    assert ahead["session_s"].tolist() == t[(t >= 10.0 - RUN_UP_S) & (t < 10.0)].tolist()
+
+
+def test_a_command_is_in_force_for_as_long_as_the_watchdog_waits_and_no_longer():
+    table = pd.DataFrame({"t_s": [0.0, 0.25, 0.5], "left_m_s": [0.1, np.nan, np.nan], "right_m_s": [0.2, np.nan, np.nan]})
+    assert held(table, 0.25)["right_m_s"].isna().tolist() == [False, False, True]
+
+
+def test_poses_before_the_first_command_of_their_own_trial_lack_none():
+    told = [0.1, np.nan, np.nan, np.nan, 0.1, 0.1]
+    table = pd.DataFrame({"trial": [0, 0, 1, 1, 1, 1], "left_m_s": told, "right_m_s": told})
+    table = table.assign(x_m=0.0, y_m=0.0, heading_rad=0.0)
+    assert without_commands(table) == pytest.approx(1 / 4)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 90.0, -90.0, 180.0])
+@pytest.mark.parametrize("size", [0.5, 1.0, 3.0])
+def test_headings_along_the_axes_are_read_from_quaternions_of_any_length(degrees, size):
+    half = np.radians(degrees) / 2
+    given = pd.DataFrame({"x": 0.0, "y": 0.0, "z": size * np.sin(half), "w": size * np.cos(half)}, index=range(3))
+    np.testing.assert_allclose(np.exp(1j * yaw(given, "z")), np.exp(1j * np.radians(degrees)), atol=1e-12)
+
+
+def test_long_quaternions_of_a_robot_on_its_side_are_refused():
+    half = np.radians(70.0) / 2
+    with pytest.raises(DataError, match="is 70 degrees off up"):
+        yaw(pd.DataFrame({"x": 2 * np.sin(half), "y": 0.0, "z": 0.0, "w": 2 * np.cos(half)}, index=range(3)), "z")

@@ -61,3 +61,12 @@ def test_what_carries_the_robot_is_predicted_by_the_other_folds_too():
 
     found = held_out_steps(Carried(), pose_filter, drifting).drift_m
     np.testing.assert_allclose(found, 1e-9 * np.arange(float(found.size)).reshape(-1, 2), atol=1e-12)
+
+
+def test_trials_that_do_not_count_have_no_part_in_what_is_predicted_of_any():
+    """Those that the odd robot drove are set aside: all others are predicted as if it had driven none."""
+    odd_ones = (1, 6)
+    plain, odd = (one.not_counting(odd_ones) for one in (predictor(), predictor(*odd_ones)))
+    pose_filter = problem_for(plain, MODEL).pose_filter
+    of_plain, of_odd = (held_out_steps(one, pose_filter, MODEL).body for one in (plain, odd))
+    np.testing.assert_allclose(of_odd, of_plain, rtol=1e-9, atol=1e-12)

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,7 @@ import yaml
 from bns.cli.main import main
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracker_faults import jumps, without_faults
-from bns.diagnose.data.tracking_noise import tracking_noise
+from bns.diagnose.data.tracking_noise import SETTLED_S, TrackingNoise, _about, _at_rest, tracking_noise
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.paired_errors import FEWEST_TRIALS, Change, paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -190,3 +191,28 @@ def test_intervals_begin_with_the_fewest_trials(trials, known):
     assert error.windows == trials
     ends = [error.models[0].low_m, error.models[0].high_m, error.total.low_m, error.total.high_m]
     assert (np.isfinite(ends) == known).all()
+
+
+def test_a_perfect_model_is_off_by_the_noise_of_both_ends_and_of_the_first_heading():
+    noise = TrackingNoise(0.001, 0.01, "at rest")
+    assert noise.error_m(np.zeros(3)) == pytest.approx(0.002)  # two coordinates, at two ends
+    assert noise.error_m(np.array([0.0, 0.2])) == pytest.approx(np.sqrt(4e-6 + 0.5 * 0.002**2))
+    assert np.isnan(noise.error_m(np.zeros(0)))
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_deviations_from_a_rest_are_as_large_as_the_noise_however_few_poses_it_has(order):
+    rng, t_s = np.random.default_rng(0), np.arange(6.0)
+    off = [_about(t_s, rng.normal(0.0, 0.002, (6, 3)) + 0.3 * order * t_s[:, None], order) for _ in range(2000)]
+    assert np.std(np.concatenate(off)) == pytest.approx(0.002, rel=0.03)
+
+
+def test_a_rest_begins_when_the_robot_has_settled():
+    t_s = np.arange(0.0, 4.0, 0.1)
+    tracks = SimpleNamespace(
+        first=np.array([0, 40]), t_s=t_s, pose=np.zeros((40, 3)), duration_s=np.array([[1.0, 2.0, 1.0]]),
+        left_m_s=np.array([[0.1, 0.0, 0.1]]), right_m_s=np.array([[0.1, 0.0, 0.0]]),
+    )  # fmt: skip
+    ((seen, _),) = _at_rest(tracks)
+    assert seen[0] == pytest.approx(1.0 + SETTLED_S, abs=0.1)
+    assert seen[-1] == pytest.approx(3.0, abs=0.1)

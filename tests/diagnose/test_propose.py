@@ -16,7 +16,7 @@ from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, 
 from bns.diagnose.design.limits import arena_of, bounds_of
 from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
 from bns.diagnose.design.power import ExpectedGain, PastTrials, decision_probability, minutes_needed, power
-from bns.diagnose.design.proposal import propose
+from bns.diagnose.design.proposal import _expected, _power_by_minutes, propose
 from bns.diagnose.design.search import Pool, select_trials
 from bns.diagnose.design.sequences import (
     Arena,
@@ -361,3 +361,29 @@ def test_speeds_in_other_units_are_refused():
 def test_a_heading_that_looks_like_radians_is_said_to_be_degrees(text, said, capsys):
     assert pose_of(text)[2] == pytest.approx(np.radians(float(text.rpartition(",")[2])))
     assert ("degrees, not radians" in capsys.readouterr().err) == said
+
+
+def test_power_is_told_by_the_minutes_driven_until_then():
+    new, old = np.full(40, 3.0), np.zeros(5)
+    both = [ExpectedGain(old, new, old, new), ExpectedGain(old, new, old, new)]
+    minutes, chances = zip(*_power_by_minutes(both, np.repeat([20.0, 40.0], 20)), strict=True)
+    assert (minutes[0], minutes[-1]) == (0.0, pytest.approx(20.0))
+    assert (np.diff(minutes) > 0).all()
+    assert chances[0] == 0.0
+    assert chances[-1] == decision_probability(both)
+    half = chances[minutes.index(pytest.approx(20 / 3))]  # the twenty short trials
+    assert half == decision_probability([one.first(20) for one in both])
+
+
+def test_what_was_seen_so_far_counts_for_the_explanation_that_it_was_likelier_under():
+    one, other, nothing = (
+        SimpleNamespace(fit=SimpleNamespace(held_out=np.array(losses))) for losses in ([1.0, 1.0], [2.0, 1.5], [5.0, 4.0])
+    )
+    told, worth = (SimpleNamespace(each=lambda values=values: np.array(values)) for values in ([3.0], [7.0]))
+    for_one = _expected(one, other, nothing, told, worth, scatter=2.0)
+    assert (for_one.old.tolist(), for_one.worth_old.tolist()) == ([1.0, 0.5], [4.0, 3.0])
+    assert (for_one.new.tolist(), for_one.worth_new.tolist(), for_one.scatter) == ([3.0], [7.0], 2.0)
+    assert for_one.chance == pytest.approx(1 / (1 + np.exp(-0.75)))
+    for_other = _expected(other, one, nothing, told, worth, scatter=2.0)
+    assert for_other.old.tolist() == [-1.0, -0.5]
+    assert for_one.chance + for_other.chance == pytest.approx(1.0)

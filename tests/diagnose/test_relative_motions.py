@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,8 +12,9 @@ import pytest
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.load import load_measured
+from bns.diagnose.data.relative_motions import relative_motions
 from bns.diagnose.data.sources.read import read_table
-from bns.diagnose.estimate.calibration import calibrated
+from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import predictor_for_search
 from bns.diagnose.values import numbers_of
@@ -161,3 +163,35 @@ def test_the_laser_khepera_is_calibrated_as_its_authors_did(subset, tmp_path):
     }
     for name, value in wanted.items():
         assert numbers[name]["low"] <= value <= numbers[name]["high"], name
+
+
+def test_motions_that_lasted_no_time_or_lack_a_number_are_left_out():
+    motion = {"left_m_s": 0.1, "right_m_s": 0.2, "x_m": 0.03, "y_m": 0.0, "heading_rad": 0.1, "weight": [1.0, 2.0, 3.0, 4.0]}
+    table = pd.DataFrame({"duration_s": [0.5, 0.0, -1.0, 0.25], **motion})
+    out = relative_motions(table)
+    assert out["weight"].tolist() == [1.0, 1.0, 4.0, 4.0]
+    assert out["trial"].tolist() == [0, 0, 1, 1]
+    assert out["t_s"].tolist() == [0.0, 0.5, 0.0, 0.25]
+    assert relative_motions(table.assign(x_m=[0.1, 0.1, 0.1, np.nan]))["weight"].tolist() == [1.0, 1.0]
+    with pytest.raises(DataError, match="No row has a duration_s above 0"):
+        relative_motions(table.assign(duration_s=0.0))
+
+
+def test_sizes_of_wheels_and_their_intervals_follow_from_mean_and_ratio():
+    """Against drawn numbers: the mean size and the ratio vary together."""
+    covariance = np.array([[4e-6, 3e-6], [3e-6, 9e-6]])
+    names = (("speed-gain", "gain"), ("wheel-mismatch", "ratio"))
+    fit = SimpleNamespace(
+        free=[SimpleNamespace(effect=effect, parameter=SimpleNamespace(name=name)) for effect, name in names],
+        values=np.array([1.1, 1.2]), covariance=covariance, se=lambda i: covariance[i, i] ** 0.5,
+        interval=lambda i: (1.1 - 2.1 * 2e-3, 1.1 + 2.1 * 2e-3),
+    )  # fmt: skip
+    drawn = np.random.default_rng(0).multivariate_normal(fit.values, covariance, 200_000)
+    left = 2 * drawn[:, 0] / (1 + drawn[:, 1])
+    sizes = wheel_sizes(fit)
+    for side, values in (("left", left), ("right", left * drawn[:, 1])):
+        value, low, high = sizes[side]
+        assert value == pytest.approx(values.mean(), rel=1e-4)
+        assert ((high - value) / 2.1, (value - low) / 2.1) == pytest.approx((values.std(), values.std()), rel=0.02)
+    fit.free = fit.free[:1]
+    assert wheel_sizes(fit) == {}

@@ -2,17 +2,19 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from bns.diagnose import diagnosis
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import _from_better_numbers, diagnose
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select.result import SelectionResult
+from bns.diagnose.select.result import SelectionResult, SelectionStep
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.decoys import DECOYS
 from bns.physics.effects import effect_named
@@ -252,3 +254,27 @@ def test_what_could_stand_in_place_of_the_newest_effect_is_known_from_the_round_
     assert set(fits[False]) <= set(fits[True])
     assert fits[False]
     assert {name: fits[True][name] for name in fits[False]} == pytest.approx(fits[False], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "hinted"),
+    [
+        ({}, True),
+        ({"z": 1.9}, False),
+        ({"z": -3.0}, False),
+        ({"p_value": 0.2}, False),
+        ({"elpd_diff": 0.4}, False),  # a decoy does better
+        ({"losses": 1e4}, False),  # nothing beside what is lost anyway
+        ({"rejected_because": "at its bound"}, False),
+        ({"accepted": ("wheelbase",)}, False),
+        ({"trials": diagnosis.FEW_TRIALS}, False),
+    ],
+)
+def test_a_sign_is_worth_more_trials_only_where_few_nearly_sufficed(change, hinted):
+    given = {"z": 3.0, "p_value": 0.002, "elpd_diff": 1.0, "losses": 9.0, "rejected_because": "", "accepted": (), "trials": 12}
+    given |= change
+    earned = SimpleNamespace(p_value=given["p_value"], z=given["z"], elpd_diff=given["elpd_diff"])
+    candidate = SimpleNamespace(name="turn-slip", rejected_because=given["rejected_because"], paired_comparison=earned)
+    nominal = SimpleNamespace(losses=np.full(12, given["losses"]))
+    found = SimpleNamespace(accepted=given["accepted"], steps=(SelectionStep((candidate,), 0.5, ""),), nominal=nominal)
+    assert (diagnosis._hint(found, given["trials"]) is candidate) is hinted

@@ -304,3 +304,43 @@ def test_tents_add_up_to_a_level_floor_and_a_patch_to_its_shares_of_them():
     small = {piece.name: amount for piece, amount in patch.pieces(0.4, 0.0, 0.35, 2.0)}
     assert max(small, key=lambda name: small[name]) == "floor-tent-1-0"
     assert "floor-tent--3-0" not in small
+
+
+def test_effects_change_what_their_words_say_by_how_much_and_to_which_side():
+    plant = machine(SNAKE.mechanism).plant
+
+    def with_effect(name, **values):
+        return SNAKE.effect_named(name).apply(plant, **values)
+
+    share = with_effect("uneven-mass", gradient=0.2).mass / plant.mass
+    assert share[[0, -1]] == pytest.approx([0.8, 1.2])
+    assert share.mean() == pytest.approx(1.0)
+    limited = with_effect("servo-speed-limit", share=0.5)
+    assert (limited.speed == 0.5).all()
+    assert (SNAKE.effect_named("servo-speed-limit").apply(limited, share=0.8).speed == 0.5).all()
+    pulled = with_effect("tether-pull", east_n=0.1, north_n=-0.2, return_n_m=0.3)
+    assert (pulled.pull_n, pulled.return_n_m) == ((0.1, -0.2), 0.3)
+    assert with_effect("floor-slope", east_rad=0.01, north_rad=-0.02).slope == (0.01, -0.02)
+    across = with_effect("friction-anisotropy", across=1.5)
+    assert (across.friction_along, across.friction_across) == (1.0, 1.5)
+    weak = with_effect("weak-joint-joint3", strength=0.4)
+    at = plant.joints.index("joint3")
+    for values in ("stiffness", "torque", "damping"):
+        changed = getattr(weak, values) / getattr(plant, values)
+        assert changed[at] == pytest.approx(0.4)
+        assert np.delete(changed, at) == pytest.approx(1.0)
+
+
+def test_what_a_camera_makes_of_points_is_as_its_words_say():
+    point, along = np.array([[[0.5, -0.2], [1.0, 2.0]]]), np.array([[[0.0, 1.0], [1.0, 0.0]]])
+    seen = Sighting(point, along, np.stack([-along[..., 1], along[..., 0]], axis=-1))
+    site = SNAKE.effect_named("marker-offset-green")
+    number = site.apply.keywords["site"]
+    moved = site.apply(seen, along_m=0.01, left_m=0.02).point_m - point
+    expected = ([-0.02, 0.01], [0.01, 0.02])[number]  # one link points north, the other one east
+    assert moved[0, number] == pytest.approx(expected)
+    assert not moved[0, 1 - number].any()
+    tilted = SNAKE.effect_named("tilted-camera").apply(seen, east_1_m=0.1, north_1_m=0.0).point_m
+    assert tilted == pytest.approx(point * np.array([1.05, 1.1])[:, None])
+    tilted = SNAKE.effect_named("tilted-camera").apply(seen, east_1_m=0.0, north_1_m=0.1).point_m
+    assert tilted == pytest.approx(point * np.array([0.98, 1.2])[:, None])

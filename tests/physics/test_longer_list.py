@@ -11,6 +11,7 @@ from bns.physics.effects.wheel_eccentricity import starts_from
 from bns.physics.model import Model
 from bns.physics.signals import Body, Conditions, Wheels
 from bns.physics.wheels.differential_drive import observe, simulate
+from bns.physics.wheels.scans import carried_on
 from tests.hidden_effects.driving import Driving
 from tests.hidden_effects.listed import cause
 from tests.hidden_effects.motion import move
@@ -285,3 +286,31 @@ def test_a_compass_is_turned_by_the_field_of_the_robot_and_right_along_it():
     for heading, off in ((np.pi / 2, 0.0), (-np.pi / 2, 0.0), (0.0, most), (np.pi, -most), (6 * np.pi, most)):
         seen = observe([[0.3, 0.1, heading]], None, model)[0]
         np.testing.assert_allclose(seen, [0.3, 0.1, heading + off], atol=1e-12)
+
+
+def test_what_is_carried_on_begins_and_fades_with_the_session_and_not_with_the_order_of_the_trials():
+    """Two trials of 1 s, the one that is listed second driven first; a pause of 2 s between them; steps of unlike lengths."""
+    step_s = np.array([[0.2, 0.8], [0.5, 0.5]])
+    begin_s = np.array([[3.0], [0.0]])
+    middle_s = begin_s + np.cumsum(step_s, axis=1) - step_s / 2
+    mean = carried_on(np.ones((2, 2)), step_s, middle_s, 2.0)
+
+    def after(s, time):
+        return 2.0 + (s - 2.0) * np.exp(-time / 2.0)  # fed by 1 a second it ends at 2
+
+    first = after(0.0, 1.0)
+    late = first * np.exp(-2.0 / 2.0)
+    for row, begun in ((1, 0.0), (0, late)):
+        half = after(begun, step_s[row, 0])
+        gained = np.array([half - begun, after(half, step_s[row, 1]) - half])
+        np.testing.assert_allclose(mean[row], 2.0 * (1.0 - gained / step_s[row]), rtol=1e-9)
+
+
+def test_a_battery_that_runs_flat_slows_both_wheels_with_the_session_and_with_every_volt_that_it_lost():
+    speed = np.array([[0.2, -0.1]])
+    volts = Conditions(session_s=np.array([[10.0, 20.0]]), battery_drop_v=np.array([[0.5, 1.0]]))
+    wheels = Wheels(np.full((1, 2), 0.5), speed, 2 * speed, B, volts)
+    slowed = effect_named("battery-sag").apply(wheels, rate_per_s=0.001, per_volt=0.1)
+    kept = np.array([[1 - 0.01 - 0.05, 1 - 0.02 - 0.1]])
+    np.testing.assert_allclose(slowed.left_m_s, speed * kept)
+    np.testing.assert_allclose(slowed.right_m_s, 2 * speed * kept)
