@@ -157,6 +157,8 @@ def test_honest_robots_leave_nothing(seed):
         ),
         ("left", "-k * u * max(u, 0)", 1.5, "speed of the left wheel, forwards and backwards",
          r"the left .* 0\.199 m/s gives 0\.1[34]\d* m/s \(-\d\d\.\d%\), -0\.199 m/s gives -0\.(199|2)\d* m/s \(.*%\)"),
+        ("w", "-k * abs(v) * sin(heading - 1)", 0.5, "heading, in proportion to the speed",
+         r"turning velocity at 0\.\d+ m/s depends on heading: \+\S+ °/s at a heading of -3\d°, -\S+ °/s at a heading of 14\d°"),
         ("right", "-k * max(fresh, 0)", 0.5, "changes of speed of the right wheel",
          r"just after a change of the right wheel's speed, \d\d% of it is missing, .*"),
         ("v", "-k * abs(v) * cos(heading)", 0.06, "direction of travel",

@@ -49,6 +49,8 @@ PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 SPEED_THERE = "forward speed at a place"
 TRAVEL = "direction of travel"
 """Where the robot drives to: its heading, or the opposite where it reverses."""
+PULL = "heading, in proportion to the speed"
+"""A turn for each metre driven, whichever way: a magnet, or a nap that guides the wheels."""
 STRAIGHT = "straight lines"
 """What happens only while both wheels are told the same, such as a heading that is held by a gyro."""
 CHANCE = DEFAULTS.residuals.chance
@@ -184,6 +186,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     if float((seen["left_m_s"] + seen["right_m_s"]).min()) < 0.0:
         yield Family(TRAVEL, "v", ("v", *(f"abs(v) * {t}" for t in turns)))  # a carpet's nap, forwards and backwards
     yield Family("heading", "w", tuple(f"moving * {t}" for t in turns))
+    yield Family(PULL, "w", tuple(f"abs(v) * {t}" for t in turns))
     yield Family("heading", SHARE, turns)  # both wheels alike: a carpet's nap
     (x0, x1), (y0, y1) = (np.quantile(predictor.tracks.pose[:, i], [0.02, 0.98]) for i in (0, 1))
     bumps = tuple(_bumps(x0, x1, y0, y1))

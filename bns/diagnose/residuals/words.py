@@ -15,6 +15,7 @@ from bns.diagnose.residuals.grammar import (
     CHANGES,
     CHANGES_ALONE,
     PLACE,
+    PULL,
     RESPONSE,
     RESPONSE_ALONE,
     RESPONSE_KNOTS_S,
@@ -156,7 +157,7 @@ def _by_heading(term: Formula, predictor: Predictor) -> str:
     change = _curve(term, "heading", grid, v=usual, moving=1.0)
     size, unit = (np.degrees(change), "°/s") if term.on == "w" else (1e3 * change, "mm/s")
     at = [f"{size[i]:+.2g} {unit} at a heading of {np.degrees(grid[i]):.0f}°" for i in (change.argmax(), change.argmin())]
-    speed = "" if term.on == "w" else f" at {usual:.2g} m/s"
+    speed = "" if term.on == "w" and term.signal != PULL else f" at {usual:.2g} m/s"
     return f"{_VELOCITIES[term.on]}{speed} depends on heading: {at[0]}, {at[1]}"
 
 
@@ -362,6 +363,7 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     (SPEED_THERE, "v"): _at_places,
     ("heading", "v"): _by_heading,
     ("heading", "w"): _by_heading,
+    (PULL, "w"): _by_heading,
     (TRAVEL, "v"): _travel,
     (STRAIGHT, "w"): _straight,
     ("distance since each wheel reversed", "wheels"): _reversal,
