@@ -6,11 +6,13 @@ import itertools
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from figure_helpers import with_evals, written
 from store.synthetic import publish_chunk, record
 
 from analysis import checks
+from analysis.checks import success
 from analysis.checks.clusters import _ashman, _intervals, _listed
 from analysis.results import NoDataError, Results
 from analysis.selection import selections
@@ -230,3 +232,18 @@ def test_clusters_lie_apart_by_their_usual_width_and_means_are_as_sure_as_their_
     assert low == pytest.approx([1.0 - 1.96 * 0.2 / np.sqrt(12), 3.0 - 1.96 * 0.6 / 6], abs=1e-4)
     assert high == pytest.approx([1.0 + 1.96 * 0.2 / np.sqrt(12), 3.0 + 1.96 * 0.6 / 6], abs=1e-4)
     assert _listed(mixture) == "1.00 and 3.00"
+
+
+def test_of_what_is_gained_the_late_share_is_that_behind_the_middle():
+    assert success._late_share(np.array([[0.2, 0.4, 1.0], [0.0, 0.6, 0.6]])) == pytest.approx([75, 0])
+    assert np.isnan(success._late_share(np.array([0.5, 0.6, 0.5])))
+
+
+def test_a_sample_that_never_comes_to_a_half_counts_as_one_evaluation_after_the_last(monkeypatch):
+    """Of eight seeds four succeed from the third evaluation on: fewer than a half in many a sample."""
+    seeds = pd.DataFrame({"root_seed": 0, "seed": np.arange(8), "runs": 1})
+    rows = pd.concat([seeds.assign(evaluation=at, successes=(seeds.seed < 4) & (at >= 3)) for at in range(1, 6)])
+    monkeypatch.setattr(success, "ever_by_seed", lambda *_: rows.assign(successes=rows.successes.astype(int)))
+    first, samples = success._until_half(None, None, "circle")
+    assert first == 3
+    assert set(samples) == {3, 6}

@@ -155,3 +155,14 @@ def test_what_the_sweep_command_confirms_is_what_stands_first(real_results, tmp_
     for drawn in best_combinations.draw(Results(results)):
         assert drawn.data.confirm_runs.tolist() == [5, 0]
         assert drawn.n == 15
+
+
+def test_the_best_counts_as_that_of_a_whole_study_only_if_every_combination_has_its_runs(tmp_path, monkeypatch):
+    monkeypatch.setattr(success, "COMBINATIONS", 2)
+    written(tmp_path, "grid", [*rated(0.1, seeds=7, good=6), *rated(0.5, seeds=5, good=1)])
+    store = Results(tmp_path)
+    for runs, words in ((5, "7 runs, the best of 2 as swept"), (6, "7 runs, as swept")):
+        monkeypatch.setattr(success, "RUNS", runs)
+        said = best_combination(store, selections(store)[0], "circle", "success", 76)
+        assert said.ours.startswith("86")
+        assert said.ours.endswith(words)

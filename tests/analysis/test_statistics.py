@@ -11,7 +11,7 @@ from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 from statsmodels.stats.multitest import multipletests
 
-from analysis import influence
+from analysis import importance, influence
 from analysis.importance import at_the_end, chance, permutation_importances, sums_of_squares, variance_shares
 from analysis.intervals import band, bootstrap, mean_interval, ratios, resampled
 from analysis.labels import CELL
@@ -191,3 +191,14 @@ def test_holm_is_that_of_statsmodels_bit_for_bit():
         p = random.random(n) ** 4
         p[n // 2 :] = p[n // 2]  # ties
         assert list(holm(p)) == list(multipletests(p, method="holm")[1])
+
+
+def test_an_order_that_holds_in_just_95_percent_of_the_samples_agrees_and_in_just_5_differs():
+    assert [likely(share) for share in (0.95, 0.949, 0.051, 0.05)] == [AGREES, UNDECIDED, UNDECIDED, DIFFERS]
+
+
+def test_a_share_of_variance_is_less_what_chance_adds_for_each_value_but_one():
+    """Worked out by hand: sums of squares 0.04 and 0.015 of 0.055, chance 0.001 for two, one and five degrees of freedom."""
+    cells = grid(a=[1, 2, 3], b=[0, 1])
+    rates = (0.1 * cells.a + 0.1 * cells.b).to_numpy()
+    assert importance._shares(cells, rates, ["a", "b"], 0.001) == pytest.approx([0.038 / 0.05, 0.014 / 0.05])

@@ -66,3 +66,14 @@ def test_never_by_default_and_the_same_numbers_then():
 def test_rounds_are_a_whole_number():
     with pytest.raises(SpecError, match=r"renew is '2\.5'; it must be a whole number from 0 to 1000"):
         run(RunSpec(approach="bns+renew=2.5", **SMALL))
+
+
+def test_whoever_takes_a_place_is_new_and_the_others_keep_where_they_come_from():
+    evolver = started("bns").evolver
+    evolver.population.origin[:] = 7
+    others = evolver.robot.initial_population(Key(5, 5), len(evolver.population), 4, evolver.spec.max_commands)
+    evolver.replace(np.array([1, 3]), others)
+    new = (evolver.population.origin == -1).all(axis=1)
+    assert np.flatnonzero(new).tolist() == [1, 3]
+    assert (evolver.population.origin[~new] == 7).all()
+    np.testing.assert_array_equal(evolver.population.controller(3), others.controller(3))

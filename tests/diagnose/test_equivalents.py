@@ -7,6 +7,7 @@ from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select import equivalents
 from bns.diagnose.select.equivalents import equivalent_pairs
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
@@ -47,3 +48,14 @@ def test_a_diagnosis_says_so_in_a_note():
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
     assert found.effects == ("camera-scale",)
     assert any("would explain as much, with one more effect" in note and "wheelbase" in note for note in found.notes)
+
+
+def test_of_more_pairs_than_are_fitted_those_that_span_most_are_taken(monkeypatch):
+    model = hidden(speed_gain={"gain": 1.05})
+    problem = problem_for(WheelPredictor(tracks_of(measured(model, trials=8, seed=5))), model)
+    others = [listed(NOMINAL)[name] for name in ("side-slip", "yaw-bias", "wheelbase", "camera-scale")]
+    monkeypatch.setattr(equivalents, "LEFT_OVER", 1.0)
+    monkeypatch.setattr(equivalents, "TRIED", 3)
+    found = equivalents._promising(problem, problem.fit(model), "speed-gain", others)
+    assert len(found) == 3
+    assert {effect.name for effect in found[0]} == {"wheelbase", "camera-scale"}

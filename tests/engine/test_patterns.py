@@ -2,8 +2,11 @@
 
 import numpy as np
 
+from bns.bootstrap.trainer import Trainer
 from bns.engine.patterns import TRAINING_SHARE, PatternSet, TrainingData
 from bns.engine.philox import Key
+from bns.robots import load_robot
+from bns.spec import RunSpec
 
 
 def numbered(first, n):
@@ -86,3 +89,14 @@ def test_what_is_forgotten_takes_along_who_may_learn_from_it():
     patterns.forget(5)
     np.testing.assert_array_equal(numbers(patterns), np.arange(5, 12))
     np.testing.assert_array_equal(patterns.present[:, : patterns.count], present[:, 5:])
+
+
+def test_the_error_is_of_the_patterns_that_a_network_may_learn_from():
+    X, y = numbered(0, 6)
+    present = np.arange(6) < np.array([[6], [4], [0]])
+    errors = []
+    for elsewhere in (0.0, 1e6):
+        trainer = Trainer.start(load_robot("khepera"), Key(0, 0), RunSpec())
+        trainer.data.training.add(X, np.where(present, y, np.float32(elsewhere)), present)
+        errors.append(trainer.errors()[0])
+    assert errors[0] == errors[1] > 0

@@ -1,0 +1,75 @@
+"""What takes the place of an accepted effect: which exchanges are fitted, and which are far behind."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bns.diagnose.select import exchanges
+from bns.diagnose.select.exchanges import BEHIND, BEHIND_LOSS, SCREEN, Entry, Exchanges
+from bns.diagnose.select.stepwise import StepwiseSelection
+
+
+def in_place(monkeypatch, start, fitted, lacking=1000.0, reached=0.0, known=()):
+    """The loss of an exchange whose start and fit have these losses; None where it is not tried to the end."""
+    begin = SimpleNamespace(loss=start, model="start", jacobian_by_parameter={})
+    monkeypatch.setattr(exchanges, "best_start", lambda *_: begin)
+    loose = SimpleNamespace(fit=lambda *_, **__: SimpleNamespace(loss=fitted, model="fitted"))
+    problem = SimpleNamespace(fit=lambda model, nearby: SimpleNamespace(loss=fitted, model=model))
+    one = Exchanges(None, {}, {}, lambda _: None)
+    fit, without = SimpleNamespace(jacobian_by_parameter={}), SimpleNamespace(loss=lacking)
+    found = one._in_place(problem, fit, loose, without, reached, dict(known), SimpleNamespace(name="e"))
+    return None if found is None else found.model
+
+
+def test_what_does_too_little_from_its_best_start_is_not_fitted(monkeypatch):
+    enough = 1000.0 * SCREEN
+    assert in_place(monkeypatch, 1000.0 - 1.01 * enough, 0.0) == "fitted"
+    assert in_place(monkeypatch, 1000.0 - 0.99 * enough, 0.0) is None
+
+
+@pytest.mark.parametrize("whole", [1e3, 1e-3])
+def test_what_ends_far_behind_is_dropped_by_the_wider_of_a_share_and_a_loss(monkeypatch, whole):
+    far = max(BEHIND * whole, BEHIND_LOSS)
+    assert in_place(monkeypatch, 0.0, 0.99 * far, lacking=whole) == "fitted"
+    assert in_place(monkeypatch, 0.0, 1.01 * far, lacking=whole) is None
+
+
+def test_what_was_fitted_in_the_round_before_is_not_looked_for_again(monkeypatch):
+    known = SimpleNamespace(loss=0.0, model="known")
+    assert in_place(monkeypatch, 1000.0, 1000.0, known={"e": known}) == "known"
+
+
+def test_exchanges_are_kept_for_the_same_problem_and_the_same_effects_alone(monkeypatch):
+    one = Exchanges(SimpleNamespace(screening=None), {}, {}, lambda _: None)
+    asked = []
+    lacking = SimpleNamespace(fit=lambda model: None, loss=lambda model: 0.0)
+    monkeypatch.setattr(exchanges, "problem_for", lambda _, model: asked.append(model) or lacking)
+    fit, problem, other = SimpleNamespace(model=SimpleNamespace(without=lambda name: name)), SimpleNamespace(), SimpleNamespace()
+    for where, accepted in ((problem, ("a",)), (problem, ("a",)), (problem, ("a", "b")), (other, ("a", "b"))):
+        assert one.of(where, fit, accepted) == []
+    assert asked == ["a", "a", "b", "a", "b"]
+    one.forget()
+    one.of(other, fit, ("a", "b"))
+    assert asked[5:] == ["a", "b"]
+
+
+def test_a_round_is_of_an_effect_that_came_in_then_beside_the_same_others():
+    entry = Entry(None, None, ("a",), SimpleNamespace(selected="b"))
+    assert entry.of("b", ("b", "a"))
+    assert not entry.of("a", ("a", "b"))
+    assert not entry.of("b", ("a", "b", "c"))
+    assert not entry.of("b", ("b",))
+
+
+@pytest.mark.parametrize(("gained", "ends"), [(0.4, ("a", "b")), (0.6, ("a", "c"))])
+def test_an_effect_is_exchanged_only_for_what_loses_less_on_held_out_trials_by_more_than_half(monkeypatch, gained, ends):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    fit, tried = (SimpleNamespace(held_out=np.array([6.0, 4.0 - less]), model=None) for less in (0.0, gained))
+    exchanged = {("a", "b"): [("b", "c", tried)], ("a", "c"): []}
+    search._exchanges = SimpleNamespace(of=lambda _problem, _fit, accepted: exchanged[accepted])
+    monkeypatch.setattr(search, "_may_stay", lambda *_: True)
+    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
+    monkeypatch.setattr(search, "_refit_with_noise", lambda *_: ("settled", tried))
+    problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
+    assert search._exchange_step(problem, fit, ("a", "b"))[2] == ends

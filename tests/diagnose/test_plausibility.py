@@ -1,0 +1,51 @@
+"""What makes fitted numbers unbelievable, and which measured ones a fit contradicts."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from bns.diagnose.estimate.fit import FreeParameter
+from bns.diagnose.estimate.plausibility import fitted_again, implausible
+from bns.physics.effect import Parameter
+from tests.diagnose.worlds import NOMINAL
+
+GAIN = Parameter("gain", "1", 0.1, 9.0, (0.5, 2.0), 1.0, "")
+
+
+def fit_of(value, low, high, model=None, effect="e", parameter=GAIN):
+    free = (FreeParameter(effect, parameter),)
+    return SimpleNamespace(free=free, values=[value], interval=lambda _: (low, high), model=model)
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "believed"),
+    [
+        (0.4, 0.3, 0.49, False),
+        (0.4, 0.3, 0.5, True),
+        (3.0, 2.0, 4.0, True),
+        (3.0, 2.01, 4.0, False),
+        (1.0, 0.2, 5.0, True),
+        (3.0, 2.01, float("inf"), True),
+    ],
+)
+def test_a_number_is_implausible_only_where_all_of_its_interval_is(value, low, high, believed):
+    why = f"gain = {value:g} is outside of the plausible range, 0.5 to 2"
+    assert implausible(fit_of(value, low, high), "e") == ("" if believed else why)
+
+
+def test_a_number_at_its_bound_is_implausible_where_bounds_count():
+    fit = fit_of(9.0, -float("inf"), float("inf"))
+    assert implausible(fit, "e") == "gain is at its bound, 9"
+    assert implausible(fit, "e", bounds=False) == ""
+    assert implausible(fit, "another") == ""
+
+
+@pytest.mark.parametrize(("low", "high", "said"), [(0.9, 1.1, True), (0.9, 1.3, False), (1.2, 1.3, False), (1.21, 1.3, True)])
+def test_a_measured_number_is_contradicted_by_an_interval_that_it_lies_outside_of(low, high, said):
+    given = NOMINAL.with_effect("speed-gain", "measured", "bench", gain=1.2)
+    now = NOMINAL.with_effect("speed-gain", gain=1.0)
+    parameter = replace(now.effects[-1].effect.parameters[0])
+    fit = fit_of(1.0, low, high, now, "speed-gain", parameter)
+    assert len(list(fitted_again(given, fit))) == 1
+    assert bool(list(fitted_again(given, fit, contradicted=True))) is said
