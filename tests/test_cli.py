@@ -1,6 +1,7 @@
 """The command line as a user meets it: what it prints, where it writes, how it ends."""
 
 import re
+from argparse import ArgumentTypeError
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,8 @@ import pytest
 
 import bns as package
 from bns.cli.main import main
-from bns.cli.options.option_types import duration
+from bns.cli.options.option_types import duration, interval
+from bns.cli.values import pose_of
 from bns.errors import BnsError
 from bns.robots.simulator import load_static_simulator
 from bns.sweep.expand.grid import load_sweep
@@ -225,3 +227,22 @@ def test_output_into_a_closed_pipe_is_no_fault(tmp_path, bns):
 
 def test_every_error_ends_with_2():
     assert BnsError.exit_code == 2
+
+
+def test_a_look_every_second_is_the_most_frequent():
+    assert interval("1s") == 1.0
+    with pytest.raises(ArgumentTypeError, match="look every 1s or less often"):
+        interval("0.9s")
+
+
+def test_a_pose_is_two_metres_and_degrees():
+    assert pose_of("1,-2,90") == pytest.approx((1.0, -2.0, np.pi / 2))
+
+
+def test_a_gpu_has_no_worker_processes_of_its_own(tmp_path, sweep_file, capsys):
+    asked = ["sweep", str(sweep_file), "--device", "cuda", "--results", str(tmp_path / "r")]
+    assert main([*asked, "--jobs", "2"]) == 2
+    assert "--device cuda is the GPU of this machine, and --jobs distributes runs over cores" in capsys.readouterr().err
+    assert main([*asked, "--executor", "joblib"]) == 2
+    assert "and --executor joblib distributes runs over cores" in capsys.readouterr().err
+    assert not (tmp_path / "r").exists()

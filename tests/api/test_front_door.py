@@ -6,6 +6,7 @@ import json
 import pickle
 import subprocess
 import sys
+from types import SimpleNamespace
 from typing import get_type_hints
 
 import matplotlib.pyplot as plt
@@ -17,7 +18,7 @@ from matplotlib.figure import Figure
 
 import bns
 from bns.api.common.shown import Shown
-from bns.api.run import Parameters
+from bns.api.run import Parameters, _first
 from bns.cli.main import main
 from bns.measurements import write_measurements
 from bns.physics.effects import all_effects
@@ -326,3 +327,30 @@ def test_the_command_line_prints_what_the_functions_give(command, log, found, re
     assert answer == json.loads(json.dumps(ours.to_json()))
     assert answer["provenance"]["bns_version"] == bns.__version__
     assert len(answer["provenance"]["model_sha256"]) == len(answer["provenance"]["data_sha256"]) == 64
+
+
+@pytest.mark.parametrize("noise", [{"noise_position_m": 0.002}, {"noise_heading_rad": 0.01}])
+def test_either_noise_of_a_pose_is_in_the_summary_of_a_model(noise):
+    plain = {"noise_position_m": 0.0, "noise_heading_rad": 0.0}
+    assert "noise of a pose" in bns.Model(wheelbase_m=0.2, **{**plain, **noise}).summary()
+    assert "noise of a pose" not in bns.Model(wheelbase_m=0.2, **plain).summary()
+
+
+def test_when_goals_were_first_reached_is_said_by_the_first_evaluation():
+    assert _first(np.array([False, True, True]), np.array([1, 2, 3])) == "first at evaluation 2, in 67% of the evaluations"
+    assert _first(np.array([False, False]), np.array([1, 2])) == "never"
+
+
+def test_a_sweep_whose_runs_failed_has_finished_and_its_progress_counts_them(tmp_path, monkeypatch):
+    told, counts = [], SimpleNamespace(total=4, done=2, failed=1, quarantined=1, remaining=0, stopped_by=None)
+
+    def carry_out(_described, request):
+        request.on_progress(SimpleNamespace(total=4, done=1, remaining=1))
+        return counts
+
+    monkeypatch.setattr("bns.api.sweep.load_executor", lambda _name: SimpleNamespace(carry_out=carry_out))
+    sweep = bns.Sweep("s", "khepera", fixed={"evaluations": 2}, seeds=4)
+    assert sweep.run(tmp_path, progress=lambda share, text: told.append((share, text))).finished
+    assert told == [(0.75, "1 of 4 runs")]
+    counts.remaining = 1
+    assert not sweep.run(tmp_path).finished

@@ -158,3 +158,18 @@ def test_what_cannot_be_left_out_is_said(log):
         log.without_rows(range(len(log.frame)))
     assert log.without_rows([]) is log
     assert log.cut({}) is log
+
+
+def test_a_cut_keeps_both_its_ends_and_what_was_left_out_before_stays_out(log):
+    name = str(log.trials["trial"].iloc[1])
+    rows, time_s = log.times_of(name)
+    cut = log.without_rows([rows[0], rows[4]]).cut({name: (time_s[3], time_s[8])})
+    assert np.flatnonzero(cut.frame["left_out"].iloc[rows].to_numpy() == 0).tolist() == [3, 5, 6, 7, 8]
+
+
+def test_a_piece_of_a_log_lasts_as_long_as_itself_without_what_goes_before():
+    t_s = np.arange(600) / 10
+    drive = pd.DataFrame({"t_s": t_s, "left_m_s": 0.1, "right_m_s": 0.1, "x_m": 0.1 * t_s, "y_m": 0.0, "heading_rad": 0.0})
+    log = bns.Measurements(split(drive, "lasting_s", 20.0))
+    assert (log.frame["run_up"] != 0).any()
+    assert log.trials["duration_s"].tolist() == pytest.approx([19.9, 39.9])  # too short a rest belongs to the piece before it

@@ -1,6 +1,8 @@
 """A robot does not outlive its supervisor, on any link; `python -m tests.hardware.outlive 20` measures."""
 
 import fcntl
+import itertools
+import json
 import os
 import re
 import shutil
@@ -14,19 +16,20 @@ from types import SimpleNamespace
 
 import pytest
 
-from bns.errors import HardwareError
+from bns.errors import HardwareError, TrialPausedError
 from bns.hardware.clock import RealClock
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.guard import client as guard_client
 from bns.hardware.guard import process as guard_process
 from bns.hardware.guard import signs
-from bns.hardware.guard.client import Guard, GuardedClock
+from bns.hardware.guard.client import Guard, GuardedClock, GuardedPlatform
 from bns.hardware.guard.order import StopOrder
 from bns.hardware.guard.recipe import bridge_recipe, bus_recipe, khepera_recipe
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.link.serial_link import NoReplyError, SerialLink
 from bns.hardware.servos.bridge import BridgeChain
 from bns.hardware.servos.dynamixel import DynamixelChain
+from bns.hardware.stop import Stop
 from bns.hardware.wheels.khepera import BAUD, KheperaIII
 
 from .. import outlive
@@ -394,3 +397,49 @@ def test_bytes_pass_unchanged(tmp_path):
         os.close(near)
         guard.close()
     assert heard == sent
+
+
+def test_what_a_guard_says_may_come_in_pieces_and_its_first_reason_stays():
+    guard, (near, far) = Guard.__new__(Guard), socket.socketpair()
+    guard._control, guard._said, guard._why = near, b"", None
+    with near, far:
+        for why in ("first", "second"):
+            line = json.dumps({"kind": "tripped", "why": why}).encode() + b"\n"
+            for piece in (line[:9], line[9:]):
+                far.send(piece)
+                said = guard.tripped()
+    assert said == "the guard stopped the robot: first"
+
+
+def test_a_long_sleep_gives_signs_of_life_all_along(monkeypatch):
+    now_s, beats = [0.0], []
+    ticking = SimpleNamespace(monotonic=lambda: now_s[0], sleep=lambda seconds: now_s.__setitem__(0, now_s[0] + seconds))
+    monkeypatch.setattr(guard_client, "time", ticking)
+    GuardedClock(SimpleNamespace(beat=lambda: beats.append(now_s[0]))).sleep(1.0)
+    assert now_s[0] == pytest.approx(1.0)
+    assert beats[-1] == now_s[0]
+    assert max(after - before for before, after in itertools.pairwise(beats)) < 0.1
+
+
+def guarded(told, check=lambda: None, **platform):
+    """A platform whose guard writes down what it is told."""
+    words = {name: lambda name=name: told.append(name) for name in ("arm", "still", "stop_now")}
+    stopping = SimpleNamespace(causes=[], alarms=[], check=check)
+    return GuardedPlatform(SimpleNamespace(**platform), SimpleNamespace(tripped=lambda: None, **words), stopping)
+
+
+@pytest.mark.parametrize(("confirmed", "said"), [(True, ["arm", "still"]), (False, ["arm"])])
+def test_a_robot_that_was_not_confirmed_to_stand_stays_guarded(confirmed, said):
+    told = []
+    assert guarded(told, stop=lambda: Stop(confirmed, 0.1, None)).stop().confirmed == confirmed
+    assert told == said
+
+
+def test_who_was_asked_to_stop_before_a_drive_does_not_begin_it():
+    def asked_to_stop():
+        raise TrialPausedError("interrupted")
+
+    told, driven = [], []
+    with pytest.raises(TrialPausedError, match="interrupted"):
+        guarded(told, asked_to_stop, drive=driven.append).drive(None)
+    assert (told, driven) == ([], [])

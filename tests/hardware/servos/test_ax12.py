@@ -452,3 +452,9 @@ def test_a_port_that_cannot_even_be_closed_is_opened_anew(chain, monkeypatch):
 def test_the_table_does_not_overlap():
     taken = [r.address + i for r in REGISTERS.values() for i in range(r.size)]
     assert len(taken) == len(set(taken))
+
+
+def test_a_speed_has_no_sign(chain):
+    driver, bus, _ = chain()
+    driver.move([-0.1] * 3, [-1.0] * 3)
+    assert {s.get("moving_speed") for s in bus.servos} == {86}

@@ -2,6 +2,7 @@
 
 import itertools
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
@@ -15,7 +16,19 @@ from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Fault, Faults
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.servos.bridge import BAUD, BridgeChain
-from bns.hardware.servos.bridge_frames import SERVO, STARTED_S, WATCHDOG_S, Frame, crc16, decoded, encoded, searched
+from bns.hardware.servos.bridge_frames import (
+    ANSWER,
+    GOAL,
+    SERVO,
+    STARTED_S,
+    STATE,
+    WATCHDOG_S,
+    Frame,
+    crc16,
+    decoded,
+    encoded,
+    searched,
+)
 from bns.hardware.servos.servo_chain import ServoError, ServoLimits
 
 
@@ -209,3 +222,30 @@ def test_a_load_is_a_share_of_the_largest_torque_with_its_sign(bridge, register,
 def test_driver_and_sketch_talk_at_the_same_speed():
     sketch = (Path(hardware.__file__).parent / "bridge_sketch" / "bridge_sketch.ino").read_text()
     assert f"Serial.begin({BAUD});" in sketch
+
+
+def test_a_speed_of_nothing_is_sent_as_the_slowest_and_not_as_full_speed(bridge):
+    driver, _ = bridge()
+    sent = []
+    driver._ask = lambda _kind, payload, _size: sent.append(payload) or payload
+    driver.move([0.0] * 3, [0.0, -1.0, 1000.0])
+    assert [steps for _, steps in GOAL.iter_unpack(sent[0])] == [1, 86, 1023]
+
+
+@pytest.mark.parametrize(("celsius", "decivolts", "said"), [(66, 120, "servo 2 is at 66 °C"), (30, 89, r"servo 2 has 8\.9 V")])
+def test_a_servo_behind_the_bridge_must_keep_its_limits(bridge, celsius, decivolts, said):
+    driver, _ = bridge()
+    good = SERVO.pack(512, 0, 30, 120, 0)
+    driver._state = lambda: good + SERVO.pack(512, 0, celsius, decivolts, 0) + good
+    with pytest.raises(ServoError, match=said):
+        driver.health()
+
+
+def test_an_answer_to_an_older_question_is_passed_over(bridge):
+    driver, _ = bridge()
+    driver.close()
+    old, new = (SERVO.pack(place, 0, 30, 120, 0) * 3 for place in (100, 512))
+    came = b"".join(encoded(Frame(STATE | ANSWER, driver._sequence + n, data)) for n, data in enumerate((old, new)))
+    quiet = {"reset_input_buffer": lambda: None, "write": len, "close": lambda: None}
+    driver._serial = SimpleNamespace(in_waiting=len(came), read=lambda _count: came, **quiet)
+    assert [one.position_rad for one in driver.health().values()] == [0.0] * 3

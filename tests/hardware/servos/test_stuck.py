@@ -145,3 +145,30 @@ def test_a_stuck_servo_ends_the_drive_and_other_faults_and_a_body_that_cannot_li
         driven(monkeypatch, stuck, straightening=True)
     with pytest.raises(TrialPausedError, match="servos failed: servo 2 is at 70"):
         driven(monkeypatch, ServoError("servo 2 is at 70"))
+
+
+def test_a_heading_a_turn_further_is_the_same_heading(driver):
+    hands, platform = Hands(), drives("")
+    platform.pose = lambda: np.array([0.0, 0.0, 2.0 * np.pi - 0.01])
+    driver(platform, hands).evaluate(1, CYCLES)
+    assert hands.placed == []
+
+
+def test_a_robot_is_put_back_once_after_a_drive_without_a_result(driver):
+    hands, platform = Hands(), drives("")
+    real, left = platform.drive, [2]
+
+    def drive(commands):
+        done = real(commands) if not left[0] else Driven(commands[:0], np.zeros((1, 9)), [], Stop(True, 0.1, 0.1, ""), "no")
+        left[0] = max(0, left[0] - 1)
+        return done
+
+    platform.drive = drive
+    driver(platform, hands).evaluate(1, CYCLES)
+    assert hands.placed == ["The drive gave no result"] * 2
+
+
+def test_a_live_view_shows_the_last_stop_in_milliseconds(driver):
+    on = driver(drives("", ""), Hands())
+    on.stops_s = [0.5, 0.07]
+    assert on.live_text()["last stop"] == "70 ms"

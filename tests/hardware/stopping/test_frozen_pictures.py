@@ -311,3 +311,27 @@ def test_a_camera_that_repeats_itself_is_looked_at_more_often(drive, clock, monk
     with pytest.raises(TrialPausedError, match="same picture"):
         on._go_to(np.tile([0.0, -0.2], 6), 0.4, 0.4)
     assert sum(seconds < 0.05 for seconds in slept) > 3
+
+
+class Clipped(Chain):
+    """Servos whose angle limits are too narrow on one side."""
+
+    def move(self, angles_rad, speeds):
+        return np.minimum(super().move(angles_rad, speeds), 0.3)
+
+
+def test_a_joint_that_a_servo_keeps_from_its_angle_pauses_the_drive_and_is_named(drive):
+    on = drive([], chain=Clipped)
+    on.straighten()
+    with pytest.raises(TrialPausedError, match=r"joint \d+ should go to \d\d°, but the command was clipped to 17°"):
+        on.carry_out(WIDE)
+
+
+def test_whether_a_cycle_was_stable_is_said_of_the_rows_after_its_command(drive):
+    on = drive([])
+    on.straighten()
+    on.carry_out(GENTLE)
+    start, *after = [row["stable"] for row in on.rows]
+    assert np.isnan(start)
+    assert len(after) > 2
+    assert set(after) == {1.0}

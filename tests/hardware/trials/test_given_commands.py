@@ -4,6 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bns.errors import HardwareError
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.link.hardware_log import HardwareLog
+from bns.robots import load_robot
+from bns.trial.experiment import _driven_before, read_commands
+
 from .calls import call, faults
 
 
@@ -95,3 +101,37 @@ def test_bad_commands_are_named_before_anything_moves(tmp_path, capsys, text, me
     assert call(*asked) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "trials").exists()
+
+
+NAMES, STARTS = "trial,left_m_s,right_m_s,duration_s", "start_x_m,start_y_m,start_heading_rad"
+
+
+def test_a_trial_starts_where_its_first_line_says(tmp_path):
+    file = tmp_path / "two.csv"
+    file.write_text(f"{NAMES},{STARTS}\n1,0.1,0.1,1,0.2,0.1,0\n1,0.1,0.1,1,-0.5,-0.5,1\n2,0.1,0.1,1,0.3,0,0\n")
+    trials = read_commands(file, load_robot("khepera"))
+    assert [len(commands) for commands, _ in trials] == [2, 1]
+    np.testing.assert_array_equal([start for _, start in trials], [[0.2, 0.1, 0.0], [0.3, 0.0, 0.0]])
+
+
+def test_a_line_without_a_start_is_named_by_its_number_in_the_file(tmp_path):
+    file = tmp_path / "gap.csv"
+    file.write_text(f"{NAMES},{STARTS}\n1,0.1,0.1,1,0,0,0\n2,0.1,0.1,1,,0,0\n")
+    with pytest.raises(HardwareError, match=r"^line 3 of .* has no number for each of start_x_m"):
+        read_commands(file, load_robot("khepera"))
+
+
+def test_commands_may_be_as_large_as_the_robot_s_limits(tmp_path):
+    robot, file = load_robot("khepera"), tmp_path / "limits.csv"
+    rows = [[trial, *(limit[side] for limit in robot.given_columns.values())] for trial, side in ((1, 0), (2, 1))]
+    pd.DataFrame(rows, columns=["trial", *robot.given_columns]).to_csv(file, index=False)
+    assert len(read_commands(file, robot)) == 2
+
+
+def test_an_experiment_that_is_complete_is_resumed_with_nothing_left_to_drive(tmp_path):
+    journal, commands = tmp_path / "journal.jsonl", np.array([[12000.0, 9000.0, 900.0]], np.float32)
+    with HardwareLog(journal, EmulatedClock(np.inf)) as log:
+        log.note("driven", evaluation=1, picked=commands.tolist(), commands=commands.tolist(), poses=np.zeros((2, 3)).tolist())
+    assert _driven_before(journal, [commands], resume=True) == 1
+    with pytest.raises(HardwareError, match="drove other commands than the file holds now"):
+        _driven_before(journal, [], resume=True)

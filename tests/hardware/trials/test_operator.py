@@ -242,3 +242,25 @@ def test_discarded_drives_feed_no_diagnosis(tmp_path):
     given["discarded"] = 1
     with pytest.raises(DataError, match="All drives are marked as discarded"):
         bns.Measurements(given)
+
+
+def test_rounds_belong_to_the_drive_that_they_were_noted_with(trial):
+    on = trial([])
+    for _ in range(2):
+        on.log.note("driven", evaluation=1, picked=COMMANDS.tolist(), commands=COMMANDS.tolist(), poses=np.zeros((3, 3)).tolist())
+        on.log.sync()
+        assert past_evaluations(on.journal)[0].rounds is None
+        on.log.note("evaluated", evaluation=1, rounds=7)
+        on.log.sync()
+        assert past_evaluations(on.journal)[0].rounds == 7
+
+
+def test_a_cycle_that_was_called_unstable_marks_the_rows_that_it_led_to(trial):
+    on = trial([])
+    rows = [{"t_s": float(n), "cycle": cycle, "stable": 1.0} for n, cycle in enumerate((1.0, 1.0, 2.0, 2.0, None))]
+    on.log.note("driven", evaluation=1, rows=rows, session_s=3.0, readings={})
+    on.log.note("marked", evaluation=1, unstable=[2])
+    on.log.sync()
+    table = measured(on.journal)
+    assert table["stable"].tolist() == [1.0, 1.0, 1.0, 0.0, 0.0]
+    assert table["session_s"].tolist() == [3.0, 4.0, 5.0, 6.0, 7.0]

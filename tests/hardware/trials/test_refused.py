@@ -2,11 +2,17 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import pytest
 import yaml
 
+from bns.hardware.clock import EmulatedClock
+from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.rig import parse_rig
+from bns.spec import RunSpec
+from bns.trial.again.replay import replayed
+from bns.trial.folder import spec_event
 
 from .. import soak
 from .calls import TRIAL, call, journal_of
@@ -129,3 +135,20 @@ def test_an_edited_journal_is_refused(tmp_path, capsys):
     said = capsys.readouterr().err
     assert "were written before lines had checksums" in said
     assert "drove another controller than this bns picks" in said
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"), [(False, "the trial did not come to its end"), (True, "stored in sweep trials-replayed")]
+)
+def test_a_journal_of_a_trial_that_was_cut_short_is_said_to_be_so(tmp_path, monkeypatch, ends, said):
+    evals = {"evaluated_fitness_world": [0.5], "evaluated_goals_reached": [1]}
+    monkeypatch.setattr("bns.trial.again.replay.run", lambda *_: SimpleNamespace(tables={"evals": evals}))
+    monkeypatch.setattr("bns.trial.again.replay.keep_run", lambda *_: None)
+    journal = tmp_path / "journal.jsonl"
+    with HardwareLog(journal, EmulatedClock(1.0)) as log:
+        log.note("trial", spec=spec_event(RunSpec(world="robot")))
+        log.note("driven", evaluation=1, picked=[[1, 1, 1]], commands=[[1, 1, 1]], poses=[[0, 0, 0], [0, 0, 0]])
+        log.note("evaluated", evaluation=1, rounds=1)
+        if ends:
+            log.note("complete", evaluations=1)
+    assert replayed(journal, tmp_path).text.endswith(said)
