@@ -1,6 +1,7 @@
 """Data walks one way: no module imports one of a higher floor. Read from the source, so that lazy imports count too."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -131,6 +132,14 @@ def test_no_module_of_a_robot_is_known_to_the_engine_or_the_loop():
     for module in modules():
         if room_of(module) in {"engine", "tasks", "bootstrap", "store", "sweep", "cli"}:
             assert "robots.khepera" not in (PACKAGE / module).read_text(), module
+
+
+def test_no_text_holds_both_sides_of_a_merge():
+    marked = re.compile(r"^(<{7} |>{7} |={7}$)", re.M)
+    texts = [f for folder in ("bns", "analysis", "sweeps", "tests", "docs") for f in (PACKAGE.parent / folder).rglob("*.*")]
+    texts = [f for f in texts if f.suffix in {".py", ".md", ".yaml", ".css", ".js", ".ino"}]
+    assert len(texts) > 500
+    assert [str(f) for f in texts if marked.search(f.read_text(errors="replace"))] == []
 
 
 def test_the_package_does_not_import_its_tests():

@@ -188,15 +188,10 @@ class Sweep(Shown):
             shard: (k, n): only the k-th (from 1) of n parts.
             budget_s: stop after this time, s.
             until: "ranking": stop when the ten best combinations of each task are known; ``.ranking`` holds them.
-<<<<<<< HEAD
-            retry_failed: repeat failed and quarantined runs.
-            progress: called with the fraction done and a text.
-=======
             confidence: with ``until``: that they are those of the whole sweep, for each task (default 0.95; 1: for certain).
             within: with ``until``: what is left out may be better than the last of them by less than this (default 0).
-            retry_failed: do failed and quarantined runs again.
-            progress: told the share that is done.
->>>>>>> trust2
+            retry_failed: repeat failed and quarantined runs.
+            progress: called with the fraction done and a text.
 
         Raises:
             StoreError: the results cannot be written, or another process writes this sweep.
