@@ -24,7 +24,7 @@ from bns.errors import BnsError, SpecError
 from bns.plotting.style import rendered
 from bns.registry import FIGURES
 
-_WAITING = 8
+_WAITING = 64
 """Figures that may be drawn and not yet written: each holds its points in memory."""
 
 
@@ -122,14 +122,19 @@ class _Drawing:
                 while len(self._waiting) > _WAITING or (self._waiting and _is_ready(self._waiting[0][3])):
                     self._publish_next()
         except NoDataError as reason:
-            self.publish_all()
+            self._publish_of(name)
             print(f"{name} ({module.PAPER}) skipped: {reason}")
             self._skip(name, module.PAPER, str(reason))
         except BnsError:
             raise
         except Exception as fault:
-            self.publish_all()
+            self._publish_of(name)
             self._note_failure(name, module.PAPER, fault)
+
+    def _publish_of(self, name: str) -> None:
+        """All that waits, where something of this script does: what is said of the script comes after its figures."""
+        if any(name == waiting[0] for waiting in self._waiting):
+            self.publish_all()
 
     def publish_all(self) -> None:
         """Whatever is drawn and not yet written."""
