@@ -48,8 +48,8 @@ class CompareResult(Shown):
 
     @property
     def errors(self) -> pd.DataFrame:
-        """One row per horizon: position_m, forward_m, left_m (m), heading_rad (rad), root mean square; position_se_m; windows
-        many), noise_floor_m (what tracking noise alone would show; NaN where the poses cannot tell)."""
+        """One row per horizon: position_m, forward_m, left_m (m), heading_rad (rad), root mean square; position_se_m (NaN for
+        one trial); windows (how many), noise_floor_m (what tracking noise alone would show; NaN where the poses cannot tell)."""
         table = pd.DataFrame(self.comparison.errors).T
         table["noise_floor_m"] = pd.Series({h: self.comparison.noise_floor_m(h) for h in self.comparison.errors})
         return table.rename_axis("horizon")

@@ -76,7 +76,7 @@ class Comparison:
             "model": self.model,
             "trials": self.trials,
             "frames": self.frames,
-            "error": {h: {**e, **self._judged_json(h)} for h, e in self.errors.items()},
+            "error": {h: {k: _plain(v) for k, v in e.items()} | self._judged_json(h) for h, e in self.errors.items()},
             "tracking_noise": noise_json(self.judged),
             "residual_dependence": [
                 {
@@ -99,6 +99,10 @@ class Comparison:
     def noise_floor_m(self, horizon: str) -> float:
         """Position error of tracking noise alone; NaN where the tracks cannot tell."""
         return self.judged.horizons[horizon].noise_floor_m
+
+
+def _plain(value: float) -> float | None:
+    return value if isinstance(value, int) else plain(value)  # a count stays one
 
 
 @one_thread_each()

@@ -1,5 +1,7 @@
 """Data that are odd are named, with trial and row; data that would mislead are refused."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -152,7 +154,11 @@ def test_dates_are_no_numbers_in_a_unit(table, unit):
 
 def test_one_trial_has_no_standard_error_and_holds_nothing_out(table):
     alone = table[table.trial == table.trial.iloc[0]]
-    assert compare(alone, NOMINAL_MODEL).errors.position_se_m.isna().all()
+    compared = compare(alone, NOMINAL_MODEL)
+    assert compared.errors.position_se_m.isna().all()
+    plain = json.loads(json.dumps(compared.to_json(), allow_nan=False))["error"]
+    assert {of["position_se_m"] for of in plain.values()} == {None}
+    assert plain["trial"]["windows"] == 1
     assert compare(table, NOMINAL_MODEL).errors.position_se_m.gt(0).all()
     added = add(alone, "motor-lag", NOMINAL_MODEL)
     assert "position error on the one trial, to which the numbers were fitted (none is held out)" in added.summary()

@@ -61,7 +61,8 @@ def smoothing_tracker(problem: Problem, fit: Fit) -> SmoothingTracker | None:
         return None
     bare = fit.model.without(LAG)
     imitated = tuple(name for name in own if name in CURVES)
-    found = [((LAG, *names), *_best(problem, predictor, reduce(Model.without, names, bare), lag_s)) for names in {(), imitated}]
+    tried = [(), imitated] if imitated else [()]
+    found = [((LAG, *names), *_best(problem, predictor, reduce(Model.without, names, bare), lag_s)) for names in tried]
     instead_of, tau_s, losses = min(found, key=lambda one: float(one[2].sum()))
     gain, se = paired_elpd_diff(fit.losses, losses)
     return SmoothingTracker(tau_s, gain / se if se > 0 else 0.0, instead_of)
