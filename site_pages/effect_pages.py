@@ -150,7 +150,8 @@ def _bench(effect: Effect) -> str:
             "from its look-alikes, then run `bns diagnose` on the old and the new log together (`--more`)."
         )
     columns = " or ".join(f"`{name}`" for name in effect.explained_by)
-    return text + (f"\n\nLog the column {columns}. {_sentence(effect.caveat)}" if columns else "")
+    text += f"\n\nLog the column {columns}. {_sentence(effect.caveat)}" if columns else ""
+    return text + (f"\n\n{_sentence(effect.assumes)}" if effect.assumes else "")
 
 
 def _sentence(text: str, begin: bool = True) -> str:

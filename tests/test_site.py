@@ -189,7 +189,7 @@ def test_effects_are_described_in_plain_english():
     jointed = [getattr(part, "effect", part) for part in map(JOINT_EFFECTS.load, JOINT_EFFECTS.names())]
     for effect in (*all_effects().values(), *jointed):
         said = (effect.sentence, effect.sized, effect.residuals, effect.measurement, effect.caveat, effect.equation)
-        for text in (*said, effect.or_of_robot, *effect.beside.values(), *(p.text for p in effect.parameters)):
+        for text in (*said, effect.assumes, effect.or_of_robot, *effect.beside.values(), *(p.text for p in effect.parameters)):
             assert not PRIVATE.search(text), f"{effect.name}: {text}"
         assert all(p.text.strip() and p.unit for p in effect.parameters), effect.name
 

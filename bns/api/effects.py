@@ -54,6 +54,7 @@ def described(name: str) -> list[dict[str, str]]:
             "measurement": effect.measurement,
             "told_apart": " ".join(effect.beside.values()),
             "or_of_robot": effect.or_of_robot,
+            "assumes": effect.assumes,
             "extends": ", ".join(name for name in (effect.extends, *effect.contains) if name),
         }
         for of, effect in found

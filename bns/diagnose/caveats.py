@@ -198,9 +198,10 @@ def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[
             yield f"{begun}, or else one of the model of the robot: {also}." if also else f"{begun}, not of the robot."
     chain = sorted((known[name] for name in names), key=lambda effect: (effect.place, effect.name))
     logged = {*tracks.extra, *(("session_s",) if tracks.start_known else ())}
+    yield from (effect.caveat for effect in chain if effect.caveat and not logged.intersection(effect.explained_by))
     # what an effect takes for granted may be why it seems to imitate something
     assuming = [*chain, *(known[name] for name in imitating if name in known)]
-    yield from (effect.caveat for effect in assuming if effect.caveat and not logged.intersection(effect.explained_by))
+    yield from (effect.assumes for effect in assuming if effect.assumes)
     tracker = smoothing_tracker(selection.problem, selection.fit) if LAG in names else None
     if tracker is not None and tracker.in_words:
         yield tracker.in_words

@@ -142,6 +142,8 @@ class Effect:
     """Columns of measurements; one of them should be logged if a verdict names the effect."""
     caveat: str = ""
     """The warning that is given if none of them was logged."""
+    assumes: str = ""
+    """What it takes for granted of a log that no column could tell, and what its numbers are where that does not hold."""
     after: str = OTHERS
     """Its place in the order of effects, unless `bns.physics.order.ORDER` lists it: right after this entry."""
     starts: tuple[tuple[float, ...], ...] = ()

@@ -17,7 +17,7 @@ def test_a_number_at_its_bound_that_changes_nothing_there_is_not_said_to_ask_for
     effect = effect_named("dead-zone")
     number = effect.parameters[0]
     assert number.low == number.neutral
-    errors = SimpleNamespace(horizons={"1s": SimpleNamespace(models=())})
+    errors = SimpleNamespace(trials=12, horizons={"1s": SimpleNamespace(models=())})
 
     def said(value):
         fit = SimpleNamespace(

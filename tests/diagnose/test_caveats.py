@@ -165,6 +165,16 @@ def test_an_offset_of_the_marker_may_be_the_robots():
     assert marker.startswith("marker-offset is an error of the measurement, or else one of the model of the robot: ")
 
 
+@pytest.mark.parametrize("imitating", [(), ("backlash",)])
+def test_what_an_effect_takes_for_granted_is_said_also_where_it_seems_to_imitate(imitating):
+    model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
+    accepted = () if imitating else ("backlash",)
+    selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), fit=SimpleNamespace(model=model))
+    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
+    notes = list(_on_effects(selection, tracks, imitating))
+    assert sum("the gears are assumed to touch in the forward direction" in note for note in notes) == 1
+
+
 @pytest.mark.parametrize(("rate", "scatter_s", "said"), [(1e-4, 5e-3, True), (0.0, 5e-3, False), (1e-4, 0.5, False)])
 def test_clocks_that_move_along_the_session_are_said_to(monkeypatch, rate, scatter_s, said):
     monkeypatch.setattr("bns.diagnose.caveats.known_effects", lambda _: {})

@@ -155,12 +155,20 @@ def test_honest_robots_leave_nothing(seed):
             "wheels", "-k * min(u, 0)", 0.1, "speed of each wheel", r"a wheel's .* -0\.199 m/s gives -0\.179 m/s \(-10\.\d%\)",
             marks=pytest.mark.slow,
         ),
-        ("left", "-k * u * max(u, 0)", 1.5, "speed of the left wheel, forwards and backwards",
-         r"the left .* 0\.199 m/s gives 0\.1[34]\d* m/s \(-\d\d\.\d%\), -0\.199 m/s gives -0\.(199|2)\d* m/s \(.*%\)"),
-        ("w", "-k * abs(v) * sin(heading - 1)", 0.5, "heading, in proportion to the speed",
-         r"turning velocity at 0\.\d+ m/s depends on heading: \+\S+ °/s at a heading of -3\d°, -\S+ °/s at a heading of 14\d°"),
-        ("right", "-k * max(fresh, 0)", 0.5, "changes of speed of the right wheel",
-         r"just after a change of the right wheel's speed, \d\d% of it is missing, .*"),
+        pytest.param(
+            "left", "-k * u * max(u, 0)", 1.5, "speed of the left wheel, forwards and backwards",
+            r"the left .* 0\.199 m/s gives 0\.1[34]\d* m/s \(-\d\d\.\d%\), -0\.199 m/s gives -0\.(199|2)\d* m/s \(.*%\)",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "w", "-k * abs(v) * sin(heading - 1)", 0.5, "heading, in proportion to the speed",
+            r"turning velocity at 0\.\d+ m/s depends on heading: \+\S+ °/s at a heading of -3\d°, -\S+ °/s at a heading of 14\d°",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "right", "-k * max(fresh, 0)", 0.5, "changes of speed of the right wheel",
+            r"just after a change of the right wheel's speed, \d\d% of it is missing, .*", marks=pytest.mark.slow,
+        ),
         ("v", "-k * abs(v) * cos(heading)", 0.06, "direction of travel",
          r"slower by [56]\.\d+% when it travels towards -?[0-5]°, faster by [56]\.\d+% .* -?1[78]\d°"),
         pytest.param(

@@ -124,7 +124,7 @@ def test_a_bare_number_at_its_bound_has_no_unit():
         values=np.array([0.3, ratio.high]),
         interval=lambda index: (0.2, 0.4) if index == 0 else (10.0, 50.0),
     )
-    errors = SimpleNamespace(horizons={"1s": SimpleNamespace(models=())})
+    errors = SimpleNamespace(trials=12, horizons={"1s": SimpleNamespace(models=())})
     said = list(warnings_on(fit, [(effect_named("force-limit"), {})], errors))
     assert any(one.startswith("force-limit: turn_ratio is at its bound, 50: the data require") for one in said)
 

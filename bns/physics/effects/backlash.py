@@ -31,7 +31,7 @@ EFFECT = Effect(
     sentence="play in the gears stops a wheel briefly whenever it changes direction",
     sized="play in the gears stops a wheel for {gap_m} of its distance whenever it changes direction",
     measurement="hold the motor still, turn the wheel by hand, and measure the play at its rim",
-    caveat="backlash: the gears are assumed to touch in the forward direction when a trial begins. If the robot drove backwards "
+    assumes="backlash: the gears are assumed to touch in the forward direction when a trial begins. If the robot drove backwards "
     "or was pushed before, the gap is estimated too small: let it drive forward a little before each trial.",
     apply=apply,
     needs="track",
