@@ -77,8 +77,8 @@ def test_what_is_driven_next_lies_far_from_every_drive_and_not_only_from_one():
 def test_a_drive_that_was_cut_short_is_kept_as_the_behaviour_of_all_its_commands():
     approach = started()
     commands = ROBOT.random_controllers(KEY, 1, 6).controller(0)
-    foretold = SIMULATOR.poses(commands)
-    measured = foretold[:3] + np.array([0.03, 0.04, 0.0])
+    predicted = SIMULATOR.poses(commands)
+    measured = predicted[:3] + np.array([0.03, 0.04, 0.0])
     approach.learn(commands, measured, 1)
-    np.testing.assert_allclose(approach.archive.behaviours, behaviours(foretold[None], np.array([6])))
+    np.testing.assert_allclose(approach.archive.behaviours, behaviours(predicted[None], np.array([6])))
     assert approach.archive.gaps == pytest.approx([0.05])

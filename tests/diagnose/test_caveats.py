@@ -22,6 +22,7 @@ from bns.diagnose.caveats import (
 )
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.estimate.smoothing_tracker import SmoothingTracker
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, ModelError, PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence
@@ -173,6 +174,17 @@ def test_what_an_effect_takes_for_granted_is_said_also_where_it_seems_to_imitate
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
     notes = list(_on_effects(selection, tracks, imitating))
     assert sum("the gears are assumed to touch in the forward direction" in note for note in notes) == 1
+
+
+@pytest.mark.parametrize(("accepted", "said"), [(("motor-lag",), 1), (("speed-gain",), 0)])
+def test_a_lag_is_said_to_be_perhaps_the_trackers(monkeypatch, accepted, said):
+    found = SmoothingTracker(tau_s=0.1, z=5.0)
+    monkeypatch.setattr("bns.diagnose.caveats.smoothing_tracker", lambda problem, fit: found)
+    model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
+    fit = SimpleNamespace(model=model)
+    selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), problem=None, fit=fit)
+    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
+    assert sum(note == found.in_words for note in _on_effects(selection, tracks)) == said
 
 
 @pytest.mark.parametrize(("rate", "scatter_s", "said"), [(1e-4, 5e-3, True), (0.0, 5e-3, False), (1e-4, 0.5, False)])

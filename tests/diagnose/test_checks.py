@@ -152,6 +152,15 @@ def test_dates_are_no_numbers_in_a_unit(table, unit):
         Measurements(dates, mapping=rules)
 
 
+def test_noise_of_a_robot_that_never_stands_is_called_a_lower_bound(table):
+    rest = measured(NOMINAL, trials=1).assign(left_m_s=0.0, right_m_s=0.0, trial="rest")
+    rest[["x_m", "y_m", "heading_rad"]] = np.random.default_rng(0).normal(0, 1e-3, (len(rest), 3))
+    standing = pd.concat([table, rest], ignore_index=True)
+    for log, said in ((table, True), (standing, False)):
+        assert (", at least; the scatter of the drive" in compare(log, NOMINAL_MODEL).summary()) == said
+        assert ("alone causes; at least " in add(log, "motor-lag", NOMINAL_MODEL).summary()) == said
+
+
 def test_one_trial_has_no_standard_error_and_holds_nothing_out(table):
     alone = table[table.trial == table.trial.iloc[0]]
     compared = compare(alone, NOMINAL_MODEL)

@@ -43,11 +43,13 @@ def first_order(values, tau_s, begin=0.0):
     return lfilter(b, a, values, zi=lfilter_zi(b, a) * (begin + np.zeros((len(values), 1))))[0]
 
 
-def alternative(table):
+def alternative(table, *beside):
     predictor = WheelPredictor(tracks_of(table))
     model = Model(wheelbase_m=BASE_M)
     problem = problem_for(predictor, model)
     fit = fit_with(problem, problem.fit(model), effect_named(LAG))
+    for name in beside:
+        fit = fit_with(problem, fit, effect_named(name))
     problem = problem_for(predictor, fit.model)
     fit = problem.fit(fit.model)
     assert fit.model.values_of(LAG)["tau_s"] == pytest.approx(TAU_S, rel=0.1)
@@ -78,6 +80,12 @@ def test_effects_that_do_what_a_filter_does_in_curves_are_named_with_the_lag():
     of_three = SmoothingTracker(0.15, 1.0, (LAG, "turn-slip-quadratic", "clock-offset"))
     said = "motor-lag and turn-slip-quadratic and clock-offset: a tracker .* of 150 ms\\) fits this log as well as these effects"
     assert re.match(said, of_three.in_words)
+
+
+def test_what_stands_beside_the_lag_for_curves_goes_with_it():
+    found = alternative(log(tracker_s=TAU_S), "turn-slip-quadratic")
+    assert found.instead_of == (LAG, "turn-slip-quadratic")
+    assert found.tau_s == pytest.approx(TAU_S, rel=0.03)
 
 
 def test_a_model_without_a_lag_has_no_alternative():

@@ -23,6 +23,7 @@ DRIFTS = DEFAULTS.data.drift_at_rest
 WIDTH = DEFAULTS.data.parabola_frames
 ORDER = DEFAULTS.data.parabola_order
 SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
+_DRIVING = "high frequency"
 _NORMAL = 0.6745
 """Median of a standard normal number's size."""
 
@@ -35,6 +36,11 @@ class TrackingNoise:
     position_m: float
     heading_rad: float
     basis: str
+
+    @property
+    def is_lower_bound(self) -> bool:
+        """Errors that consecutive poses share are not seen while the robot drives."""
+        return self.basis == _DRIVING
 
     def error_m(self, distance_m: Array) -> float:
         """Root mean square position error of a perfect model, from noise at both ends of windows.
@@ -105,7 +111,7 @@ def _high_frequency(tracks: Tracks) -> TrackingNoise | None:
         parts.append((windows @ middle)[one & ~repeats] / spare)
     if sum(map(len, parts)) < FEWEST_AT_REST:
         return None
-    return _pooled(parts, "high frequency")
+    return _pooled(parts, _DRIVING)
 
 
 def _residual_maker(width: int, order: int) -> Array:

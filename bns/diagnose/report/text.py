@@ -207,7 +207,7 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
     else:
         pose_mm, basis = 1e3 * errors.noise.position_m, errors.noise.basis
         of = {"at rest": "poses at rest", "high frequency": "poses at high frequency"}.get(basis, basis)
-        least = "at least " if basis == "high frequency" else ""
+        least = "at least " if errors.noise.is_lower_bound else ""
         yield f"  (noise: error that the tracking alone causes; {least}{pose_mm:.2f} mm per pose, estimated from {of})"
 
 
@@ -256,7 +256,8 @@ def _comparison(c: Comparison) -> Iterator[str]:
                 f"  {horizon:10}{1e3 * e['position_m']:8.2f}{scatter}{1e3 * e['forward_m']:10.2f}"
                 f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{noise}{e['windows']:9.0f}"
             )
-    yield "  (noise: error that tracking noise alone would cause; the scatter of the drive is not included)"
+    least = ", at least" if c.judged.noise is not None and c.judged.noise.is_lower_bound else ""
+    yield f"  (noise: error that tracking noise alone would cause{least}; the scatter of the drive is not included)"
     if c.hint:
         yield f"  {c.hint}"
     yield "\nwhere it fails: fraction of the loss that a free curve along each variable would remove, on held-out trials:"

@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -258,21 +259,27 @@ def test_a_process_that_is_stopped_between_two_clocks_takes_that_for_no_sleep(mo
     assert signs.slept_s() == slept
 
 
+@contextmanager
+def armed_guard(tmp_path):
+    """In this process, told to watch over it; nothing is at its port."""
+    near, far = socket.socketpair()
+    with near, far:
+        setup = {"process": os.getpid(), "silent_s": HANGS_S, "log": None, "link": str(tmp_path / "x" / "y")}
+        setup |= {"port": "none", "sysfs": "/sys", "identity": None, "gives_up_s": HANGS_S}
+        guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far)
+        near.send(b"a")
+        guard._turn(1.0)
+        yield guard
+
+
 def test_a_computer_that_slept_stops_the_robot_when_it_wakes(tmp_path, monkeypatch):
     slept = iter([0.0, 0.0, 0.05, 31.0, 31.0])
     monkeypatch.setattr(guard_process, "slept_s", lambda: next(slept))
-    near, far = socket.socketpair()
-    setup = {"process": os.getpid(), "silent_s": HANGS_S, "log": None, "link": str(tmp_path / "x" / "y")}
-    setup |= {"port": "none", "sysfs": "/sys", "identity": None, "gives_up_s": HANGS_S}
-    guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far)
-    near.send(b"a")
-    guard._turn(1.0)
-    for why in ("", "", "the computer slept for 30.9 s"):  # the clocks differ by a little at all times
-        guard._judge()
-        assert guard.why.startswith(why[:25])
-    assert guard.why.startswith("the computer slept for 3")
-    near.close()
-    far.close()
+    with armed_guard(tmp_path) as guard:
+        for why in ("", "", "the computer slept for 30.9 s"):  # the clocks differ by a little at all times
+            guard._judge()
+            assert guard.why.startswith(why[:25])
+        assert guard.why.startswith("the computer slept for 3")
 
 
 def test_a_computer_that_sleeps_while_its_guard_looks_at_the_trial_is_said_to_have_slept(tmp_path, monkeypatch):
@@ -284,17 +291,10 @@ def test_a_computer_that_sleeps_while_its_guard_looks_at_the_trial_is_said_to_ha
         return True
 
     monkeypatch.setattr(guard_process, "slept_s", lambda: clock["slept_s"])
-    near, far = socket.socketpair()
-    setup = {"process": os.getpid(), "silent_s": HANGS_S, "log": None, "link": str(tmp_path / "x" / "y")}
-    setup |= {"port": "none", "sysfs": "/sys", "identity": None, "gives_up_s": HANGS_S}
-    guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far)
-    near.send(b"a")
-    guard._turn(1.0)
-    monkeypatch.setattr(guard_process, "frozen", sleeps)
-    guard._judge()
-    assert guard.why == "the computer slept for 31.0 s"
-    near.close()
-    far.close()
+    with armed_guard(tmp_path) as guard:
+        monkeypatch.setattr(guard_process, "frozen", sleeps)
+        guard._judge()
+        assert guard.why == "the computer slept for 31.0 s"
 
 
 

@@ -14,6 +14,8 @@ from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.servos.packets import BROADCAST, WIRES
 from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits, StrainWatch
 
+from .watched import speeds_under_torque
+
 IDS = (1, 2, 3)
 packet = WIRES[1].instruction
 
@@ -205,16 +207,7 @@ def test_arming_does_not_jerk(chain):
 
 def test_torque_never_comes_on_with_the_speed_that_a_servo_was_left_at(chain):
     driver, bus, _ = chain(moving_speed=500)
-    speeds = {}
-    for servo in bus.servos:
-
-        def watched(address, data, servo=servo, write=servo.write):
-            refused = write(address, data)
-            if servo.get("torque_enable"):
-                speeds.setdefault(servo.get("id"), set()).add(servo.get("moving_speed"))
-            return refused
-
-        servo.write = watched
+    speeds = speeds_under_torque(bus.servos)
     driver.arm()
     assert speeds == {number: {1} for number in IDS}
 

@@ -26,6 +26,8 @@ from bns.hardware.servos.x430_table import X430, XL430_W250, XM430_W350
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 
+from .watched import speeds_under_torque
+
 IDS = (1, 2, 3)
 TWO = WIRES[2]
 SET_UP = {"baud_rate": 3}
@@ -91,16 +93,7 @@ def test_a_chain_arms_moves_and_stops(chain, clock, kind):
 @pytest.mark.parametrize("kind", X430)
 def test_torque_never_comes_on_with_the_speed_that_a_servo_was_left_at(chain, kind):
     driver, bus, _ = chain(kind=kind, moving_speed=500)
-    speeds = {}
-    for servo in bus.servos:
-
-        def watched(address, data, servo=servo, write=servo.write):
-            refused = write(address, data)
-            if servo.get("torque_enable"):
-                speeds.setdefault(servo.get("id"), set()).add(servo.get("moving_speed"))
-            return refused
-
-        servo.write = watched
+    speeds = speeds_under_torque(bus.servos)
     driver.arm()
     assert speeds == {number: {1} for number in IDS}
 
