@@ -1,6 +1,7 @@
 """Time-outs that follow the link: the arithmetic of RFC 6298, and drives over links of every speed."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -25,6 +26,8 @@ from bns.trial.session import TrialSetup, open_rig
 from ..robots_on_the_line import DistantRobot
 
 MOST = ReplyLimits(1.0, 0.0, 100.0)
+HANGS_S = 30.0
+"""A computer this busy stops nothing."""
 
 
 def test_the_time_out_is_that_of_the_rfc():
@@ -82,10 +85,15 @@ class BodysEye:
 )
 @pytest.mark.slow
 def test_a_slow_link_is_driven_over(tmp_path, monkeypatch, delay_s, jitter, loss):
-    """On a real line in real time, guard and all: done or paused, and standing."""
+    """On a real line in real time, guard and all: done or paused, and standing.
+
+    A computer that stands still for a while pauses nothing here: without a loss, a pause is the link's.
+    """
     robot = DistantRobot(tmp_path, delay_s, jitter, loss, seed=1)
     monkeypatch.setattr(platform, "open_tracker", lambda _settings, clock: BodysEye(robot, clock))
-    rig, commands = replace(shipped_rig("khepera"), port=str(robot.path)), np.array(3 * [[9000.0, 6000.0, 1000.0]], np.float32)
+    shipped, commands = shipped_rig("khepera"), np.array(3 * [[9000.0, 6000.0, 1000.0]], np.float32)
+    patient = replace(shipped.limits, silent_s=HANGS_S, late_s=HANGS_S, lost_s=HANGS_S)
+    rig = replace(shipped, port=str(robot.path), limits=patient)
     try:
         with Stopping() as stopping, open_rig(TrialSetup(rig, yes=True), 0, tmp_path / "journal.jsonl", stopping) as opened:
             driven = opened.platform.drive(commands)
@@ -95,6 +103,22 @@ def test_a_slow_link_is_driven_over(tmp_path, monkeypatch, delay_s, jitter, loss
         assert loss
     assert not robot.moves()
     assert all(e["confirmed"] for e in events(tmp_path / "journal.jsonl", "stop"))
+    robot.close()
+
+
+def test_a_driver_that_waits_for_an_answer_gives_signs_of_life_all_the_while(tmp_path):
+    """The guard hears of the trial whenever it asks the time: between any two waits, each far shorter than its patience."""
+    robot, clock = DistantRobot(tmp_path, 0.15, 0.0, 0.0), RealClock()
+    link = SerialLink(str(robot.path), BAUD, clock, HardwareLog(None, None))
+    happened, now_s, read = [], clock.now_s, link._serial.read
+    clock.now_s = lambda: happened.append("asked the time") or now_s()
+    link._serial.read = lambda *size: happened.append("waited") or read(*size)
+    link.exchange(b"E\n", HANGS_S)
+    assert happened.count("waited") > 2
+    without = sum(pair == ("waited", "waited") for pair in pairwise(happened))
+    assert without <= len(b"e,0,0\r\n")  # the letters of the answer are read one by one, and are there
+    assert link._serial.timeout < 0.1 * shipped_rig("khepera").limits.silent_s
+    link.close()
     robot.close()
 
 
