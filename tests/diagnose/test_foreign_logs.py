@@ -11,7 +11,7 @@ import yaml
 from bns.cli.main import main
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import checked
-from bns.diagnose.data.guess.mapping import drafted
+from bns.diagnose.data.guess.mapping import guessed
 from bns.diagnose.data.load import load_measured
 from bns.diagnose.data.mapping import load_mapping
 from bns.diagnose.data.merge_topics import held, without_commands
@@ -243,7 +243,7 @@ def test_mappings_that_are_wrong_say_where(tmp_path, change, message):
     ],
 )
 def test_a_mapping_is_drafted_from_the_names(columns, drafted_):
-    draft = yaml.safe_load(drafted(pd.DataFrame(columns)))
+    draft = yaml.safe_load(guessed(pd.DataFrame(columns)).text)
     assert draft["columns"] == drafted_
     assert ("wheelbase_m" in draft) == ("turn_rad_s" in drafted_)
     assert ("trials" in draft) == ("trial" not in drafted_)

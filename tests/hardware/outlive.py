@@ -143,7 +143,7 @@ def outlived(nursery, link, cause, folder, gone_s=0.0, kind=Robot, patient=False
 
     `patient`: as `forked_trial.drive` has it.
     """
-    robot = kind(link, folder)
+    robot = kind(link, folder, **({"watchdog_s": HANGS_S} if patient and link == "bridge" else {}))
     try:
         still_s, alone_s, ended = _befell(nursery, robot, cause, folder, gone_s, patient)
         _guard_ends(robot, folder)

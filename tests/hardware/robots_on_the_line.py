@@ -17,6 +17,7 @@ from bns.hardware.emulators.devices.khepera import KheperaEmulator
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
+from bns.hardware.servos.bridge_frames import WATCHDOG_S
 from bns.hardware.wheels.khepera import firmware
 from bns.physics.model import load_model
 from bns.robots.khepera import START
@@ -59,9 +60,12 @@ class WorldsClock(EmulatedClock):
 
 
 class Robot:
-    """A robot at the end of a link; `path` is its port. All that was written to it is in `heard`, with times."""
+    """A robot at the end of a link; `path` is its port. All that was written to it is in `heard`, with times.
 
-    def __init__(self, link, folder):
+    `watchdog_s` is a bridge's.
+    """
+
+    def __init__(self, link, folder, watchdog_s=WATCHDOG_S):
         self.link, self.clock, self.heard = link, WorldsClock(), []
         self._bridge = None
         if link == "serial":
@@ -71,7 +75,7 @@ class Robot:
         else:
             self.servos = [Servo(n, self.clock, Faults()) for n in range(1, 13)]
             if link == "bridge":
-                self._device = self._bridge = BridgeEmulator(self.servos, self.clock)
+                self._device = self._bridge = BridgeEmulator(self.servos, self.clock, watchdog_s=watchdog_s)
             else:
                 self._device = Bus(self.servos, self.clock)
         self.line = PseudoTerminal(self, folder, link)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,28 +158,3 @@ def laid_paths(tracks: Tracks, steps: Steps) -> Array:
     x = start[:, 0] + cos * way[:, 0] - sin * way[:, 1] + drift[:, 0]
     y = start[:, 1] + sin * way[:, 0] + cos * way[:, 1] + drift[:, 1]
     return np.stack([x, y, start[:, 2] + way[:, 2]], axis=1)
-
-
-def noise_floor(predictor: Predictor, noise: Array, horizon: str) -> dict[str, float]:
-    """Error that a perfect model would show: tracking noise at both ends, and the scatter of the drive between."""
-    tracks = predictor.tracks
-    start, end = predictor.windows(horizon)
-    if not len(start):
-        return {}
-    way = np.cumsum(predictor.way_m)
-    driven = way[end] - way[start]
-    straight = np.hypot(*(tracks.pose[end, :2] - tracks.pose[start, :2]).T)
-    heading = noise[1] ** 2 * straight**2
-    bent = (
-        noise[4] ** 2 * driven * straight**2 / 3
-    )  # heading scatter on the way, a third of it as displacement at the end
-    position = 4 * noise[0] ** 2 + heading + bent + (noise[2] ** 2 + noise[3] ** 2) * driven
-    return {
-        "position_m": float(np.sqrt(position.mean())),
-        "heading_rad": float(np.sqrt((2 * noise[1] ** 2 + noise[4] ** 2 * driven).mean())),
-    }
-
-
-def summaries(predictor: Predictor, steps: Steps) -> Mapping[str, dict[str, float]]:
-    """`Errors.summary` at every horizon that the tracks have."""
-    return {h: errors_of(predictor, steps, h).summary(len(predictor.tracks)) for h in HORIZONS}

@@ -121,18 +121,6 @@ def probe_effect(channel: str, curve: Array, heading_rad: Array | None) -> Effec
     )
 
 
-def flexible_columns(problem: Problem, fit: Fit, variable: str, channel: str, *, centred: bool = False) -> Array:
-    """Change of the whitened innovations a unit of each basis function of a free curve, (frames, 3, k).
-
-    ``centred``: every basis function has mean zero over the steps, so that the curve cannot stand for what acts everywhere.
-    """
-    variables = problem.predictor.variables()
-    basis = next(functions for name, functions in curves(variables) if name == variable)
-    if centred:
-        basis = [function - function.mean() for function in basis]
-    return _columns(problem, fit, channel, basis, variables.get("heading_rad"))
-
-
 def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array | None) -> Array:
     """Change of the whitened innovations a unit of each basis function, (frames, 3, k)."""
     small = 1e-3 if channel in {"yaw_rad_s", SHARE} else 1e-4

@@ -21,12 +21,14 @@ from bns.hardware.servos.bridge_frames import (
     MOVE,
     NO_ANSWER,
     POSITION,
+    REFUSED,
     SERVO,
     STARTED_S,
     STATE,
     STOP,
     STOPPED,
     VERSION,
+    WATCHDOG_S,
     Frame,
     encoded,
     searched,
@@ -44,6 +46,13 @@ _STOP_TIMEOUT_S = 0.06
 """Twelve servos read take 12 ms, one of them silent nine more; the frames 4 ms."""
 _BETWEEN_S = 0.02
 _LISTEN_S = 0.02
+_QUESTIONS = {HELLO: "to say what it is", ARM: "to turn the torque on", MOVE: "to move", STATE: "to report", STOP: "to stop"}
+_NOT_TAKEN = "a servo does not take what it is told"
+_WHY = {
+    ARM: f" ({_NOT_TAKEN})",
+    MOVE: f" (its watchdog took the torque off when it heard nothing for {WATCHDOG_S:g} s: a busy computer, a bad cable; or the "
+    f"board started anew: its power; or {_NOT_TAKEN})",
+}
 
 
 class BridgeChain:
@@ -159,6 +168,8 @@ class BridgeChain:
             if answer is not None and answer.kind == kind | ANSWER and len(answer.payload) == size:
                 return answer.payload
             problem = "no answer" if answer is None else f"the answer was {answer}"
+            if answer is not None and answer.kind == REFUSED | ANSWER:
+                problem = f"it refuses {_QUESTIONS[kind]}{_WHY.get(kind, '')}"
         raise ServoError(f"bridge: {problem}; asked {attempts} times")
 
     def _lose(self, error: Exception) -> None:

@@ -18,6 +18,7 @@ from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.servos.bridge import BAUD, BridgeChain
 from bns.hardware.servos.bridge_frames import (
     ANSWER,
+    ARM,
     GOAL,
     SERVO,
     STARTED_S,
@@ -206,8 +207,17 @@ def test_a_start_byte_before_an_answer_hides_nothing(bridge):
 
 def test_nonsense_is_refused_by_the_bridge(bridge):
     driver, _ = bridge()
-    with pytest.raises(ServoError, match="asked 6 times"):
-        driver.move([0.0], [1.0])
+    with pytest.raises(ServoError, match=r"refuses to turn the torque on.*; asked 6 times"):
+        driver._ask(ARM, bytes([101]), 0)
+
+
+def test_a_computer_that_was_too_busy_is_told_of_the_watchdog(bridge, clock):
+    driver, _ = bridge()
+    driver.arm()
+    driver.move([0.0] * 3, [1.0] * 3)
+    clock.sleep(1.1 * WATCHDOG_S)
+    with pytest.raises(ServoError, match=r"refuses to move \(its watchdog took the torque off .* for 0\.5 s.*asked 6 times"):
+        driver.move([0.0] * 3, [1.0] * 3)
 
 
 @pytest.mark.parametrize(("register", "share"), [(0, 0.0), (512, 512 / 1023), (1023, 1.0), (1024 + 512, -512 / 1023)])

@@ -71,11 +71,6 @@ class Guess:
         return said + yaml.safe_dump(self.mapping, sort_keys=False, default_flow_style=None, width=120)
 
 
-def drafted(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = None) -> str:
-    """The guess as YAML; an empty ``columns`` where no name tells anything. ``others``: further files by name, joined by time."""
-    return guessed(table, others).text
-
-
 def guessed(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = None, name: str = "") -> Guess:
     """The guess for one file, or for several of which the first is the one beside which the mapping lies."""
     motions = motions_of(table)

@@ -44,10 +44,15 @@ class BridgeEmulator:
     """The device at the far end of a line. Opening its port starts it anew (`opened`): deaf for `boot_s`, it then says hello."""
 
     def __init__(
-        self, servos: Sequence[Servo], clock: EmulatedClock, faults: Faults | None = None, boot_s: float = BOOT_S
+        self,
+        servos: Sequence[Servo],
+        clock: EmulatedClock,
+        faults: Faults | None = None,
+        boot_s: float = BOOT_S,
+        watchdog_s: float = WATCHDOG_S,
     ) -> None:
         self.servos, self._clock, self._faults = list(servos), clock, faults or Faults()
-        self._boot_s, self._awake_s = boot_s, -math.inf
+        self._boot_s, self._awake_s, self._watchdog_s = boot_s, -math.inf, watchdog_s
         self.send: Callable[[bytes], None] = lambda _data: None
         """What it says unasked goes there: to its line."""
         self.boot_loader_heard = False
@@ -82,7 +87,8 @@ class BridgeEmulator:
                 self.send(encoded(Frame(HELLO | ANSWER, 0, self._hello())))
             if self._buffer and now_s - self._byte_s > TORN_S:
                 self.send(self._after_torn())
-            if not self._starting and now_s - self._heard_s > WATCHDOG_S and any(s.get("torque_enable") for s in self.servos):
+            silent = not self._starting and now_s - self._heard_s > self._watchdog_s
+            if silent and any(servo.get("torque_enable") for servo in self.servos):
                 self._stop()
         finally:
             self._lock.release()
