@@ -36,6 +36,12 @@ def blank(title: str, x: str, y: str, tools: str = "pan,wheel_zoom,reset", heigh
     return made
 
 
+def legend_above(figure: Any) -> None:
+    """Inside it would cover where some line runs."""
+    figure.add_layout(figure.legend[0], "above")
+    figure.legend.orientation, figure.legend.border_line_alpha, figure.legend.padding = "horizontal", 0.0, 2
+
+
 def drawable(points: Array) -> Array:
     """Every so-manieth point, the last one too."""
     every = max(1, -(-len(points) // _MOST_POINTS))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool
 
-from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank, drawable
+from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank, drawable, legend_above
 from bns.diagnose.data.bodies.cycles import CycleTracks
 from bns.diagnose.data.bodies.joints import JointTracks
 from bns.diagnose.data.tracks import Array, Tracks
@@ -41,8 +41,7 @@ class PathFigure:
         self._marked = ColumnDataSource({"x": [], "y": [], "color": []})
         self.figure.multi_line("x", "y", source=self._marked, line_color="color", line_width=7, line_alpha=0.45)
         self.figure.scatter("x", "y", source=self._dots, color="color", size=11, line_color="black")
-        self.figure.add_layout(self.figure.legend[0], "above")  # inside it would cover where some path begins
-        self.figure.legend.orientation = "horizontal"
+        legend_above(self.figure)
 
     def fill(self, title: str, t_s: Array, measured: Array, predicted: Array) -> None:
         """Poses (frames, 3) of both at the times ``t_s`` (frames,)."""

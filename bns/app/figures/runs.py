@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from bokeh.models import ColumnDataSource, CustomJS, FixedTicker, HoverTool
 
-from bns.app.figures.common import blank
+from bns.app.figures.common import blank, legend_above
 from bns.plotting.style import BLUE, GREY, OKABE_ITO, RED
 
 SUCCEEDED, FAILED = OKABE_ITO[2], RED
@@ -74,10 +74,13 @@ class ParallelFigure:
     def __init__(self) -> None:
         self.source = ColumnDataSource({"x": [[0.0]], "y": [[0.0]], "color": [SUCCEEDED]})
         self._ends = ColumnDataSource({"x": [0.0], "y": [0.0], "text": [""]})
-        self.figure: Any = blank("", "", "", height=320, y_range=(-0.12, 1.12))
+        self.figure: Any = blank("", "", "", height=340, y_range=(-0.2, 1.2))
         self.figure.multi_line("x", "y", source=self.source, color="color", line_alpha=0.25)
-        self.figure.text("x", "y", "text", source=self._ends, text_font_size="11px", text_align="center", y_offset=6)
+        self.figure.text(
+            "x", "y", "text", source=self._ends, text_font_size="11px", text_align="center", text_baseline="middle"
+        )
         self.figure.yaxis.visible = False
+        self.figure.x_range.range_padding = 0.25  # the names of the axes go down to the left
         self.figure.xaxis.major_label_orientation = 0.5
 
     def fill(self, rows: pd.DataFrame, axes: Mapping[str, str]) -> None:
@@ -98,7 +101,7 @@ class ParallelFigure:
         }
         self._ends.data = {
             "x": [*places, *places],
-            "y": [-0.06] * len(places) + [1.06] * len(places),
+            "y": [-0.1] * len(places) + [1.1] * len(places),
             "text": [*low, *high],
         }
         self.figure.xaxis.ticker = FixedTicker(ticks=places)
@@ -131,7 +134,7 @@ class CurveFigure:
         looks = zip(self._sources, (BLUE, RED, GREY), ("solid", "dashed", "dotted"), names, strict=True)
         for source, color, dash, name in looks:
             self.figure.line("x", "y", source=source, color=color, line_dash=dash, line_width=2, legend_label=name)
-        self.figure.legend.location, self.figure.legend.background_fill_alpha = "top_right", 0.6
+        legend_above(self.figure)
 
     def fill(self, which: int, evaluations: Any, values: Any) -> None:
         """Run A (0), B (1), or the one under the pointer (2)."""

@@ -21,6 +21,8 @@ TITLE = "bns explore: results"
 EVERY_MS = 10_000
 _MOST_NAMES = 2_000
 """Of runs in a menu; filters make the list shorter."""
+_MOST_SHOWN = 6
+"""Of a filter's values without scrolling."""
 
 
 def results_page(study: Study) -> Any:
@@ -40,7 +42,7 @@ class ResultsScreen:
         self._x = pn.widgets.Select(**called("Across"), options=_options(OUTCOMES), value="diversity", width=220)
         self._y = pn.widgets.Select(**called("Up"), options=_options(OUTCOMES), value="fitness_error", width=220)
         self._curve = pn.widgets.Select(**called("Curve"), options=_options(CURVES), width=220)
-        self._names = [pn.widgets.Select(**called(f"Run {letter}"), options=[], width=300) for letter in "AB"]
+        self._names = [pn.widgets.Select(**called(f"Run {letter}"), options=[], **WIDE) for letter in "AB"]
         self._live = pn.widgets.Checkbox(**called("Look for new runs every 10 s"), value=False)
         self._clock: Any = None
         self._next = 0
@@ -77,7 +79,7 @@ class ResultsScreen:
         compared = pn.Column(
             heading("Two runs side by side"),
             words,
-            row(*self._names, self._curve),
+            beside(*self._names, self._curve),
             drawn(self._curves.figure),
             pair,
             **WIDE,
@@ -88,7 +90,7 @@ class ResultsScreen:
         for name, menu in self._filters.items():
             values = sorted(self._study.runs[name].dropna().unique().tolist(), key=_numbers_first)
             menu.options = {str(value): value for value in values}
-            menu.visible = len(values) > 1
+            menu.visible, menu.size = len(values) > 1, min(max(len(values), 2), _MOST_SHOWN)
 
     def _draw(self) -> None:
         rows = self._study.chosen({name: menu.value for name, menu in self._filters.items()})

@@ -28,7 +28,7 @@ PARAMETERS = (
     "evaluations",
 )
 OUTCOMES = {
-    "success": "the fittest succeeds at the end (at the smallest radius)",
+    "success": "success at the end (smallest radius)",
     "goals_reached": "goals reached",
     "diversity": "diversity",
     "fitness_error": "fitness error (1/m)",

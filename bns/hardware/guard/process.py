@@ -21,7 +21,7 @@ from typing import Any
 
 from .line import Line, OtherDeviceError
 from .order import StopOrder
-from .signs import frozen, slept_s
+from .signs import GONE, not_running, slept_s
 
 TICK_S = 0.05
 _BUSY_S = 3.0
@@ -89,7 +89,7 @@ class Guard:
     def _judge(self) -> None:
         """Trip if the trial does not look after the robot."""
         # before the clocks: a trial whose computer slept in between is found stopped, and that is no cause of its own
-        stopped = self._armed and not self.why and frozen(self._setup["process"])
+        state = not_running(self._setup["process"]) if self._armed and not self.why else ""
         now_s, slept = time.monotonic(), slept_s()
         slept, self._slept_s = slept - self._slept_s, slept
         if self._terminated and not self._gone:
@@ -99,8 +99,8 @@ class Guard:
             return
         if slept > _SLEPT_S:
             self._trip(f"the computer slept for {slept:.1f} s")
-        elif stopped:
-            self._trip("the trial's process was stopped")
+        elif state:
+            self._trip(f"the trial's process {state}")
         elif now_s - self._beat_s > self._setup["silent_s"]:
             self._trip(f"the trial gave no sign of life for {now_s - self._beat_s:.2f} s")
 
@@ -146,7 +146,7 @@ class Guard:
             return
         self._gone = True
         if self._armed or not said:
-            self._trip("the trial's process is gone" if not said else "the trial ended without a confirmed stop")
+            self._trip(f"the trial's process {GONE}" if not said else "the trial ended without a confirmed stop")
 
     def _from_driver(self) -> None:
         data = os.read(self._line.near, 4096)

@@ -8,6 +8,10 @@ from pathlib import Path
 _TOGETHER_S, _READINGS = 0.01, 5
 """Two clocks are read within so many seconds of each other, at one of so many readings: a process may be stopped between."""
 
+STOPPED, GONE = "was stopped", "is gone"
+_STATES = {b"T": STOPPED, b"t": STOPPED, b"Z": GONE, b"X": GONE}
+"""Of a process, in proc_pid_stat(5)."""
+
 
 def slept_s() -> float:
     """Seconds since the boot that the computer was suspended: the steady clock stands still then."""
@@ -21,10 +25,11 @@ def slept_s() -> float:
     return since_boot_s - steady_s
 
 
-def frozen(process: int) -> bool:
-    """Whether a process was stopped (SIGSTOP, a debugger); False where the system does not tell."""
+def not_running(process: int) -> str:
+    """That a process was stopped (SIGSTOP, a debugger) or is gone (its parent has not asked after it yet); "" where it runs, and
+    where the system does not tell."""
     try:
         stat = Path(f"/proc/{process}/stat").read_bytes()
     except OSError:
-        return False
-    return stat[stat.rfind(b")") + 2 : stat.rfind(b")") + 3] in {b"T", b"t", b"Z", b"X"}
+        return ""
+    return _STATES.get(stat[stat.rfind(b")") + 2 : stat.rfind(b")") + 3], "")

@@ -47,8 +47,8 @@ def checked_lines(path: Path, data: bytes) -> list[str]:
     unsealed = next((at for at, line in enumerate(lines) if b'"crc"' in line), len(lines))
     crc = zlib.crc32(b"".join(line + b"\n" for line in lines[:unsealed]))
     for number, line in enumerate(lines[unsealed:], unsealed + 1):
-        crc = _followed(path, number, line, crc)
-    text = [_text(path, number, line) for number, line in enumerate(lines, 1)]
+        crc = _followed(path, number, line, crc, unsealed)
+    text = [_text(path, number, line, unsealed) for number, line in enumerate(lines, 1)]
     if unsealed:
         warnings.warn(
             f"{path}: lines 1 to {unsealed} were written before lines had checksums, so changes to them cannot be "
@@ -59,17 +59,18 @@ def checked_lines(path: Path, data: bytes) -> list[str]:
     return text
 
 
-def _followed(path: Path, number: int, line: bytes, crc: int) -> int:
-    """The checksum of a line that must follow one with ``crc``."""
+def _followed(path: Path, number: int, line: bytes, crc: int, unsealed: int) -> int:
+    """The checksum of a line that must follow one with ``crc``; ``unsealed`` lines at the top have none of their own."""
     seal = _sealed(line)
     if seal is None:
-        raise _wrong(path, number, "was changed")
+        raise _wrong(path, number, "was changed", unsealed)
     if seal[0] > number:
-        raise _wrong(path, number, f"is number {seal[0]}: lines before it are lost")
+        raise _wrong(path, number, f"is number {seal[0]}: lines before it are lost", unsealed)
     if seal[0] < number:
-        raise _wrong(path, number, f"is number {seal[0]}: it is there twice, or lines changed places")
+        raise _wrong(path, number, f"is number {seal[0]}: it is there twice, or lines changed places", unsealed)
     if _crc(crc, line[: line.rindex(b',"crc"')]) != seal[1]:
-        raise _wrong(path, number, "was changed, or the one before it")
+        above = ", or one above it" if number == unsealed + 1 > 1 else ""
+        raise _wrong(path, number, f"was changed{above}", unsealed)
     return seal[1]
 
 
@@ -83,14 +84,14 @@ def _crc(before: int, body: bytes) -> int:
     return zlib.crc32(body, zlib.crc32(before.to_bytes(4, "little")))
 
 
-def _text(path: Path, number: int, line: bytes) -> str:
+def _text(path: Path, number: int, line: bytes, unsealed: int) -> str:
     try:
         return line.decode()
     except UnicodeDecodeError as error:
-        raise _wrong(path, number, "is no text") from error
+        raise _wrong(path, number, "is no text", unsealed) from error
 
 
-def _wrong(path: Path, number: int, what: str) -> HardwareError:
-    kept = f"head -n {number - 2} {path}" if number > 2 else ""
-    below = f" Everything above it can be resumed: {kept} > FILE, in its place." if kept else ""
+def _wrong(path: Path, number: int, what: str, unsealed: int) -> HardwareError:
+    checked = number - 1 > unsealed  # the line before it is as it was written, and so are all above that
+    below = f" Everything above it can be resumed: head -n {number - 1} {path} > FILE, in its place." if checked else ""
     return HardwareError(f"line {number} of {path} {what}. Take the file from a copy, unedited.{below}")

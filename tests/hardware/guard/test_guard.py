@@ -310,14 +310,24 @@ def test_a_computer_that_sleeps_while_its_guard_looks_at_the_trial_is_said_to_ha
 
     def sleeps(_process):
         clock["slept_s"] = 31.0
-        return True
+        return signs.STOPPED
 
     monkeypatch.setattr(guard_process, "slept_s", lambda: clock["slept_s"])
     with armed_guard(tmp_path) as guard:
-        monkeypatch.setattr(guard_process, "frozen", sleeps)
+        monkeypatch.setattr(guard_process, "not_running", sleeps)
         guard._judge()
         assert guard.why == "the computer slept for 31.0 s"
 
+
+
+def test_a_process_that_is_dead_is_not_taken_for_one_that_was_stopped():
+    """Until its parent asks after it, it is still listed."""
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
+        assert signs.not_running(child.pid) == ""
+        for signal_, state in ((signal.SIGSTOP, "was stopped"), (signal.SIGKILL, "is gone")):
+            child.send_signal(signal_)
+            until(lambda state=state: signs.not_running(child.pid) == state)
+    assert signs.not_running(child.pid) == ""
 
 
 def test_a_robot_is_stopped_over_a_slow_link(tmp_path):

@@ -44,7 +44,7 @@ def test_what_was_written_is_read(log):
         (lambda lines: [*lines[:6], lines[7], lines[6], *lines[8:]], "line 7 of .* is number 8"),
         (lambda lines: [*lines[:6], lines[6].replace("D,6", "D,9"), *lines[7:]], "line 7 of .* was changed"),
         (lambda lines: [*lines[:6], lines[6].split(',"n"')[0] + "}\n", *lines[7:]], "line 7 of .* was changed"),
-        (lambda lines: [lines[0].split(',"n"')[0] + "}\n", *lines[1:]], "line 2 of .* was changed, or the one before"),
+        (lambda lines: [lines[0].split(',"n"')[0] + "}\n", *lines[1:]], "line 2 of .* was changed, or one above it"),
         (lambda lines: [*lines[:6], lines[6][:-1] + lines[7], *lines[8:]], "line 7 of .*"),
     ],
 )
@@ -77,6 +77,22 @@ def test_any_changed_byte_is_noticed(log):
             data_of(log)
 
 
+def test_what_the_message_says_to_keep_is_all_that_stands_above_the_change(log):
+    whole, draw = log.read_bytes(), np.random.default_rng(4)
+    for at in draw.integers(len(whole) - 1, size=60):
+        data = bytearray(whole)
+        data[at] ^= 1 << int(draw.integers(7))
+        log.write_bytes(data)
+        with pytest.raises(HardwareError) as refused:
+            data_of(log)
+        changed = whole[:at].count(b"\n")
+        told = re.search(r"head -n (\d+)", str(refused.value))
+        kept = int(told[1]) if told else 0
+        assert kept == (changed if changed else 0)
+        log.write_bytes(b"".join(data.splitlines(keepends=True)[:kept]))
+        assert data_of(log) == [f"D,{number},{number}" for number in range(kept)]
+
+
 def test_last_line_without_an_end_is_passed_over_and_gone_on_after(log):
     log.write_bytes(log.read_bytes()[:-5])
     assert len(data_of(log)) == 19
@@ -96,5 +112,5 @@ def test_logs_from_before_checksums_are_read_with_a_note_and_sealed_by_what_foll
     with pytest.warns(LogWarning, match="lines 1 to 3"):
         assert data_of(path) == [f"D,{number},{number}" for number in range(5)]
     path.write_text(path.read_text().replace("D,1", "D,7"))
-    with pytest.raises(HardwareError, match=r"line 4 of .* was changed, or the one before it"):
+    with pytest.raises(HardwareError, match=r"line 4 of .* was changed, or one above it"):
         data_of(path)
