@@ -31,7 +31,7 @@ def remembering():
 def bns():
     """Run the command line in a process of its own: bns("run", "--seed", "3") -> completed process."""
 
-    def call(*arguments, cwd=None, timeout=240, **environment):
+    def call(*arguments, cwd=None, timeout=600, **environment):
         return subprocess.run(
             [sys.executable, "-m", "bns", *map(str, arguments)],
             cwd=cwd, env=os.environ | remembering() | environment, capture_output=True, text=True, timeout=timeout, check=False,

@@ -90,6 +90,6 @@ def _build(folder: Path) -> None:
             shutil.copy(file, folder / file.name)
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", "dist", "."]
     done = subprocess.run(
-        command, cwd=folder, env=without_us(), capture_output=True, text=True, timeout=250, check=False
+        command, cwd=folder, env=without_us(), capture_output=True, text=True, timeout=600, check=False
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]

@@ -220,7 +220,7 @@ def test_output_into_a_closed_pipe_is_no_fault(tmp_path, bns):
     import sys
 
     shell = f"{sys.executable} -m bns query --csv --no-header 'SELECT i FROM range(200000) t(i)' --results {tmp_path} | head -1"
-    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=600, check=False)
     assert done.stdout == "0\n"
     assert done.stderr == ""
 

@@ -261,7 +261,7 @@ def test_the_commands_of_the_example_are_understood(tmp_path):
 def test_the_script_of_the_example_finds_what_is_hidden(tmp_path):
     assert main(["example", str(tmp_path)]) == 0
     done = subprocess.run(
-        [sys.executable, "example.py"], cwd=tmp_path, capture_output=True, text=True, timeout=200, check=False,
+        [sys.executable, "example.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False,
         env=os.environ | {"PYTHONPATH": str(SWEEPS.parent)},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

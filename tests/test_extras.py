@@ -45,7 +45,7 @@ print(imported)
 
 
 def carried_out(code):
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=200, check=False)
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600, check=False)
 
 
 @pytest.mark.slow

@@ -62,7 +62,7 @@ def test_kernels_are_cached_elsewhere_when_the_package_cannot_be_written(tmp_pat
 def test_closed_or_full_streams_are_no_traceback(streams, tmp_path):
     assert main(["run", *QUICK, "--results", str(tmp_path)]) == 0
     command = f"{sys.executable} -m bns status --results {tmp_path} {streams}"
-    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == (2 if "full" in streams else 0)
     assert "Traceback" not in done.stderr
 

@@ -79,7 +79,7 @@ if __name__ == "__main__":
     main()
 """
     (tmp_path / "sweep.py").write_text(script)
-    done = subprocess.run([sys.executable, tmp_path / "sweep.py"], capture_output=True, text=True, timeout=100, check=False)
+    done = subprocess.run([sys.executable, tmp_path / "sweep.py"], capture_output=True, text=True, timeout=600, check=False)
     assert done.stdout == "done\n", done.stderr
     assert done.stderr == ""
 

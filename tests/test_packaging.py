@@ -134,7 +134,7 @@ def test_what_is_installed_finds_its_parts(installed, tmp_path, code, answer):
 def test_figures_are_drawn_from_what_is_installed(installed, tmp_path):
     command = [sys.executable, "-m", "bns", "figures", "--results", "none"]
     done = subprocess.run(
-        command, cwd=tmp_path, env=without_us(installed), capture_output=True, text=True, timeout=100, check=False
+        command, cwd=tmp_path, env=without_us(installed), capture_output=True, text=True, timeout=600, check=False
     )
     assert done.returncode == 2, done.stderr
     assert "bns: there are no runs in" in done.stderr

@@ -42,7 +42,7 @@ def drawn(real_results, tmp_path_factory) -> Path:
 
 def browse(place: Path, width: int, profile: Path) -> str:
     command = [BROWSER, *QUIET, f"--user-data-dir={profile}", f"--window-size={width},900", "--dump-dom", place.as_uri()]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    return subprocess.run(command, capture_output=True, text=True, timeout=600, check=True).stdout
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; apt-get install chromium")

@@ -51,7 +51,7 @@ def paced(monkeypatch):
 
     def diagnose(*arguments, alone, **more):
         def told(entry):
-            steps.acquire(timeout=120)
+            steps.acquire(timeout=600)
             alone(entry)
 
         return whole(*arguments, alone=told, **more)

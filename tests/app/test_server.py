@@ -26,7 +26,7 @@ def page():
 
 def answer(address, **headers):
     try:
-        with urllib.request.urlopen(urllib.request.Request(address, headers=headers), timeout=30) as got:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=headers), timeout=600) as got:
             return got.status
     except urllib.error.HTTPError as refused:
         return refused.code
@@ -39,7 +39,7 @@ def test_the_page_is_served_on_loopback_under_a_token(page):
 
 
 def test_a_phone_is_told_to_use_its_own_width(page):
-    with urllib.request.urlopen(page.address, timeout=30) as got:
+    with urllib.request.urlopen(page.address, timeout=600) as got:
         head = got.read().decode().partition("<body")[0]
     assert '<meta name="viewport" content="width=device-width' in head
 

@@ -10,7 +10,8 @@ from pathlib import Path
 CHROMIUM = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
 )
-SLOW_MS = 120_000
+SLOW_MS = 600_000
+"""Only what hangs takes as long, on however busy a machine."""
 
 
 class Visit:

@@ -56,7 +56,7 @@ def done(folder):
     (folder / "commands.py").write_text(SCRIPT)
     carried_out = subprocess.run(
         [sys.executable, "commands.py", json.dumps(COMMANDS)],
-        cwd=folder, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=280, check=False,
+        cwd=folder, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=600, check=False,
     )  # fmt: skip
     assert carried_out.returncode == 0, carried_out.stderr
     return json.loads(carried_out.stdout.splitlines()[-1])

@@ -24,7 +24,7 @@ def kill(results, action, moment, number):
         capture_output=True,
         text=True,
         check=False,
-        timeout=120,
+        timeout=600,
     )
     assert done.returncode == -signal.SIGKILL, done.stderr
     return done.stdout

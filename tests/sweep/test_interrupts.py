@@ -63,7 +63,7 @@ def begun(tmp_path) -> list[str]:
 
 
 def summary_of(process: subprocess.Popen) -> dict:
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert (process.returncode, err) == (0, "")
     return json.loads(out.splitlines()[-1])
 

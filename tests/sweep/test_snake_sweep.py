@@ -61,7 +61,7 @@ def kill_when_under_way(file, results):
 def test_a_killed_sweep_goes_on_to_the_same_numbers_and_both_robots_share_a_store(snakes, tmp_path):
     kill_when_under_way(snakes, tmp_path / "a")
     assert len(load(tmp_path / "a", "runs")) >= 1
-    assert started(snakes, tmp_path / "a").wait(timeout=240) == 0
+    assert started(snakes, tmp_path / "a").wait(timeout=600) == 0
     run_sweep(load_sweep(snakes), tmp_path / "b", job=run_job, executor=SerialExecutor(run_job))
     for table in ("evals", "paths", "generations", "probes"):
         resumed, whole = (deterministic(load(tmp_path / place, table)) for place in "ab")

@@ -30,7 +30,7 @@ def journal_of(results):
 
 def with_files_of_at_most(size, *arguments):
     return subprocess.run(
-        [sys.executable, "-m", "bns", *map(str, arguments)], capture_output=True, text=True, check=False, timeout=200,
+        [sys.executable, "-m", "bns", *map(str, arguments)], capture_output=True, text=True, check=False, timeout=600,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
     )  # fmt: skip
 

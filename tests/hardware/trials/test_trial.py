@@ -161,7 +161,7 @@ def test_signals_stop_the_robot_first(tmp_path, number, word):
             break
         time.sleep(0.1)
     process.send_signal(number)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=600)
     assert process.returncode == 3, said
     assert word in said
     assert "the same command with --resume goes on" in said
