@@ -110,6 +110,8 @@ class BodyModel(Model, JointedModel):
         if given is None:
             JointedModel.__init__(self, **fields)
             return
+        if "wheelbase_m" in fields:
+            raise ModelError(no_wheels(given))
         settings = {name: fields.pop(name) for name in list(fields) if name not in own}
         if isinstance(given, JointedModel):
             body = given
@@ -126,6 +128,12 @@ class BodyModel(Model, JointedModel):
     def __repr__(self) -> str:
         names = ", ".join(active.effect.name for active in self.effects)
         return f"<Model: {self.name}, {len(machine(self.mechanism).joints)} joints, effects: {names or 'none'}>"
+
+
+def no_wheels(given: Given) -> str:
+    """That a wheelbase was given for what has none."""
+    named = given.name if isinstance(given, physics.Model) else fspath(given)
+    return f"The model {named} has no wheels: leave {in_both('--wheelbase', 'wheelbase_m')} out."
 
 
 def _names_a_body(given: Given | None) -> bool:

@@ -361,11 +361,14 @@ def words_of(options: argparse.Namespace) -> dict[str, str]:
 
 
 def model_of(options: argparse.Namespace) -> Given:
-    """The model of the options; the name as it is where it means networks."""
+    """The model of the options; the name as it is where it means networks. ModelError also where a wheelbase has no wheels."""
     from bns.api.common.prepared import are_networks
-    from bns.api.model import Model
+    from bns.api.model import Model, no_wheels
+    from bns.errors import ModelError
 
     if are_networks(options.model):
+        if options.wheelbase is not None:
+            raise ModelError(no_wheels(str(options.model)))
         return str(options.model)
     return Model(options.model, **({} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}))
 

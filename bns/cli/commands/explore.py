@@ -6,7 +6,7 @@ import argparse
 import logging
 from pathlib import Path
 
-from bns.cli.commands.diagnose import Adder
+from bns.cli.commands.diagnose import Adder, model_of
 
 LARGEST_PORT = 65_535
 
@@ -39,19 +39,15 @@ def add_commands(command: Adder) -> None:
 
 def explore(options: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C or SIGTERM, which is how it is meant to end: exit code 0."""
-    from bns.api.common.prepared import are_networks
-    from bns.api.model import Model
     from bns.app.explore import Explorer, shown_of
     from bns.extras import require
 
     require("app", "panel", "bokeh")
     logging.getLogger("tornado.access").setLevel(logging.ERROR)  # no line for every file that the browser fetches
-    given = {} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}
-    words = (options.model, *(["--wheelbase", f"{options.wheelbase:g}"] if given else []))
+    words = (options.model, *([] if options.wheelbase is None else ["--wheelbase", f"{options.wheelbase:g}"]))
     files = [str(file) for file in options.data]
     log = files[0] if len(files) == 1 else files or None
-    model = options.model if are_networks(options.model) else Model(options.model, **given)
-    explorer = Explorer(shown_of(log, model, files, words), options.port)
+    explorer = Explorer(shown_of(log, model_of(options), files, words), options.port)
     print(explorer.address, flush=True)
     print("open this address in a browser on this machine; Ctrl-C ends the page", flush=True)
     explorer.serve(browser=not options.no_browser)
