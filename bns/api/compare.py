@@ -37,7 +37,7 @@ class CompareResult(Shown):
     """How far predictions are off, and where.
 
     ``comparison`` holds the complete result. ``causes`` says why the networks of a run are wrong; it is None for a model, and
-    for networks without their training patterns.
+    for networks without their training patterns. ``used`` says how much of the measurements is compared; "" for all.
     """
 
     log: Measurements
@@ -45,6 +45,7 @@ class CompareResult(Shown):
     comparison: Comparison
     causes: NetworkErrors | None = None
     of_networks: bool = False
+    used: str = ""
 
     @property
     def errors(self) -> pd.DataFrame:
@@ -131,4 +132,5 @@ def compare(
     causes = why_wrong(cast("NetworkPredictor", ready.predictor)) if kept else None
     of_networks = isinstance(ready.predictor, NetworkPredictor)
     meter.done()
-    return CompareResult(ready.log, ready.model, result, causes, of_networks)
+    used = ready.thinned if isinstance(ready, Prepared) else ""
+    return CompareResult(ready.log, ready.model, result, causes, of_networks, used)

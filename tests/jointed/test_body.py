@@ -204,6 +204,18 @@ def test_data_of_another_kind_of_robot_are_refused(tmp_path):
         bns.compare(_no_elbow(), bns.Model(file))
 
 
+def test_set_points_of_a_servo_that_the_model_lacks_are_said_to_be_unused(tmp_path, capsys):
+    file, measured = tmp_path / "arm.xml", tmp_path / "arm.csv"
+    file.write_text(xml())
+    log(2).assign(gripper_set_rad=0.1).to_csv(measured, index=False)
+    assert main(["compare", str(measured), "--model", str(file)]) == 0
+    said = "; gripper_set_rad: the model has no such servo, so what it was told is not used"
+    assert said in capsys.readouterr().err
+    log(2).to_csv(measured, index=False)
+    assert main(["compare", str(measured), "--model", str(file)]) == 0
+    assert "no such servo" not in capsys.readouterr().err
+
+
 def _no_elbow():
     return log(1).drop(columns=["elbow_set_rad"])
 

@@ -9,7 +9,7 @@ from bns.api.common.arguments import named_model
 from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
 from bns.diagnose.data.bodies.cycles import CycleTracks, marker_noise_m
-from bns.diagnose.data.bodies.joints import JointTracks, check_names, check_scales
+from bns.diagnose.data.bodies.joints import SET, JointTracks, check_names, check_scales
 from bns.diagnose.data.bodies.stretches import stretches_of_cycles, stretches_of_joints
 from bns.diagnose.data.load import Measured, naming
 from bns.diagnose.data.tracks import Tracks
@@ -42,9 +42,10 @@ class Prepared:
 
     @property
     def thinned(self) -> str:
-        """How many of the poses are used, in words; "" for all."""
+        """How many of the poses are used, in words; "" for all. Of a body also which set points are not."""
         if isinstance(self.predictor, JointedPredictor):
-            return _used_in_words(self.log.measured.tracks, self.predictor)
+            tracks = self.log.measured.tracks
+            return _used_in_words(tracks, self.predictor) + _of_no_servo(tracks, self.model)
         used, there = len(self.predictor.tracks.t_s), len(self.log.measured.tracks.t_s)
         return f"{used} of {there} poses are used, evenly chosen; all commands are" if used < there else ""
 
@@ -119,6 +120,15 @@ def _prepared_body(read: Measurements, model: Model) -> Prepared:
             check_scales(tracks, body.joints, body.told, None if body.free else float(body.model.stat.extent))
         predictor = JointedPredictor(stretches_of_joints(tracks, model.mechanism, body.joints), model, "stretch")
     return Prepared(read, replace(measured, tracks=predictor.tracks), predictor, model)
+
+
+def _of_no_servo(tracks: Tracks, model: Model) -> str:
+    """Which set points of the measurements the model has no servo for."""
+    if not isinstance(tracks, JointTracks) or not isinstance(model, JointedModel):
+        return ""
+    servos = machine(model.mechanism).joints
+    others = [name + SET for name in tracks.joints if name not in servos]
+    return f"; {', '.join(others)}: the model has no such servo, so what it was told is not used" if others else ""
 
 
 def _used_in_words(tracks: Tracks, predictor: JointedPredictor) -> str:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 from bns.cli.parser import Parser, add_trust, data_first
 
 if TYPE_CHECKING:
-    from bns.api.common.prepared import Prepared
     from bns.api.common.progress import Progress
     from bns.api.diagnose import DiagnoseResult
     from bns.api.measurements import Measurements
@@ -203,6 +202,7 @@ def compare(options: argparse.Namespace) -> int:
     model, log = model_of(options), log_of(options)
     with ticking("comparing") as tick:
         seen = held_against(log, model, fresh=options.fresh, progress=tick)
+    _say_used(seen.used)
     if seen.of_networks and seen.causes is None:
         print(
             "bns: these networks come without their training patterns, so the causes of their errors cannot be given",
@@ -282,7 +282,7 @@ def diagnosed(options: argparse.Namespace) -> DiagnoseResult:
             fresh=options.fresh,
             progress=tick,
         )
-    _say_thinned(found.ready)
+    _say_used(found.ready.thinned)
     return found
 
 
@@ -304,7 +304,7 @@ def add(options: argparse.Namespace) -> int:
             per_trial=options.per_trial,
             progress=tick,
         )
-    _say_thinned(result.ready)
+    _say_used(result.ready.thinned)
     result.model.save(options.output)
     print(json.dumps(result.to_json()) if options.json else result.summary())
     if not options.json:
@@ -373,9 +373,9 @@ def model_of(options: argparse.Namespace) -> Given:
     return Model(options.model, **({} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}))
 
 
-def _say_thinned(ready: Prepared) -> None:
-    if ready.thinned:
-        print(ready.thinned, file=sys.stderr)
+def _say_used(how_much: str) -> None:
+    if how_much:
+        print(how_much, file=sys.stderr)
 
 
 def _drawn(options: argparse.Namespace, draw: Callable[[Path], Iterator[Path]]) -> None:
