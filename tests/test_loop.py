@@ -1,5 +1,7 @@
 """The loop and whoever drives for it: rounds that went on during a drive, an early end, the same luck for all options."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,40 @@ def test_the_next_round_is_due_only_if_none_went_on_during_the_drive():
     assert usual["generations"].tolist() == [2, 4, 6]
     assert meanwhile["generations"].tolist() == [6, 12, 18]
     assert meanwhile["training_patterns"][0] > 0  # the drive is learned from, in the rounds of the next
+
+
+class BusyLater(CountingDriver):
+    """Does its rounds during the second drive alone."""
+
+    def drive(self, evaluation, controller, advance):
+        self.rounds = 2 * (evaluation == 2)
+        return super().drive(evaluation, controller, advance)
+
+
+def test_a_drive_is_foretold_by_the_simulator_that_picked_it_whatever_is_learned_meanwhile():
+    spec = RunSpec(evaluations=2, **SMALL)
+    usual, busy = evals(spec), evals(spec, driver=BusyLater(spec, 0))
+    assert (usual["generations"][1], busy["generations"][1]) == (4, 6)
+    for name in ("evaluated_fitness_world", "evaluated_fitness_simulation", "evaluated_fitness_error"):
+        np.testing.assert_array_equal(busy[name], usual[name])
+
+
+class Passed(CountingDriver):
+    """Somebody passes over the second evaluation."""
+
+    def drive(self, evaluation, controller, advance):
+        return replace(super().drive(evaluation, controller, advance), skipped=evaluation == 2)
+
+
+def test_an_evaluation_that_was_passed_over_teaches_nothing_and_has_no_row():
+    spec = RunSpec(evaluations=3, **SMALL)
+    driver = Passed(spec, 0)
+    rows, whole = evals(spec, driver=driver), evals(spec)
+    assert rows["evaluation"].tolist() == [1, 3]
+    assert len(driver.picked) == 3
+    learned = rows["training_patterns"] + rows["validation_patterns"]
+    assert learned.tolist() == np.cumsum(rows["commands"]).tolist()
+    assert whole["generations"][1] == rows["generations"][1]
 
 
 def test_a_driver_that_has_finished_ends_the_run():

@@ -57,6 +57,19 @@ def test_untrained_a_hybrid_is_its_model(name):
     np.testing.assert_allclose(approach.evolver.scores.fitness, physics.score(approach.evolver.population).fitness, rtol=1e-5)
 
 
+@pytest.mark.parametrize("name", ["bns+model=khepera", "bns+model=khepera+ensemble=2"])
+def test_where_its_networks_fail_a_hybrid_is_its_model_again(name):
+    approach, physics = started(name), PhysicsSimulator(ROBOT, TASK, DRAWING)
+    commands = drives(1)[0]
+    approach.learn(commands, PhysicsSimulator(ROBOT, TASK, SLIPPING).poses(commands), 1)
+    for trainer in getattr(approach.trainer, "members", [approach.trainer]):
+        trainer.rule.weights[:] = np.nan
+    approach.train()
+    approach.copy()
+    assert approach.measures()["arithmetic_failures"] == len(ROBOT.networks) * (2 if "ensemble" in name else 1)
+    np.testing.assert_allclose(approach.simulator.poses(commands), physics.poses(commands), atol=1e-6)
+
+
 def test_networks_learn_what_the_model_gets_wrong():
     approach = started("bns+model=khepera", training_iterations_per_evaluation=1000)
     world = PhysicsSimulator(ROBOT, TASK, SLIPPING)

@@ -1,5 +1,8 @@
 """Two effects that do together what one does are named; others are not."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
@@ -9,6 +12,7 @@ from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select import equivalents
 from bns.diagnose.select.equivalents import equivalent_pairs
+from bns.physics.effects import all_effects
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
@@ -59,3 +63,21 @@ def test_of_more_pairs_than_are_fitted_those_that_span_most_are_taken(monkeypatc
     found = equivalents._promising(problem, problem.fit(model), "speed-gain", others)
     assert len(found) == 3
     assert {effect.name for effect in found[0]} == {"wheelbase", "camera-scale"}
+
+
+def test_sensitivities_are_asked_for_at_numbers_that_an_effect_may_have():
+    """Where it does nothing, an effect may stand at its bound; then the only way is inwards."""
+    asked = []
+    base = SimpleNamespace(with_active=lambda _, values: values)
+    problem = SimpleNamespace(whitened=lambda values: asked.append(values) or np.zeros((1, 3)))
+    at_the_top = SimpleNamespace(neutral=1.0, low=0.0, high=1.0, plausible=(0.2, 1.0))
+    inside = SimpleNamespace(neutral=0.0, low=-1.0, high=1.0, plausible=(-0.5, 0.5))
+    own = SimpleNamespace(parameters=(at_the_top, inside), neutral={"one": 1.0, "other": 0.0})
+    for effect in (own, *filter(equivalents._smooth, all_effects().values())):
+        asked.clear()
+        assert len(list(equivalents._columns(problem, base, np.zeros((1, 3)), np.ones((1, 1)), effect))) == len(asked)
+        for values in asked:
+            assert all(p.low <= value <= p.high for p, value in zip(effect.parameters, values, strict=True))
+        neutral = tuple(effect.neutral.values())
+        moved = [[i for i in range(len(neutral)) if values[i] != neutral[i]] for values in asked]
+        assert moved == [[i] for i in range(len(neutral))]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.select import exchanges
+from bns.diagnose.select import exchanges, stepwise
 from bns.diagnose.select.exchanges import BEHIND, BEHIND_LOSS, SCREEN, Entry, Exchanges
 from bns.diagnose.select.stepwise import StepwiseSelection
 
@@ -73,3 +73,61 @@ def test_an_effect_is_exchanged_only_for_what_loses_less_on_held_out_trials_by_m
     monkeypatch.setattr(search, "_refit_with_noise", lambda *_: ("settled", tried))
     problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
     assert search._exchange_step(problem, fit, ("a", "b"))[2] == ends
+
+
+def test_an_exchange_that_asks_for_too_much_once_it_has_settled_gives_way_to_the_next_best(monkeypatch):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    fit, best, second = (SimpleNamespace(held_out=np.array([6.0, 4.0 - less]), model=less) for less in (0.0, 3.0, 2.0))
+    exchanged = {("a", "b"): [("b", "c", best), ("b", "d", second)], ("a", "d"): [("d", "c", best)]}
+    search._exchanges = SimpleNamespace(of=lambda _problem, _fit, accepted: exchanged[accepted])
+    monkeypatch.setattr(search, "_may_stay", lambda *_: True)
+    problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
+    monkeypatch.setattr(search, "_refit_with_noise", lambda model, _: (problem, SimpleNamespace(model=model)))
+    monkeypatch.setattr(search, "_rejected", lambda settled, name, **_: "too much" if (settled.model, name) == (3.0, "c") else "")
+    assert search._exchange_step(problem, fit, ("a", "b"))[2] == ("a", "d")
+
+
+@pytest.mark.parametrize(
+    ("change", "earned"),
+    [
+        ({}, True),
+        ({"gain": 0.99}, False),  # too little beside what a trial loses on average
+        ({"decoy": 2.0}, False),
+        ({"decoy": 2.0, "gain": 2.01}, True),
+        ({"p_value": 0.01}, False),
+        ({"z": 2.0}, False),
+    ],
+)
+def test_what_comes_in_is_certain_does_better_than_decoys_and_gains_enough(change, earned):
+    given = {"gain": 1.01, "decoy": 0.0, "p_value": 0.009, "z": 2.1} | change
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    search.level, search._least_z = 0.01, 2.0
+    before, least = SimpleNamespace(held_out=np.array([6.0, 10.0])), 8.0 * stepwise.MIN_GAIN
+    comparison = SimpleNamespace(p_value=given["p_value"], z=given["z"], elpd_diff=given["gain"] * least)
+    assert search._earned(SimpleNamespace(paired_comparison=comparison), before, given["decoy"] * least) is earned
+
+
+def test_a_look_back_asks_of_every_effect_but_the_newest_whether_it_stays(monkeypatch):
+    search, asked = StepwiseSelection.__new__(StepwiseSelection), []
+    search.catalogue = {}
+    monkeypatch.setattr(search, "_shortened", lambda *state: state)
+    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
+    monkeypatch.setattr(search, "_stays", lambda _problem, _simpler, _fit, name: asked.append(name) or True)
+    monkeypatch.setattr(stepwise, "at_bound", lambda *_: False)
+    monkeypatch.setattr(stepwise, "reduced", lambda *_: None)
+    fit = SimpleNamespace(model=SimpleNamespace(effects=()))
+    assert search._backward_step(None, fit, ("a", "b", "c"))[2] == ("a", "b", "c")
+    assert asked == ["a", "b"]
+
+
+@pytest.mark.parametrize(("numbers", "anything", "competes"), [(2, True, False), (2, False, True), (1, True, True)])
+def test_no_explanation_competes_by_one_more_number_that_may_be_anything(monkeypatch, numbers, anything, competes):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    fit, tried = SimpleNamespace(free=[1]), SimpleNamespace(free=[1] * numbers)
+    search._exchanges = SimpleNamespace(of=lambda *_: [("b", "c", tried)])
+    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
+    monkeypatch.setattr(search, "_earned_over", lambda *_: True)
+    for name, answer in (("limiting", anything), ("indistinguishable", True), ("without", None)):
+        monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
+    found = search._competing_models(None, fit, ("a", "b", "d"))
+    assert found == ([(("a", "c", "d"), tried)] if competes else [])

@@ -17,7 +17,8 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import _with_interval, diagnosis_text, enumerated
 from bns.diagnose.residuals.outliers import Outlier
 from bns.diagnose.residuals.unexplained import Unexplained
-from bns.diagnose.select.result import SelectionResult
+from bns.diagnose.select import result
+from bns.diagnose.select.result import SelectionResult, SelectionStep
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -41,6 +42,52 @@ def test_what_competes_with_what_is_left_is_asked_again(late):
     assert search.competing(found) is found
     nothing = replace(found, accepted=(), competing_models=())
     assert search.competing(nothing) is nothing
+
+
+def test_with_fewer_effects_nothing_competes_until_it_is_asked_for(late):
+    found = standing(late, "clock-offset", "speed-gain", competing=(("command-delay", "speed-gain"),))
+    kept = found.only(("clock-offset",))
+    assert (kept.accepted, kept.competing_models) == (("clock-offset",), ())
+    assert [active.effect.name for active in kept.fit.model.effects] == ["clock-offset"]
+    assert kept.fit.loss == pytest.approx(kept.problem.loss(kept.fit.model))
+
+
+def test_without_any_effect_before_and_after_are_the_model_as_given_under_its_own_noise(late):
+    found = standing(late, "clock-offset", competing=(("command-delay",),))
+    for bare in (found.withdrawn(), found.only(())):
+        assert (bare.accepted, bare.competing_models, bare.fit.model.effects) == ((), (), ())
+        assert bare.nominal is bare.fit
+        assert bare.fit.loss == pytest.approx(bare.problem.loss(NOMINAL))
+        assert (bare.problem.pose_filter.noise > found.problem.pose_filter.noise).any()  # a late clock looks like noise
+
+
+@pytest.mark.parametrize(
+    ("falls", "fell", "lower"),
+    [(True, [None, True], True), (True, [None, False], False), (False, [True], False), (True, [], False)],
+)
+def test_an_error_is_certainly_lower_where_it_falls_as_a_whole_and_for_certain_at_one_horizon(monkeypatch, falls, fell, lower):
+    """The errors are mocked; a horizon of too few windows has no total."""
+    horizons = {i: SimpleNamespace(total=None if one is None else SimpleNamespace(fell=one)) for i, one in enumerate(fell)}
+    monkeypatch.setattr(result, "held_out_steps", lambda *_: None)
+    monkeypatch.setattr(result, "paired_errors", lambda *_: SimpleNamespace(falls=falls, horizons=horizons))
+    one = SimpleNamespace(predictor=None, pose_filter=None), SimpleNamespace(model=None)
+    assert result.certainly_lower(one, one) is lower
+
+
+@pytest.mark.parametrize(("added", "first"), [(effect_named("clock-offset"), ("clock-offset",)), (None, ())])
+def test_clocks_are_named_before_what_was_found_beside_them_unless_the_model_had_one(late, added, first):
+    search, found = StepwiseSelection(late, NOMINAL), standing(late, "speed-gain", competing=(("wheelbase",),))
+    clock = NOMINAL.with_effect("clock-offset", offset_s=0.0)
+    search.model = SimpleNamespace(per_trial_effect=clock.effects[0])
+    clocks = SimpleNamespace(fit="the clocks' fit", paired_comparison="what they earned")
+    ended = search._with_clocks(replace(found, steps=(_step("speed-gain"), _step(""))), "nominal", clocks, added)
+    assert (ended.accepted, ended.competing_models) == ((*first, "speed-gain"), ((*first, "wheelbase"),))
+    assert [[c.name for c in step.ranking] for step in ended.steps] == [["clock-offset", "speed-gain"], [""]]
+    assert ended.nominal == "nominal"
+
+
+def _step(name):
+    return SelectionStep((SimpleNamespace(name=name),), 0.0, name)
 
 
 def test_a_diagnosis_whose_search_lost_an_effect_keeps_its_tie(late, monkeypatch):

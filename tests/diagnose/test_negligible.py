@@ -45,6 +45,15 @@ def test_half_a_millisecond_is_negligible_and_a_small_mismatch_is_not():
     assert negligible(selected("clock-offset")) == ()  # alone it is what there is: the error decides (`PairedErrors.falls`)
 
 
+def test_of_two_effects_that_can_stand_for_one_another_one_is_kept():
+    """Each alone changes no error while the other is there: a clock and a command that are late are the same in a log."""
+    seen = WheelPredictor(tracks_of(measured(hidden(wheelbase={"factor": 1.05}, clock_offset={"offset_s": 0.08}), trials=12)))
+    names = ("wheelbase", "clock-offset", "command-delay")
+    problem, fit, _ = fit_set(seen, NOMINAL, [listed(NOMINAL, None, seen.tracks)[name] for name in names])
+    dropped = negligible(SelectionResult(problem, problem.fit(NOMINAL), fit, names, ()))
+    assert dropped in {("clock-offset",), ("command-delay",)}
+
+
 def test_ties_keep_what_is_left_of_them():
     one = selected("wheelbase", "clock-offset")
     competing = (("marker-offset", "clock-offset"), ("wheelbase", "command-delay"))
@@ -52,6 +61,10 @@ def test_ties_keep_what_is_left_of_them():
     assert kept.accepted == ("wheelbase",)
     assert kept.competing_models == (("marker-offset",),)
     assert [a.effect.name for a in kept.fit.model.effects] == ["wheelbase"]
+    two = selected("wheelbase", "wheel-mismatch", "clock-offset")
+    competing = (("marker-offset", "wheel-mismatch", "clock-offset"), ("wheelbase", "wheel-mismatch", "command-delay"))
+    kept = replace(two, competing_models=competing).lacking(("wheel-mismatch", "clock-offset"))
+    assert (kept.accepted, kept.competing_models) == (("wheelbase",), (("marker-offset",),))
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,18 @@ def test_children_are_exactly_the_twins(n, capacity, rate, share, shortest, gene
     assert hits == slow_hits
 
 
+@pytest.mark.parametrize("inside", [False, True])
+def test_lists_of_unequal_length_are_cut_each_at_its_own_place(inside):
+    """Two hundred pairs, of which some forty are cut at two places."""
+    old, order = parents(401, capacity=40), np.arange(401)
+    operators = Operators(cuts_inside=inside)
+    children, hits = bred(old, 0.0, 0.0, 1, order=order, operators=operators)
+    slow, _, slow_hits = reference.breed(KEY, old, order.tolist(), tournament_cdf(401, 0.0), 0.0, BOUNDS, 1, 1, operators)
+    assert hits == slow_hits
+    for i, child in enumerate(slow):
+        np.testing.assert_array_equal(children.controller(i), child)
+
+
 def test_readings_of_the_operators_do_what_they_say():
     old = parents(200)
     plain, exact = (everyone(bred(old, 1.0, operators=one)[0]) for one in (DEFAULT, Operators(exact=(False, False, True))))

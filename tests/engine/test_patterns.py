@@ -56,6 +56,17 @@ def test_more_patterns_than_there_was_room_for():
     np.testing.assert_array_equal(numbers(patterns), np.arange(patterns.count))
 
 
+def test_a_pattern_that_a_network_may_not_learn_from_stays_so_however_often_it_counts():
+    patterns, present = PatternSet.empty(5, 3), np.ones((3, 4), bool)
+    present[1, 2] = False
+    patterns.add(*numbered(0, 4), present)
+    merged = patterns.counted(np.array([1, 0, 3, 2])).merged()
+    assert [(inputs[0].tolist(), counts.tolist()) for inputs, _, counts in merged] == [
+        ([0, 2, 3], [1, 3, 2]), ([0, 3], [1, 2]), ([0, 2, 3], [1, 3, 2]),
+    ]  # fmt: skip
+    assert patterns.present[:, :4].tolist() == present.tolist()
+
+
 def test_what_is_not_finite_is_left_out_and_counted():
     X, y = numbered(0, 40)
     X[2, 3], y[0, 5], y[2, 6], y[1, 6] = np.nan, np.inf, -np.inf, np.nan

@@ -7,7 +7,7 @@ import torch
 
 from bns.engine import reference
 from bns.engine.philox import Key
-from bns.engine.snn import BLOCK, hidden_count, initial_weights, predict, sigmoid, weight_count
+from bns.engine.snn import BLOCK, PREDICTION_BLOCK, hidden_count, initial_weights, predict, sigmoid, weight_count
 
 
 @numba.njit(error_model="numpy")
@@ -43,6 +43,13 @@ def test_outputs_are_the_twins(hidden, n):
     weights, X = networks(hidden), inputs(n)
     # H outputs weighted with at most 1: each is good to 2e-7 (sigmoid) and a few roundings of 6e-8.
     np.testing.assert_allclose(predict(weights, X), reference.predict(weights, X), rtol=0, atol=hidden * 5e-7)
+
+
+def test_a_last_input_that_is_0_at_first_counts_where_it_comes():
+    """It is left out only where all of it is 0, however many patterns are handled at once."""
+    weights, X = networks(), inputs(2 * PREDICTION_BLOCK + 3)
+    X[4, :-2] = 0
+    np.testing.assert_allclose(predict(weights, X), reference.predict(weights, X), rtol=0, atol=20 * 5e-7)
 
 
 def test_saturated_networks_are_good_to_single_precision():

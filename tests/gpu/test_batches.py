@@ -108,6 +108,38 @@ def test_a_batch_is_no_larger_than_the_time_that_is_left_allows(monkeypatch):
     assert executor.free == 10
 
 
+@pytest.mark.parametrize(("wall_s", "room"), [(0.5, 4), (600.0, 1)])
+def test_a_batch_that_was_not_full_makes_the_next_one_smaller_but_not_larger(monkeypatch, wall_s, room):
+    clock = itertools.count()
+    monkeypatch.setattr(batches.time, "perf_counter", lambda: wall_s * next(clock))
+    executor = BatchExecutor(make=Steps, first=4)
+    for spec in ordered_specs(SWEEP)[:2]:
+        executor.submit(spec)
+    while executor.in_flight:
+        executor.next(0.0)
+    assert executor.free == room
+
+
+def test_no_run_is_taken_while_a_batch_is_under_way():
+    executor = BatchExecutor(make=Steps, first=4)
+    for spec in ordered_specs(SWEEP)[:2]:
+        executor.submit(spec)
+    assert executor.free == 2
+    assert executor.next(-1.0) is None  # one evaluation
+    assert (executor.free, executor.in_flight) == (0, 2)
+
+
+def test_runs_of_a_batch_share_its_processor_time_and_all_took_as_long_as_it_did(monkeypatch):
+    for name, step_s in (("perf_counter", 5.0), ("process_time", 8.0)):
+        clock = itertools.count()
+        monkeypatch.setattr(batches.time, name, lambda clock=clock, step_s=step_s: step_s * next(clock))
+    executor = BatchExecutor(make=Steps, first=4)
+    for spec in ordered_specs(SWEEP)[:4]:
+        executor.submit(spec)
+    records = [record for record in (executor.next(0.0) for _ in range(9)) if record is not None]
+    assert [(record.run["wall_s"], record.run["cpu_s"]) for record in records] == [(5.0, 2.0)] * 4
+
+
 def test_no_batch_is_begun_when_the_time_is_up(tmp_path):
     assert swept(tmp_path, budget=Budget(0.0)).stopped_by == "budget"
     assert Steps.begun == []

@@ -180,6 +180,12 @@ def of(name, gain, p_value=0.001):
     return screening.Screened(SimpleNamespace(name=name), gain, p_value)
 
 
+def test_a_gain_is_what_the_loss_falls_by_to_the_bottom_of_its_parabola():
+    """Of the loss x²·4/2 - 2·x the bottom is at 1/2, lower by 1/2; a number that does nothing gains nothing."""
+    assert screening._gain(np.array([2.0]), np.array([[4.0]])) == pytest.approx(0.5)
+    assert screening._gain(np.array([2.0, 0.0]), np.diag([4.0, 0.0])) == pytest.approx(0.5)
+
+
 def test_only_what_is_likely_and_near_the_best_is_fitted():
     assert chosen([of("a", 10.0), of("b", 2.1), of("c", 1.9)]) == ["a", "b"]
     assert chosen([of("luck", 90.0, 0.06), of("a", 10.0), of("b", 2.1)]) == ["a", "b"]

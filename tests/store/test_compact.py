@@ -102,6 +102,23 @@ def test_damaged_page_is_found_and_set_aside(tmp_path):
         assert len(load(tmp_path)) == 100
 
 
+@pytest.mark.parametrize("elsewhere", [True, False])
+def test_rows_without_their_run_are_removed_only_where_they_are_elsewhere_as_well(tmp_path, elsewhere):
+    """A run in two folds: one has lost its row in runs; the other has all, or has lost its evaluations."""
+    spec = next(specs(1, 3))
+    for _ in range(2):
+        with Writer(tmp_path, "s") as writer:
+            writer.append(record(spec))
+    orphan, rows_of_other = parts(tmp_path, "evals")
+    next(path for path in parts(tmp_path, "runs") if path.name == orphan.name).unlink()
+    if not elsewhere:
+        rows_of_other.unlink()
+    summary = compact(tmp_path)
+    assert not orphan.exists()
+    assert [(path.name, rows(path)) for path in summary.set_aside] == ([] if elsewhere else [(orphan.name, 3)])
+    assert rows_of_other.exists() is elsewhere
+
+
 def test_journals_left_behind_are_recovered(tmp_path):
     class StopError(Exception):
         pass

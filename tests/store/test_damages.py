@@ -8,7 +8,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from bns.spec import RunSpec
 from bns.store import StoreWarning, Writer, compact, finished, load, query
+from bns.store.disk import whole
 from bns.store.disk.digest import Memory, digest_in, identity, is_intact
 from bns.store.disk.parquet import file_bytes
 from bns.store.disk.parts import find_parts
@@ -184,3 +186,21 @@ def test_large_stores_are_remembered_by_the_next_process(tmp_path, monkeypatch):
     for kept in (tmp_path / "cache" / "bns").iterdir():
         kept.write_text("no JSON")
     assert not Memory(tmp_path).has(path, now)
+
+
+@pytest.mark.parametrize(
+    ("kept", "wanted"),
+    [
+        ("evals", ("evals",)),
+        ("paths", ("evals", "paths")),
+        ("full", ("evals", "paths", "generations", "probes")),
+    ],
+)
+def test_beside_runs_from_before_digests_stands_what_they_were_asked_to_record_if_they_went_well(tmp_path, kept, wanted):
+    spec = RunSpec(evaluations=3, record=kept)
+    for sweep, run in (("well", record(spec, wanted)), ("badly", failed(spec))):
+        with Writer(tmp_path, sweep) as writer:
+            writer.append(run)
+    well, badly = (next((tmp_path / "runs" / f"sweep={sweep}").rglob("*.parquet")) for sweep in ("well", "badly"))
+    assert set(whole._wanted_by_record(well)) == set(wanted)
+    assert whole._wanted_by_record(badly) == ()

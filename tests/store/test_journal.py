@@ -11,6 +11,7 @@ from bns.errors import StoreError
 from bns.store import StoreWarning, Writer, compact, finished, load
 from bns.store.disk import journal as journal_module
 from bns.store.disk.journal import MAGIC, journals
+from bns.store.write import fold
 
 from .synthetic import failed, record, records, specs
 
@@ -85,6 +86,28 @@ def test_damaged_frame_is_reported_and_the_others_kept(left, where, frame):
     assert (results / "set-aside" / "journal" / path.name).read_bytes() == data
 
 
+def test_rows_of_a_fold_that_is_under_way_are_not_called_lost(left, monkeypatch):
+    results, path, _, _ = left
+    before, published = load(results), fold.publish
+
+    def stopped(data, staged, place):
+        if "runs" in place.relative_to(results).parts:
+            raise StopError
+        published(data, staged, place)
+
+    monkeypatch.setattr(fold, "publish", stopped)
+    with pytest.raises(StopError):
+        fold.fold_journal(results, journals(results)[0])
+    assert path.exists()
+    assert list((results / "evals").rglob("*.parquet"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pdt.assert_frame_equal(load(results), before)
+    path.rename(results / "elsewhere")
+    with pytest.warns(StoreWarning, match="there is no readable runs/"):
+        assert finished(results, "s") == {}
+
+
 def test_run_in_a_journal_and_in_a_file_is_taken_once(left, tmp_path_factory):
     results, path, runs, _ = left
     kept = tmp_path_factory.mktemp("kept") / path.name
@@ -137,6 +160,25 @@ def test_journal_of_a_newer_version_is_refused(left, monkeypatch):
     monkeypatch.setattr(journal_module, "SCHEMA_VERSION", 0)
     with pytest.raises(StoreError, match=r"schema version 2; this bns knows 0.*pip install -U bns"):
         finished(results, "s")
+
+
+def test_journal_of_an_older_version_is_read_and_folded_as_of_this_one(left, monkeypatch):
+    """Version 1 knew neither approaches nor robot time: half a minute beside what was driven."""
+    results, path, _, _ = left
+    before = load(results)
+    driven_s = before.groupby("run_id").driven_ms.cumsum() / 1000 + 30 * before.evaluation
+    old = []
+    for frame in journal_module.read_journal(journals(results)[0]).frames:
+        tables = {name: table.drop_columns([n for n in ("approach", "robot_s") if n in table.column_names])
+                  for name, table in frame.tables.items()}  # fmt: skip
+        old.append(replace(frame, tables=tables))
+    with monkeypatch.context() as earlier:
+        earlier.setattr(journal_module, "SCHEMA_VERSION", 1)
+        path.write_bytes(b"".join(journal_module.encoded(frame, "s") for frame in old))
+    pdt.assert_frame_equal(load(results), before.assign(robot_s=driven_s))
+    with Writer(results, "s") as writer:
+        assert writer.recovered == 3
+    pdt.assert_frame_equal(load(results), before.assign(robot_s=driven_s))
 
 
 def test_empty_journal_is_removed(tmp_path):

@@ -30,6 +30,16 @@ def test_second_writer_is_refused_at_once_and_told_who_holds_the_sweep(tmp_path)
     assert len(finished(tmp_path, "s")) == len(finished(tmp_path, "t")) == 1
 
 
+def test_a_shard_that_was_refused_keeps_nobody_out(tmp_path):
+    one = ShardLock(tmp_path, "s", "a")
+    one.acquire()
+    with pytest.raises(SweepLockedError):
+        ShardLock(tmp_path, "s", "a").acquire()
+    one.release()
+    with SweepLock(tmp_path, "s"):
+        pass
+
+
 def test_shards_of_one_sweep_are_written_side_by_side_and_the_whole_is_not(tmp_path):
     one, other = (ShardLock(tmp_path, "s", shard) for shard in "ab")
     one.acquire()

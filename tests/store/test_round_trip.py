@@ -2,6 +2,7 @@
 
 import pickle
 from datetime import UTC, datetime
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -115,6 +116,17 @@ def test_sweep_file_is_kept_once(tmp_path):
     assert kept.values.tolist() == [["s", spec_hash("grid: 1\n"), "grid: 1\n", 2]]
     write(tmp_path, [], sweep_text="grid: 2\n")
     assert len(load(tmp_path, "specs")) == 2
+
+
+def test_of_two_sweep_files_of_the_same_second_the_later_is_known_as_such(tmp_path, monkeypatch):
+    for microsecond, text in ((7, "a: 1\n"), (8, "a: 2\n")):
+        now = datetime(2026, 1, 1, 12, 0, 0, microsecond, tzinfo=UTC)
+        monkeypatch.setattr("bns.store.write.writer.datetime", SimpleNamespace(now=lambda _, now=now: now))
+        with Writer(tmp_path, "s", sweep_text=text):
+            pass
+    kept = load(tmp_path, "specs", columns=["written_at", "text"]).sort_values("written_at")
+    assert kept["text"].tolist() == ["a: 1\n", "a: 2\n"]
+    assert kept["written_at"].dt.microsecond.tolist() == [7, 8]
 
 
 def test_finished_names_every_run_of_one_sweep(tmp_path):

@@ -5,6 +5,7 @@ import signal
 import sys
 import time
 import types
+import warnings
 from pathlib import Path
 
 import pandas as pd
@@ -22,7 +23,7 @@ from bns.store import load
 from bns.sweep.expand.order import ordered_specs
 from bns.sweep.jobs import dask_link
 from bns.sweep.jobs.dask_job import LeavesSignals
-from bns.sweep.jobs.dask_workers import DaskExecutor, DaskWarning
+from bns.sweep.jobs.dask_workers import DaskExecutor, DaskWarning, _advise
 from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.jobs.workers import LEFT_TO_PARENT
 from bns.sweep.runner import run_sweep
@@ -185,3 +186,21 @@ def test_workers_of_its_own_leave_ctrl_c_to_the_process_that_sweeps():
     finally:
         for number, handler in former.items():
             signal.signal(number, handler)
+
+
+def test_every_thread_of_a_worker_takes_a_run_and_one_run_waits_for_the_first_worker(monkeypatch):
+    link = dask_link.DaskLink("tcp://127.0.0.1:8786", 1, 1.0)
+    assert link.slots == 1
+    for threads, slots in (({"a": 2, "b": 3}, 5), ({"a": 1}, 1), ({}, 1)):
+        client = types.SimpleNamespace(status="running", nthreads=lambda threads=threads: threads)
+        monkeypatch.setattr(link, "_client", client)
+        link._looked_at = float("-inf")
+        assert link.slots == slots
+
+
+def test_workers_with_two_threads_are_advised_against_and_those_with_one_are_not():
+    with pytest.warns(DaskWarning, match=r"1 Dask workers have more than one thread \(b has 2\).*--nthreads 1"):
+        _advise({"a": 1, "b": 2})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        _advise({"a": 1, "b": 1})
