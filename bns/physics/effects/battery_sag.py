@@ -45,6 +45,7 @@ EFFECT = Effect(
     residuals="Distances and turns shrink by one fraction, which grows from trial to trial.",
     lookalikes=("speed-gain",),
     sentence="the robot becomes slower as its battery discharges",
+    sized="the robot becomes {rate_per_s:slower|faster|} in the course of the session (a discharging battery makes it slower)",
     measurement="log the battery's voltage (column battery_v)",
     explained_by=("session_s", "battery_v"),
     caveat="No session_s or battery_v was logged: the trials are assumed to follow one another without pauses.",
