@@ -9,6 +9,8 @@ from scipy.special import stdtr
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.variables import bare, label, velocity
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.estimate.smoothing_tracker import LAG, smoothing_tracker
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
@@ -20,6 +22,7 @@ from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import ties_of
+from bns.physics.effect import Parameter
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.model import Model
@@ -32,6 +35,7 @@ WORST_SHARE = DEFAULTS.residuals.worst_share
 SHOWN = DEFAULTS.report.moments
 OFTEN = DEFAULTS.verdict.often
 FEWEST_CLOCKS = DEFAULTS.verdict.fewest_clocks
+OUTGROWN = DEFAULTS.verdict.outgrown
 
 
 def notes_on(
@@ -85,6 +89,8 @@ def notes_on(
         said = f"{formula_in_words}: " if formula_in_words else ""
         yield f"A candidate term: {said}{formula.on} + {formula.term} with {values}."
     yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
+    if found.terms and not (with_terms is not None and with_terms.rose_in_the_end):
+        yield from _on_cancelling(selection.fit, found.terms[0].fit, selection.accepted)
     if terms and with_terms is not None and (with_terms.rose_in_the_end or not with_terms.falls):
         yield _no_lower(with_terms)
     if hint is not None:
@@ -93,6 +99,36 @@ def notes_on(
     for c in selection.steps[0].ranking:
         if c.rejected_because and c.paired_comparison.elpd_diff > NOTABLE * float(selection.nominal.losses.mean()):
             yield f"{c.name} was not considered: {c.rejected_because}."
+
+
+def _on_cancelling(without: Fit, beside: Fit, accepted: Sequence[str]) -> Iterator[str]:
+    """On effects of one number that it takes much further from neutral once a term for the rest stands beside them."""
+    before, after = _only_numbers(without), _only_numbers(beside)
+    for name in accepted:
+        if name not in before or name not in after:
+            continue
+        (p, value, _, most), (_, value_beside, least, _) = before[name], after[name]
+        if least > OUTGROWN * most:
+            yield (
+                f"{name} and the free term cancel in part: beside the term, {p.name} is {value_beside:.3g}{with_unit(p)}, and "
+                f"{value:.3g} without it. What acts may be neither of the two, but something that only both together describe "
+                f"(such as friction that changes along the session): do not read {p.name} by itself."
+            )
+
+
+def _only_numbers(fit: Fit) -> dict[str, tuple[Parameter, float, float, float]]:
+    """Of effects with one fitted number: which, its value, and the least and most distance from neutral in its interval."""
+    each: dict[str, list[int]] = {}
+    for index, number in enumerate(fit.free):
+        each.setdefault(number.effect, []).append(index)
+    found = {}
+    for name, indices in each.items():
+        p = fit.free[indices[0]].parameter
+        if len(indices) == 1 and np.isfinite(p.neutral):
+            low, high = (end - p.neutral for end in fit.interval(indices[0]))
+            within = low <= 0.0 <= high
+            found[name] = p, float(fit.values[indices[0]]), 0.0 if within else min(abs(low), abs(high)), max(abs(low), abs(high))
+    return found
 
 
 def implausible_text(selection: SelectionResult, name: str) -> str:

@@ -12,6 +12,7 @@ import bns.diagnose.diagnosis as said_by
 from bns.api.diagnose import DiagnoseResult
 from bns.diagnose.caveats import (
     _no_lower,
+    _on_cancelling,
     _on_drift,
     _on_effects,
     _on_rest,
@@ -255,10 +256,50 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
         fit=SimpleNamespace(model=NOMINAL), nominal=SimpleNamespace(losses=np.ones(10)),
     )  # fmt: skip
     nothing = dict.fromkeys(("imitating", "withdrawn", "unseen", "negligible", "formula", "errors_with_terms"))
-    found = SimpleNamespace(**nothing | {"selection": selection, "negligible": {}, "imitating": (), "rest": NOTHING})
+    found = SimpleNamespace(**nothing | {"selection": selection, "negligible": {}, "imitating": (), "rest": NOTHING, "terms": ()})
     hint = SimpleNamespace(name="turn-slip", paired_comparison=SimpleNamespace(z=z))
     (note,) = notes_on(found, tracks_of(measured(NOMINAL, trials=10)), hint)
     assert note == f"turn-slip may be missing, but 10 trials are too few to decide; about {more} more would decide."
+
+
+def fit_of(*numbers):
+    """As a `Fit`: name of the effect, parameter, value, low, high each."""
+    free = tuple(SimpleNamespace(effect=name, parameter=number_of(effect_named(name), key)) for name, key, *_ in numbers)
+    return SimpleNamespace(
+        free=free, values=[number[2] for number in numbers], interval=lambda index: tuple(numbers[index][3:])
+    )
+
+
+def number_of(effect, key):
+    return next(p for p in effect.parameters if p.name == key)
+
+
+SAG, GAIN = ("battery-sag", "rate_per_s"), ("speed-gain", "gain")
+
+
+@pytest.mark.parametrize(
+    ("without", "beside", "said"),
+    [
+        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, 3e-4, 2.5e-4, 3.5e-4), True),  # 2.5 is more than twice 1.2
+        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, 3e-4, 2.3e-4, 3.7e-4), False),  # 2.3 is not
+        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, -3e-4, -3.5e-4, -2.5e-4), True),
+        ((*SAG, -1e-4, -1.2e-4, -0.8e-4), (*SAG, 1e-4, 0.8e-4, 1.2e-4), False),
+        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, 2e-4, -3e-4, 7e-4), False),  # it may be none at all
+        ((*GAIN, 1.05, 1.04, 1.06), (*GAIN, 1.14, 1.13, 1.15), True),  # neutral is 1: 5 % and 14 %
+        ((*GAIN, 1.05, 1.04, 1.06), (*GAIN, 1.1, 1.11, 1.12), False),
+    ],
+)
+def test_an_effect_that_a_term_multiplies_is_said_to_cancel_a_part_of_it(without, beside, said):
+    name, key, value, *_ = beside
+    notes = list(_on_cancelling(fit_of(without), fit_of(beside), (name,)))
+    assert bool(notes) == said
+    assert not said or f"{name} and the free term cancel in part: beside the term, {key} is {value:.3g}" in notes[0]
+    assert not list(_on_cancelling(fit_of(without), fit_of(beside), ()))
+
+
+def test_of_an_effect_with_several_numbers_none_is_said_to_have_outgrown_the_others():
+    without, beside = ((("floor-slope", "x_m_s", x, x, x), ("floor-slope", "y_m_s", 0.01, 0.01, 0.01)) for x in (0.001, 0.1))
+    assert not list(_on_cancelling(fit_of(*without), fit_of(*beside), ("floor-slope",)))
 
 
 def test_an_implausible_wheelbase_is_asked_about_with_both_distances():

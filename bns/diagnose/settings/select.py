@@ -190,6 +190,12 @@ class Verdict:
         "1",
         f"An effect that would have gained this fraction of the loss, but is rejected, is mentioned; {BY_HAND}.",
     )
+    outgrown: float = setting(
+        2.0,
+        "1",
+        "An effect whose number is certainly further from neutral by this factor beside a free term than without it is said to "
+        f"cancel a part of that term: what is added for the rest should not multiply what was found before; {BY_HAND}.",
+    )
     bins: int = setting(
         8, "bins", f"Bins, with equal numbers of values, of a curve of errors along a variable; {BY_HAND}."
     )
