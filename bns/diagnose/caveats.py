@@ -9,7 +9,7 @@ from scipy.special import stdtr
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.variables import bare, label, velocity
-from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.cancelling import Cancelled, cancelled
 from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.estimate.smoothing_tracker import LAG, smoothing_tracker
 from bns.diagnose.outcome import Outcome
@@ -22,7 +22,7 @@ from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import ties_of
-from bns.physics.effect import Parameter
+from bns.physics.effect import Effect, Parameter
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.model import Model
@@ -35,7 +35,6 @@ WORST_SHARE = DEFAULTS.residuals.worst_share
 SHOWN = DEFAULTS.report.moments
 OFTEN = DEFAULTS.verdict.often
 FEWEST_CLOCKS = DEFAULTS.verdict.fewest_clocks
-OUTGROWN = DEFAULTS.verdict.outgrown
 
 
 def notes_on(
@@ -73,7 +72,8 @@ def notes_on(
     for name, numbers in found.negligible.items():
         of_log = name not in known or known[name].of_measuring
         why = " It may be an artefact of the log, such as rounded time stamps." if of_log else ""
-        said = ", ".join(f"{key} = {number['value']:.3g} {number['unit']}" for key, number in numbers.items())
+        units = {key: "" if number["unit"] == "1" else f" {number['unit']}" for key, number in numbers.items()}
+        said = ", ".join(f"{key} = {number['value']:.3g}{units[key]}" for key, number in numbers.items())
         yield (
             f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "
             f"more, so it is not named.{why}"
@@ -90,7 +90,7 @@ def notes_on(
         yield f"A candidate term: {said}{formula.on} + {formula.term} with {values}."
     yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
     if found.terms and not (with_terms is not None and with_terms.rose_in_the_end):
-        yield from _on_cancelling(selection.fit, found.terms[0].fit, selection.accepted)
+        yield from map(_on_cancelling, cancelled(selection.fit, found.terms[0].fit, selection.accepted))
     if terms and with_terms is not None and (with_terms.rose_in_the_end or not with_terms.falls):
         yield _no_lower(with_terms)
     if hint is not None:
@@ -101,34 +101,14 @@ def notes_on(
             yield f"{c.name} was not considered: {c.rejected_because}."
 
 
-def _on_cancelling(without: Fit, beside: Fit, accepted: Sequence[str]) -> Iterator[str]:
-    """On effects of one number that it takes much further from neutral once a term for the rest stands beside them."""
-    before, after = _only_numbers(without), _only_numbers(beside)
-    for name in accepted:
-        if name not in before or name not in after:
-            continue
-        (p, value, _, most), (_, value_beside, least, _) = before[name], after[name]
-        if least > OUTGROWN * most:
-            yield (
-                f"{name} and the free term cancel in part: beside the term, {p.name} is {value_beside:.3g}{with_unit(p)}, and "
-                f"{value:.3g} without it. What acts may be neither of the two, but something that only both together describe "
-                f"(such as friction that changes along the session): do not read {p.name} by itself."
-            )
-
-
-def _only_numbers(fit: Fit) -> dict[str, tuple[Parameter, float, float, float]]:
-    """Of effects with one fitted number: which, its value, and the least and most distance from neutral in its interval."""
-    each: dict[str, list[int]] = {}
-    for index, number in enumerate(fit.free):
-        each.setdefault(number.effect, []).append(index)
-    found = {}
-    for name, indices in each.items():
-        p = fit.free[indices[0]].parameter
-        if len(indices) == 1 and np.isfinite(p.neutral):
-            low, high = (end - p.neutral for end in fit.interval(indices[0]))
-            within = low <= 0.0 <= high
-            found[name] = p, float(fit.values[indices[0]]), 0.0 if within else min(abs(low), abs(high)), max(abs(low), abs(high))
-    return found
+def _on_cancelling(each: Cancelled) -> str:
+    """On an effect and a term that undo each other in part."""
+    p = each.parameter
+    return (
+        f"{each.name} and the free term cancel in part: beside the term, {p.name} is {each.beside:.3g}{with_unit(p)}, and "
+        f"{each.without:.3g} without it. What acts may be neither of the two, but something that only both together describe "
+        f"(such as friction that changes along the session): do not read {p.name} by itself."
+    )
 
 
 def implausible_text(selection: SelectionResult, name: str) -> str:
@@ -277,7 +257,7 @@ def _on_times(selection: SelectionResult, tracks: Tracks, names: Collection[str]
         return
     for active in selection.fit.model.effects:
         for parameter, value in zip(active.effect.parameters, active.values, strict=True):
-            if active.effect.name in names and parameter.unit == "s" and 0 < abs(value) < step_s:
+            if active.effect.name in names and _is_time(active.effect, parameter) and 0 < abs(value) < step_s:
                 yield (
                     f"{active.effect.name}: {parameter.name} = {value:.3g} s is shorter than the {step_s:.3g} s between poses, "
                     "and in this log commands change only in rows that have a pose. If a row holds the command of its time, each "
@@ -285,6 +265,11 @@ def _on_times(selection: SelectionResult, tracks: Tracks, names: Collection[str]
                     "that. Log each command in a row of its own, with the time at which it was sent."
                 )
                 return
+
+
+def _is_time(effect: Effect, p: Parameter) -> bool:
+    """A lag, a delay or a shift of clocks; what a body does has seconds as well where a speed is divided by an acceleration."""
+    return p.unit == "s" and effect.stage in {"wheel", "clock"}
 
 
 def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from bns.diagnose.caveats import notes_on, on_many_apart, on_worst
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
+from bns.diagnose.estimate.cancelling import cancelled
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.plausibility import fitted_again
 from bns.diagnose.estimate.significance import fewest_trials
@@ -145,7 +146,8 @@ class Diagnosis:
     def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:
         """The numbers of the effects: where terms were found that may be added, as fitted beside these, which keep them unbiased.
 
-        Of single relative motions: as calibrated together, since an effect that was not accepted has a number there, too.
+        Of single relative motions: as calibrated together, since an effect that was not accepted has a number there, too. Numbers
+        that cancel a part of a term are marked ``cancels``.
         """
         if self.selection is None:
             return {}
@@ -154,7 +156,11 @@ class Diagnosis:
             return {name: together.get(name, values) for name, values in numbers_of(self.selection.fit).items()}
         fit = _presented(self.selection, self.terms, self.errors_with_terms)
         own = {term.name for term in self.terms}
-        return {name: values for name, values in numbers_of(fit).items() if name not in own}
+        found = {name: values for name, values in numbers_of(fit).items() if name not in own}
+        if fit is not self.selection.fit:
+            for one in cancelled(self.selection.fit, fit, self.selection.accepted):
+                found[one.name][one.parameter.name]["cancels"] = True
+        return found
 
     def _without_worst(self) -> dict[str, Any] | None:
         if self.without_worst is None:

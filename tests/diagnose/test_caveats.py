@@ -12,7 +12,6 @@ import bns.diagnose.diagnosis as said_by
 from bns.api.diagnose import DiagnoseResult
 from bns.diagnose.caveats import (
     _no_lower,
-    _on_cancelling,
     _on_drift,
     _on_effects,
     _on_rest,
@@ -91,7 +90,7 @@ def test_an_error_falls_where_that_is_surest_and_rises_nowhere_by_what_matters(c
 @pytest.mark.parametrize(("low", "high", "added"), [(0.001, 0.02, False), (-0.001, 0.02, True)])
 def test_terms_with_which_an_error_rises_are_in_no_extended_model(monkeypatch, low, high, added):
     """The fits are mocked: with the term the gain is 0.8, without it 0.9."""
-    fits = {name: SimpleNamespace(model=name) for name in ("without", "with")}
+    fits = {name: SimpleNamespace(model=name, free=()) for name in ("without", "with")}
     monkeypatch.setattr(said_by, "numbers_of", lambda fit: {"speed-gain": 0.8 if fit is fits["with"] else 0.9})
     monkeypatch.setattr(asked_of, "documented", lambda fit, *_: fit.model)
     monkeypatch.setattr(asked_of, "Model", lambda model: model)
@@ -248,6 +247,11 @@ def test_only_times_shorter_than_that_between_poses_are_doubted(tau_s, said):
     assert not list(_on_times(selection, tracks, {"wheelbase"}))
 
 
+def test_a_slip_in_seconds_is_no_time():
+    selection = SimpleNamespace(fit=SimpleNamespace(model=NOMINAL.with_effect("side-slip", slip_s=0.03)))
+    assert not list(_on_times(selection, tracks_of(measured(NOMINAL, trials=3, seed=5)), {"side-slip"}))
+
+
 @pytest.mark.parametrize(("z", "more"), [(2.0, 16), (3.0, 5), (0.1, 400)])
 def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more):
     """The gain in standard errors grows with the root of the trials: from 2 to 3.2 it takes 2.56 times as many."""
@@ -260,46 +264,6 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
     hint = SimpleNamespace(name="turn-slip", paired_comparison=SimpleNamespace(z=z))
     (note,) = notes_on(found, tracks_of(measured(NOMINAL, trials=10)), hint)
     assert note == f"turn-slip may be missing, but 10 trials are too few to decide; about {more} more would decide."
-
-
-def fit_of(*numbers):
-    """As a `Fit`: name of the effect, parameter, value, low, high each."""
-    free = tuple(SimpleNamespace(effect=name, parameter=number_of(effect_named(name), key)) for name, key, *_ in numbers)
-    return SimpleNamespace(
-        free=free, values=[number[2] for number in numbers], interval=lambda index: tuple(numbers[index][3:])
-    )
-
-
-def number_of(effect, key):
-    return next(p for p in effect.parameters if p.name == key)
-
-
-SAG, GAIN = ("battery-sag", "rate_per_s"), ("speed-gain", "gain")
-
-
-@pytest.mark.parametrize(
-    ("without", "beside", "said"),
-    [
-        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, 3e-4, 2.5e-4, 3.5e-4), True),  # 2.5 is more than twice 1.2
-        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, 3e-4, 2.3e-4, 3.7e-4), False),  # 2.3 is not
-        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, -3e-4, -3.5e-4, -2.5e-4), True),
-        ((*SAG, -1e-4, -1.2e-4, -0.8e-4), (*SAG, 1e-4, 0.8e-4, 1.2e-4), False),
-        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, 2e-4, -3e-4, 7e-4), False),  # it may be none at all
-        ((*GAIN, 1.05, 1.04, 1.06), (*GAIN, 1.14, 1.13, 1.15), True),  # neutral is 1: 5 % and 14 %
-        ((*GAIN, 1.05, 1.04, 1.06), (*GAIN, 1.1, 1.11, 1.12), False),
-    ],
-)
-def test_an_effect_that_a_term_multiplies_is_said_to_cancel_a_part_of_it(without, beside, said):
-    name, key, value, *_ = beside
-    notes = list(_on_cancelling(fit_of(without), fit_of(beside), (name,)))
-    assert bool(notes) == said
-    assert not said or f"{name} and the free term cancel in part: beside the term, {key} is {value:.3g}" in notes[0]
-    assert not list(_on_cancelling(fit_of(without), fit_of(beside), ()))
-
-
-def test_of_an_effect_with_several_numbers_none_is_said_to_have_outgrown_the_others():
-    without, beside = ((("floor-slope", "x_m_s", x, x, x), ("floor-slope", "y_m_s", 0.01, 0.01, 0.01)) for x in (0.001, 0.1))
-    assert not list(_on_cancelling(fit_of(*without), fit_of(*beside), ("floor-slope",)))
 
 
 def test_an_implausible_wheelbase_is_asked_about_with_both_distances():

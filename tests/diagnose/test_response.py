@@ -108,6 +108,13 @@ def test_a_response_says_from_what_it_begins_and_no_time_that_its_knots_do_not_r
     assert in_words(SimpleNamespace(**vars(term), fit=SimpleNamespace(model=model)), None).startswith(said)
 
 
+def test_a_response_that_is_over_before_the_first_knot_is_said_to_be_at_once():
+    """No half of the speed by one time and all of it before that."""
+    term = SimpleNamespace(signal=RESPONSE, on="wheels", term="k * (ago(0.0, 0.03) - u)", values={"k": 1.0})
+    said = in_words(SimpleNamespace(**vars(term), fit=SimpleNamespace(model=NOMINAL)), None)
+    assert said == "after a change of its command a wheel has the new speed within 0.04 s"
+
+
 def test_a_free_response_is_tried_only_where_no_effect_was_accepted(monkeypatch):
     """It can imitate lag, delay and limits; these have names, and numbers that can be measured."""
     asked = []

@@ -42,7 +42,7 @@ def number(value, low=None, high=None, **more):
         ("clock-drift", {"rate": number(0.003)}, "the tracker's clock runs 0.3 % faster than the clock of the commands"),
         ("understeer", {"loss_s_m": number(-0.2)}, "the robot turns more the faster it drives"),
         ("battery-sag", {"rate_per_s": number(-0.001)}, "the robot becomes faster in the course of the session"),
-        ("battery-sag", {"rate_per_s": number(0.0), "per_volt": number(0.2)}, "the robot becomes slower as its battery"),
+        ("battery-sag", {"rate_per_s": number(0.0), "per_volt": number(0.2)}, "the robot becomes slower (or faster) in"),
         ("dead-zone", {"width_m_s": number(0.0060564)}, "every wheel loses 6.1 mm/s of its speed to friction"),
         ("speed-limit", {"max_m_s": number(0.42)}, "no wheel runs faster than 420 mm/s"),
     ],

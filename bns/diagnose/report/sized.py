@@ -37,7 +37,7 @@ def sized_sentence(effect: Effect, numbers: Mapping[str, Mapping[str, Any]]) -> 
 def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
     """A number alone; with ``words`` ("above|below") how far it is from neutral, and to which side; nothing if that is open."""
     value, low, high = (number.get(key) for key in ("value", "low", "high"))
-    if value is None or not np.isfinite(value) or number.get("per_trial"):
+    if value is None or not np.isfinite(value) or number.get("per_trial") or number.get("cancels"):
         return
     if not words:
         yield _size(value, p)

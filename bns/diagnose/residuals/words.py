@@ -303,6 +303,8 @@ def _response(term: Formula, _: Predictor) -> str:
     half_s = float(grid[np.argmax(speed >= end / 2.0)])
     half = f"after {half_s:.2g} s" if half_s > RESPONSE_KNOTS_S[1] else f"within {RESPONSE_KNOTS_S[1]:g} s"
     settled = float(grid[np.max(np.flatnonzero(np.abs(speed - end) > 0.05 * abs(end)), initial=0)])
+    if max(half_s, settled) <= RESPONSE_KNOTS_S[1]:
+        return f"after a change of its command{_left_of(term)} {what} has the new speed within {RESPONSE_KNOTS_S[1]:g} s"
     over = float(speed.max()) / end - 1.0
     beyond = f", goes beyond it by {over:.0%} after {grid[int(speed.argmax())]:.2g} s" if over > 0.02 else ""
     return (

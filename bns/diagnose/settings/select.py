@@ -193,8 +193,9 @@ class Verdict:
     outgrown: float = setting(
         2.0,
         "1",
-        "An effect whose number is certainly further from neutral by this factor beside a free term than without it is said to "
-        f"cancel a part of that term: what is added for the rest should not multiply what was found before; {BY_HAND}.",
+        "An effect whose number is certainly further from neutral by this factor beside a free term than without it, or "
+        "certainly on the other side of neutral, is said to cancel a part of that term: what is added for the rest should not "
+        f"multiply what was found before; {BY_HAND}.",
     )
     bins: int = setting(
         8, "bins", f"Bins, with equal numbers of values, of a curve of errors along a variable; {BY_HAND}."

@@ -44,7 +44,7 @@ EFFECT = Effect(
     equation="u' = u·(1 - rate·session - per_volt·(V0 - V)) for each wheel",
     residuals="Distances and turns shrink by one fraction, which grows from trial to trial.",
     lookalikes=("speed-gain",),
-    sentence="the robot becomes slower as its battery discharges",
+    sentence="the robot becomes slower (or faster) in the course of the session, as when its battery discharges",
     sized="the robot becomes {rate_per_s:slower|faster|} in the course of the session (a discharging battery makes it slower)",
     measurement="log the battery's voltage (column battery_v)",
     explained_by=("session_s", "battery_v"),

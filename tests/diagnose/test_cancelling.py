@@ -1,0 +1,79 @@
+"""An effect and a free term that undo each other in part: a note says so, and the sentence takes no side."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from bns.diagnose.caveats import _on_cancelling
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.estimate.cancelling import Cancelled, cancelled
+from bns.diagnose.report.sized import sized_sentence
+from bns.physics.effects import effect_named
+
+
+def number_of(name, key):
+    return next(p for p in effect_named(name).parameters if p.name == key)
+
+
+def fit_of(*numbers):
+    """As a `Fit`: name of the effect, parameter, value, low, high each."""
+    free = tuple(SimpleNamespace(effect=name, parameter=number_of(name, key)) for name, key, *_ in numbers)
+    return SimpleNamespace(
+        free=free, values=[number[2] for number in numbers], interval=lambda index: tuple(numbers[index][3:])
+    )
+
+
+SAG, GAIN = ("battery-sag", "rate_per_s"), ("speed-gain", "gain")
+
+
+@pytest.mark.parametrize(
+    ("without", "beside", "cancels"),
+    [
+        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, 3e-4, 2.5e-4, 3.5e-4), True),  # 2.5 is more than twice 1.2
+        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, 3e-4, 2.3e-4, 3.7e-4), False),  # 2.3 is not
+        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, -3e-4, -3.5e-4, -2.5e-4), True),
+        ((*SAG, -1e-4, -1.2e-4, -0.8e-4), (*SAG, 1e-4, 0.8e-4, 1.2e-4), True),  # no larger, to the other side
+        ((*SAG, -1e-4, -1.2e-4, -0.8e-4), (*SAG, 1e-5, -1e-5, 3e-5), False),  # perhaps none
+        ((*SAG, -1e-5, -3e-5, 1e-5), (*SAG, 2e-5, 1e-5, 3e-5), False),  # perhaps none before
+        ((*SAG, 1e-4, 0.8e-4, 1.2e-4), (*SAG, 2e-4, -3e-4, 7e-4), False),
+        ((*GAIN, 1.05, 1.04, 1.06), (*GAIN, 1.14, 1.13, 1.15), True),  # neutral is 1: 5 % and 14 %
+        ((*GAIN, 1.05, 1.04, 1.06), (*GAIN, 1.11, 1.1, 1.12), False),
+        ((*GAIN, 1.05, 1.04, 1.06), (*GAIN, 0.97, 0.96, 0.98), True),
+    ],
+)
+def test_a_number_that_a_term_multiplies_or_turns_round_cancels_a_part_of_it(without, beside, cancels):
+    name, key, value, *_ = beside
+    found = list(cancelled(fit_of(without), fit_of(beside), (name,)))
+    assert found == ([Cancelled(name, number_of(name, key), without[2], value)] if cancels else [])
+    assert not list(cancelled(fit_of(without), fit_of(beside), ()))
+
+
+def test_of_an_effect_with_several_numbers_none_is_said_to_have_outgrown_the_others():
+    without, beside = (
+        (("floor-slope", "x_m_s", x, x, x), ("floor-slope", "y_m_s", 0.01, 0.01, 0.01)) for x in (0.001, 0.1)
+    )
+    assert not list(cancelled(fit_of(*without), fit_of(*beside), ("floor-slope",)))
+
+
+def test_the_note_has_both_numbers():
+    said = _on_cancelling(Cancelled("understeer", number_of("understeer", "loss_s_m"), 0.201, -0.051))
+    assert said.startswith("understeer and the free term cancel in part: beside the term, loss_s_m is -0.051 s/m, and 0.201 w")
+
+
+def test_the_sentence_takes_no_side_then(monkeypatch):
+    """Slip that grows with the speed, and understeer: beside a term that slows both motions the number has the other sign."""
+    without = fit_of(("understeer", "loss_s_m", 0.2, 0.19, 0.21))
+    beside = fit_of(("understeer", "loss_s_m", -0.05, -0.06, -0.04))
+
+    def numbers_of(fit):
+        return {"understeer": {"loss_s_m": {"value": fit.values[0], "low": None, "high": None}}}
+
+    monkeypatch.setattr("bns.diagnose.diagnosis.numbers_of", numbers_of)
+    selection = SimpleNamespace(fit=without, accepted=("understeer",))
+    found = Diagnosis("unlisted", selection, terms=(SimpleNamespace(fit=beside, name="unlisted"),))
+    number = found.numbers["understeer"]
+    assert number["loss_s_m"]["cancels"]
+    understeer = effect_named("understeer")
+    assert sized_sentence(understeer, number) == understeer.sentence
+    alone = Diagnosis("effects", selection)
+    assert "less the faster" in sized_sentence(understeer, alone.numbers["understeer"])
