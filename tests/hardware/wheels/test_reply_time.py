@@ -93,7 +93,7 @@ def test_a_slow_link_is_driven_over(tmp_path, monkeypatch, delay_s, jitter, loss
     monkeypatch.setattr(platform, "open_tracker", lambda _settings, clock: BodysEye(robot, clock))
     shipped, commands = shipped_rig("khepera"), np.array(3 * [[9000.0, 6000.0, 1000.0]], np.float32)
     patient = replace(shipped.limits, silent_s=HANGS_S, late_s=HANGS_S, lost_s=HANGS_S)
-    rig = replace(shipped, port=str(robot.path), limits=patient)
+    rig = replace(shipped, port=str(robot.path), limits=patient, driver={**shipped.driver, "most_reply_s": HANGS_S})
     try:
         with Stopping() as stopping, open_rig(TrialSetup(rig, yes=True), 0, tmp_path / "journal.jsonl", stopping) as opened:
             driven = opened.platform.drive(commands)
