@@ -102,11 +102,11 @@ def notes_on(
 
 
 def _on_cancelling(each: Cancelled) -> str:
-    """On an effect and a term that undo each other in part."""
+    """On an effect and a free term that cancel in part."""
     p = each.parameter
     return (
-        f"{each.name} and the free term cancel in part: beside the term, {p.name} is {each.beside:.3g}{with_unit(p)}, and "
-        f"{each.without:.3g} without it. What acts may be neither of the two, but something that only both together describe "
+        f"{each.name} and the free term cancel in part: with the term in the model, {p.name} is {each.beside:.3g}{with_unit(p)}, "
+        f"and {each.without:.3g} without it. What acts may be neither of the two, but something that only both together describe "
         f"(such as friction that changes along the session): do not read {p.name} by itself."
     )
 

@@ -1,4 +1,4 @@
-"""An effect and a free term that undo each other in part: a note says so, and the sentence takes no side."""
+"""An effect and a free term that cancel in part: a note says so, and the sentence takes no side."""
 
 from types import SimpleNamespace
 
@@ -57,11 +57,11 @@ def test_of_an_effect_with_several_numbers_none_is_said_to_have_outgrown_the_oth
 
 def test_the_note_has_both_numbers():
     said = _on_cancelling(Cancelled("understeer", number_of("understeer", "loss_s_m"), 0.201, -0.051))
-    assert said.startswith("understeer and the free term cancel in part: beside the term, loss_s_m is -0.051 s/m, and 0.201 w")
+    assert said.startswith("understeer and the free term cancel in part: with the term in the model, loss_s_m is -0.051 s/m")
 
 
 def test_the_sentence_takes_no_side_then(monkeypatch):
-    """Slip that grows with the speed, and understeer: beside a term that slows both motions the number has the other sign."""
+    """Slip that grows with the speed, and understeer: with a term that slows both motions the number changes its sign."""
     without = fit_of(("understeer", "loss_s_m", 0.2, 0.19, 0.21))
     beside = fit_of(("understeer", "loss_s_m", -0.05, -0.06, -0.04))
 

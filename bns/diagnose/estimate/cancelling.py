@@ -1,4 +1,4 @@
-"""Effects and free terms that undo each other in part: what a term for the rest does to the numbers found without it."""
+"""Effects and free terms that cancel in part: what a term for the rest does to the numbers found without it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OUTGROWN = DEFAULTS.verdict.outgrown
 
 
 class Cancelled(NamedTuple):
-    """An effect of one number: its value by itself, and beside a term that it cancels in part."""
+    """An effect of one number: its value without a term and with one that it cancels in part."""
 
     name: str
     parameter: Parameter

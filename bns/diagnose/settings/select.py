@@ -193,7 +193,7 @@ class Verdict:
     outgrown: float = setting(
         2.0,
         "1",
-        "An effect whose number is certainly further from neutral by this factor beside a free term than without it, or "
+        "An effect whose number is certainly further from neutral by this factor with a free term than without it, or "
         "certainly on the other side of neutral, is said to cancel a part of that term: what is added for the rest should not "
         f"multiply what was found before; {BY_HAND}.",
     )
