@@ -87,7 +87,11 @@ class Jobs:
 
             self._document.add_next_tick_callback(show)
 
-        self._pool.submit(work).add_done_callback(ended)
+        def on_the_page() -> T:
+            with set_curdoc(self._document):  # else Panel takes the page that another thread is busy with, which may be none
+                return work()
+
+        self._pool.submit(on_the_page).add_done_callback(ended)
 
     def begin(self) -> None:
         """The browser has the page: from now on what is done is shown."""

@@ -16,6 +16,8 @@ from tests.hidden_snake.worlds import Hidden, World, driven
 
 pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
 
+import panel as pn
+
 from bns.app.explore import tabs_of
 from bns.app.html import found_errors
 from bns.app.jobs import Jobs
@@ -142,6 +144,18 @@ def test_nothing_is_shown_before_the_browser_has_the_page():
     document.tick()
     assert done == [1, 2]
     assert said == ["first", "second", ""]
+
+
+def test_what_is_made_meanwhile_is_made_for_this_page():
+    """Panel asks which page a part is for, twice: the main thread may have let go of its own in between."""
+    document, made = Ticks(), []
+    jobs = Jobs(document, lambda _text: None, lambda _by: None)
+    jobs.begin()
+    jobs.run("which page", lambda: pn.state.curdoc, made.append, made.append)
+    jobs._pool.shutdown(wait=True)
+    document.tick()
+    assert made == [document]
+    assert pn.state.curdoc is not document
 
 
 @pytest.fixture(scope="module")

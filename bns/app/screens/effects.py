@@ -113,7 +113,11 @@ class EffectsScreen:
                 self._refresh_effects()
                 self._sync_switches(self._tab.now)
 
-        self._jobs.run("listing the effects", self._groups, listed, self._problem.show, later=True)
+        def failed(text: str) -> None:
+            self._listing = None  # the next picture asks again
+            self._problem.show(text)
+
+        self._jobs.run("listing the effects", self._groups, listed, failed, later=True)
 
     def move(self, effect: str, parameter: str, value: float) -> None:
         """A number was moved by hand."""
