@@ -51,7 +51,7 @@ _NOT_TAKEN = "a servo does not take what it is told"
 _WHY = {
     ARM: f" ({_NOT_TAKEN})",
     MOVE: f" (its watchdog took the torque off when it heard nothing for {WATCHDOG_S:g} s: a busy computer, a bad cable; or the "
-    f"board started anew: its power; or {_NOT_TAKEN})",
+    f"board restarted: check its power; or {_NOT_TAKEN})",
 }
 
 
