@@ -72,8 +72,7 @@ def notes_on(
     for name, numbers in found.negligible.items():
         of_log = name not in known or known[name].of_measuring
         why = " It may be an artefact of the log, such as rounded time stamps." if of_log else ""
-        units = {key: "" if number["unit"] == "1" else f" {number['unit']}" for key, number in numbers.items()}
-        said = ", ".join(f"{key} = {number['value']:.3g}{units[key]}" for key, number in numbers.items())
+        said = ", ".join(f"{key} = {number['value']:.3g}{with_unit(number['unit'])}" for key, number in numbers.items())
         yield (
             f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "
             f"more, so it is not named.{why}"
@@ -105,9 +104,9 @@ def _on_cancelling(each: Cancelled) -> str:
     """On an effect and a free term that cancel in part."""
     p = each.parameter
     return (
-        f"{each.name} and the free term cancel in part: with the term in the model, {p.name} is {each.beside:.3g}{with_unit(p)}, "
-        f"and {each.without:.3g} without it. What acts may be neither of the two, but something that only both together describe "
-        f"(such as friction that changes along the session): do not read {p.name} by itself."
+        f"{each.name} and the free term cancel in part: with the term in the model, {p.name} is {each.beside:.3g}"
+        f"{with_unit(p.unit)}, and {each.without:.3g} without it. What acts may be neither of the two, but something that only "
+        f"both together describe (such as friction that changes along the session): do not read {p.name} by itself."
     )
 
 

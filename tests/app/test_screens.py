@@ -158,6 +158,26 @@ def test_what_is_made_meanwhile_is_made_for_this_page():
     assert pn.state.curdoc is not document
 
 
+def test_a_list_of_effects_that_could_not_be_made_is_made_with_the_next_picture():
+    class FirstListFails(AtOnce):
+        left = 1
+
+        def run(self, text, work, done, failed, later=False):
+            if later and self.left:
+                self.left -= 1
+                failed("Internal error")
+            else:
+                super().run(text, work, done, failed)
+
+    tab = Tab()
+    tab.open(LOG, "log.csv")
+    screen = EffectsScreen(tab, FirstListFails())
+    screen.enter()
+    assert not screen._effects
+    screen.update()
+    assert "motor-lag" in screen._effects
+
+
 @pytest.fixture(scope="module")
 def snake(tmp_path_factory):
     path = tmp_path_factory.mktemp("snake") / "snake.parquet"

@@ -2,13 +2,17 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from bns.diagnose.caveats import _on_cancelling
+from bns.diagnose.caveats import _on_cancelling, notes_on
+from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.cancelling import Cancelled, cancelled
 from bns.diagnose.report.sized import sized_sentence
+from bns.diagnose.residuals.unexplained import NOTHING
 from bns.physics.effects import effect_named
+from tests.diagnose.worlds import NOMINAL, measured
 
 
 def number_of(name, key):
@@ -19,7 +23,7 @@ def fit_of(*numbers):
     """As a `Fit`: name of the effect, parameter, value, low, high each."""
     free = tuple(SimpleNamespace(effect=name, parameter=number_of(name, key)) for name, key, *_ in numbers)
     return SimpleNamespace(
-        free=free, values=[number[2] for number in numbers], interval=lambda index: tuple(numbers[index][3:])
+        free=free, values=[number[2] for number in numbers], interval=lambda index: tuple(numbers[index][3:]), model=NOMINAL
     )
 
 
@@ -58,6 +62,22 @@ def test_of_an_effect_with_several_numbers_none_is_said_to_have_outgrown_the_oth
 def test_the_note_has_both_numbers():
     said = _on_cancelling(Cancelled("understeer", number_of("understeer", "loss_s_m"), 0.201, -0.051))
     assert said.startswith("understeer and the free term cancel in part: with the term in the model, loss_s_m is -0.051 s/m")
+
+
+@pytest.mark.parametrize(("rose", "said"), [((), True), (("trial",), False)])
+def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(rose, said):
+    selection = SimpleNamespace(
+        implausible={}, accepted=("battery-sag",), competing_models=(), steps=(SimpleNamespace(ranking=()),),
+        fit=fit_of((*SAG, 1e-4, 0.8e-4, 1.2e-4)), nominal=SimpleNamespace(losses=np.ones(10)),
+    )  # fmt: skip
+    nothing = dict.fromkeys(("withdrawn", "unseen", "formula"))
+    found = SimpleNamespace(
+        **nothing, selection=selection, negligible={}, imitating=("battery-sag",), rest=NOTHING,
+        terms=(SimpleNamespace(fit=fit_of((*SAG, 3e-4, 2.5e-4, 3.5e-4))),),
+        errors_with_terms=SimpleNamespace(rose_in_the_end=rose, falls=True),
+    )  # fmt: skip
+    notes = list(notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None))
+    assert any(note.startswith("battery-sag and the free term cancel in part") for note in notes) == said
 
 
 def test_the_sentence_takes_no_side_then(monkeypatch):

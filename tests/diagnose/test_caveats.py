@@ -266,6 +266,21 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
     assert note == f"turn-slip may be missing, but 10 trials are too few to decide; about {more} more would decide."
 
 
+def test_a_number_without_a_unit_is_written_without_one(monkeypatch):
+    monkeypatch.setattr("bns.diagnose.caveats.known_effects", lambda _selection: {})
+    selection = SimpleNamespace(
+        implausible={}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
+        fit=SimpleNamespace(model=NOMINAL), nominal=SimpleNamespace(losses=np.ones(10)),
+    )  # fmt: skip
+    numbers = {"x_m_s": {"value": 0.0026, "unit": "m/s"}, "behind_share": {"value": 0.00124, "unit": "1"}}
+    nothing = dict.fromkeys(("withdrawn", "unseen", "formula", "errors_with_terms"))
+    found = SimpleNamespace(
+        **nothing, selection=selection, negligible={"slope-load": numbers}, imitating=(), rest=NOTHING, terms=()
+    )
+    (note,) = notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None)
+    assert "negligible (x_m_s = 0.0026 m/s, behind_share = 0.00124):" in note
+
+
 def test_an_implausible_wheelbase_is_asked_about_with_both_distances():
     fit = SimpleNamespace(model=NOMINAL.with_effect("wheelbase", factor=1.5).with_effect("speed-gain", gain=1.5))
     selection = SimpleNamespace(fit=fit, implausible={"wheelbase": "factor = 1.5 is too much", "speed-gain": "so is gain"})

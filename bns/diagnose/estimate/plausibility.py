@@ -29,10 +29,10 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
             continue
         value, (low, high) = float(fit.values[index]), fit.interval(index)
         if bounds and _stopped(p, value):
-            return f"{p.name} is at its bound, {value:g}{with_unit(p)}"
+            return f"{p.name} is at its bound, {value:g}{with_unit(p.unit)}"
         if np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
             least, most = p.plausible
-            return f"{p.name} = {value:g}{with_unit(p)} is outside of the plausible range, {least:g} to {most:g}"
+            return f"{p.name} = {value:g}{with_unit(p.unit)} is outside of the plausible range, {least:g} to {most:g}"
     return ""
 
 
@@ -76,7 +76,7 @@ def fitted_again(before: Model, fit: Fit, contradicted: bool = False) -> Iterato
             ends = {key: intervals.get((longer, key), (-np.inf, np.inf)) for key in changed}
             changed = {key: p for key, p in changed.items() if not ends[key][0] <= active.by_name[key] <= ends[key][1]}
         was, now = (
-            ", ".join(f"{key} = {values[key]:.5g}{with_unit(p)}" for key, p in changed.items())
+            ", ".join(f"{key} = {values[key]:.5g}{with_unit(p.unit)}" for key, p in changed.items())
             for values in (active.by_name, own)
         )
         if changed:
@@ -84,9 +84,9 @@ def fitted_again(before: Model, fit: Fit, contradicted: bool = False) -> Iterato
             yield f"{name} was {active.basis} ({was}); its parameters were fitted again with the others{place}: {now}."
 
 
-def with_unit(p: Parameter) -> str:
+def with_unit(unit: str) -> str:
     """The unit behind a blank; nothing for a bare number."""
-    return "" if p.unit == "1" else f" {p.unit}"
+    return "" if unit == "1" else f" {unit}"
 
 
 def _stopped(p: Parameter, value: float) -> bool:

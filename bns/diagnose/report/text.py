@@ -15,6 +15,7 @@ from bns.diagnose.data.checks import Finding
 from bns.diagnose.design.competing_models import Rival
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.calibration import wheel_sizes
+from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.report.plain_language import further_notes
 from bns.diagnose.report.sized import sized_sentence
@@ -160,15 +161,10 @@ def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
 
 
 def _number(name: str, n: Mapping[str, Any]) -> str:
-    said = f"{name} = {n['value']:.5g}{_unit(n)}"
+    said = f"{name} = {n['value']:.5g}{with_unit(n['unit'])}"
     if without_width(n["low"], n["high"]):
         return f"{said} (no interval: one trial only, at a bound, or no small change changes the loss)"
     return f"{said} (95 %: {n['low']:.5g} to {n['high']:.5g})"
-
-
-def _unit(number: Mapping[str, Any]) -> str:
-    """The unit behind a blank; nothing for a bare number."""
-    return "" if number["unit"] == "1" else f" {number['unit']}"
 
 
 def _errors(errors: PairedErrors | None) -> Iterator[str]:
@@ -299,7 +295,7 @@ def extension_text(m: ExtendedModel) -> str:
         lines += [
             _with_interval(effect, name, n)
             if n["low"] is not None and n["high"] is not None
-            else f"  {effect}: {name} = {n['value']:.5g} ± {n['se']:.2g}{_unit(n)} (standard error)"
+            else f"  {effect}: {name} = {n['value']:.5g} ± {n['se']:.2g}{with_unit(n['unit'])} (standard error)"
             for name, n in numbers.items()
         ]
     lines += [f"  warning: {text}" for text in m.warnings]
