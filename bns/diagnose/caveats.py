@@ -80,7 +80,7 @@ def notes_on(
     yield from _on_effects(selection, tracks, found.imitating)
     yield from _on_the_cone(selection.fit.model)
     for names in longer:
-        yield f"{' with '.join(names)} would explain as much, with one more effect."
+        yield _on_longer(selection, names)
     yield from _on_rest(found.rest, tracks)
     formula, with_terms = found.formula, found.errors_with_terms
     if formula is not None and not formula.signal and formula.paired_comparison.p_value < CHANCE:
@@ -200,6 +200,17 @@ def _on_the_cone(model: Model) -> Iterator[str]:
             "than along the axes, as no floor does. An effect of friction may stand for that. Set <option cone=\"elliptic\"/> in "
             "the model and ask again."
         )
+
+
+def _on_longer(selection: SelectionResult, names: Sequence[str]) -> str:
+    """Two effects that would do what one accepted effect does; whether they have as many numbers as it has."""
+    known = known_effects(selection)
+    gone = [name for name in selection.accepted if name not in names]
+    come = [name for name in names if name not in selection.accepted]
+    lost, gained = (sum(len(known[name].parameters) for name in some) for some in (gone, come))
+    numbers = "as many numbers" if gained == lost else "fewer numbers" if gained < lost else ""
+    more = f"one more effect and {numbers}" if numbers else "one more effect"
+    return f"{' with '.join(come)} in the place of {' with '.join(gone)} would explain as much, with {more}."
 
 
 def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[str] = ()) -> Iterator[str]:

@@ -26,13 +26,13 @@ from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.residuals.words import in_words
 from bns.diagnose.residuals.worst_trials import WithoutWorst, apart, far_off, most_left_out, standing_out
-from bns.diagnose.select.equivalents import equivalent_pairs
+from bns.diagnose.select.equivalents import TRIED, equivalent_pairs
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import before_and_after, dependence_values, numbers_of, numbers_of_term, ranked_values, ties_of
 from bns.physics.effect import Effect
-from bns.physics.model import Model
+from bns.physics.model import ActiveEffect, Model
 
 VERDICTS = ("none", "effects", "tie", "unlisted", "insufficient-data")
 FEW_TRIALS = DEFAULTS.verdict.few_trials
@@ -319,7 +319,25 @@ def _longer(selection: SelectionResult, effects: Mapping[str, Effect]) -> list[t
     """Pairs of effects that explain what one accepted effect explains; of those that the search tried."""
     tried = {c.name for step in selection.steps for c in step.ranking}
     others = [effect for name, effect in effects.items() if name in tried and name not in selection.accepted]
-    return equivalent_pairs(selection.problem, selection.fit, selection.accepted, others)
+    by_name = {effect.name: effect for effect in others}
+    nearly = {name: _nearly(selection, name, by_name) for name in selection.accepted}
+    return equivalent_pairs(selection.problem, selection.fit, selection.accepted, others, nearly)
+
+
+def _nearly(selection: SelectionResult, name: str, others: Mapping[str, Effect]) -> list[ActiveEffect]:
+    """What an accepted effect extends, and the best of those that it was chosen from, each with its numbers then."""
+    if selection.problem.predictor.screening is not None:  # a fit takes too long
+        return []
+    active = next(a for a in selection.fit.model.effects if a.effect.name == name)
+    values = selection.fit.model.values_of(name)
+    parent = others.get(active.effect.extends)
+    found = [ActiveEffect(parent, tuple(values[p.name] for p in parent.parameters))] if parent else []
+    came = next((step for step in selection.steps if step.selected in {name, active.effect.extends}), None)
+    ranked = [c for c in (came.ranking if came else ()) if c.name in others and not c.rejected_because]
+    there = {a.effect.name for a in found}
+    for candidate in [c for c in ranked if c.name not in there][:TRIED]:
+        found.append(ActiveEffect(others[candidate.name], tuple(candidate.fit.model.values_of(candidate.name).values())))
+    return found
 
 
 def too_little(tracks: Tracks, fewest: int) -> str:

@@ -13,14 +13,15 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select import equivalents
 from bns.diagnose.select.equivalents import equivalent_pairs
 from bns.physics.effects import all_effects
+from bns.physics.model import ActiveEffect
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
-def longer_than(model, names):
-    predictor = WheelPredictor(tracks_of(measured(model, seed=5)))
+def longer_than(model, names, nearly=None, **seen):
+    predictor = WheelPredictor(tracks_of(measured(model, seed=5, **seen)))
     problem = problem_for(predictor, model)
     others = [effect for name, effect in listed(NOMINAL).items() if name not in names]
-    return equivalent_pairs(problem, problem.fit(model), names, others)
+    return equivalent_pairs(problem, problem.fit(model), names, others, nearly)
 
 
 @pytest.mark.parametrize(
@@ -45,6 +46,32 @@ def test_beside_another_effect_that_one_stays():
 def test_what_is_like_no_pair_has_none(name):
     values = {"motor_lag": {"tau_s": 0.09}, "side_slip": {"slip_s": 0.08}, "yaw_bias": {"rate_rad_s": 0.04}}
     assert longer_than(hidden(**{name: values[name]}), [name.replace("_", "-")]) == []
+
+
+def test_what_does_nearly_all_alone_is_completed():
+    """A Stribeck friction that hardly fades is a dead zone and a gain; where the dead zone does nothing, nothing shows it."""
+    model = hidden(stribeck={"width_m_s": 0.0082, "fade_m_s": 0.48})
+    quiet = {"noise": (0.0004, 0.005), "jitter": 0.002, "commands": 8, "speeds": (0.02, 0.12)}
+    assert longer_than(model, ["stribeck"], **quiet) == []
+    effects = all_effects()
+    nearly = {"stribeck": [ActiveEffect(effects[n], v) for n, v in (("dead-zone", (0.0082,)), ("speed-gain", (0.9,)))]}
+    assert longer_than(model, ["stribeck"], nearly, **quiet) == [("dead-zone", "speed-gain")]
+
+
+def test_one_that_does_it_alone_is_no_pair():
+    """It is a tie then, and the search has named it."""
+    model = hidden(stribeck={"width_m_s": 0.0082, "fade_m_s": 5.0})
+    nearly = {"stribeck": [ActiveEffect(all_effects()["dead-zone"], (0.0082,))]}
+    assert longer_than(model, ["stribeck"], nearly) == []
+
+
+def test_a_diagnosis_says_so_of_what_an_effect_extends():
+    model = hidden(stribeck={"width_m_s": 0.0082, "fade_m_s": 0.48})
+    table = measured(model, trials=24, seed=5, noise=(0.0004, 0.005), jitter=0.002, commands=8, speeds=(0.02, 0.12))
+    found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
+    assert found.effects == ("stribeck",)
+    said = "dead-zone with speed-gain in the place of stribeck would explain as much, with one more effect and as many numbers."
+    assert said in found.notes
 
 
 def test_a_diagnosis_says_so_in_a_note():
