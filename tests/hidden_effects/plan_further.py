@@ -50,10 +50,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "dead-zone-mismatch": ({"width_m_s": 0.006, "left_share": 1.8}, {"width_m_s": 0.015, "left_share": 0.4}),
     "speed-limit-mismatch": ({"max_m_s": 0.16, "left_spare": 0.2}, {"max_m_s": 0.12, "left_spare": -1.0}),
     "turn-dead-zone": ({"width_rad_s": 0.1}, {"width_rad_s": 0.25}),
-    "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06}),
+    "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06, "headings": 0.0}),
     "compass-deviation": ({"cosine_share": 0.05, "sine_share": -0.03}, {"cosine_share": -0.12, "sine_share": 0.15}),
     "lens-distortion": (
-        {"per_m2": -0.04, "x_m": 0.8, "y_m": 0.5},
+        {"per_m2": -0.04, "x_m": 0.8, "y_m": 0.5, "headings": 0.0},
         {"per_m2": 0.08, "x_m": 0.7, "y_m": 0.4},
     ),
     "force-limit": ({"max_m_s2": 0.4, "turn_ratio": 2.5}, {"max_m_s2": 0.2, "turn_ratio": 4.0}),
