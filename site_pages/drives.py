@@ -78,6 +78,7 @@ VALUES: dict[str, dict[str, float]] = {
     "tether-pull": {"pull_per_s": 0.015, "anchor_x_m": 0.0, "anchor_y_m": 0.5},
     "tilted-camera": {"x_per_m": 0.3, "y_per_m": 0.1},
     "turn-dead-zone": {"width_rad_s": 0.3},
+    "friction-warm-up": {"width_m_s": 0.01, "cold_m_s": 0.03, "time_s": 60.0},
     "turn-slip": {"slip_s": 0.12},
     "turn-slip-quadratic": {"slip_s2": 0.1},
     "uneven-patch": {"x_m": 0.35, "y_m": 0.0, "radius_m": 0.12, "loss": 0.08, "apart_share": 1.0, "left_share": 2.0},

@@ -16,6 +16,7 @@ ORDER = (
     "warm-up",
     "dead-zone",
     "dead-zone-mismatch",
+    "friction-warm-up",
     "stribeck",
     "dead-band",
     "speed-limit",

@@ -1,5 +1,7 @@
 """What firmware, drives and bearings do to commands, and scrubbing to turns: each is named with its numbers."""
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
@@ -33,6 +35,20 @@ def test_each_is_named_with_its_numbers(name, values):
     found = diagnose(driven(**{name.replace("-", "_"): values}), NOMINAL)
     assert (found.verdict, found.effects) == ("effects", (name,))
     assert {key: one["value"] for key, one in found.numbers[name].items()} == pytest.approx(values, rel=0.03)
+
+
+@pytest.mark.slow
+def test_friction_that_falls_over_a_session_is_named_with_its_numbers():
+    """Each trial of a table has a dead zone of its own, as long as trials are short beside the time constant."""
+    trials = []
+    for i in range(24):
+        width = 0.006 + 0.012 * np.exp(-(30 * i + 3) / 240)
+        one = measured(hidden(dead_zone={"width_m_s": width}), trials=1, seed=i, speeds=(-0.2, 0.2), jitter=0.002)
+        trials.append(one.assign(trial=i, session_s=one["t_s"] + 30 * i))
+    found = diagnose(WheelPredictor(tracks_of(pd.concat(trials, ignore_index=True))), NOMINAL)
+    assert (found.verdict, found.effects) == ("effects", ("friction-warm-up",))
+    numbers = {key: one["value"] for key, one in found.numbers["friction-warm-up"].items()}
+    assert numbers == pytest.approx({"width_m_s": 0.006, "cold_m_s": 0.012, "time_s": 240.0}, rel=0.15)
 
 
 @pytest.mark.parametrize("step_m_s", [0.0113, *(pytest.param(step, marks=pytest.mark.slow) for step in (0.027, 0.045))])

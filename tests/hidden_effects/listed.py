@@ -115,6 +115,20 @@ class DeadZone(Cause):
 
 
 @dataclass
+class FrictionWarmUp(Cause):
+    """The lost part of a command falls to its share of a warm robot as the session goes on."""
+
+    width_m_s: float
+    cold_m_s: float
+    time_s: float
+
+    def demand(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        session = np.maximum(moment.session_s + moment.trial_s, 0.0)
+        lost = (self.width_m_s + self.cold_m_s * np.exp(-session / self.time_s))[..., None]
+        return np.where(wheels > 0, np.maximum(wheels - lost, 0.0), np.minimum(wheels + lost, 0.0))
+
+
+@dataclass
 class DeadBand(Cause):
     """A wheel stands while its command is below this."""
 
@@ -359,6 +373,7 @@ LISTED: dict[str, type[Cause]] = {
     "wheelbase": Wheelbase,
     "yaw-bias": YawBias,
     "turn-dead-zone": TurnDeadZone,
+    "friction-warm-up": FrictionWarmUp,
     "turn-slip": TurnSlip,
     "turn-slip-quadratic": QuadraticTurnSlip,
     "side-slip": SideSlip,

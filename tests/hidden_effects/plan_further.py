@@ -50,6 +50,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "dead-zone-mismatch": ({"width_m_s": 0.006, "left_share": 1.8}, {"width_m_s": 0.015, "left_share": 0.4}),
     "speed-limit-mismatch": ({"max_m_s": 0.16, "left_spare": 0.2}, {"max_m_s": 0.12, "left_spare": -1.0}),
     "turn-dead-zone": ({"width_rad_s": 0.1}, {"width_rad_s": 0.25}),
+    "friction-warm-up": (
+        {"width_m_s": 0.004, "cold_m_s": 0.008, "time_s": 240.0},
+        {"width_m_s": 0.01, "cold_m_s": 0.02, "time_s": 480.0},
+    ),
     "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06, "headings": 0.0}),
     "compass-deviation": ({"cosine_share": 0.05, "sine_share": -0.03}, {"cosine_share": -0.12, "sine_share": 0.15}),
     "lens-distortion": (

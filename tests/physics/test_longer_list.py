@@ -264,6 +264,20 @@ def test_a_wheel_stands_before_it_turns_the_other_way_counted_from_when_it_stopp
     assert again[-1, 0] == pytest.approx(0.2)
 
 
+def test_a_cold_robot_loses_more_to_friction_than_one_that_has_driven():
+    """37 % of what a cold one loses in addition is left after the time constant; never does a wheel turn backwards for it."""
+    apply = effect_named("friction-warm-up").apply
+    speed = np.array([[0.1, -0.1, 0.015, 0.1]])
+    session = np.array([[0.0, 100.0, 0.0, 1e6]])
+    wheels = Wheels(np.ones((1, 4)), speed, -speed, B, Conditions(session_s=session))
+    out = apply(wheels, width_m_s=0.01, cold_m_s=0.02, time_s=100.0)
+    left = [0.07, -(0.09 - 0.02 / np.e), 0.0, 0.09]
+    assert out.left_m_s[0] == pytest.approx(left)
+    assert out.right_m_s[0] == pytest.approx([-v for v in left])
+    run_in = apply(wheels, width_m_s=0.01, cold_m_s=-0.02, time_s=100.0)  # a loss below zero would push
+    assert run_in.left_m_s[0, 0] == pytest.approx(0.1)
+
+
 def test_a_turn_loses_a_constant_rate_and_a_slight_curve_becomes_a_straight_line():
     model = IDEAL.with_effect("turn-dead-zone", width_rad_s=0.2)
     for rate, turned in ((0.5, 0.3), (-0.5, -0.3), (0.15, 0.0)):

@@ -15,7 +15,7 @@ def apply(wheels: Wheels, width_m_s: float) -> Wheels:
     return replace(wheels, left_m_s=shrunk(wheels.left_m_s, width_m_s), right_m_s=shrunk(wheels.right_m_s, width_m_s))
 
 
-def shrunk(speed: Array, width: float) -> Array:
+def shrunk(speed: Array, width: Array | float) -> Array:
     """A speed reduced towards zero by ``width``, and not beyond zero."""
     return np.sign(speed) * np.maximum(np.abs(speed) - width, 0.0)
 
