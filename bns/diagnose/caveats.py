@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.special import stdtr
@@ -21,7 +22,7 @@ from bns.diagnose.residuals.worst_trials import WithoutWorst
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.values import ties_of
+from bns.diagnose.values import numbers_of, ties_of, without_width
 from bns.physics.effect import Effect, Parameter
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
@@ -77,6 +78,7 @@ def notes_on(
             f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "
             f"more, so it is not named.{why}"
         )
+    yield from _on_moved(found)
     yield from _on_effects(selection, tracks, found.imitating)
     yield from _on_the_cone(selection.fit.model)
     for names in longer:
@@ -200,6 +202,23 @@ def _on_the_cone(model: Model) -> Iterator[str]:
             "than along the axes, as no floor does. An effect of friction may stand for that. Set <option cone=\"elliptic\"/> in "
             "the model and ask again."
         )
+
+
+def _on_moved(found: Outcome) -> Iterator[str]:
+    """Numbers that are others without the negligible effects than with them: each outside of the other one's interval."""
+    now = numbers_of(found.selection.fit) if found.beside_negligible else {}
+    for name, numbers in found.beside_negligible.items():
+        pairs = [(key, now[name][key], with_it) for key, with_it in numbers.items() if key in now.get(name, {})]
+        moved = [(key, a, b) for key, a, b in pairs if not (_inside(a["value"], b) or _inside(b["value"], a))]
+        if moved:
+            said = ", ".join(f"{key} = {b['value']:.4g}{with_unit(b['unit'])}, not {a['value']:.4g}" for key, a, b in moved)
+            yield f"With {' and '.join(found.negligible)} in the model, the parameters of {name} differ: {said}."
+
+
+def _inside(value: float, number: Mapping[str, Any]) -> bool:
+    """Whether a value lies in the interval of a number; so it is said to where there is no interval."""
+    low, high = number["low"], number["high"]
+    return low is None or high is None or without_width(low, high) or bool(low <= value <= high)
 
 
 def _on_longer(selection: SelectionResult, names: Sequence[str]) -> str:

@@ -58,6 +58,8 @@ class Outcome:
     withdrawn: tuple[str, ...]
     imitating: tuple[str, ...]
     negligible: dict[str, dict[str, dict[str, Any]]]
+    beside_negligible: dict[str, dict[str, dict[str, Any]]]
+    """The numbers of the effects that stand as they are with the negligible ones in the model; empty if none is."""
     terms: tuple[Formula, ...]
     slight: tuple[Formula, ...]
     """Terms for what is certainly left and does not count, because it is slight."""
@@ -134,6 +136,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         stands.withdrawn,
         imitating,
         {name: numbers for name, numbers in numbers_of(whole.fit).items() if name in tiny},
+        {name: numbers for name, numbers in numbers_of(whole.fit).items() if tiny and name in selection.accepted},
         terms,
         slight,
         unseen,

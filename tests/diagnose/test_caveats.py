@@ -260,6 +260,7 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
         fit=SimpleNamespace(model=NOMINAL), nominal=SimpleNamespace(losses=np.ones(10)),
     )  # fmt: skip
     nothing = dict.fromkeys(("imitating", "withdrawn", "unseen", "negligible", "formula", "errors_with_terms"))
+    nothing["beside_negligible"] = {}
     found = SimpleNamespace(**nothing | {"selection": selection, "negligible": {}, "imitating": (), "rest": NOTHING, "terms": ()})
     hint = SimpleNamespace(name="turn-slip", paired_comparison=SimpleNamespace(z=z))
     (note,) = notes_on(found, tracks_of(measured(NOMINAL, trials=10)), hint)
@@ -268,16 +269,18 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
 
 def test_a_number_without_a_unit_is_written_without_one(monkeypatch):
     monkeypatch.setattr("bns.diagnose.caveats.known_effects", lambda _selection: {})
+    monkeypatch.setattr("bns.diagnose.caveats._on_moved", lambda _: ["What it moves."])
     selection = SimpleNamespace(
         implausible={}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
         fit=SimpleNamespace(model=NOMINAL), nominal=SimpleNamespace(losses=np.ones(10)),
     )  # fmt: skip
     numbers = {"x_m_s": {"value": 0.0026, "unit": "m/s"}, "behind_share": {"value": 0.00124, "unit": "1"}}
-    nothing = dict.fromkeys(("withdrawn", "unseen", "formula", "errors_with_terms"))
+    nothing = {**dict.fromkeys(("withdrawn", "unseen", "formula", "errors_with_terms")), "beside_negligible": {}}
     found = SimpleNamespace(
         **nothing, selection=selection, negligible={"slope-load": numbers}, imitating=(), rest=NOTHING, terms=()
     )
-    (note,) = notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None)
+    note, moves = notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None)
+    assert moves == "What it moves."
     assert "negligible (x_m_s = 0.0026 m/s, behind_share = 0.00124):" in note
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import outcome
+from bns.diagnose import caveats, outcome
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
@@ -20,6 +20,8 @@ from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import NOTHING
 from bns.diagnose.select.negligible import LUCK, MEDIAN_OF, _largest_fall, fall_matters, negligible
 from bns.diagnose.select.result import SelectionResult
+from bns.diagnose.values import numbers_of
+from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 TRUTH = {"wheelbase": {"factor": 1.05}, "wheel_mismatch": {"ratio": 1.004}, "clock_offset": {"offset_s": -5e-4}}
@@ -253,3 +255,30 @@ def test_a_fall_matters_where_it_is_certain_and_two_percent(change_m, fell, matt
     near = SimpleNamespace(models=models, change_between=lambda *_: nothing)
     assert fall_matters(SimpleNamespace(horizons={"1s": near, "trial": far}), "a", "b") is matters
     assert not fall_matters(SimpleNamespace(horizons={"1s": near}), "a", "b")
+
+
+def test_numbers_that_what_is_negligible_moves_are_said():
+    """A slope that also acts at rest is fitted 12 % too large without that; a number inside either interval has not moved."""
+
+    def fit_of(value):
+        slope = effect_named("floor-slope")
+        free = [SimpleNamespace(effect="floor-slope", parameter=p) for p in slope.parameters]
+        ends = [(value - 1e-4, value + 1e-4), (0.001, 0.005)]
+        return SimpleNamespace(
+            free=free,
+            values=np.array([value, 0.003]),
+            interval=lambda i: ends[i],
+            se=lambda _: 1e-4,
+            model=SimpleNamespace(per_trial_effect=None),
+        )
+
+    def notes(now, beside):
+        numbers = numbers_of(fit_of(beside))
+        found = SimpleNamespace(
+            selection=SimpleNamespace(fit=fit_of(now)), beside_negligible=numbers, negligible={"slope-load": {}}
+        )
+        return list(caveats._on_moved(found))
+
+    said = "With slope-load in the model, the parameters of floor-slope differ: x_m_s = 0.004 m/s, not 0.0045."
+    assert notes(0.0045, 0.004) == [said]
+    assert notes(0.00405, 0.004) == []
