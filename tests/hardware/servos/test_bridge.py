@@ -4,6 +4,7 @@ import itertools
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -240,6 +241,16 @@ def test_a_speed_of_nothing_is_sent_as_the_slowest_and_not_as_full_speed(bridge)
     driver._ask = lambda _kind, payload, _size: sent.append(payload) or payload
     driver.move([0.0] * 3, [0.0, -1.0, 1000.0])
     assert [steps for _, steps in GOAL.iter_unpack(sent[0])] == [1, 86, 1023]
+
+
+def test_goals_beyond_what_a_servo_can_turn_to_are_its_first_and_last_step(bridge):
+    """The AX-12 has 1,024 steps over 300 degrees; 0 rad is step 512."""
+    driver, _ = bridge()
+    sent = []
+    driver._ask = lambda _kind, payload, _size: sent.append(payload) or payload
+    angles = driver.move([-9.0, 0.0, 9.0], [1.0] * 3)
+    assert [goal for goal, _ in GOAL.iter_unpack(sent[0])] == [0, 512, 1023]
+    assert np.degrees(angles) == pytest.approx([-512 / 1023 * 300, 0.0, 511 / 1023 * 300])
 
 
 @pytest.mark.parametrize(("celsius", "decivolts", "said"), [(66, 120, "servo 2 is at 66 °C"), (30, 89, r"servo 2 has 8\.9 V")])

@@ -174,6 +174,17 @@ def test_a_header_that_leads_nowhere_is_passed_over_wherever_it_ends():
 
 
 @pytest.mark.parametrize("protocol", [1, 2])
+@pytest.mark.parametrize("stray", range(9))
+def test_a_packet_that_comes_in_two_pieces_behind_stray_bytes_is_put_together(protocol, stray):
+    wire = WIRES[protocol]
+    whole = wire.instruction(3, WRITE, b"\x20\x01")
+    for cut in range(len(whole)):
+        packet, kept = wire.taken(bytes(stray) + whole[:cut])
+        assert packet is None
+        assert wire.taken(kept + whole[cut:] + b"next") == (Packet(3, WRITE, b"\x20\x01"), b"next")
+
+
+@pytest.mark.parametrize("protocol", [1, 2])
 def test_an_answer_is_whole_only_behind_its_header_and_with_all_of_its_bytes(protocol):
     wire = WIRES[protocol]
     answer = wire.status(3, 0, bytes(range(8)))

@@ -45,6 +45,23 @@ def test_either_protocol_says_that_an_instruction_arrived_damaged():
     """Protocol 2.0: error number 3, beside the alarm bit or without; protocol 1.0: bit 4, beside others or alone."""
     assert [XL430_W250.garbled(error) for error in (0, 2, 3, 4, 0x80, 0x83)] == [False, False, True, False, False, True]
     assert [AX12.garbled(error) for error in (0, 0x10, 0x20, 0x30)] == [False, True, False, True]
+    assert [error for error in range(256) if XL430_W250.garbled(error)] == [3, 0x83]
+
+
+@pytest.mark.parametrize(
+    ("bits", "hardware", "said"),
+    [
+        (0x06, 0, "value beyond a limit"),
+        (0x86, 0x20, "overload, value beyond a limit"),
+        (0x80, 0x24, "overheated, overload"),
+        (0x80, 0, "an alarm that has ended"),
+        (0x09, 0, "error 9"),
+    ],
+)
+def test_an_error_byte_names_the_alarms_and_why_an_instruction_was_refused(bits, hardware, said):
+    """Protocol 2.0: bit 7 says that `hardware_error` holds alarms, the other seven are a number."""
+    assert XL430_W250.in_words(bits, hardware) == said
+    assert AX12.in_words(0x01 | 0x20) == "voltage out of its limits, overload"
 
 
 @pytest.fixture
