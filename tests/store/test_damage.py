@@ -180,6 +180,16 @@ def test_newer_files_name_the_update(store):
             read(store)
 
 
+@pytest.mark.parametrize(("sweep", "task"), [("s", "square"), ("t", "circle")])
+def test_a_file_in_the_folder_of_another_sweep_or_task_is_named_and_not_read(store, sweep, task):
+    before, first = load(store), files(store, "evals")[0]
+    place = store / "evals" / f"sweep={sweep}" / f"task={task}" / first.name
+    place.parent.mkdir(parents=True)
+    shutil.copy(first, place)
+    with pytest.warns(StoreWarning, match=f"{first.name} is skipped: it was written for sweep 's', task 'circle'"):
+        pdt.assert_frame_equal(load(store), before)
+
+
 def test_empty_and_missing_results_name_the_commands_to_begin_with(tmp_path):
     for results in (tmp_path, tmp_path / "none"):
         with pytest.raises(StoreError, match=r"no results in .* bns sweep khepera-small, or"):

@@ -201,3 +201,17 @@ def test_damage_is_counted_to_the_byte(left):
     assert (len(found.frames), found.damaged, found.torn) == (2, starts[2] - starts[1], 0)
     other = replace(file, sweep="another")
     assert (journal_module.scan(data, other).damaged, journal_module.scan(data, other).frames) == (len(data), [])
+
+
+def test_damage_and_a_torn_frame_at_the_end_are_counted_to_the_byte(left):
+    _, path, _, starts = left
+    file, data = journals(path.parents[1])[0], path.read_bytes()
+    for start in starts:
+        for cut in range(1, 100):
+            found = journal_module.scan(data[: start + cut], file)
+            assert (len(found.frames), found.damaged, found.torn) == (starts.index(start), 0, cut)
+    last = bytearray(data)
+    last[starts[2] + 60] ^= 1
+    for more in range(4):
+        found = journal_module.scan(bytes(last) + b"x" * more, file)
+        assert (len(found.frames), found.damaged, found.torn) == (2, len(data) + more - starts[2], 0)

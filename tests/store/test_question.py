@@ -176,3 +176,18 @@ def test_rows_are_counted_over_all_batches(store, monkeypatch):
     assert len(query(store, "SELECT * FROM range(3900)")) == 3900
     with pytest.raises(StoreError, match="more than 2048 rows; 4000 rows"):
         query(store, "SELECT * FROM range(6000)")
+
+
+def test_bytes_are_counted_over_all_batches(store, monkeypatch):
+    """A whole number takes eight bytes and a bit: a MiB holds 129,055 of them."""
+    monkeypatch.setattr(question, "MOST_BYTES", 1 << 20)
+    assert len(query(store, "SELECT * FROM range(120000)")) == 120000
+    with pytest.raises(StoreError, match=r"more than 12\d{4} rows; 5000000 rows or 1 MiB are fetched"):
+        query(store, "SELECT * FROM range(140000)")
+
+
+@pytest.mark.parametrize(("memory_mib", "said"), [(4096, "2.0 GiB"), (300, "256.0 MiB")])
+def test_a_question_works_with_half_of_the_memory_and_no_less_than_it_needs(store, monkeypatch, memory_mib, said):
+    pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": memory_mib << 8}
+    monkeypatch.setattr(question.os, "sysconf", pages.__getitem__)
+    assert query(store, "SELECT current_setting('memory_limit') AS most")["most"].tolist() == [said]
