@@ -169,6 +169,12 @@ def test_wheel_speeds_and_durations_in_si():
     assert ROBOT.driven_ms(np.array([[1, 1, 400.0], [1, 1, 650.0]])) == 1050
 
 
+def test_commands_typed_in_si_become_the_firmwares():
+    """0.1 m/s is 14,401 steps of the firmware's, a second a thousand milliseconds; backwards is negative."""
+    typed = ROBOT.parse_commands(np.array([[0.1, -0.2, 2.5], [0.0, 0.1, 0.4]]))
+    np.testing.assert_allclose(typed, [[14401.0, -28802.0, 2500.0], [0.0, 14401.0, 400.0]], rtol=1e-12)
+
+
 def test_success_by_radius():
     # Passes 6, 9, 13 and 19 cm from the only goal.
     for distance, expected in ((0.06, 4), (0.09, 3), (0.13, 2), (0.19, 1), (0.21, 0)):

@@ -1,5 +1,6 @@
 """What a task file may say, and what is said of one that is wrong; what a Khepera is asked to try beside its populations."""
 
+from importlib import import_module
 from types import SimpleNamespace
 
 import numpy as np
@@ -66,6 +67,20 @@ def test_an_entry_point_must_be_called_as_its_task(name):
         TASKS._checked(Part("khepera.mmm", "x"), task)
     with pytest.raises(SpecError, match=r"it is no bns.tasks.Task, and no package with a file mmm.yaml"):
         TASKS._checked(Part("khepera.mmm", "x"), SimpleNamespace(name="mmm"))
+
+
+def test_a_package_with_a_file_of_that_name_is_a_task(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "rink").mkdir()
+    (tmp_path / "rink" / "__init__.py").touch()
+    (tmp_path / "rink" / "ring.yaml").write_text("title: Größe\nsource: s\ngoals_m: [[0.1, 0.2], [0.3, 0.4]]\n", encoding="utf-8")
+    task = TASKS._checked(Part("khepera.ring", "x"), import_module("rink"))
+    assert (task.name, task.title, task.goals_m.tolist()) == ("ring", "Größe", [[0.1, 0.2], [0.3, 0.4]])
+
+
+def test_an_entry_point_that_names_no_robot_is_told_how_to_be_called():
+    with pytest.raises(SpecError, match=r"it calls itself 'ring'; the entry point must be called ROBOT\.ring"):
+        TASKS._checked(Part("hoop", "x"), Task("ring", "t", "s", np.zeros((1, 2))))
 
 
 def test_every_task_goes_by_its_own_name():
