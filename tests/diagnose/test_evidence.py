@@ -59,6 +59,14 @@ def test_gain_is_paired_by_trial():
     assert paired_elpd_diff(before, np.array([10.0, np.inf, 30.0]))[0] == -np.inf
 
 
+def test_the_error_of_a_mean_gain_is_that_of_a_sample():
+    """Gains 1, 2, 3 and 6: squares about their mean of 3 sum to 14, over three degrees of freedom and four trials."""
+    before = np.array([11.0, 7.0, 8.0, 9.0])
+    gain, error = paired_elpd_diff(before, before - [1.0, 2.0, 3.0, 6.0])
+    assert (gain, error) == pytest.approx((3.0, (14 / 3 / 4) ** 0.5))
+    assert paired_elpd_diff(before[:1], before[:1] - 1.0) == (1.0, np.inf)
+
+
 @pytest.mark.parametrize(
     ("effects", "effect", "name", "true"),
     [

@@ -139,3 +139,4 @@ def test_only_a_gradient_that_presses_a_number_against_its_bound_holds_it_there(
     assert active_mask(there, free, np.array([outwards])).tolist() == [False]
     assert active_mask(there, free, np.array([-outwards])).tolist() == [True]
     assert active_mask(inside, free, np.array([outwards])).tolist() == [True]
+    assert active_mask(there, free, np.array([0.0])).tolist() == [True], "nothing presses"

@@ -41,6 +41,16 @@ def test_displacements_equal_their_twin(followed_world):
     assert np.abs(found).max(axis=0).min() > 1e-3
 
 
+@pytest.mark.parametrize("turn_rad", [0.2499, -0.2499, 0.2501, 0.1, 3.0])
+def test_a_circle_of_many_frames_is_followed_to_the_last_digits(turn_rad):
+    """Chords of a circle of radius 1: each the same in the frame of the pose before it, however often that was turned on."""
+    heading = turn_rad * np.arange(200.0)
+    poses = np.column_stack([np.sin(heading), -np.cos(heading), heading])
+    found = displacements(poses, np.arange(200) == 0)[1:]
+    expected = np.array([np.sin(turn_rad), 1 - np.cos(turn_rad), turn_rad])
+    np.testing.assert_allclose(found, np.tile(expected, (199, 1)), rtol=0.0, atol=5e-14)
+
+
 def test_a_true_model_leaves_white_noise():
     predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=12, jitter=0.0, noise=(0.002, 0.008))))
     steps = predictor.steps(NOMINAL)

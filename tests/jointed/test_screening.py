@@ -115,6 +115,14 @@ def test_a_multiple_is_screened_both_ways():
     assert both.values == (pytest.approx(0.3**0.6),)
 
 
+@pytest.mark.parametrize("changed", [0.0, np.nan])
+def test_an_effect_that_changes_nothing_or_cannot_be_computed_is_worth_nothing(changed):
+    problem, base, effect = one_sided((0.3, 4.0))
+    problem.whitened = lambda _model: base.whitened + changed
+    found = screening._scored_at(problem, base, effect, (0.4,))
+    assert (found.gain, found.p_value) == (0.0, 1.0)
+
+
 @pytest.mark.parametrize(
     ("name", "ways"),
     [

@@ -111,6 +111,24 @@ def test_the_surprise_at_a_noise_is_that_of_the_normal_distribution_with_its_cov
     assert np.diff(found) == pytest.approx(np.diff(exact))
 
 
+@pytest.mark.parametrize(
+    ("frames", "off", "said"),
+    [
+        (1, 3.0, 4.5),
+        (1, 3.5, 6.125),
+        (1, 10.0, 28.875),  # 3.5 times 10, less half of 3.5 squared
+        (4, 5.0, 12.5),
+        (4, 10.0, 38.634),  # likewise from 5.232: 3.5 and by how much the roots of 12 and of 3 differ
+    ],
+)
+def test_an_error_far_longer_than_usual_counts_linearly(frames, off, said):
+    """Of one stretch under unit noise: three numbers a frame, squares in full up to 3.5 for three numbers."""
+    luck = Luck(np.zeros((frames + 1, 3, 0)), np.zeros(0, dtype=np.int64), np.zeros(frames + 1, dtype=np.int64), np.zeros(1, int))
+    squares, entries = np.array([[off**2], [0.0], [0.0]]), np.array([[2.0 * frames], [1.0 * frames]])
+    sums = _Sums(squares, np.zeros((3, 1, 6)), np.zeros((3, 1, 6, 6)), entries)
+    assert sums.surprise(luck, np.ones(4)) == pytest.approx(said, abs=1e-3)
+
+
 def test_the_noise_that_was_put_in_is_estimated_and_leaves_unit_errors():
     predictor, steps = driven(150, seed=2)
     noise = estimate_stretch_noise(predictor, steps)
