@@ -12,18 +12,20 @@ ROOMS: dict[str, tuple[str, str]] = {
     "store": (
         "bns/store/disk/*.py bns/store/write/*.py bns/store/read/*.py",
         "tests/store/test_damage.py tests/store/test_order.py tests/store/test_journal.py tests/store/test_compact.py "
-        "tests/store/test_round_trip.py tests/store/test_lock.py tests/store/test_question.py",
+        "tests/store/test_round_trip.py tests/store/test_lock.py tests/store/test_question.py tests/store/test_disk.py",
     ),
     "estimate": (
         "bns/diagnose/estimate/*.py",
         "tests/diagnose/test_held_out.py tests/diagnose/test_evidence.py tests/diagnose/test_clocks.py "
         "tests/diagnose/test_normal.py tests/diagnose/test_formula_starts.py tests/jointed/test_stretch_noise.py "
-        "tests/jointed/test_screening.py",
+        "tests/jointed/test_screening.py tests/jointed/test_look_around.py tests/diagnose/test_intervals.py "
+        "tests/diagnose/test_smoothing_tracker.py tests/diagnose/test_relative_motions.py::"
+        "test_sizes_of_wheels_and_their_intervals_follow_from_mean_and_ratio",
     ),
     "select": (
         "bns/diagnose/select/*.py",
         "tests/diagnose/test_alike.py tests/diagnose/test_negligible.py tests/diagnose/test_equivalents.py "
-        "tests/diagnose/test_search.py tests/jointed/test_screening.py",
+        "tests/diagnose/test_search.py tests/diagnose/test_exchanges.py tests/jointed/test_screening.py",
     ),
     "safety": (
         "bns/hardware/safety.py",
