@@ -1,11 +1,13 @@
 """Chances are what they say, and fits say how well they know."""
 
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.fit import Problem
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import fewest_trials, paired_elpd_diff, sign_flip_p
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -53,6 +55,28 @@ def test_one_step_of_least_squares_from_nothing_ends_near_the_fit():
         assert step - neutral == pytest.approx(fitted - neutral, rel=0.15)
 
 
+@pytest.mark.parametrize(
+    ("gains", "asked_at", "is_of_the_end"),
+    [((1.6, 1.6, 1.6), [0], False), ((1.4, 1.6, 1.6), [0, 1], False), ((1.6, 1.4, 1.4), [0, 2, 3], True)],
+)
+def test_slopes_serve_again_while_the_loss_falls_by_three_quarters_of_what_they_said(gains, asked_at, is_of_the_end):
+    """A residual of 2 that falls by 1 with each unit of one number: squares of half a residual say 2 less."""
+    problem, asked = Problem.__new__(Problem), []
+
+    def at(step):
+        model = SimpleNamespace(per_trial_effect=None, step=step)
+        return SimpleNamespace(model=model, whitened=np.array([[2.0, 0.0, 0.0]]), loss=100.0 - sum(gains[:step]))
+
+    def jacobian(place, *_):
+        asked.append(place.model.step)
+        return SimpleNamespace(jacobian=np.array([[[-1.0], [0.0], [0.0]]]))
+
+    problem._jacobian = jacobian
+    problem._lower = lambda place, *_: (at(place.model.step + 1), 1e-3)
+    end, _, fresh = problem._descended(at(0), (), None, 3)
+    assert (end.model.step, asked, fresh) == (3, asked_at, is_of_the_end)
+
+
 def test_gain_is_paired_by_trial():
     before = np.array([10.0, 20.0, 30.0])
     assert paired_elpd_diff(before, before - 1.0) == (1.0, 0.0)
@@ -92,7 +116,6 @@ def test_planted_numbers_come_back_within_their_intervals(effects, effect, name,
 
 def test_what_holds_a_trial_out_is_close_to_a_fit_without_it():
     """One Newton step from the common fit stands for a fit to all other trials."""
-    from bns.diagnose.estimate.fit import Problem
     from bns.diagnose.estimate.noise import huber
 
     predictor = WheelPredictor(tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=8, seed=5)))
