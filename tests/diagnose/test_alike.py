@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from bns.diagnose.select.indistinguishable import TIE_LOSS, TIE_SHARE, indistinguishable, matters
 
@@ -32,6 +33,15 @@ def test_a_few_wild_trials_do_not_hide_that_nearly_all_lose():
     losses[0] = 3000.0  # the mean is now hardly more than its standard error
     assert losses.mean() < 2 * losses.std(ddof=1) / np.sqrt(60)
     assert not indistinguishable(losing(losses), FIT, WITHOUT)
+
+
+@pytest.mark.parametrize(("standard_errors", "tie"), [(1.9, True), (2.1, False)])
+def test_a_loss_of_two_standard_errors_is_no_tie_though_half_of_the_trials_gain(standard_errors, tie):
+    """Half of 60 trials lose and half gain, 50 apart from the mean either way: a standard error of 50 / √59."""
+    mean = standard_errors * 50.0 / 59**0.5
+    losses = mean + np.repeat([50.0, -50.0], 30)
+    assert losses.mean() > 2 * TIE_SHARE * 100
+    assert indistinguishable(losing(losses), FIT, WITHOUT) is tie
 
 
 def test_a_few_trials_that_alone_are_against_it_leave_a_tie():

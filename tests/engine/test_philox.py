@@ -67,6 +67,10 @@ def test_whatever_names_a_draw_changes_all_of_it(change):
     assert not np.isin(one(**change), one()).any()
 
 
+def test_no_two_purposes_share_their_numbers():
+    assert list(Purpose.__members__.values()) == list(range(len(Purpose.__members__)))
+
+
 def test_uniforms_fill_the_unit_interval_evenly():
     u = uniforms(Key(0, 0), Purpose.PROBE, 0, 50, 500).ravel()
     assert u.min() >= 0
