@@ -107,6 +107,27 @@ def test_what_comes_in_is_certain_does_better_than_decoys_and_gains_enough(chang
     assert search._earned(SimpleNamespace(paired_comparison=comparison), before, given["decoy"] * least) is earned
 
 
+@pytest.mark.parametrize(
+    ("beside", "tried", "told"),
+    [
+        ((), "lag", True),
+        (("given",), "lag", True),
+        (("given", "slip"), "lag", False),  # one that the search has taken already
+        (("given",), "decoy", False),
+    ],
+)
+def test_of_every_effect_beside_the_given_ones_alone_is_told_and_of_no_decoy(monkeypatch, beside, tried, told):
+    def model_with(names):
+        return SimpleNamespace(effects=[SimpleNamespace(effect=SimpleNamespace(name=name)) for name in names])
+
+    search, heard = StepwiseSelection.__new__(StepwiseSelection), []
+    search.model, search.catalogue, search.tick, search.alone = model_with(["given"]), {"lag": None}, lambda _: None, heard.append
+    monkeypatch.setattr(stepwise, "fit_with", lambda *_: "added")
+    monkeypatch.setattr(search, "_candidate", lambda _problem, _fit, added, name: (added, name))
+    assert search._tried(None, SimpleNamespace(model=model_with(beside)), {}, SimpleNamespace(name=tried)) == ("added", tried)
+    assert heard == [("added", tried)] * told
+
+
 def test_a_look_back_asks_of_every_effect_but_the_newest_whether_it_stays(monkeypatch):
     search, asked = StepwiseSelection.__new__(StepwiseSelection), []
     search.catalogue = {}
