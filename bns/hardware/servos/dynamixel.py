@@ -105,36 +105,36 @@ class DynamixelChain:
         self._checked(
             number,
             f"write {name} {value}",
-            lambda: (0, *self._packets.writeTxRx(self._port, number, address, size, data)),
+            lambda: (b"", *self._packets.writeTxRx(self._port, number, address, size, data)),
             alarms,
         )
 
     def _checked(
-        self, number: int, what: str, call: Callable[[], tuple[int, int, int]], alarms: bool, attempts: int = ATTEMPTS
-    ) -> int:
-        """Value of a call that answers (value, result, error byte); asked again when nothing or nonsense comes."""
+        self, number: int, what: str, call: Callable[[], tuple[bytes, int, int]], alarms: bool, attempts: int = ATTEMPTS
+    ) -> bytes:
+        """Registers from a call that answers (registers, result, error byte); asked again when nothing or nonsense comes."""
         problem = ""
         for attempt in range(attempts):
             self.retries += attempt > 0
             try:
                 self._reopen()
-                value, result, bits = call()
+                data, result, bits = call()
             except IndexError:  # the SDK reads past the end of a status packet that is too short
-                value, result, bits = 0, COMM_RX_CORRUPT, 0
+                data, result, bits = b"", COMM_RX_CORRUPT, 0
                 problem = "corrupt status packet"
             except (OSError, TerminalError, HardwareError) as error:
                 self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
             finally:
                 self._port.is_using = False  # an exchange broken off leaves it set, and every later call fails
-            self._journal.note("servo", id=number, what=what, result=result, error=bits, value=value)
+            self._journal.note("servo", id=number, what=what, result=result, error=bits, data=data.hex())
             if result == COMM_SUCCESS and self.table.garbled(bits):
                 problem = "what reached it was garbled"
             elif result == COMM_SUCCESS:
                 if bits & ~self.table.alarm_bits or (bits and not alarms):
                     alarm = self.table.in_words(bits, self._hardware_error(number, bits))
                     raise ServoAlarmError(f"servo {number}: {alarm}")
-                return value
+                return data
             else:
                 problem = problem or str(self._packets.getTxRxResult(result))
         raise ServoError(f"servo {number}: {what}: {problem}; asked {attempts} times")
@@ -251,23 +251,20 @@ class DynamixelChain:
     def _block(self, number: int, first: str, last: str, alarms: bool = False, attempts: int = ATTEMPTS) -> bytes:
         """The registers from `first` to `last`."""
         start, size = self.table.span(first, last)
-        found: list[bytes] = []
 
-        def call() -> tuple[int, int, int]:
+        def call() -> tuple[bytes, int, int]:
             data, result, bits = self._packets.readTxRx(self._port, number, start, size)
-            found[:] = [bytes(data)]
             refused = bits & ~self.table.alarm_bits
             good = result != COMM_SUCCESS or refused or self._port.took(self.table.protocol, number, size)
-            return 0, result if good else COMM_RX_CORRUPT, bits
+            return bytes(data), result if good else COMM_RX_CORRUPT, bits
 
-        self._checked(number, f"read {first}" + f" to {last}" * (last != first), call, alarms, attempts)
-        return found[0]
+        return self._checked(number, f"read {first}" + f" to {last}" * (last != first), call, alarms, attempts)
 
     def recover(self, number: int) -> None:
         """After an overload shutdown, when its cause is gone: the torque limit is written again, or the servo rebooted where it
         takes that; and no alarm may be left."""
         if "hardware_error" in self.table.registers:
-            self._checked(number, "reboot", lambda: (0, *self._packets.reboot(self._port, number)), True)
+            self._checked(number, "reboot", lambda: (b"", *self._packets.reboot(self._port, number)), True)
             self._clock.sleep(_REBOOTS_S)
         self.write(number, "torque_limit", self._torque(), alarms=True)
         self.read(number, "present_position")

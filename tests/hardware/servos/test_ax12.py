@@ -50,6 +50,17 @@ def test_an_adapter_that_echoes_is_found_out(chain):
     assert not any(servo.get("torque_enable") for servo in bus.servos)
 
 
+def test_the_log_holds_the_registers_that_a_servo_sent(chain, monkeypatch):
+    """Low byte first: a torque limit of 500 is f4 01. What is written stands in words."""
+    driver, bus, _ = chain()
+    noted = []
+    monkeypatch.setattr(driver._journal, "note", lambda kind, **said: noted.append(said))
+    bus.servos[1].put("torque_limit", 500)
+    assert driver.read(2, "torque_limit") == 500
+    driver.write(2, "torque_limit", 300)
+    assert [(one["what"], one["data"]) for one in noted] == [("read torque_limit", "f401"), ("write torque_limit 300", "")]
+
+
 @pytest.mark.parametrize(
     ("prepare", "message"),
     [
