@@ -296,6 +296,7 @@ class DynamixelChain:
             self._reopen()
             self._packets.write1ByteTxOnly(self._port, BROADCAST, self.table.registers["torque_enable"].address, 0)
             self._port.is_using = False
+            self._journal.note("servo", id=BROADCAST, what="write torque_enable 0 to all")
 
     def _not_still(self, number: int, places: dict[int, int]) -> str:
         """Why a servo does not stand still yet, or nothing. `places`: where those whose torque is off were at the last look."""

@@ -59,6 +59,8 @@ def test_the_log_holds_the_registers_that_a_servo_sent(chain, monkeypatch):
     assert driver.read(2, "torque_limit") == 500
     driver.write(2, "torque_limit", 300)
     assert [(one["what"], one["data"]) for one in noted] == [("read torque_limit", "f401"), ("write torque_limit 300", "")]
+    driver.stop()
+    assert {"id": BROADCAST, "what": "write torque_enable 0 to all"} in noted
 
 
 @pytest.mark.parametrize(
