@@ -72,7 +72,7 @@ def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(rose, sai
     )  # fmt: skip
     nothing = dict.fromkeys(("withdrawn", "unseen", "formula"))
     found = SimpleNamespace(
-        **nothing, selection=selection, negligible={}, imitating=("battery-sag",), rest=NOTHING,
+        **nothing, selection=selection, negligible={}, beside_negligible={}, imitating=("battery-sag",), rest=NOTHING,
         terms=(SimpleNamespace(fit=fit_of((*SAG, 3e-4, 2.5e-4, 3.5e-4))),),
         errors_with_terms=SimpleNamespace(rose_in_the_end=rose, falls=True),
     )  # fmt: skip
