@@ -54,8 +54,6 @@ class Parameter:
     """A small change that is still visible in data; 0: a thousandth of the plausible range."""
     jagged: bool = False
     """Whether the likelihood has steps or kinks along it, at commands, ticks or poses: its interval needs a search."""
-    otherwise: float | None = None
-    """Its value where none is given; None: one must be. For models that were written before the effect had this parameter."""
 
     @property
     def is_multiple(self) -> bool:
@@ -229,7 +227,6 @@ class Effect:
         for name in values:
             if name not in names:
                 raise ModelError(unknown_name(f"parameter of {self.name}", name, names))
-        values = {**{p.name: p.otherwise for p in self.parameters if p.otherwise is not None}, **values}
         missing = [name for name in names if name not in values]
         if missing:
             raise ModelError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -117,11 +117,8 @@ class CasterDrag(Cause):
         return body._replace(forward=forward, turn=turn)
 
 
-@dataclass
 class Picture(Cause):
-    """A camera's picture of the floor: places and, by a second point a little ahead, a share of what headings turn."""
-
-    headings: float = field(default=1.0, kw_only=True)
+    """A camera's picture of the floor: places and, by a second point a little ahead, headings."""
 
     def pictured(self, places: np.ndarray) -> np.ndarray:
         """Places (..., 2) as the picture shows them."""
@@ -132,7 +129,7 @@ class Picture(Cause):
         ahead = poses[..., :2] + NEAR_M * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
         here, there = self.pictured(poses[..., :2]), self.pictured(ahead)
         shown = np.arctan2(there[..., 1] - here[..., 1], there[..., 0] - here[..., 0])
-        nearest = heading + self.headings * np.angle(np.exp(1j * (shown - heading)))
+        nearest = heading + np.angle(np.exp(1j * (shown - heading)))
         return np.concatenate([here, nearest[..., None]], axis=-1)
 
 

@@ -54,10 +54,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"width_m_s": 0.004, "cold_m_s": 0.008, "time_s": 240.0},
         {"width_m_s": 0.01, "cold_m_s": 0.02, "time_s": 480.0},
     ),
-    "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06, "headings": 0.0}),
+    "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06}),
     "compass-deviation": ({"cosine_share": 0.05, "sine_share": -0.03}, {"cosine_share": -0.12, "sine_share": 0.15}),
     "lens-distortion": (
-        {"per_m2": -0.04, "x_m": 0.8, "y_m": 0.5, "headings": 0.0},
+        {"per_m2": -0.04, "x_m": 0.8, "y_m": 0.5},
         {"per_m2": 0.08, "x_m": 0.7, "y_m": 0.4},
     ),
     "force-limit": ({"max_m_s2": 0.4, "turn_ratio": 2.5}, {"max_m_s2": 0.2, "turn_ratio": 4.0}),

@@ -198,13 +198,3 @@ def test_files_that_are_no_text_are_named(tmp_path):
 def test_effects_of_the_catalogue_need_no_trust(monkeypatch):
     monkeypatch.setenv(VARIABLE, "")
     assert effect_named("motor-lag").name == "motor-lag"
-
-
-def test_a_model_from_before_headings_could_come_from_elsewhere_is_read_as_it_was_meant():
-    """Only the number that came later may be missing."""
-    written = f"{HEAD}effects:\n  - {{name: tilted-camera, values: {{x_per_m: 0.1, y_per_m: 0.0}}, {WHY}}}\n"
-    assert parse_model(written, "a.yaml").values_of("tilted-camera") == {"x_per_m": 0.1, "y_per_m": 0.0, "headings": 1.0}
-    given = written.replace("y_per_m: 0.0", "y_per_m: 0.0, headings: 0.0")
-    assert parse_model(given, "a.yaml").values_of("tilted-camera")["headings"] == 0.0
-    with pytest.raises(ModelError, match="tilted-camera lacks y_per_m"):
-        parse_model(written.replace(", y_per_m: 0.0", ""), "a.yaml")

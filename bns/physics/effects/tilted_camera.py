@@ -10,28 +10,24 @@ import numpy as np
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import View, Wheels
-from bns.physics.wheels.pictures import HEADINGS, both_ways
 
 _NEAREST = 0.05
 
 
-def apply(view: View, x_per_m: float, y_per_m: float, headings: float) -> View:
-    """Positions divided by 1 + ``x_per_m``·x + ``y_per_m``·y.
-
-    Headings turn by the share ``headings`` of what a line in the picture turns.
-    """
+def apply(view: View, x_per_m: float, y_per_m: float) -> View:
+    """Positions divided by 1 + ``x_per_m``·x + ``y_per_m``·y; headings distorted likewise."""
     x, y, heading = np.moveaxis(view.poses, -1, 0)
     depth = np.maximum(1.0 + x_per_m * x + y_per_m * y, _NEAREST)
     cos, sin = np.cos(heading), np.sin(heading)
     recedes = (x_per_m * cos + y_per_m * sin) / depth
     ahead, left = 1.0 - recedes * (cos * x + sin * y), -recedes * (cos * y - sin * x)
-    return View(np.stack([x / depth, y / depth, heading + headings * np.arctan2(left, ahead)], axis=-1))
+    return View(np.stack([x / depth, y / depth, heading + np.arctan2(left, ahead)], axis=-1))
 
 
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     """A few percent of the picture's width, in both directions."""
     small = 0.03 / max(float(np.ptp(wheels.places, axis=0).max()), 1e-2)
-    return both_ways((small, 0.0), (-small, 0.0), (0.0, small), (0.0, -small))
+    return ((small, 0.0), (-small, 0.0), (0.0, small), (0.0, -small))
 
 
 EFFECT = Effect(
@@ -58,14 +54,14 @@ EFFECT = Effect(
             "fraction by which lengths shrink per metre north",
             resolution=1e-4,
         ),
-        HEADINGS,
     ),
-    equation="x' = x/(1 + p·x + q·y), y' = y/(1 + p·x + q·y); headings turn by a fraction h of what lines in the "
-    "picture turn",
+    equation="x' = x/(1 + p·x + q·y), y' = y/(1 + p·x + q·y); headings turn likewise",
     residuals="Distances are too short on one side of the floor and too long on the other; the error changes linearly.",
     lookalikes=("lens-distortion", "camera-scale", "tether-pull"),
     sentence="the camera is tilted, so that distances on one side of its picture look too short",
     measurement="track a bar of known length in the four corners of the floor",
+    assumes="tilted-camera: the headings are assumed to come from the same picture, and so to be distorted with it. If a "
+    "gyro or a compass measures them, the numbers are wrong.",
     apply=apply,
     needs="track",
     needs_place=True,
