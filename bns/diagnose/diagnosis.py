@@ -325,19 +325,13 @@ def _longer(selection: SelectionResult, effects: Mapping[str, Effect]) -> list[t
 
 
 def _nearly(selection: SelectionResult, name: str, others: Mapping[str, Effect]) -> list[ActiveEffect]:
-    """What an accepted effect extends, and the best of those that it was chosen from, each with its numbers then."""
+    """The best of the effects that an accepted one, or what it extends, was chosen from, each with its numbers then."""
     if selection.problem.predictor.screening is not None:  # a fit takes too long
         return []
-    active = next(a for a in selection.fit.model.effects if a.effect.name == name)
-    values = selection.fit.model.values_of(name)
-    parent = others.get(active.effect.extends)
-    found = [ActiveEffect(parent, tuple(values[p.name] for p in parent.parameters))] if parent else []
-    came = next((step for step in selection.steps if step.selected in {name, active.effect.extends}), None)
-    ranked = [c for c in (came.ranking if came else ()) if c.name in others and not c.rejected_because]
-    there = {a.effect.name for a in found}
-    for candidate in [c for c in ranked if c.name not in there][:TRIED]:
-        found.append(ActiveEffect(others[candidate.name], tuple(candidate.fit.model.values_of(candidate.name).values())))
-    return found
+    extends = next(a.effect.extends for a in selection.fit.model.effects if a.effect.name == name)
+    came = next((step for step in selection.steps if step.selected in {name, extends}), None)
+    ranked = [c for c in (came.ranking if came else ()) if c.name in others and not c.rejected_because][:TRIED]
+    return [ActiveEffect(others[c.name], tuple(c.fit.model.values_of(c.name).values())) for c in ranked]
 
 
 def too_little(tracks: Tracks, fewest: int) -> str:

@@ -125,6 +125,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
     whole = stands.selection
     tiny = () if terms else _negligible(whole)
     selection = refitted(whole.lacking(tiny), predictor, given) if tiny else whole
+    numbers = numbers_of(whole.fit) if tiny else {}
     # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
     guesses = stands.rest.residual_dependence or (tuple(stands.dependence[:1]) if stands.rest.outliers else ())
     formula = terms[0] if terms else best_formula(whole.problem, whole.fit, guesses) if guesses else None
@@ -135,8 +136,8 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         stands.rest,
         stands.withdrawn,
         imitating,
-        {name: numbers for name, numbers in numbers_of(whole.fit).items() if name in tiny},
-        {name: numbers for name, numbers in numbers_of(whole.fit).items() if tiny and name in selection.accepted},
+        {name: numbers[name] for name in numbers if name in tiny},
+        {name: numbers[name] for name in numbers if name in selection.accepted},
         terms,
         slight,
         unseen,

@@ -48,26 +48,52 @@ def test_what_is_like_no_pair_has_none(name):
     assert longer_than(hidden(**{name: values[name]}), [name.replace("_", "-")]) == []
 
 
-def test_what_does_nearly_all_alone_is_completed():
+STRIBECK = {"width_m_s": 0.0082, "fade_m_s": 0.48}
+QUIET = {"noise": (0.0004, 0.005), "jitter": 0.002, "commands": 8, "speeds": (0.02, 0.12)}
+DEAD_ZONE = ActiveEffect(all_effects()["dead-zone"], (0.0082,))
+GAIN = ActiveEffect(all_effects()["speed-gain"], (0.9,))
+
+
+@pytest.mark.parametrize("nearly", [[DEAD_ZONE, GAIN], [DEAD_ZONE, DEAD_ZONE]])
+def test_what_does_nearly_all_alone_is_completed(nearly):
     """A Stribeck friction that hardly fades is a dead zone and a gain; where the dead zone does nothing, nothing shows it."""
-    model = hidden(stribeck={"width_m_s": 0.0082, "fade_m_s": 0.48})
-    quiet = {"noise": (0.0004, 0.005), "jitter": 0.002, "commands": 8, "speeds": (0.02, 0.12)}
-    assert longer_than(model, ["stribeck"], **quiet) == []
-    effects = all_effects()
-    nearly = {"stribeck": [ActiveEffect(effects[n], v) for n, v in (("dead-zone", (0.0082,)), ("speed-gain", (0.9,)))]}
-    assert longer_than(model, ["stribeck"], nearly, **quiet) == [("dead-zone", "speed-gain")]
+    model = hidden(stribeck=STRIBECK)
+    assert longer_than(model, ["stribeck"], **QUIET) == []
+    assert longer_than(model, ["stribeck"], {"stribeck": nearly}, **QUIET) == [("dead-zone", "speed-gain")]
+
+
+@pytest.mark.parametrize(
+    ("near", "left", "completed_by"),
+    [
+        (DEAD_ZONE, {"speed-gain": 0.29, "wheelbase": 0.31}, ["speed-gain"]),  # 0.03 of 0.1
+        (DEAD_ZONE, {"speed-gain": 0.2, "wheelbase": 0.1, "side-slip": 0.29}, ["wheelbase", "speed-gain"]),
+        (GAIN, {"wheelbase": 0.01}, []),  # it misses more than a tenth of the friction's gain itself
+    ],
+)
+def test_only_what_does_most_of_the_rest_completes_what_does_nearly_all(monkeypatch, near, left, completed_by):
+    class Spans:
+        def __init__(self, *_):
+            pass
+
+        left = staticmethod(lambda name: left[name])
+
+    model = hidden(stribeck=STRIBECK)
+    problem = problem_for(WheelPredictor(tracks_of(measured(model, seed=5, **QUIET))), model)
+    monkeypatch.setattr(equivalents, "_Spans", Spans)
+    others = [listed(NOMINAL)[name] for name in left]
+    found = equivalents._completed(problem, problem.fit(model), problem.fit(NOMINAL), near, others)
+    assert [[effect.name for effect in pair] for pair, _ in found] == [[near.effect.name, name] for name in completed_by]
+    assert all(near.effect.name in {a.effect.name for a in start.effects} for _, start in found)
 
 
 def test_one_that_does_it_alone_is_no_pair():
     """It is a tie then, and the search has named it."""
     model = hidden(stribeck={"width_m_s": 0.0082, "fade_m_s": 5.0})
-    nearly = {"stribeck": [ActiveEffect(all_effects()["dead-zone"], (0.0082,))]}
-    assert longer_than(model, ["stribeck"], nearly) == []
+    assert longer_than(model, ["stribeck"], {"stribeck": [DEAD_ZONE]}) == []
 
 
-def test_a_diagnosis_says_so_of_what_an_effect_extends():
-    model = hidden(stribeck={"width_m_s": 0.0082, "fade_m_s": 0.48})
-    table = measured(model, trials=24, seed=5, noise=(0.0004, 0.005), jitter=0.002, commands=8, speeds=(0.02, 0.12))
+def test_a_diagnosis_says_so_of_what_was_nearly_as_good_when_an_effect_was_chosen():
+    table = measured(hidden(stribeck=STRIBECK), trials=24, seed=5, **QUIET)
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
     assert found.effects == ("stribeck",)
     said = "dead-zone with speed-gain in the place of stribeck would explain as much, with one more effect and as many numbers."

@@ -39,7 +39,7 @@ def test_each_is_named_with_its_numbers(name, values):
 
 @pytest.mark.slow
 def test_friction_that_falls_over_a_session_is_named_with_its_numbers():
-    """Each trial of a table has a dead zone of its own, as long as trials are short beside the time constant."""
+    """The dead zone is constant within each trial: trials are short compared with the time constant."""
     trials = []
     for i in range(24):
         width = 0.006 + 0.012 * np.exp(-(30 * i + 3) / 240)

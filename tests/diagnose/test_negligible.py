@@ -93,8 +93,12 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
         asked.append(selection.accepted)
         return ("wheel-mismatch",)
 
+    beside = []
     monkeypatch.setattr(outcome, "negligible", judged)
+    monkeypatch.setattr(caveats, "_on_moved", lambda found: beside.append(found.beside_negligible) or [])
     found = diagnose(predictor(), NOMINAL)
+    assert set(beside[0]) == set(found.effects)
+    assert beside[0]["wheelbase"]["factor"]["value"] == pytest.approx(1.05, abs=5e-3)
     assert set(asked[0]) >= {"wheelbase", "wheel-mismatch"}
     assert found.verdict in {"effects", "tie"}
     assert set(found.effects) == set(asked[0]) - {"wheel-mismatch"}

@@ -44,6 +44,14 @@ def number(value, low=None, high=None, **more):
         ("battery-sag", {"rate_per_s": number(-0.001)}, "the robot becomes faster in the course of the session"),
         ("battery-sag", {"rate_per_s": number(0.0), "per_volt": number(0.2)}, "the robot becomes slower (or faster) in"),
         ("dead-zone", {"width_m_s": number(0.0060564)}, "every wheel loses 6.1 mm/s of its speed to friction"),
+        (
+            *("friction-warm-up", {"width_m_s": number(0.01), "cold_m_s": number(0.02), "time_s": number(240.0)}),
+            "friction takes 10 mm/s of its speed from every wheel, 20 mm/s more when the session begins",
+        ),
+        (
+            *("friction-warm-up", {"width_m_s": number(0.01), "cold_m_s": number(-0.005), "time_s": number(240.0)}),
+            "friction takes 10 mm/s of its speed from every wheel, 5 mm/s less when the session begins",
+        ),
         ("speed-limit", {"max_m_s": number(0.42)}, "no wheel runs faster than 420 mm/s"),
     ],
 )

@@ -42,7 +42,7 @@ EFFECT = Effect(
     residuals="Slow commands fall short, in the first trials of a session more than later.",
     lookalikes=("dead-zone", "battery-sag", "heating"),
     sentence="friction takes more speed from the wheels of a cold robot than later in the session",
-    sized="friction takes {width_m_s} of its speed from every wheel, and {cold_m_s} in addition when the session begins",
+    sized="friction takes {width_m_s} of its speed from every wheel, {cold_m_s:more|less} when the session begins",
     measurement="lift the robot while it is cold, raise one wheel's command slowly from zero, and note the command at which the "
     "wheel begins to turn; again after half an hour of driving",
     explained_by=("session_s",),
