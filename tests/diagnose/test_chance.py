@@ -42,3 +42,26 @@ def test_a_delay_that_gives_way_to_another_delay_with_a_lag_is_no_luck():
     added = fit_with(problem, base, effects["motor-lag"])
     assert added.model.values_of("command-delay")["delay_s"] == pytest.approx(0.1, abs=0.02)
     assert problem.paired_comparison(base, added).p_value < 1e-4
+
+
+def test_a_threshold_between_two_commands_is_no_luck():
+    """A little more or less of it changes nothing, so that it has no tangent where it was found; its way there has."""
+    robot = hidden(dead_band={"threshold_m_s": 0.06})
+    predictor = WheelPredictor(tracks_of(measured(robot, trials=24, seed=2, commands=3)))
+    problem = problem_for(predictor, NOMINAL)
+    base = problem.fit(NOMINAL)
+    added = fit_with(problem, base, listed(NOMINAL, None, predictor.tracks)["dead-band"])
+    assert not added.jacobian.any()
+    assert problem.paired_comparison(base, added).p_value < 1e-4
+
+
+def test_a_number_without_influence_earns_nothing():
+    """No wheel turns backwards; what is gained beside it, by a wheelbase that was not at its best, is not its own."""
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=12, seed=1, commands=3)))
+    problem = problem_for(predictor, NOMINAL)
+    started = NOMINAL.with_effect("wheelbase", factor=1.1)
+    base = problem.fit(started, rounds=0)
+    added = problem.fit(started.with_effect("reverse-gain", gain=0.9))
+    comparison = problem.paired_comparison(base, added)
+    assert comparison.elpd_diff > 1
+    assert comparison.p_value == 1.0

@@ -280,11 +280,11 @@ class Problem:
         elpd_diff, dse = paired_elpd_diff(base.held_out, added.held_out)
         known = {(f.effect, f.parameter.name) for f in base.free}
         new = [j for j, f in enumerate(added.free) if (f.effect, f.parameter.name) not in known]
-        # a number with no influence here has no column
-        new = [j for j in new if np.abs(added.jacobian[..., j]).max() > 0]
-        if not new or elpd_diff <= 0:
+        # the whole way, since between two steps of a response the slope is 0; without influence anywhere nothing is earned
+        chords = self._chords(added, new) if new and elpd_diff > 0 else np.zeros((0, 3, 0))
+        if not chords.any():
             return PairedComparison(elpd_diff, dse, 1.0)
-        columns = _reaching(added.whitened - base.whitened, self._chords(added, new))
+        columns = _reaching(added.whitened - base.whitened, chords)
         joint = np.concatenate([base.jacobian, columns], axis=2)
         return PairedComparison(
             elpd_diff, dse, chance(self.normal_equations(joint, base.whitened), base.jacobian.shape[2])
