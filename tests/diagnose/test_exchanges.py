@@ -128,6 +128,21 @@ def test_of_every_effect_beside_the_given_ones_alone_is_told_and_of_no_decoy(mon
     assert heard == [("added", tried)] * told
 
 
+@pytest.mark.parametrize(("given", "stays"), [(["slip", "lag"], True), (["slip"], False), ([], False)])
+def test_a_longer_effect_takes_the_place_of_what_was_found_and_stands_beside_what_was_given(monkeypatch, given, stays):
+    """What a user's model has is not the search's to take away."""
+    search, asked = StepwiseSelection.__new__(StepwiseSelection), []
+    search.model = SimpleNamespace(effects=[SimpleNamespace(effect=SimpleNamespace(name=name)) for name in given])
+    search.tick, search.catalogue = lambda _: None, {}
+    monkeypatch.setattr(stepwise, "fit_extended", lambda *asked_with: asked.append(asked_with) or "added")
+    monkeypatch.setattr(search, "_candidate", lambda _problem, _fit, added, name: (added, name))
+    longer = SimpleNamespace(name="longer-lag")
+    fit = SimpleNamespace(model=search.model)
+    place = {"longer-lag": (str(b"lag", "ascii"), "with the lag")}
+    assert search._tried("problem", fit, place, longer) == ("added", "longer-lag")
+    assert asked == [("problem", "with the lag", longer, stays)]
+
+
 def test_a_look_back_asks_of_every_effect_but_the_newest_whether_it_stays(monkeypatch):
     search, asked = StepwiseSelection.__new__(StepwiseSelection), []
     search.catalogue = {}

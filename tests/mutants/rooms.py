@@ -19,7 +19,8 @@ ROOMS: dict[str, tuple[str, str]] = {
         "tests/diagnose/test_held_out.py tests/diagnose/test_evidence.py tests/diagnose/test_clocks.py "
         "tests/diagnose/test_normal.py tests/diagnose/test_formula_starts.py tests/jointed/test_stretch_noise.py "
         "tests/jointed/test_screening.py tests/jointed/test_look_around.py tests/diagnose/test_intervals.py "
-        "tests/diagnose/test_smoothing_tracker.py tests/diagnose/test_relative_motions.py::"
+        "tests/diagnose/test_smoothing_tracker.py tests/diagnose/test_cancelling.py tests/diagnose/test_plausibility.py "
+        "tests/diagnose/test_relative_motions.py::"
         "test_sizes_of_wheels_and_their_intervals_follow_from_mean_and_ratio",
     ),
     "select": (

@@ -147,6 +147,16 @@ def test_a_stop_of_joints_that_stand_is_timed_from_its_order(bridge, clock):
     assert 0.0 < stop.acknowledged_s <= stop.seconds < 0.2
 
 
+@pytest.mark.parametrize("sooner_s", [0.0, 40.0])
+def test_a_stop_that_is_given_up_says_for_how_long_it_was_tried(bridge, clock, sooner_s):
+    """From its order on, whenever that is."""
+    driver, _ = bridge(Fault("silent-servo", at_s=0.0, for_s=1e9, servo=2))
+    clock.sleep(sooner_s)
+    stop = driver.stop(patience_s=0.5)
+    assert (stop.confirmed, stop.acknowledged_s) == (False, None)
+    assert 0.5 < stop.seconds < 0.8
+
+
 def test_no_question_has_the_number_of_one_of_the_255_before(bridge):
     driver, _ = bridge()
     numbers, real = [], driver._once

@@ -184,6 +184,16 @@ def test_a_packet_that_comes_in_two_pieces_behind_stray_bytes_is_put_together(pr
         assert wire.taken(kept + whole[cut:] + b"next") == (Packet(3, WRITE, b"\x20\x01"), b"next")
 
 
+@pytest.mark.timeout(20)  # that it is found twice in the same place would be looked for without end
+@pytest.mark.parametrize("before", [0, 1, 5])
+def test_who_begins_to_listen_inside_a_packet_passes_over_the_stuffed_headers_in_it(before):
+    """Of a packet whose beginning was missed; what follows is whole."""
+    missed = TWO.instruction(2, WRITE, b"\xff\xff\xfd" * 2)[8 - before :]
+    assert missed[before:].startswith(b"\xff\xff\xfd\xfd\xff\xff\xfd\xfd")
+    assert TWO.taken(missed) == (None, missed[-3:])
+    assert TWO.taken(missed + TWO.instruction(3, WRITE, b"\x20") + b"x") == (Packet(3, WRITE, b"\x20"), b"x")
+
+
 @pytest.mark.parametrize("protocol", [1, 2])
 def test_an_answer_is_whole_only_behind_its_header_and_with_all_of_its_bytes(protocol):
     wire = WIRES[protocol]
