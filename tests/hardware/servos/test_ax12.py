@@ -50,6 +50,20 @@ def test_an_adapter_that_echoes_is_found_out(chain):
     assert not any(servo.get("torque_enable") for servo in bus.servos)
 
 
+def test_an_echo_is_looked_for_only_where_something_is_wrong(chain):
+    heard = []
+
+    def prepare(bus):
+        answers = bus.receive
+        bus.receive = lambda data: (heard.append(data[2]), answers(data))[1]
+
+    chain(prepare=prepare)
+    assert set(heard) == set(IDS)
+    with pytest.raises(HardwareError, match="servo 4 is missing"):
+        chain(asked=(4,), prepare=prepare)
+    assert BROADCAST in heard
+
+
 def test_the_log_holds_the_registers_that_a_servo_sent(chain, monkeypatch):
     """Low byte first: a torque limit of 500 is f4 01. What is written stands in words."""
     driver, bus, _ = chain()
@@ -326,7 +340,7 @@ def test_an_overload_latches_until_the_torque_limit_is_written(chain, clock):
         driver.health()
     driver.recover(2)
     driver.health()
-    assert bus.servos[1].get("torque_limit") > 0
+    assert bus.servos[1].get("torque_limit") == round(0.8 * 1023)  # no more than it had
 
 
 @pytest.mark.parametrize(

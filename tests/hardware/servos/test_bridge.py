@@ -21,6 +21,7 @@ from bns.hardware.servos.bridge_frames import (
     ANSWER,
     ARM,
     GOAL,
+    POSITION,
     SERVO,
     STARTED_S,
     STATE,
@@ -155,6 +156,21 @@ def test_a_stop_that_is_given_up_says_for_how_long_it_was_tried(bridge, clock, s
     stop = driver.stop(patience_s=0.5)
     assert (stop.confirmed, stop.acknowledged_s) == (False, None)
     assert 0.5 < stop.seconds < 0.8
+
+
+@pytest.mark.parametrize(("steps", "looks"), [(0, 2), (1, 2), (-1, 2), (2, 3), (-2, 3)])
+def test_a_joint_behind_the_bridge_stands_still_within_one_step_between_two_looks(bridge, steps, looks):
+    """A reading may jump by one step of 0.29 degrees."""
+    driver, _ = bridge()
+    places, asked = [500, 500 + steps, 500 + steps], []
+
+    def answer(*_):
+        asked.append(places[len(asked)])
+        return bytes(2) + b"".join(POSITION.pack(place) for place in (512, asked[-1], 512))
+
+    driver._ask = answer
+    assert driver.stop().confirmed
+    assert len(asked) == looks
 
 
 def test_no_question_has_the_number_of_one_of_the_255_before(bridge):

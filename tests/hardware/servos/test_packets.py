@@ -205,6 +205,15 @@ def test_an_answer_is_whole_only_behind_its_header_and_with_all_of_its_bytes(pro
         assert not wire.seems_whole(answer[:at] + b"\x00" + answer[at + 1 :])
 
 
+def test_an_answer_of_more_bytes_than_one_byte_can_count_is_whole_with_all_of_them():
+    """Protocol 2.0: the low byte of the length first; 256 data bytes are 260 with instruction, error and CRC."""
+    answer = TWO.status(3, 0, bytes(256))
+    assert answer[5:7] == b"\x04\x01"
+    assert TWO.seems_whole(answer)
+    assert not TWO.seems_whole(answer[:-1])
+    assert not TWO.seems_whole(answer[: answer[5] + 7])
+
+
 @pytest.mark.parametrize("off", [-1, 1])
 def test_a_checksum_that_is_lower_or_higher_is_noticed(off):
     clean = WIRES[1].status(3, 0, b"\x05")

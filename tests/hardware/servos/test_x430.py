@@ -64,6 +64,23 @@ def test_an_error_byte_names_the_alarms_and_why_an_instruction_was_refused(bits,
     assert AX12.in_words(0x01 | 0x20) == "voltage out of its limits, overload"
 
 
+@pytest.mark.parametrize(
+    ("table", "name", "value", "raw"),
+    [  # two's complement; of an AX-12 the magnitude, and bit 10 for the other direction
+        (XL430_W250, "present_load", -885, 0xFC8B),
+        (XL430_W250, "present_load", 0x7FFF, 0x7FFF),
+        (XL430_W250, "present_load", -0x8000, 0x8000),
+        (XL430_W250, "present_position", -1, 0xFFFFFFFF),
+        (XL430_W250, "present_position", 0x40000000, 0x40000000),
+        (AX12, "present_load", -300, 1024 + 300),
+        (AX12, "present_load", 1023, 1023),
+    ],
+)
+def test_a_value_below_nothing_stands_in_a_register_as_the_manual_says(table, name, value, raw):
+    assert table.raw(name, value) == raw
+    assert table.value(name, raw) == value
+
+
 @pytest.fixture
 def chain(tmp_path, clock):
     """chain(*faults, kind, **registers) -> driver, bus, line."""
@@ -148,6 +165,20 @@ def test_lost_and_garbled_answers_are_asked_for_again(chain):
 def test_chains_that_cannot_be_used(chain, build, message):
     with pytest.raises(HardwareError, match=message):
         chain(**build)
+
+
+def test_a_speed_beyond_what_a_register_holds_is_sent_as_the_highest_that_it_holds(chain):
+    driver, bus, _ = chain()
+    driver.move([0.1] * 3, [1e6] * 3)
+    assert {servo.get("moving_speed") for servo in bus.servos} == {32767}
+
+
+@pytest.mark.parametrize("alarms", [False, True])
+def test_who_lets_alarms_pass_is_told_all_the_same_that_an_instruction_was_refused(chain, alarms):
+    driver, bus, _ = chain()
+    with pytest.raises(ServoError, match="servo 2: value out of range"):
+        driver.write(2, "goal_position", 4096, alarms=alarms)
+    assert bus.servos[1].get("goal_position") == 2048
 
 
 def test_an_overload_is_named_and_stays_until_the_servo_is_rebooted(chain, clock):
