@@ -59,3 +59,11 @@ def test_losses_that_are_small_in_all_are_a_tie_though_every_trial_shows_them():
 def test_a_loss_as_large_as_the_least_that_matters_matters():
     assert matters(np.array([0.0, 1.0, 2.0]) * TIE_SHARE, 1.0, 10**9).tolist() == [False, True, True]
     assert matters(np.array([0.5, 1.0, 2.0]) * TIE_LOSS, 0.0, 1).tolist() == [False, True, True]
+
+
+@pytest.mark.parametrize(("lose", "tie"), [(45, True), (46, False)])
+def test_trials_that_lose_are_no_luck_from_four_standard_deviations_of_heads_and_tails_on(lose, tie):
+    """Of 60 coins, heads less tails has a standard deviation of √60: 30 is less than four of them, 32 is more."""
+    losses = np.where(np.arange(60) < lose, 1.0, -1.0)
+    losses[0] = 3000.0  # the mean says nothing
+    assert indistinguishable(losing(losses), FIT, WITHOUT) is tie

@@ -7,7 +7,9 @@ import pytest
 
 from bns.diagnose.select import exchanges, stepwise
 from bns.diagnose.select.exchanges import BEHIND, BEHIND_LOSS, SCREEN, Entry, Exchanges
+from bns.diagnose.select.result import Candidate
 from bns.diagnose.select.stepwise import StepwiseSelection
+from bns.physics.decoys import DECOYS
 
 
 def in_place(monkeypatch, start, fitted, lacking=1000.0, reached=0.0, known=()):
@@ -167,3 +169,54 @@ def test_no_explanation_competes_by_one_more_number_that_may_be_anything(monkeyp
         monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
     found = search._competing_models(None, fit, ("a", "b", "d"))
     assert found == ([(("a", "c", "d"), tried)] if competes else [])
+
+
+def test_the_best_of_the_decoys_sets_the_threshold(monkeypatch):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    search.predictor, search._worth = SimpleNamespace(screening=None), {}
+    earns = dict(zip([decoy.name for decoy in DECOYS], np.random.default_rng(0).permutation(len(DECOYS)), strict=True))
+
+    def tried(_problem, _fit, _place, effect):
+        return Candidate(effect.name, None, SimpleNamespace(elpd_diff=float(earns[effect.name])))
+
+    monkeypatch.setattr(search, "_worth_a_fit", lambda *_: [])
+    monkeypatch.setattr(search, "_tried", tried)
+    monkeypatch.setattr(search, "_earned", lambda *_: False)
+    search.catalogue = {}
+    step, _, _ = search._forward_step(None, SimpleNamespace(model=SimpleNamespace(effects=())), ())
+    assert step.decoy_threshold == len(DECOYS) - 1 > 0
+
+
+@pytest.mark.parametrize(
+    ("numbers", "ends", "competing"),
+    [
+        ({"b": 3, "c": 3}, "a", [("b",), ("c",)]),
+        ({"b": 2, "c": 1}, "c", [("a",), ("b",)]),
+        ({"b": 4, "c": 2}, "c", [("a",), ("b",)]),
+        ({}, "a", []),
+    ],
+)
+def test_of_explanations_that_cannot_be_told_apart_the_one_with_fewest_numbers_is_named(monkeypatch, numbers, ends, competing):
+    """The one that was found has three, and is named where none has fewer."""
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    search.model = None
+    fits = {name: SimpleNamespace(free=[0] * count, name=name) for name, count in ({"a": 3} | numbers).items()}
+    monkeypatch.setattr(search, "_competing_models", lambda *_: [((name,), fits[name]) for name in numbers])
+    found = search._ended(SimpleNamespace(fit=lambda _model: None), fits["a"], ("a",), [])
+    assert (found.accepted, found.fit.name) == ((ends,), ends)
+    assert list(found.competing_models) == competing
+
+
+@pytest.mark.parametrize(("better", "kept"), [(True, ("longer", "b")), (False, ("b", "lag"))])
+def test_a_longer_effect_that_lowers_no_error_goes_back_to_the_one_that_it_extends(monkeypatch, better, kept):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    search.catalogue = {name: SimpleNamespace(extends=part) for name, part in (("lag", ""), ("longer", "lag"), ("b", ""))}
+    fit = SimpleNamespace(model=SimpleNamespace(effects=()))
+    monkeypatch.setattr(search, "_shortened", lambda *state: state)
+    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
+    monkeypatch.setattr(search, "_stays", lambda *_: True)
+    monkeypatch.setattr(search, "_refit_with_noise", lambda model, _: (problem, SimpleNamespace(model=model)))
+    for name, answer in (("at_bound", False), ("variant", False), ("certainly_better", better), ("reduced", fit)):
+        monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
+    problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
+    assert search._backward_step(problem, fit, ("longer", "b"))[2] == kept

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from bns.diagnose.select.extending import extended, fits_better, simple, to_extend, variant
 from bns.physics.effects import all_effects
@@ -39,3 +40,19 @@ def test_what_is_a_part_of_an_accepted_effect_is_not_tried_beside_it():
     assert not variant(catalogue, "braking-lag")
     assert not variant(catalogue, "motor-lag")
     assert variant(catalogue, "wheel-diameters")
+
+
+def test_what_extends_the_same_effect_in_another_way_may_take_the_place_of_one_that_does():
+    """For that no exchange is asked for: each of them is a fit."""
+    catalogue = all_effects()
+    fit = SimpleNamespace(model=SimpleNamespace(effects=(SimpleNamespace(effect=catalogue["braking-lag"]),)))
+    others = [catalogue[name] for name in ("lag-mismatch", "braking-lag", "inertia-lag")]
+    found = to_extend(others, fit, ("braking-lag",), lambda: pytest.fail("asked for"))
+    assert found == {"lag-mismatch": ("braking-lag", fit), "inertia-lag": ("braking-lag", fit)}
+
+
+def test_exchanges_are_asked_for_only_where_something_has_no_place_yet():
+    catalogue = all_effects()
+    fit = SimpleNamespace(model=SimpleNamespace(effects=(SimpleNamespace(effect=catalogue["motor-lag"]),)))
+    found = to_extend([catalogue["lag-mismatch"]], fit, ("motor-lag",), lambda: pytest.fail("asked for"))
+    assert found == {"lag-mismatch": ("motor-lag", fit)}

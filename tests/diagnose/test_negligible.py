@@ -18,8 +18,10 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.established import Established
 from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import NOTHING
+from bns.diagnose.select import negligible as negligible_module
+from bns.diagnose.select import result
 from bns.diagnose.select.negligible import LUCK, MEDIAN_OF, _largest_fall, fall_matters, negligible
-from bns.diagnose.select.result import SelectionResult
+from bns.diagnose.select.result import SelectionResult, certainly_lower
 from bns.diagnose.values import numbers_of
 from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -286,3 +288,29 @@ def test_numbers_that_what_is_negligible_moves_are_said():
     said = "With slope-load in the model, the parameters of floor-slope differ: x_m_s = 0.004 m/s, not 0.0045."
     assert notes(0.0045, 0.004) == [said]
     assert notes(0.00405, 0.004) == []
+
+
+@pytest.mark.parametrize(("fall", "dropped"), [(0.0199, ("b",)), (0.02, ())])
+def test_an_effect_is_negligible_that_lowers_no_error_by_two_percent(monkeypatch, fall, dropped):
+    monkeypatch.setattr(negligible_module, "_without_each", lambda *_: None)
+    monkeypatch.setattr(negligible_module, "_largest_fall", lambda _errors, name, _all: {"a": 0.5, "b": fall, "c": 0.3}[name])
+    assert negligible(SimpleNamespace(accepted=("a", "b", "c"))) == dropped
+
+
+@pytest.mark.parametrize(
+    ("falls", "fell", "lower"),
+    [(True, (None, True), True), (True, (False, True), True), (True, (None, False), False), (False, (True, True), False)],
+)
+def test_an_error_is_certainly_lower_that_falls_over_one_horizon_and_rises_over_none(monkeypatch, falls, fell, lower):
+    horizons = {at: SimpleNamespace(total=None if one is None else SimpleNamespace(fell=one)) for at, one in enumerate(fell)}
+    seen = []
+
+    def errors(predictor, steps):
+        seen.append((predictor, steps))
+        return SimpleNamespace(falls=falls, horizons=horizons)
+
+    monkeypatch.setattr(result, "paired_errors", errors)
+    monkeypatch.setattr(result, "held_out_steps", lambda _predictor, pose_filter, model: (pose_filter, model))
+    one, other = ((SimpleNamespace(predictor="tracks", pose_filter=n), SimpleNamespace(model=n)) for n in (1, 2))
+    assert certainly_lower(one, other) is lower
+    assert seen == [("tracks", [("before", (1, 1)), ("after", (2, 2))])]

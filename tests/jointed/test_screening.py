@@ -150,6 +150,13 @@ def test_what_comes_near_the_best_is_worked_out_before_it_is_compared(monkeypatc
     assert [c.fit.loss for c in out] == ([1.0, 1.0] if far > stepwise.BEHIND else [1.0, 100 - 90 * far])
 
 
+def test_where_nothing_lowers_the_loss_nothing_is_worked_out():
+    search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
+    search.predictor = SimpleNamespace(anchor=lambda _model: pytest.fail("worked out"))
+    rough = [Candidate(name, SimpleNamespace(loss=loss, model=name), None) for name, loss in (("a", 100.0), ("b", 101.0))]
+    assert search._worked_out(None, SimpleNamespace(loss=100.0), rough) == rough
+
+
 def test_a_step_of_the_search_compares_what_was_worked_out(monkeypatch):
     search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
     search.predictor, search.catalogue = SimpleNamespace(screening=64), dict.fromkeys("abcde")

@@ -26,7 +26,8 @@ ROOMS: dict[str, tuple[str, str]] = {
     "select": (
         "bns/diagnose/select/*.py",
         "tests/diagnose/test_alike.py tests/diagnose/test_negligible.py tests/diagnose/test_equivalents.py "
-        "tests/diagnose/test_search.py tests/diagnose/test_exchanges.py tests/jointed/test_screening.py",
+        "tests/diagnose/test_search.py tests/diagnose/test_exchanges.py tests/diagnose/test_extending.py "
+        "tests/jointed/test_screening.py",
     ),
     "safety": (
         "bns/hardware/safety.py",
