@@ -61,9 +61,10 @@ def test_a_loss_as_large_as_the_least_that_matters_matters():
     assert matters(np.array([0.5, 1.0, 2.0]) * TIE_LOSS, 0.0, 1).tolist() == [False, True, True]
 
 
-@pytest.mark.parametrize(("lose", "tie"), [(45, True), (46, False)])
-def test_trials_that_lose_are_no_luck_from_four_standard_deviations_of_heads_and_tails_on(lose, tie):
-    """Of 60 coins, heads less tails has a standard deviation of √60: 30 is less than four of them, 32 is more."""
-    losses = np.where(np.arange(60) < lose, 1.0, -1.0)
+@pytest.mark.parametrize(("trials", "lose", "tie"), [(60, 45, True), (60, 46, False), (100, 70, True), (100, 71, False)])
+def test_trials_that_lose_are_no_luck_beyond_four_standard_deviations_of_heads_and_tails(trials, lose, tie):
+    """Heads less tails of 60 coins have a standard deviation of √60: 30 are less than four of them, 32 are more."""
+    losses = np.where(np.arange(trials) < lose, 1.0, -1.0)
     losses[0] = 3000.0  # the mean says nothing
-    assert indistinguishable(losing(losses), FIT, WITHOUT) is tie
+    tried, fit, without = (SimpleNamespace(held_out=lost) for lost in (losses, np.zeros(trials), np.full(trials, 100.0)))
+    assert indistinguishable(tried, fit, without) is tie

@@ -7,10 +7,14 @@ import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate import fit as fit_module
+from bns.diagnose.estimate import starts
 from bns.diagnose.estimate.fit import Problem
+from bns.diagnose.estimate.noise import estimate_noise
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import fewest_trials, paired_elpd_diff, sign_flip_p
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
@@ -102,12 +106,9 @@ def test_the_error_of_a_mean_gain_is_that_of_a_sample():
     ],
 )
 def test_planted_numbers_come_back_within_their_intervals(effects, effect, name, true):
-    from bns.diagnose.estimate.starts import fit_with
-    from bns.physics.effects import effect_named
-
     predictor = WheelPredictor(tracks_of(measured(hidden(**effects), trials=14, seed=3)))
     problem = problem_for(predictor, NOMINAL)
-    fit = fit_with(problem, problem.fit(NOMINAL), effect_named(effect))
+    fit = starts.fit_with(problem, problem.fit(NOMINAL), effect_named(effect))
     index = [f.parameter.name for f in fit.free].index(name)
     low, high = fit.interval(index, 0.999)
     assert low < true < high
@@ -135,3 +136,58 @@ def test_so_many_trials_are_the_fewest_that_can_bring_an_effect_in():
     fewest = fewest_trials(level)
     assert fewest == 10  # 2 of the 2^10 ways that the signs can fall
     assert sign_flip_p(np.ones((fewest - 1, 1)), np.eye(1)) >= level > sign_flip_p(np.ones((fewest, 1)), np.eye(1))
+
+
+def test_the_noise_of_tracking_is_taken_from_the_tracks_where_they_tell_it():
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=3)))
+    steps = predictor.steps(NOMINAL)
+    guessed = estimate_noise(predictor, steps)
+    predictor.tracking = (0.0031, 0.0123)
+    known = estimate_noise(predictor, steps)
+    assert known[:2] == pytest.approx([0.0031, 0.0123])
+    assert abs(guessed[:2] / known[:2] - 1).min() > 0.1
+
+
+@pytest.mark.parametrize(("ruling", "flatter"), [(3.1, True), (2.9, False)])
+def test_where_one_trial_rules_a_slope_each_trial_has_the_one_of_its_flatter_side(ruling, flatter):
+    """Three trials of one frame each; the last has more or less than nine tenths of the sum of squares."""
+    one = fit_module.FreeParameter("wheelbase", effect_named("wheelbase").parameters[0])
+    ahead, back = (np.array([[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]]) for a, b, c in ((0.7, 0.7, ruling), (0.6, 0.8, 0.1)))
+    problem = Problem.__new__(Problem)
+    problem.predictor = SimpleNamespace(luck=None, tracks=SimpleNamespace(first=np.arange(4)))
+    problem._trial = np.arange(3)
+    problem._difference = lambda _at, _free, _j, by: ahead if by > 0 else back
+    at = SimpleNamespace(model=hidden(wheelbase={"factor": 1.0}))
+    found = problem._slope(at, [one], 0, 1e-3)
+    np.testing.assert_array_equal(found, np.stack([back[0], ahead[1], back[2]]) if flatter else ahead)
+    problem.predictor.luck = object()
+    assert problem._slope(at, [one], 0, 1e-3) is ahead
+
+
+def test_of_wide_slopes_to_both_sides_the_flatter_one_counts(monkeypatch):
+    one = fit_module.FreeParameter("wheelbase", effect_named("wheelbase").parameters[0])
+    at = SimpleNamespace(model=hidden(wheelbase={"factor": 1.0}), whitened=np.zeros((2, 3)))
+    problem, flat = Problem.__new__(Problem), np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    monkeypatch.setattr(fit_module, "increments", lambda *_: [0.1, -0.1, 0.2])
+    problem._slope = lambda _at, _free, _j, by: {0.1: 3.0, -0.1: 1.0, 0.2: -2.0}[by] * flat
+    np.testing.assert_array_equal(problem._jacobian(at, [one], wide=True).jacobian[..., 0], flat)
+
+
+def test_the_way_to_a_fit_takes_the_place_of_the_direction_most_like_it():
+    """Most like it whatever its length or its sign."""
+    columns = np.array([[[9.0, 0.0, 1.0], [0.0, -0.1, 1.0], [0.0, 0.0, 1.0]]])
+    way = np.array([[0.2, 1.0, 0.1]])
+    expected = columns.copy()
+    expected[..., 1] = way
+    np.testing.assert_array_equal(fit_module._reaching(way, columns), expected)
+    assert columns[0, 1, 1] == -0.1, "the columns given stay as they are"
+
+
+@pytest.mark.parametrize(("falls", "rounds"), [(0.049, 0), (0.051, None)])
+def test_a_start_that_earns_next_to_nothing_of_what_a_trial_loses_is_not_followed(monkeypatch, falls, rounds):
+    """Ten trials that lose 10 each: half a percent of that is 0.05."""
+    start = SimpleNamespace(model="there", loss=100.0 - falls, jacobian_by_parameter="nearby")
+    monkeypatch.setattr(starts, "best_start", lambda *_: start)
+    base = SimpleNamespace(loss=100.0, losses=np.full(10, 10.0))
+    problem = SimpleNamespace(fit=lambda *asked: asked)
+    assert starts.fit_with(problem, base, None) == ("there", rounds, "nearby")

@@ -7,6 +7,7 @@ import pytest
 
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.jagged import _drawn, _middle_of_least, _searched, with_jagged
 from bns.diagnose.estimate.normal_equations import normal_equations
@@ -128,6 +129,35 @@ def test_the_bootstrap_of_a_parabola_is_the_jackknifes_interval():
 def test_of_equally_good_values_the_middle_is_taken():
     losses = np.array([9.0, 2.0, 1.0, 1.0, 1.01, 1.0, 5.0, 1.0])
     assert _middle_of_least(np.arange(8.0), losses) == 3.5
+
+
+def fit_of(value, variance, trials, numbers=2, jacobian=1.0):
+    """A fit of which the first number, with bounds 0.5 and 2, has this value and this variance."""
+    factor = replace(effect_named("wheelbase").parameters[0], low=0.5, high=2.0)
+    free = tuple(FreeParameter(f"e{i}", factor) for i in range(numbers))
+    covariance, jacobian = np.diag([variance] + [1.0] * (numbers - 1)), np.full((trials, 3, numbers), jacobian)
+    return Fit(None, free, np.array([value] * numbers), covariance, np.ones(trials), np.ones(trials), jacobian[..., 0], jacobian)
+
+
+def test_an_interval_is_student_s_with_a_degree_of_freedom_a_trial_less_one_a_number():
+    """Of tables: 2.776 with four degrees of freedom, 12.706 with one, which is the least."""
+    assert fit_of(1.0, 1e-4, 6).interval(0) == pytest.approx((1.0 - 0.02776, 1.0 + 0.02776), abs=1e-5)
+    assert fit_of(1.0, 1e-4, 3).interval(0) == pytest.approx((1.0 - 0.12706, 1.0 + 0.12706), abs=1e-5)
+    assert fit_of(1.0, 1e-4, 2).interval(0) == fit_of(1.0, 1e-4, 3).interval(0)
+    assert fit_of(1.0, 1e-4, 6).interval(0, 0.9) == pytest.approx((1.0 - 0.02132, 1.0 + 0.02132), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("value", "ends"), [(1.0, (0.5, 2.0)), (0.4, (0.4, 2.0)), (2.1, (0.5, 2.1))], ids=["inside", "below", "above"]
+)
+def test_an_interval_ends_at_the_bounds_and_holds_its_value(value, ends):
+    """A user's model may have a number that is beyond them."""
+    assert fit_of(value, 100.0, 20).interval(0) == ends
+
+
+def test_a_number_that_no_pose_depends_on_may_be_anything():
+    assert fit_of(1.0, 0.0, 20, jacobian=0.0).interval(0) == (0.5, 2.0)
+    assert fit_of(1.0, 0.0, 20).interval(0) == (1.0, 1.0)
 
 
 @pytest.mark.parametrize(("end", "outwards"), [("low", 1.0), ("high", -1.0)])

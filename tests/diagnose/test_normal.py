@@ -53,3 +53,9 @@ def test_no_numbers_no_equations():
     curvature, gradient = normal_equations(JACOBIAN[..., :0], WHITE)
     assert (curvature.shape, gradient.shape) == ((0, 0), (0,))
     np.testing.assert_array_equal(innovations_after(FIRST, JACOBIAN[..., :0], WHITE, np.zeros((3, 0))), WHITE)
+
+
+def test_the_robust_loss_goes_on_along_its_tangent_beyond_its_bend():
+    far = np.array([0.0, 1.0, HUBER, HUBER + 1.0, HUBER + 10.0])
+    along = np.stack([0.6 * far, np.zeros(5), -0.8 * far], axis=1)
+    assert huber(along) == pytest.approx(HUBER**2 / 2 + np.array([-(HUBER**2) / 2, (1 - HUBER**2) / 2, 0, HUBER, 10 * HUBER]))

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from bns.diagnose.estimate.fit import FreeParameter
-from bns.diagnose.estimate.plausibility import fitted_again, implausible
+from bns.diagnose.estimate.plausibility import fitted_again, implausible, limiting, undetermined
 from bns.physics.effect import Parameter
 from tests.diagnose.worlds import NOMINAL
 
@@ -49,3 +49,28 @@ def test_a_measured_number_is_contradicted_by_an_interval_that_it_lies_outside_o
     fit = fit_of(1.0, low, high, now, "speed-gain", parameter)
     assert len(list(fitted_again(given, fit))) == 1
     assert bool(list(fitted_again(given, fit, contradicted=True))) is said
+
+
+@pytest.mark.parametrize(
+    ("intervals", "said", "may_be_anything"),
+    [
+        ([(0.1, 9.0), (0.1, 9.0)], "these data do not determine gain and lag", True),
+        ([(0.1, 9.0), (0.1, 8.9)], "", True),
+        ([(0.2, 9.0), (0.1, 8.9)], "", False),
+        ([], "", False),
+    ],
+)
+def test_an_effect_is_undetermined_where_all_its_numbers_may_be_anything_and_limiting_where_one_may(
+    intervals, said, may_be_anything
+):
+    names = (GAIN, replace(GAIN, name="lag"))
+    free = tuple(FreeParameter("e", p) for p, _ in zip(names, intervals, strict=False))
+    other = FreeParameter("other", GAIN)
+    fit = SimpleNamespace(free=(*free, other), interval=lambda i: [*intervals, (0.1, 9.0)][i])
+    assert undetermined(fit, "e") == said
+    assert limiting(fit, "e") is may_be_anything
+
+
+def test_a_number_without_bounds_is_never_said_to_be_anything():
+    unbounded = replace(GAIN, low=-float("inf"), high=float("inf"))
+    assert not limiting(fit_of(1.0, -float("inf"), float("inf"), parameter=unbounded), "e")
