@@ -12,7 +12,7 @@ from bns.diagnose.estimate import starts
 from bns.diagnose.estimate.fit import Problem
 from bns.diagnose.estimate.noise import estimate_noise
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.significance import fewest_trials, paired_elpd_diff, sign_flip_p
+from bns.diagnose.estimate.significance import FLIPS, fewest_trials, paired_elpd_diff, sign_flip_p
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -31,6 +31,11 @@ def test_trials_that_pull_together_are_no_luck():
     scores = 1.0 + 0.1 * np.random.default_rng(2).normal(size=(20, 1))
     assert sign_flip_p(scores, scores.T @ scores) < 1e-4
     assert sign_flip_p(np.zeros((20, 1)), np.zeros((1, 1))) == 1.0
+
+
+def test_no_chance_is_less_than_that_of_one_lot_among_all_that_were_drawn():
+    """Thirty trials pull the same way in two of a billion lots, of which twenty thousand are drawn."""
+    assert sign_flip_p(np.ones((30, 1)), np.eye(1)) == 1 / (1 + FLIPS)
 
 
 def test_the_chance_of_numbers_that_depend_on_one_another_is_that_of_all_signs():

@@ -1,17 +1,19 @@
 """Intervals: the jackknife over trials, and numbers along which the loss has steps."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate import fit_set as fit_set_module
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.jagged import _drawn, _middle_of_least, _searched, with_jagged
 from bns.diagnose.estimate.normal_equations import normal_equations
-from bns.diagnose.estimate.parameters import FreeParameter, active_mask
+from bns.diagnose.estimate.parameters import FreeParameter, active_mask, increment, increments
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import jackknife_covariance
 from bns.diagnose.estimate.starts import listed
@@ -158,6 +160,33 @@ def test_an_interval_ends_at_the_bounds_and_holds_its_value(value, ends):
 def test_a_number_that_no_pose_depends_on_may_be_anything():
     assert fit_of(1.0, 0.0, 20, jacobian=0.0).interval(0) == (0.5, 2.0)
     assert fit_of(1.0, 0.0, 20).interval(0) == (1.0, 1.0)
+
+
+def test_slopes_are_taken_inwards_at_the_upper_bound_and_wide_ones_to_both_sides_where_there_is_room():
+    factor = next(p for p in effect_named("wheelbase").parameters if p.name == "factor")
+    number, usual = FreeParameter("wheelbase", factor), increment(FreeParameter("wheelbase", factor), factor.neutral)
+    assert usual > 0
+    assert [increment(number, value) for value in (factor.low, factor.high - 2 * usual)] == [usual, usual]
+    assert increment(number, factor.high) == -usual
+    up, down = increments(number, factor.neutral, wide=True)
+    assert up > 20 * usual
+    assert down < -20 * usual
+    assert [step < 0 for step in increments(number, factor.high, wide=True)] == [True]
+    assert [step > 0 for step in increments(number, factor.low, wide=True)] == [True]
+    assert increments(number, factor.neutral) == [usual]
+
+
+@pytest.mark.parametrize(("falls", "taken"), [(0.4, False), (0.6, True), (-0.4, False)])
+def test_an_effect_of_several_that_is_begun_again_must_end_lower_by_half(monkeypatch, falls, taken):
+    """By less, it is the same valley."""
+    model = SimpleNamespace(without=lambda name: name)
+    fit, again = SimpleNamespace(loss=10.0, model=model, jacobian_by_parameter={}), SimpleNamespace(loss=10.0 - falls)
+    effects = [SimpleNamespace(name=name) for name in "ab"]
+    ends = {("a", "a"): fit, ("b", "b"): again}
+    monkeypatch.setattr(fit_set_module, "fit_with", lambda _problem, lacking, effect: ends[lacking, effect.name])
+    problem = SimpleNamespace(fit=lambda model, nearby: model)
+    assert fit_set_module._begun_again(problem, fit, effects) is (again if taken else fit)
+    assert fit_set_module._begun_again(problem, fit, effects[1:]) is fit
 
 
 @pytest.mark.parametrize(("end", "outwards"), [("low", 1.0), ("high", -1.0)])

@@ -77,6 +77,10 @@ def test_steps_put_together_are_the_poses_that_they_lead_to():
     change = predicted_since_begin(luck, pose, east) - together
     assert np.hypot(*change[2::3, :2].T) == pytest.approx([2.0] * 4)  # two frames of a metre each
     assert change[2::3, 0] == pytest.approx(2 * np.cos(begins[:, 2]))
+    assert change[2::3, 1] == pytest.approx(-2 * np.sin(begins[:, 2]))
+    north = predicted_since_begin(luck, pose, Steps(steps.body, np.tile([0.0, 1.0], (12, 1)))) - together
+    assert north[2::3, 0] == pytest.approx(2 * np.sin(begins[:, 2]))
+    assert north[2::3, 1] == pytest.approx(2 * np.cos(begins[:, 2]))
 
 
 def test_whitened_errors_have_the_length_that_their_covariance_gives_them():
