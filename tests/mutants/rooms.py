@@ -39,7 +39,7 @@ ROOMS: dict[str, tuple[str, str]] = {
         "bns/hardware/servos/bridge.py bns/hardware/servos/packets.py bns/hardware/servos/servo_table.py",
         "tests/hardware/stopping/test_confirmed_stop.py tests/hardware/wheels/test_khepera.py "
         "tests/hardware/wheels/test_khepera_asks.py tests/hardware/servos/test_ax12.py tests/hardware/servos/test_bridge.py "
-        "tests/hardware/servos/test_x430.py tests/hardware/servos/test_packets.py",
+        "tests/hardware/servos/test_x430.py tests/hardware/servos/test_packets.py tests/hardware/servos/test_servo_chain.py",
     ),
 }
 """Name -> files that are changed, tests that must notice; patterns with spaces between."""
