@@ -35,6 +35,8 @@ class Hidden:
     strength: dict[int, float] = field(default_factory=dict)
     zero_rad: dict[int, float] = field(default_factory=dict)
     gradient: float = 0.0
+    load_kg: dict[int, float] = field(default_factory=dict)
+    """On single links, at their middles."""
     sag: float = 0.0
     marker_m: dict[str, tuple[float, float]] = field(default_factory=dict)
     scale: float = 0.0
@@ -51,7 +53,7 @@ def _xml(h: Hidden) -> str:
     share = 1.0 + h.gradient * np.linspace(-1, 1, LINKS)
     inner, pitch_m = "", PITCH_M * h.pitch
     for n in reversed(range(LINKS)):
-        mass = (MASS_KG / LINKS + (BOARD_KG if n == 0 else 0.0)) * share[n]
+        mass = (MASS_KG / LINKS + (BOARD_KG if n == 0 else 0.0)) * share[n] + h.load_kg.get(n, 0.0)
         half = pitch_m / 2
         across = mass * (3 * RADIUS_M**2 + (pitch_m * 0.8) ** 2) / 12
         inertia = f"{mass * RADIUS_M**2 / 2} {across} {across}"

@@ -69,6 +69,7 @@ def worlds() -> list[World]:
         single("weak-joint-7", Hidden(strength={7: 0.3}), "weak-joint-joint7"),
         single("weak-joint-9", Hidden(strength={9: 0.45}), "weak-joint-joint9"),
         single("weak-joint-1", Hidden(strength={1: 0.4}), "weak-joint-joint1"),
+        single("load", Hidden(load_kg={8: 0.12}), "link-mass-link8"),
         World("scale-and-weak", "two", Hidden(scale=0.03, strength={6: 0.5}), ("camera-scale", "weak-joint-joint6")),
     ]
 

@@ -134,6 +134,19 @@ def test_one_link_that_grips_holds_the_body_there(sound):
     assert np.abs(moved(simulated(held)) - moved(sound))[:, :2].max() > 5e-3
 
 
+def test_one_heavy_link_weighs_as_much_more_and_turns_the_body(sound):
+    body = machine(SNAKE.mechanism)
+    effect = SNAKE.effect_named("link-mass-link8")
+    assert "link8" in effect.sentence
+    assert "link8" in effect.measurement
+    loaded = effect.apply(body.plant, factor=3.0)
+    assert loaded.mass.tolist() == [3.0 if n == 8 else 1.0 for n in range(13)]
+    before, after = body.model, body.changed(loaded)
+    assert (after.body_mass / np.maximum(before.body_mass, 1e-9))[1:].tolist() == pytest.approx(loaded.mass.tolist())
+    assert after.body_inertia[9] == pytest.approx(3.0 * before.body_inertia[9])
+    assert np.abs(moved(simulated(loaded)) - moved(sound))[:, :2].max() > 5e-3
+
+
 def test_a_slope_pulls_downhill_in_the_world_s_frame(sound):
     plant = machine(SNAKE.mechanism).plant
     tilted = simulated(SNAKE.effect_named("floor-slope").apply(plant, east_rad=0.0, north_rad=0.05))

@@ -38,6 +38,14 @@ def test_a_quadruped_has_servos_links_and_effects_by_their_own_names(body):
     for name in ("weak-joint-FR_calf_joint", "link-friction-FR_calf", "floor-friction", "marker-offset-head"):
         assert name in known
     assert "link-friction-FR_hip" not in known  # nothing of it may touch the floor
+    assert "link-mass-FR_hip" in known
+
+
+def test_an_arm_may_carry_a_load_though_no_floor_touches_it(tmp_path):
+    (tmp_path / "arm.xml").write_text(arm.xml())
+    known = load_body(str(tmp_path / "arm.xml")).catalogue()
+    assert [name for name in known if name.startswith("link-mass-")] == [f"link-mass-{name}-link" for name in arm.JOINTS]
+    assert not [name for name in known if name.startswith("link-friction-")]
 
 
 def test_a_pyramid_of_friction_is_pointed_out_where_a_body_lies_on_a_floor(tmp_path, body):

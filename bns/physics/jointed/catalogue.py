@@ -11,14 +11,19 @@ from bns.physics.jointed.catalogue_parts import PerJoint, PerLink, PerSite
 from bns.registry import JOINT_EFFECTS
 
 Links = tuple[tuple[str, int], ...]
-"""Links that may touch the floor: their names and numbers."""
+"""Links: their names and numbers."""
 
 
 @lru_cache(maxsize=32)
-def catalogue(joints: tuple[str, ...], sites: tuple[str, ...], links: Links, free: bool) -> dict[str, Effect]:
-    """Name -> effect of a body with these joints, tracked sites and links; what the floor does only to one that lies on it."""
+def catalogue(
+    joints: tuple[str, ...], sites: tuple[str, ...], links: Links, on_floor: Links, free: bool
+) -> dict[str, Effect]:
+    """Name -> effect of a body with these joints, tracked sites and links; what the floor does only to one that lies on it.
+
+    ``on_floor``: the links that may touch it.
+    """
     parts = [JOINT_EFFECTS.load(name) for name in JOINT_EFFECTS.names()]
-    listed = (effect for part in parts for effect in _members(part, joints, sites, links if free else ()))
+    listed = (effect for part in parts for effect in _members(part, joints, sites, links, on_floor if free else ()))
     clocks = (effect_named(name) for name in ("clock-offset", "clock-drift"))
     return {e.name: e for e in (*listed, *clocks) if free or e.name not in OF_THE_FLOOR}
 
@@ -28,13 +33,17 @@ OF_THE_FLOOR = ("floor-friction", "friction-anisotropy", "floor-slope", "floor-p
 
 
 def _members(
-    part: Effect | PerJoint | PerSite | PerLink, joints: tuple[str, ...], sites: tuple[str, ...], links: Links
+    part: Effect | PerJoint | PerSite | PerLink,
+    joints: tuple[str, ...],
+    sites: tuple[str, ...],
+    links: Links,
+    on_floor: Links,
 ) -> Iterator[Effect]:
     if isinstance(part, PerJoint):
         yield from (part.of(joint) for joint in joints)
     elif isinstance(part, PerSite):
         yield from (part.of(site, number) for number, site in enumerate(sites))
     elif isinstance(part, PerLink):
-        yield from (part.of(*link) for link in links)
+        yield from (part.of(*link) for link in (on_floor if part.on_floor else links))
     else:
         yield part

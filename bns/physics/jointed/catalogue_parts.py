@@ -66,8 +66,11 @@ class PerSite(_Placed):
         return self._at(site, {"site": site}, {"site": number})
 
 
+@dataclass(frozen=True)
 class PerLink(_Placed):
-    """One for every link that may touch the floor."""
+    """One for every link that may touch the floor, or for every link that has mass."""
+
+    on_floor: bool = True
 
     def of(self, link: str, number: int) -> Effect:
         """The effect at that link, the ``number``-th of the body."""

@@ -51,7 +51,7 @@ class Machine:
 
     ``joints``: of each actuator, in their order; ``joint_at``: their positions in qpos; ``stiffness_n_m_rad``,
     ``torque_n_m`` (joints,) as the model has them; ``told`` (joints, 2): the range in which a servo follows its set points;
-    ``free``: does the body lie free on a floor? ``links``: bodies that have mass.
+    ``free``: does the body lie free on a floor?
     """
 
     model: Any
@@ -67,8 +67,15 @@ class Machine:
     @property
     def on_the_floor(self) -> tuple[tuple[str, int], ...]:
         """Links that may touch it: name, and number among the links."""
-        links = sorted({int(link) - 1 for link in self.pair_links})
-        return tuple((self.model.body(link + 1).name or f"link-{link}", link) for link in links)
+        return tuple((self._name(link), link) for link in sorted({int(link) - 1 for link in self.pair_links}))
+
+    @property
+    def links(self) -> tuple[tuple[str, int], ...]:
+        """Those that have mass: name, and number among the links."""
+        return tuple((self._name(link), link) for link in np.flatnonzero(self.model.body_mass[1:] > 0).tolist())
+
+    def _name(self, link: int) -> str:
+        return str(self.model.body(link + 1).name) or f"link-{link}"
 
     @property
     def pyramidal(self) -> bool:
