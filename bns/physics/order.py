@@ -13,6 +13,7 @@ ORDER = (
     "reverse-gain",
     "wheel-mismatch",
     "battery-sag",
+    "supply-sag",
     "warm-up",
     "dead-zone",
     "dead-zone-mismatch",

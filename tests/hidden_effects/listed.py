@@ -39,6 +39,7 @@ from tests.hidden_effects.listed_motors import (
     ReverseGain,
     SpeedLimitMismatch,
     Stribeck,
+    SupplySag,
     WarmUp,
     WheelEccentricity,
 )
@@ -353,6 +354,7 @@ LISTED: dict[str, type[Cause]] = {
     "speed-scaling": SpeedScaling,
     "reversal-pause": ReversalPause,
     "battery-sag": BatterySag,
+    "supply-sag": SupplySag,
     "motor-lag": MotorLag,
     "acceleration-limit": AccelerationLimit,
     "force-limit": ForceLimit,

@@ -12,6 +12,20 @@ from tests.hidden_effects.listed_loads import FINE
 
 
 @dataclass
+class SupplySag(Cause):
+    """Both motors draw currents in proportion to their speeds from a battery with a resistance; both get what is left."""
+
+    loss_s_m: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        turning = wheels.copy()
+        for _ in range(60):
+            left = 1.0 - self.loss_s_m * np.abs(turning).sum(axis=-1, keepdims=True)
+            turning = (turning + wheels * left) / 2
+        return turning
+
+
+@dataclass
 class CommandQuantisation(Cause):
     """The controller knows multiples of a step."""
 

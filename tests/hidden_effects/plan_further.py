@@ -54,6 +54,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"width_m_s": 0.004, "cold_m_s": 0.008, "time_s": 240.0},
         {"width_m_s": 0.01, "cold_m_s": 0.02, "time_s": 480.0},
     ),
+    "supply-sag": ({"loss_s_m": 0.2}, {"loss_s_m": 0.6}),
     "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06}),
     "compass-deviation": ({"cosine_share": 0.05, "sine_share": -0.03}, {"cosine_share": -0.12, "sine_share": 0.15}),
     "lens-distortion": (

@@ -278,6 +278,15 @@ def test_a_cold_robot_loses_more_to_friction_than_one_that_has_driven():
     assert run_in.left_m_s[0, 0] == pytest.approx(0.1)
 
 
+def test_motors_on_one_battery_slow_each_other_down():
+    """The voltage that is left is the one at which both currents leave it: 1 / (1 + 0.5 * 0.4) of 0.3 and 0.1 m/s."""
+    apply = effect_named("supply-sag").apply
+    wheels = Wheels(np.ones((1, 3)), np.array([[0.3, 0.3, 0.0]]), np.array([[-0.1, 0.0, 0.0]]), B)
+    out = apply(wheels, loss_s_m=0.5)
+    assert out.left_m_s[0] == pytest.approx([0.3 / 1.2, 0.3 / 1.15, 0.0])
+    assert out.right_m_s[0] == pytest.approx([-0.1 / 1.2, 0.0, 0.0])
+
+
 def test_a_turn_loses_a_constant_rate_and_a_slight_curve_becomes_a_straight_line():
     model = IDEAL.with_effect("turn-dead-zone", width_rad_s=0.2)
     for rate, turned in ((0.5, 0.3), (-0.5, -0.3), (0.15, 0.0)):
