@@ -93,10 +93,14 @@ class Fit:
 
 @dataclass(frozen=True)
 class StartingPoint:
-    """Where a fit may begin: a model, its loss, and the Jacobian's columns nearby, (frames, 3) each."""
+    """Where a fit may begin: a model, its loss, and the Jacobian's columns nearby, (frames, 3) each.
+
+    ``promised``: the loss to which a step of least squares leads to first order.
+    """
 
     model: Model
     loss: float
+    promised: float
     jacobian_by_parameter: Mapping[FreeParameter, Array]
 
 
@@ -184,10 +188,12 @@ class Problem:
         """One undamped step of least squares in all numbers, with the Jacobian of ``base`` for those that it has too."""
         free, at = self.free(model), self._point(model)
         reduced = self._jacobian(at, free, base.jacobian_by_parameter)
-        there = self._moved(
-            model, free, reduced, _damped_step(*normal_equations(reduced.jacobian, at.whitened), 1e-9), 0.0
-        )
-        return StartingPoint(there, self.loss(there), dict(zip(free, np.moveaxis(reduced.jacobian, 2, 0), strict=True)))
+        equations = normal_equations(reduced.jacobian, at.whitened)
+        step = _damped_step(*equations, 1e-9)
+        there = self._moved(model, free, reduced, step, 0.0)
+        promised = at.loss - _predicted_decrease(step, *equations)
+        known = dict(zip(free, np.moveaxis(reduced.jacobian, 2, 0), strict=True))
+        return StartingPoint(there, self.loss(there), promised, known)
 
     def fit(self, model: Model, rounds: int | None = None, nearby: Mapping[FreeParameter, Array] | None = None) -> Fit:
         """Levenberg-Marquardt from the values the model has, within the bounds of every number; ``rounds`` 0 keeps them.

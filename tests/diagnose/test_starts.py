@@ -1,0 +1,41 @@
+"""Where the fit with one effect more begins, and when it is not made."""
+
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.problem import settled_problem
+from bns.diagnose.estimate.starts import best_start, fit_with, listed
+from bns.diagnose.predict.wheels import WheelPredictor
+from tests.diagnose.worlds import NOMINAL, hidden, measured
+
+
+def fitted(robot, started, **kind):
+    """Problem, fit of a model that is not the robot's, and the effects."""
+    predictor = WheelPredictor(tracks_of(measured(robot, seed=1, **kind)))
+    return *settled_problem(predictor, started, None), listed(NOMINAL, None, predictor.tracks)
+
+
+def test_an_effect_is_fitted_though_others_do_by_now_what_it_does():
+    """Friction of the right wheel alone, described as friction in both gears and unlike wheels: no start is better at first."""
+    robot = hidden(
+        dead_zone_mismatch={"width_m_s": 0.008, "left_share": 0.0}, inertia_lag={"tau_s": 0.06, "turn_ratio": 0.42}
+    )
+    imitated = hidden(
+        wheel_mismatch={"ratio": 0.95},
+        gear_friction={"tau_s": 0.06, "turn_ratio": 0.42, "friction_m_s": 0.003, "loss_m_s": 0.008},
+    )
+    problem, base, effects = fitted(robot, imitated, trials=16, commands=6, speeds=(-0.2, 0.2))
+    start = best_start(problem, base, effects["dead-zone-mismatch"])
+    assert start.loss >= base.loss > start.promised + 10
+    added = fit_with(problem, base, effects["dead-zone-mismatch"])
+    assert added.loss < base.loss - 200
+    assert added.model.values_of("dead-zone-mismatch") == pytest.approx({"width_m_s": 0.008, "left_share": 0.0}, abs=3e-4)
+    assert added.model.values_of("gear-friction")["loss_m_s"] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_an_effect_that_promises_nothing_is_not_fitted():
+    problem, base, effects = fitted(NOMINAL, hidden(wheelbase={"factor": 1.0}), trials=12)
+    start = best_start(problem, base, effects["motor-lag"])
+    assert min(start.loss, start.promised) > base.loss - 1
+    added = fit_with(problem, base, effects["motor-lag"])
+    assert added.model == start.model
