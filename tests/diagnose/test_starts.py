@@ -28,9 +28,9 @@ def test_an_effect_is_fitted_though_others_do_by_now_what_it_does():
     start = best_start(problem, base, effects["dead-zone-mismatch"])
     assert start.loss >= base.loss > start.promised + 10
     added = fit_with(problem, base, effects["dead-zone-mismatch"])
+    assert added.loss == pytest.approx(problem.fit(robot).loss, abs=3)
     assert added.loss < base.loss - 200
-    assert added.model.values_of("dead-zone-mismatch") == pytest.approx({"width_m_s": 0.008, "left_share": 0.0}, abs=3e-4)
-    assert added.model.values_of("gear-friction")["loss_m_s"] == pytest.approx(0.0, abs=1e-4)
+    assert added.model.values_of("dead-zone-mismatch")["left_share"] == pytest.approx(0.0, abs=0.01)
 
 
 def test_an_effect_that_promises_nothing_is_not_fitted():
