@@ -28,8 +28,8 @@ def test_an_effect_is_fitted_though_others_do_by_now_what_it_does():
     start = best_start(problem, base, effects["dead-zone-mismatch"])
     assert start.loss >= base.loss > start.promised + 10
     added = fit_with(problem, base, effects["dead-zone-mismatch"])
-    assert added.loss == pytest.approx(problem.fit(robot).loss, abs=3)
-    assert added.loss < base.loss - 200
+    least = problem.fit(robot).loss
+    assert added.loss - least < 0.1 * (base.loss - least)
     assert added.model.values_of("dead-zone-mismatch")["left_share"] == pytest.approx(0.0, abs=0.01)
 
 
