@@ -202,6 +202,18 @@ def test_a_spring_is_found_from_what_was_tracked():
     assert {name: values[name] for name in spring} == pytest.approx(spring, rel=0.15, abs=0.02)
 
 
+def test_a_pull_of_one_size_is_found_with_its_place():
+    """A weight over a pulley, here 20 mm/s: a soft spring stretched far."""
+    reel = {"anchor_x_m": 1.0, "anchor_y_m": 0.5, "pull_per_s": 0.002, "free_m": -10.0, "ahead_share": -0.3}
+    predictor = WheelPredictor(
+        tracks_of(measured(hidden(tether_load=reel | {"at_rest": 1.0}), trials=30, seed=5, speeds=(-0.2, 0.2)))
+    )
+    _, fit, _ = fit_set(predictor, NOMINAL, [effect_named("tether-load")])
+    values = fit.model.values_of("tether-load")
+    assert (values["anchor_x_m"], values["anchor_y_m"]) == pytest.approx((1.0, 0.5), abs=0.02)
+    assert -values["pull_per_s"] * values["free_m"] == pytest.approx(0.02, rel=0.05)
+
+
 def test_what_no_pose_depends_on_may_be_anything_that_is_allowed():
     """Whether a slope moves a standing robot, where it never stands."""
     slope = {"x_m_s": 0.012, "y_m_s": -0.007, "behind_share": 0.1, "at_rest": 0.0}

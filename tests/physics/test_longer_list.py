@@ -249,6 +249,16 @@ def test_a_cable_is_slack_within_its_free_length():
     assert far[0] + 0.1 == pytest.approx(0.5 * 0.1 * 0.02, rel=0.02)
 
 
+def test_a_cable_on_a_reel_pulls_near_its_anchor_too():
+    """A force of 0.05 m/s is that of 10 m beyond the slack at 0.005/s, which grows by 1 % over 10 cm."""
+    reel = {"pull_per_s": 0.005, "anchor_x_m": 0.2, "anchor_y_m": 0.0, "free_m": -10.0, "ahead_share": 0.0, "at_rest": 1.0}
+    model = IDEAL.with_effect("tether-load", **reel)
+    for x in (0.15, -0.5):
+        start = np.array([[x, 0.0, 0.0]])
+        end = simulate(model, [[0.0]], [[0.0]], [[0.02]], start=start)[0, -1]
+        assert end[0] - x == pytest.approx((0.05 + 0.005 * (0.2 - x)) * 0.02, rel=0.01)
+
+
 def test_commands_are_cut_off_towards_zero():
     for speed, driven in ((0.089, 0.06), (-0.089, -0.06), (0.029, 0.0), (0.09, 0.09), (0.3, 0.3)):
         model = IDEAL.with_effect("command-truncation", step_m_s=0.03, share=1.0)

@@ -15,7 +15,8 @@ import numpy as np
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import huber
-from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_after
+from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_after, normal_equations
+from bns.diagnose.estimate.parameters import active_mask
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, chance, paired_elpd_diff
 from bns.diagnose.parallel import each
 from bns.diagnose.settings import DEFAULTS
@@ -137,25 +138,31 @@ def earned_by_columns(problem: Problem, fit: Fit, columns: Array) -> PairedCompa
 
 
 def with_columns(problem: Problem, fit: Fit, columns: Array) -> tuple[PairedComparison, Array]:
-    """As `earned_by_columns`, and the held-out losses (trials,) of the model with them, its own numbers moving along."""
-    joint = np.concatenate([fit.jacobian, columns], axis=2)
+    """As `earned_by_columns`, and the held-out losses (trials,) of the model with them, its own numbers moving along.
+
+    But for those that press against a bound: beyond it they might do what the addition does, and they cannot go there.
+    """
+    given = fit.jacobian[..., active_mask(fit.model, fit.free, normal_equations(fit.jacobian, fit.whitened)[1])]
+    joint, own = np.concatenate([given, columns], axis=2), given.shape[2]
     equations = problem.normal_equations(joint, fit.whitened)
-    tried = [_held_out_losses(problem, fit, joint, equations, penalty) for penalty in PENALTIES]
+    tried = [_held_out_losses(problem, fit, joint, equations, own, penalty) for penalty in PENALTIES]
     elpd_diff, dse = max((paired_elpd_diff(fit.held_out, losses) for losses in tried), key=lambda pair: pair[0])
-    comparison = PairedComparison(elpd_diff, dse, chance(equations, fit.jacobian.shape[2]) if elpd_diff > 0 else 1.0)
+    comparison = PairedComparison(elpd_diff, dse, chance(equations, own) if elpd_diff > 0 else 1.0)
     return comparison, min(tried, key=lambda losses: float(losses.sum()))
 
 
-def _held_out_losses(problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, penalty: float) -> Array:
+def _held_out_losses(
+    problem: Problem, fit: Fit, joint: Array, equations: NormalEquations, own: int, penalty: float
+) -> Array:
     """Losses (trials,) with a linear addition to a fitted model, each trial judged by a fit to the others.
 
-    The model's own numbers move along with it. ``penalty``: how many typical trials speak for the addition being nothing.
+    The model's own numbers, the first ``own``, move along with it. ``penalty``: how many typical trials speak for the addition being nothing.
     """
     gradients, curvatures = equations.gradients, equations.curvatures
-    total, trials, base_numbers = curvatures.sum(axis=0), len(curvatures), fit.jacobian.shape[2]
+    total, trials = curvatures.sum(axis=0), len(curvatures)
     scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
     ridge = np.full(len(total), penalty / trials)
-    ridge[:base_numbers] = 1e-9
+    ridge[:own] = 1e-9
     others = (total - curvatures) / np.outer(scale, scale) + np.diag(ridge)
     against = (gradients.sum(axis=0) - gradients) / scale
     steps = -np.linalg.solve(others, against[..., None])[..., 0] / scale

@@ -50,7 +50,15 @@ EFFECT = Effect(
         Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.5), 0.0, "speed per metre of distance from the anchor"),
         Parameter("anchor_x_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, east"),
         Parameter("anchor_y_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, north"),
-        Parameter("free_m", "m", 0.0, 100.0, (0.0, 10.0), 0.0, "length below which the cable is slack", reached=(0.0,)),
+        Parameter(
+            "free_m",
+            "m",
+            -100.0,
+            100.0,
+            (-100.0, 10.0),
+            0.0,
+            "length below which the cable is slack (negative: it pulls at the anchor, too, as a weight or a reel does)",
+        ),
         Parameter(
             "ahead_share",
             "1",
