@@ -156,7 +156,8 @@ def _held_out_losses(
 ) -> Array:
     """Losses (trials,) with a linear addition to a fitted model, each trial judged by a fit to the others.
 
-    The model's own numbers, the first ``own``, move along with it. ``penalty``: how many typical trials speak for the addition being nothing.
+    The model's own numbers, the first ``own``, move along with it. ``penalty``: how many typical trials speak for the addition
+    being nothing.
     """
     gradients, curvatures = equations.gradients, equations.curvatures
     total, trials = curvatures.sum(axis=0), len(curvatures)
