@@ -61,10 +61,12 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
 
     ``known``: a model whose numbers of the effect, where it has it, are one start more: places have many valleys.
     An effect that earns next to nothing there, and promises nothing, is not followed further: the answer would be the same.
-    Where the numbers of ``base`` do by now what the effect does, every start is worse, and all of them have to move at once.
+    Where the numbers of ``base`` do by now what the effect does, every start is worse, and all of them have to move at once. Of a
+    body, which is simulated for minutes, promises are not followed.
     """
     start = best_start(problem, base, effect, known)
-    hopeless = base.loss - min(start.loss, start.promised) < NOTHING * base.loss / len(base.losses)
+    hoped = min(start.loss, start.promised) if problem.predictor.screening is None else start.loss
+    hopeless = base.loss - hoped < NOTHING * base.loss / len(base.losses)
     return problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter)
 
 
