@@ -27,7 +27,7 @@ EFFECT = Effect(
     name="acceleration-limit",
     stage="wheel",
     parameters=(
-        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 50.0), math.inf, "highest acceleration of a wheel"),
+        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest acceleration of a wheel"),
     ),
     equation="|dw/dt| <= a for each wheel",
     residuals="A start from rest falls short by u^2/(2·a): fast commands lose more than in proportion. Steps of "

@@ -29,7 +29,7 @@ EFFECT = Effect(
     name="braking-limit",
     stage="wheel",
     parameters=(
-        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 50.0), math.inf, "highest acceleration of a wheel"),
+        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest acceleration of a wheel"),
         Parameter("brake_ratio", "1", 0.02, 50.0, (0.2, 5.0), 1.0, "highest deceleration of a wheel, divided by that"),
     ),
     equation="|dw/dt| <= a while |w| rises, r·a while it falls, for each wheel",

@@ -29,7 +29,7 @@ EFFECT = Effect(
     stage="wheel",
     parameters=(
         Parameter(
-            "max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 50.0), math.inf, "highest acceleration on a straight line"
+            "max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest acceleration on a straight line"
         ),
         Parameter(
             "turn_ratio",

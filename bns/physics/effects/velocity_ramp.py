@@ -27,7 +27,7 @@ EFFECT = Effect(
     name="velocity-ramp",
     stage="wheel",
     parameters=(
-        Parameter("forward_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 50.0), math.inf, "highest forward acceleration"),
+        Parameter("forward_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest forward acceleration"),
         Parameter("turn_rad_s2", "rad/s^2", 1e-2, math.inf, (0.05, 500.0), math.inf, "highest acceleration of turning"),
     ),
     equation="|dv/dt| <= a for v = (l + r)/2, |d(omega)/dt| <= c for omega = (r - l)/b",
