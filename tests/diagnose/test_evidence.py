@@ -188,11 +188,16 @@ def test_the_way_to_a_fit_takes_the_place_of_the_direction_most_like_it():
     assert columns[0, 1, 1] == -0.1, "the columns given stay as they are"
 
 
-@pytest.mark.parametrize(("falls", "rounds"), [(0.049, 0), (0.051, None)])
-def test_a_start_that_earns_next_to_nothing_of_what_a_trial_loses_is_not_followed(monkeypatch, falls, rounds):
-    """Ten trials that lose 10 each: half a percent of that is 0.05."""
-    start = SimpleNamespace(model="there", loss=100.0 - falls, jacobian_by_parameter="nearby")
+@pytest.mark.parametrize(
+    ("falls", "promises", "screening", "rounds"),
+    [(0.049, 0.049, None, 0), (0.051, 0.0, None, None), (0.0, 0.051, None, None), (0.0, 0.051, "few", 0)],
+)
+def test_a_start_that_earns_next_to_nothing_of_what_a_trial_loses_is_not_followed(
+    monkeypatch, falls, promises, screening, rounds
+):
+    """Ten trials that lose 10 each: half a percent of that is 0.05. Promises are followed where no fit takes minutes."""
+    start = SimpleNamespace(model="there", loss=100.0 - falls, promised=100.0 - promises, jacobian_by_parameter="nearby")
     monkeypatch.setattr(starts, "best_start", lambda *_: start)
     base = SimpleNamespace(loss=100.0, losses=np.full(10, 10.0))
-    problem = SimpleNamespace(fit=lambda *asked: asked)
+    problem = SimpleNamespace(fit=lambda *asked: asked, predictor=SimpleNamespace(screening=screening))
     assert starts.fit_with(problem, base, None) == ("there", rounds, "nearby")
