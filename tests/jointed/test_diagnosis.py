@@ -197,7 +197,7 @@ def test_a_joint_of_an_arm_whose_zero_is_off_is_named(bent_arm):
 
 @pytest.mark.slow
 def test_a_weak_joint_of_an_arm_is_named_with_its_strength(arm):
-    found = bns.diagnose(log(10, seed=2, strength=0.5), bns.Model(arm))
+    found = bns.diagnose(log(12, seed=2, strength=0.5), bns.Model(arm))
     assert found.effects == ("weak-joint-elbow",)
     assert found.diagnosis.numbers["weak-joint-elbow"]["strength"]["value"] == pytest.approx(0.5, abs=0.05)
 
