@@ -140,7 +140,7 @@ def test_a_longer_effect_takes_the_place_of_what_was_found_and_stands_beside_wha
     monkeypatch.setattr(search, "_candidate", lambda _problem, _fit, added, name: (added, name))
     longer = SimpleNamespace(name="longer-lag")
     fit = SimpleNamespace(model=search.model)
-    place = {"longer-lag": (str(b"lag", "ascii"), "with the lag")}
+    place = {"longer-lag": (str(b"lag", "ascii"), "with the lag")}  # equal to the name above, and another object
     assert search._tried("problem", fit, place, longer) == ("added", "longer-lag")
     assert asked == [("problem", "with the lag", longer, stays)]
 
