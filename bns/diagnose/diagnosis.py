@@ -269,8 +269,8 @@ def _diagnosed(
         shared = StepwiseSelection(predictor, model, extra, tick, barred, own_clocks=False)
         without = outcome_of(_from_better_numbers(shared.run(), before), predictor, model, tick)
         found = found if predicts_better_throughout(found, without) else without
-    if found.fewer and not found.terms and isinstance(predictor, WheelPredictor):  # of a body it would take minutes
-        found = replace(found, selection=search.competing(found.selection))
+    if found.fewer and isinstance(predictor, WheelPredictor):  # of a body it would take minutes
+        found = replace(found, selection=search.competing(found.selection, alike=bool(found.terms)))
     if isinstance(predictor, WheelPredictor):
         found = replace(found, selection=alike_in_metres(found.selection))
     left = found.rest.any or bool(found.terms)

@@ -113,6 +113,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
                 stands, found = _standing(shorter, predictor, given, tick), again
         found = _believable(found, stands, predictor, response)
         lost = tuple(name for name in stands.selection.accepted if name not in found.names)
+        unseen = unseen and not _does_better_than_more(found, stands.selection, lost)
         next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
         errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
         matters = errors is None or _matters(errors)
@@ -289,8 +290,10 @@ def _established(
     past = rest.command_times is None  # a response in time would describe the mean of delays that differ
     found = established(predictor, selection.nominal.model, accepted, response, selection.fit.model, past)
     lost = set(selection.accepted) - set(found.names)
-    if lost and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):
-        # the effects predict better than what they are said to imitate: it is the terms that imitate
+    believed = not found.terms or not any(implausible(selection.fit, name) for name in lost)
+    if lost and believed and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):
+        # the effects predict better than what they are said to imitate: it is the terms that imitate; numbers that no robot
+        # has are no evidence of that
         return replace(established(predictor, selection.fit.model, {}, False, past=past), names=selection.accepted)
     return found
 
@@ -317,6 +320,16 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
     names = tuple(name for name in found.names if name not in tiny)
     terms = tuple(replace(term, fit=fit) for term in found.terms if term.name not in tiny)
     return Established(names, terms, problem, fit)
+
+
+def _does_better_than_more(found: Established, selection: SelectionResult, lost: tuple[str, ...]) -> bool:
+    """Do terms predict certainly better than the effects that they leave nothing to do, and that are more than they are?
+
+    Then the effects only together reproduce one curve, however little they leave.
+    """
+    if not 0 < len(found.terms) < len(lost):
+        return False
+    return certainly_lower((selection.problem, selection.fit), (found.problem, found.fit))
 
 
 def _believable(found: Established, stands: Standing, predictor: Predictor, response: bool | None) -> Established:

@@ -37,6 +37,7 @@ ORDER = (
     "braking-lag",
     "gear-friction",
     "controller-overshoot",
+    "sliding-contact",
     "heating",  # by the work that the wheels really do
     "wheel-diameters",
     "wheel-eccentricity",

@@ -44,6 +44,52 @@ def test_what_competes_with_what_is_left_is_asked_again(late):
     assert search.competing(nothing) is nothing
 
 
+def test_beside_terms_only_explanations_of_the_same_likelihood_compete(late, monkeypatch):
+    """Held-out losses above and below that of the accepted effect by less and by more than odds of 20 to 1."""
+    search, found = StepwiseSelection(late, NOMINAL), standing(late, "clock-offset")
+    by = {"same": 0.0, "near": 2.9, "nearer": -2.9, "worse": 3.1, "better": -3.1}
+    trials = len(found.fit.held_out)
+    others = [((name,), replace(found.fit, held_out=found.fit.held_out + by / trials)) for name, by in by.items()]
+    monkeypatch.setattr(search, "_competing_models", lambda *_: others)
+    assert search.competing(found).competing_models == tuple((name,) for name in by)
+    assert search.competing(found, alike=True).competing_models == (("same",), ("near",), ("nearer",))
+
+
+@pytest.mark.parametrize(
+    ("terms", "lost", "lower", "better"),
+    [(1, 2, True, True), (1, 2, False, False), (2, 2, True, False), (1, 1, True, False), (0, 2, True, False)],
+)
+def test_more_effects_than_terms_that_predict_worse_imitate_however_little_they_leave(monkeypatch, terms, lost, lower, better):
+    selection, found = (SimpleNamespace(problem=name, fit=name, terms=("term",) * terms) for name in ("effects", "terms"))
+    asked = []
+    monkeypatch.setattr(outcome, "certainly_lower", lambda *pairs: asked.append(pairs) or lower)
+    assert outcome._does_better_than_more(found, selection, ("effect",) * lost) is better
+    assert all(pairs == (("effects", "effects"), ("terms", "terms")) for pairs in asked)
+
+
+@pytest.mark.parametrize(
+    ("terms", "plausible", "lower", "asked"),
+    [(1, True, True, 2), (1, True, False, 1), (1, False, True, 1), (0, False, True, 2), (0, True, True, 2)],
+)
+def test_effects_that_predict_better_than_terms_stay_unless_their_numbers_are_no_robots(
+    late, monkeypatch, terms, plausible, lower, asked
+):
+    """A search with terms that leaves the accepted effect out; where it stays, terms are sought beside it."""
+    calls = []
+
+    def leaving_out(predictor, given, accepted, *_, **__):
+        calls.append(tuple(accepted))
+        return outcome.Established((), ("a term",) * terms, None, None)
+
+    rest = SimpleNamespace(any=True, command_times=None)
+    monkeypatch.setattr(outcome, "established", leaving_out)
+    monkeypatch.setattr(outcome, "certainly_lower", lambda *_: lower)
+    monkeypatch.setattr(outcome, "implausible", lambda *_: "" if plausible else "2 is outside of the plausible range")
+    found = outcome._established(standing(late, "clock-offset"), late, rest)
+    assert calls == [("clock-offset",), ()][:asked]
+    assert found.names == (("clock-offset",) if asked == 2 else ())
+
+
 def test_with_fewer_effects_nothing_competes_until_it_is_asked_for(late):
     found = standing(late, "clock-offset", "speed-gain", competing=(("command-delay", "speed-gain"),))
     kept = found.only(("clock-offset",))

@@ -23,7 +23,7 @@ def number(value, low=None, high=None, **more):
     ("name", "numbers", "said"),
     [
         ("speed-gain", {"gain": number(0.93, 0.92, 0.94)}, "both wheels turn 7 % slower than commanded"),
-        ("speed-gain", {"gain": number(1.125)}, "both wheels turn 12 % faster than commanded"),
+        ("speed-gain", {"gain": number(1.125)}, "both wheels turn 12.5 % faster than commanded"),
         ("wheel-mismatch", {"ratio": number(1.0296, 1.0282, 1.031)}, "the right wheel's diameter is 3 % larger than the left"),
         ("wheelbase", {"factor": number(2.5)}, "the effective wheelbase is longer by a factor of 2.5 than that of the model"),
         ("wheelbase", {"factor": number(0.4)}, "the effective wheelbase is shorter by a factor of 2.5 than that of the model"),
@@ -38,7 +38,7 @@ def number(value, low=None, high=None, **more):
             "the right wheel runs no faster than 100 mm/s, the other one may run faster",
         ),
         ("motor-lag", {"tau_s": number(0.2001)}, "the motors follow their commands with a lag of 200 ms"),
-        ("clock-offset", {"offset_s": number(-1.25)}, "the tracker's clock is 1.2 s behind the clock of the commands"),
+        ("clock-offset", {"offset_s": number(-1.25)}, "the tracker's clock is 1.25 s behind the clock of the commands"),
         ("clock-drift", {"rate": number(0.003)}, "the tracker's clock runs 0.3 % faster than the clock of the commands"),
         ("understeer", {"loss_s_m": number(-0.2)}, "the robot turns more the faster it drives"),
         ("battery-sag", {"rate_per_s": number(-0.001)}, "the robot becomes faster in the course of the session"),

@@ -120,6 +120,58 @@ def _braked(volts, inverse, constant, resistance, most, small_s):
 
 
 @dataclass
+class SlidingContact(Cause):
+    """Stiff controllers force each wheel of a body with mass and inertia; one of its points rubs on the floor, within a disc."""
+
+    friction_m_s: float
+    distance_share: float
+    left_share: float
+    gain = 2.0
+    tau_s = 0.002
+    turn_ratio = 0.5
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        mass = 2 * self.gain * self.tau_s
+        inertia = self.turn_ratio * mass * BASE_M**2 / 4
+        force = 2 * self.gain * self.friction_m_s
+        place = self.distance_share * BASE_M, self.left_share * BASE_M
+        return _rubbing(wheels, mass, inertia, self.gain, force, place, moment.step_s / FINE)
+
+
+@njit
+def _rubbing(told, mass, inertia, gain, most, place, small_s):
+    """In each small step the impulse of friction, within its disc, that leaves the least energy of the sliding point's motion."""
+    out = np.empty_like(told)
+    behind, aside = place
+    gentle = 1 / (1 / mass + (behind**2 + aside**2) / inertia)
+    for trial in range(told.shape[0]):
+        v, turn = 0.0, 0.0
+        for i in range(told.shape[1]):
+            way_v, way_turn = 0.0, 0.0
+            for _ in range(FINE):
+                left = gain * (told[trial, i, 0] - v + turn * BASE_M / 2) * small_s
+                right = gain * (told[trial, i, 1] - v - turn * BASE_M / 2) * small_s
+                free_v, free_turn = v + (left + right) / mass, turn + (right - left) * BASE_M / 2 / inertia
+                push, across = 0.0, 0.0
+                after_v, after_turn = free_v, free_turn
+                for _ in range(60):
+                    before_v, before_turn = after_v, after_turn
+                    push -= gentle * (after_v - aside * after_turn)
+                    across -= gentle * (-behind * after_turn)
+                    over = np.hypot(push, across) / (most * small_s)
+                    if over > 1.0:
+                        push, across = push / over, across / over
+                    after_v, after_turn = free_v + push / mass, free_turn - (aside * push + behind * across) / inertia
+                    if abs(after_v - before_v) + BASE_M * abs(after_turn - before_turn) < 1e-12:
+                        break
+                way_v, way_turn = way_v + (v + after_v) / 2, way_turn + (turn + after_turn) / 2
+                v, turn = after_v, after_turn
+            out[trial, i, 0] = (way_v - way_turn * BASE_M / 2) / FINE
+            out[trial, i, 1] = (way_v + way_turn * BASE_M / 2) / FINE
+    return out
+
+
+@dataclass
 class ControllerOvershoot(Cause):
     """A controller with a proportional and an integral part on each wheel of one body, whose motors also brake by themselves."""
 

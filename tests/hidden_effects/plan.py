@@ -83,6 +83,7 @@ UNLISTED: dict[str, tuple[Parameters, Parameters]] = {
     "reverse-loss": ({"loss": 0.05}, {"loss": 0.15}),
     "swing": ({"rate_rad_s": 0.06, "period_s": 2.0}, {"rate_rad_s": 0.15, "period_s": 1.3}),
     "kicks": ({"rate_per_s": 0.08, "turn_rad": 0.06}, {"rate_per_s": 0.05, "turn_rad": 0.15}),
+    "lost-pulses": ({"from_m_s": 0.1, "lost": 0.06}, {"from_m_s": 0.08, "lost": 0.15}),
     "late-start": ({"time_s": 0.08}, {"time_s": 0.2}),
     "left-overshoot": ({"frequency_hz": 3.0, "damping": 0.6}, {"frequency_hz": 2.0, "damping": 0.35}),
     "speed-lag": ({"tau_s": 0.12, "fastest_m_s": 0.208}, {"tau_s": 0.3, "fastest_m_s": 0.208}),

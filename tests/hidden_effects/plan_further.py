@@ -79,6 +79,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"tau_s": 0.1, "turn_ratio": 1.0, "friction_m_s": 0.03, "loss_m_s": 0.0},
         {"tau_s": 0.2, "turn_ratio": 0.5, "friction_m_s": 0.08, "loss_m_s": 0.01},
     ),
+    "sliding-contact": (
+        {"friction_m_s": 0.006, "distance_share": 0.5, "left_share": 0.0},
+        {"friction_m_s": 0.02, "distance_share": 0.9, "left_share": -0.4},
+    ),
     "slope-load": (
         {"x_m_s": 0.003, "y_m_s": -0.002, "behind_share": 0.05, "at_rest": 0.0},
         {"x_m_s": -0.008, "y_m_s": 0.006, "behind_share": 0.15, "at_rest": 1.0},
@@ -111,6 +115,7 @@ TURNING = {
     "gear-friction",
     "reversal-pause",
     "reverse-gain",
+    "sliding-contact",
     "stribeck",
 }
 """Effects that show only where wheels reverse or turn slowly."""

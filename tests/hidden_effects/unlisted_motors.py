@@ -11,6 +11,18 @@ from tests.hidden_effects.cause import Cause, Moment
 
 
 @dataclass
+class LostPulses(Cause):
+    """A counter that misses pulses of a fast wheel: its controller makes good what it does not see."""
+
+    from_m_s: float
+    lost: float
+
+    def command(self, wheels: np.ndarray) -> np.ndarray:
+        size = np.abs(wheels)
+        return np.sign(wheels) * np.where(size > self.from_m_s, self.from_m_s + (size - self.from_m_s) / (1 - self.lost), size)
+
+
+@dataclass
 class LateStart(Cause):
     """A wheel that stands stays where it is for a while before it starts."""
 
@@ -96,6 +108,7 @@ class WeakSupply(Cause):
 
 
 MOTORS: dict[str, type[Cause]] = {
+    "lost-pulses": LostPulses,
     "late-start": LateStart,
     "left-overshoot": LeftOvershoot,
     "speed-lag": SpeedLag,

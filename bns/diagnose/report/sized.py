@@ -56,7 +56,7 @@ def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
 
 
 def _size(value: float, p: Parameter) -> str:
-    """Two figures, in units for people."""
+    """In units for people."""
     if p.unit == "1":
         return f"{_figures(100.0 * value)} %"
     size, unit = for_people(value, p.unit)
@@ -65,8 +65,9 @@ def _size(value: float, p: Parameter) -> str:
 
 
 def _figures(value: float) -> str:
-    """Two significant figures, without an exponent."""
+    """Two significant figures, three of what begins with 1 (124 is not 120 beside an interval), without an exponent."""
     if value == 0.0 or not np.isfinite(value):
         return f"{value:g}"
-    digits = 1 - int(np.floor(np.log10(abs(value))))
+    power = int(np.floor(np.log10(abs(value))))
+    digits = (2 if abs(value) < 2.0 * 10.0**power else 1) - power
     return f"{round(value, digits):.{max(digits, 0)}f}".rstrip("0").rstrip(".") if digits > 0 else f"{round(value, digits):.0f}"

@@ -154,16 +154,19 @@ class StepwiseSelection:
             tried.add(frozenset(accepted))
         return self._ended(problem, fit, accepted, steps)
 
-    def competing(self, found: SelectionResult) -> SelectionResult:
+    def competing(self, found: SelectionResult, alike: bool = False) -> SelectionResult:
         """The result of this search with fewer effects than it ended with, and the explanations that compete with what is left.
 
-        Those of the search competed with all of its effects. Trials with clocks of their own, and terms, are not asked.
+        Those of the search competed with all of its effects. Trials with clocks of their own are not asked. ``alike``: only those
+        whose likelihood is the same (to `variant_evidence`): where terms describe a part of the motion, and are not fitted again
+        with each effect, trials differ by more than the effects do, and anything would compete.
         """
         if not found.accepted or found.competing_models or found.fit.model.per_trial_effect is not None:
             return found
         self._exchanges.forget()
         self._exchanges.entry = None
         models = self._competing_models(found.problem, found.fit, found.accepted)
+        models = [one for one in models if not alike or not (fits_better(found.fit, one[1]) or fits_better(one[1], found.fit))]
         return replace(found, competing_models=tuple(names for names, _ in models))
 
     def stands(self, before: SelectionResult) -> SelectionResult | None:
