@@ -159,7 +159,7 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
         p, value = number.parameter, float(fit.values[index])
         if number.effect not in added:
             continue
-        if value in {p.low, p.high} and value != p.neutral:
+        if value in {p.low, p.high} and value != p.neutral and value not in p.reached:
             at = f"{p.name} is at its bound, {value:g}{with_unit(p.unit)}"
             yield f"{number.effect}: {at}: the data require more than the model allows."
     for name in sorted(added):

@@ -323,13 +323,13 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
 
 
 def _does_better_than_more(found: Established, selection: SelectionResult, lost: tuple[str, ...]) -> bool:
-    """Do terms predict certainly better than the effects that they leave nothing to do, and that are more than they are?
+    """Do terms predict certainly better, at every horizon, than the effects that they leave nothing to do, and that are more?
 
     Then the effects only together reproduce one curve, however little they leave.
     """
     if not 0 < len(found.terms) < len(lost):
         return False
-    return certainly_lower((selection.problem, selection.fit), (found.problem, found.fit))
+    return certainly_lower((selection.problem, selection.fit), (found.problem, found.fit), throughout=True)
 
 
 def _believable(found: Established, stands: Standing, predictor: Predictor, response: bool | None) -> Established:

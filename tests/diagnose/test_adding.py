@@ -29,6 +29,17 @@ def test_a_number_at_its_bound_that_changes_nothing_there_is_not_said_to_ask_for
     assert len(said(number.high)) == 1
 
 
+def test_a_bound_that_robots_reach_is_not_said_to_hold_the_data_back():
+    effect = effect_named("dead-zone-mismatch")
+    number = next(p for p in effect.parameters if p.name == "left_share")
+    errors = SimpleNamespace(trials=12, horizons={"1s": SimpleNamespace(models=())})
+    for value in (number.low, number.high):
+        fit = SimpleNamespace(
+            free=(FreeParameter(effect.name, number),), values=np.array([value]), interval=lambda _, at=value: (at, at)
+        )
+        assert not [one for one in warnings_on(fit, [(effect, {})], errors) if "at its bound" in one]
+
+
 def test_an_effect_of_each_trial_is_fitted_though_the_shared_one_is_known():
     table = measured(hidden(clock_offset={"offset_s": 0.08}), trials=6, seed=3, commands=3)
     data = measured_table(table, Path("log.csv"))

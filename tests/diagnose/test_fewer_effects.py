@@ -62,7 +62,7 @@ def test_beside_terms_only_explanations_of_the_same_likelihood_compete(late, mon
 def test_more_effects_than_terms_that_predict_worse_imitate_however_little_they_leave(monkeypatch, terms, lost, lower, better):
     selection, found = (SimpleNamespace(problem=name, fit=name, terms=("term",) * terms) for name in ("effects", "terms"))
     asked = []
-    monkeypatch.setattr(outcome, "certainly_lower", lambda *pairs: asked.append(pairs) or lower)
+    monkeypatch.setattr(outcome, "certainly_lower", lambda *pairs, throughout: asked.append(pairs) or (lower and throughout))
     assert outcome._does_better_than_more(found, selection, ("effect",) * lost) is better
     assert all(pairs == (("effects", "effects"), ("terms", "terms")) for pairs in asked)
 
@@ -108,16 +108,25 @@ def test_without_any_effect_before_and_after_are_the_model_as_given_under_its_ow
 
 
 @pytest.mark.parametrize(
-    ("falls", "fell", "lower"),
-    [(True, [None, True], True), (True, [None, False], False), (False, [True], False), (True, [], False)],
+    ("falls", "fell", "lower", "throughout"),
+    [
+        (True, [None, True], True, True),
+        (True, [False, True], True, False),
+        (True, [None, False], False, False),
+        (False, [True], False, False),
+        (True, [], False, False),
+    ],
 )
-def test_an_error_is_certainly_lower_where_it_falls_as_a_whole_and_for_certain_at_one_horizon(monkeypatch, falls, fell, lower):
-    """The errors are mocked; a horizon of too few windows has no total."""
+def test_an_error_is_certainly_lower_where_it_falls_as_a_whole_and_for_certain_at_one_horizon(
+    monkeypatch, falls, fell, lower, throughout
+):
+    """Or at all, if that is asked. The errors are mocked; a horizon of too few windows has no total."""
     horizons = {i: SimpleNamespace(total=None if one is None else SimpleNamespace(fell=one)) for i, one in enumerate(fell)}
     monkeypatch.setattr(result, "held_out_steps", lambda *_: None)
     monkeypatch.setattr(result, "paired_errors", lambda *_: SimpleNamespace(falls=falls, horizons=horizons))
     one = SimpleNamespace(predictor=None, pose_filter=None), SimpleNamespace(model=None)
     assert result.certainly_lower(one, one) is lower
+    assert result.certainly_lower(one, one, throughout=True) is throughout
 
 
 @pytest.mark.parametrize(("added", "first"), [(effect_named("clock-offset"), ("clock-offset",)), (None, ())])

@@ -86,6 +86,12 @@ def test_beside_a_free_response_no_shift_in_time_is_named():
     assert found.names == ()
 
 
+def test_a_response_that_begins_beyond_its_end_goes_there_at_once():
+    term = SimpleNamespace(signal=RESPONSE, on="wheels", term="k * (1 - ago(0.2, 0.4))", values={"k": 0.5}, fit=SimpleNamespace())
+    term.fit.model = NOMINAL
+    assert "goes beyond it by 50% at once, and stays within 5% of it from 0.3" in in_words(term, None)
+
+
 @pytest.mark.parametrize("term", ["k * (ago(0.1, 0.2) - ago(0.4, 0.7))", "-k * ago(0.2, 0.4)"])
 def test_what_is_no_response_to_a_step_is_not_described_as_one(term):
     """A term that overshoots by more than the step, or ends in the other direction."""

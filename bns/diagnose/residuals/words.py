@@ -306,7 +306,9 @@ def _response(term: Formula, _: Predictor) -> str:
     if max(half_s, settled) <= RESPONSE_KNOTS_S[1]:
         return f"after a change of its command{_left_of(term)} {what} has the new speed within {RESPONSE_KNOTS_S[1]:g} s"
     over = float(speed.max()) / end - 1.0
-    beyond = f", goes beyond it by {over:.0%} after {grid[int(speed.argmax())]:.2g} s" if over > 0.02 else ""
+    most_s = float(grid[int(speed.argmax())])
+    when = "at once" if most_s == 0.0 else f"after {most_s:.2g} s"
+    beyond = f", goes beyond it by {over:.0%} {when}" if over > 0.02 else ""
     return (
         f"after a change of its command{_left_of(term)} {what} has half of the new speed {half}{beyond}, and stays within 5% of "
         f"it from {settled:.2g} s on"

@@ -82,12 +82,16 @@ def predicts_better(one: SelectionResult, other: SelectionResult) -> bool:
     return certainly_lower((one.problem, one.fit), (other.problem, other.fit))
 
 
-def certainly_lower(before: tuple[Problem, Fit], after: tuple[Problem, Fit]) -> bool:
-    """Does the held-out error fall for certain from one fit to the other, at one horizon at least, and rise at none?"""
+def certainly_lower(before: tuple[Problem, Fit], after: tuple[Problem, Fit], throughout: bool = False) -> bool:
+    """Does the held-out error fall for certain from one fit to the other, at one horizon at least, and rise at none?
+
+    ``throughout``: at every horizon that has windows enough for an interval.
+    """
     predictor = before[0].predictor
     steps = [
         (name, held_out_steps(predictor, problem.pose_filter, fit.model))
         for name, (problem, fit) in (("before", before), ("after", after))
     ]
     errors = paired_errors(predictor, steps)
-    return errors.falls and any(e.total is not None and e.total.fell for e in errors.horizons.values())
+    fell = [e.total.fell for e in errors.horizons.values() if e.total is not None]
+    return errors.falls and any(fell) and (all(fell) or not throughout)

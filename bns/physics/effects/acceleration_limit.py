@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Wheels
 from bns.physics.wheels.scans import rate_limited
@@ -27,7 +29,7 @@ EFFECT = Effect(
     name="acceleration-limit",
     stage="wheel",
     parameters=(
-        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest acceleration of a wheel"),
+        Parameter("max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 50.0), math.inf, "highest acceleration of a wheel"),
     ),
     equation="|dw/dt| <= a for each wheel",
     residuals="A start from rest falls short by u^2/(2·a): fast commands lose more than in proportion. Steps of "
@@ -38,4 +40,5 @@ EFFECT = Effect(
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
     apply=apply,
     needs="track",
+    starts=tuple((float(most),) for most in np.geomspace(0.02, 20.0, 30)),
 )
