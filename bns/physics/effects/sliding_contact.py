@@ -27,9 +27,9 @@ EFFECT = Effect(
         Parameter(
             "distance_share",
             "1",
-            0.0,
+            0.1,  # two wheels and a point nearer to their axle do not carry a robot; there it would be a dead zone of both
             3.0,
-            (0.0, 1.5),
+            (0.15, 1.5),
             0.5,
             "how far behind or ahead of the axle the point slides, in wheelbases: friction is the same for both",
         ),
